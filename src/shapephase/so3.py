@@ -361,6 +361,26 @@ def matrix_from_quat(quat_xyzw: Array) -> Array:
     return matrix
 
 
+def matrix_from_euler(angles: Array, axes: str) -> Array:
+    """Turns about coordinate axes, each about its axis as those before have turned it: (..., k) -> (..., 3, 3).
+
+    Parameters
+    ----------
+    angles : (..., k) in the order of the turns [rad]
+    axes : k letters x, y or z; (a, b, c) about "zyx" is R_z(a) R_y(b) R_x(c)
+
+    Examples
+    --------
+    >>> turned = sp.so3.matrix_from_euler(np.array([0.5 * np.pi, 0.5 * np.pi]), "zx")
+    >>> turned.round(9).astype(int).tolist()  # columns: where x, y and z go
+    [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    """
+    turned = np.broadcast_to(np.eye(3), (*angles.shape[:-1], 3, 3))
+    for k, axis in enumerate(axes):
+        turned = turned @ exp(angles[..., k, None] * np.eye(3)["xyz".index(axis)])
+    return turned
+
+
 def turn_of(quat_xyzw: Array, rate: Array) -> Array:
     """The angular velocity, in body axes, of a unit quaternion with this rate: (..., 4), (..., 4) -> (..., 3).
 

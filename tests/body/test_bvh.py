@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.errors import IgnoredElementWarning, ModelFileError, ShapeError, TrajectoryError
@@ -35,7 +36,9 @@ def body(tmp_path_factory):
 
 
 def random_rows(count, turns=ZYX):
-    return np.random.default_rng(3).uniform(-80.0, 80.0, (count, len(columns(turns))))
+    """A random posture, and others near it: a bone turns by less than a third of a turn between them."""
+    generator, width = np.random.default_rng(3), len(columns(turns))
+    return generator.uniform(-80.0, 80.0, width) + generator.uniform(-15.0, 15.0, (count, width))
 
 
 @pytest.mark.parametrize("turns", [ZYX, ("Xrotation", "Zrotation", "Yrotation")], ids=["zyx", "xzy"])
@@ -44,7 +47,7 @@ def test_bones_are_where_the_format_puts_them(turns, tmp_path):
     rows = random_rows(3, turns)
     body = load(write(tmp_path / "turns.bvh", bvh_text(rows, STEP, turns)))
     recorded = sp.read_recorded_motion(tmp_path / "turns.bvh", body)
-    assert body.n_shape == 3 * (len(bvh_files.bones()) - 5)
+    assert body.n_shape == 4 * (len(bvh_files.bones()) - 5)
     for frame, row in enumerate(rows):
         expected = posed(row, turns)
         shape = recorded.path.shape(recorded.times[frame])
@@ -109,22 +112,29 @@ def flip(body):
     times = STEP * np.arange(97)
     tuck = np.sin(np.pi * times / times[-1]) ** 2
     sway = np.sin(2.0 * np.pi * times / times[-1])
-    target = body.shape({
-        **{f"{side}UpLeg_Xrotation": -2.0 for side in ("Left", "Right")},
-        **{f"{side}Leg_Xrotation": 2.2 for side in ("Left", "Right")},
-        **{f"{side}Arm_Yrotation": sign * 1.2 for side, sign in (("Left", -1.0), ("Right", 1.0))},
-        "Spine_Xrotation": 0.5,
-        "Neck_Xrotation": 0.4,
-    })  # fmt: skip
-    lean = body.shape({"LowerBack_Zrotation": 0.2, "LeftArm_Zrotation": 0.9, "RightForeArm_Yrotation": 0.6})
-    shapes = tuck[:, None] * target + sway[:, None] * lean
+    turns = {
+        **{f"{side}UpLeg": (-2.0, 0.0, 0.0) for side in ("Left", "Right")},
+        **{f"{side}Leg": (2.2, 0.0, 0.0) for side in ("Left", "Right")},
+        "RightArm": (0.0, 1.2, 0.0), "LeftArm": (0.0, -1.2, 0.0), "Spine": (0.5, 0.0, 0.0), "Neck": (0.4, 0.0, 0.0),
+    }  # fmt: skip
+    leans = {"LowerBack": (0.0, 0.0, 0.2), "LeftArm": (0.0, 0.0, 0.9), "RightForeArm": (0.0, 0.6, 0.0)}
+    shapes = np.tile(body.shape(), (len(times), 1))
+    for bone in {*turns, *leans}:
+        vectors = np.outer(tuck, turns.get(bone, np.zeros(3))) + np.outer(sway, leans.get(bone, np.zeros(3)))
+        first = body.joint_index(f"{bone}.x")
+        shapes[:, first : first + 4] = Rotation.from_rotvec(vectors).as_quat()
     path = sp.ShapePath.spline(times, shapes, periodic=False, joint_names=body.joint_names)
     return times, path, sp.reconstruct(sp.articulated(body, path), MOMENTUM, tolerance=1e-10)
 
 
 def rows_of(times, path, motion):
     """What a recorder writes of it: places in units, angles in degrees."""
-    named = dict(zip(path.joint_names, np.degrees(path.shape(times)).T, strict=True))
+    shapes, named = path.shape(times), {}
+    for first, name in enumerate(path.joint_names):
+        if name.endswith(".x"):
+            bone, turned = name.removesuffix(".x"), Rotation.from_quat(shapes[:, first : first + 4])
+            angles = turned.as_euler("ZYX", degrees=True).T
+            named |= {f"{bone}_{turn}": each for turn, each in zip(ZYX, angles, strict=True)}
     fall = {"start": [0.0, 1.0, 0.0], "velocity": [0.0, 3.5, -0.8], "gravity": [0.0, -9.81, 0.0]}
     places = motion.base_position(times, **fall) / UNIT
     turned = motion.attitude(times)
@@ -181,13 +191,27 @@ def test_the_flight_is_found_between_two_stances(body, somersault, tmp_path):
     np.testing.assert_allclose(fitted(body, recorded).momentum, MOMENTUM, rtol=0, atol=1e-4 * 45.0)
 
 
-def test_angles_that_files_wrap_go_on(body, tmp_path):
-    rows = np.zeros((7, len(columns())))
-    turn = columns().index("LeftArm_Xrotation")
-    rows[:, turn] = [150.0, 165.0, 179.0, -167.0, -152.0, -139.0, -128.0]
-    recorded = sp.read_recorded_motion(write(tmp_path / "wrap.bvh", bvh_text(rows, STEP)), body)
-    found = recorded.path.shape(recorded.times)[:, body.joint_index("LeftArm_Xrotation")]
-    np.testing.assert_allclose(np.degrees(found), rows[:, turn] % 360.0, rtol=1e-15)
+WRAPPED = np.array([150.0, 165.0, 179.0, -167.0, -152.0, -139.0, -128.0])
+
+
+@pytest.mark.parametrize("second", ["", "Yrotation "], ids=["one channel", "two channels"])
+def test_hinges_that_files_wrap_go_on(second, tmp_path):
+    """A bone of one or two channels is hinges, whose angles are determined but for whole turns."""
+    text = re.sub(r"(JOINT LeftLeg\n.*\n.*\n\s+)CHANNELS 3 .*", rf"\1CHANNELS {1 + bool(second)} {second}Xrotation",
+                  skeleton_text())  # fmt: skip
+    names = [name for name in columns() if not re.match(r"LeftLeg_[ZY]", name)]
+    place = names.index("LeftLeg_Xrotation")
+    if second:
+        names.insert(place, "LeftLeg_Yrotation")
+    rows = np.zeros((len(WRAPPED), len(names)))
+    rows[:, names.index("LeftLeg_Xrotation")] = WRAPPED
+    frames = "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
+    file = write(tmp_path / "wrap.bvh", f"{text}MOTION\nFrames: {len(rows)}\nFrame Time: {STEP}\n{frames}\n")
+    body = load(file)
+    recorded = sp.read_recorded_motion(file, body)
+    found = recorded.path.shape(recorded.times)[:, body.joint_index("LeftLeg_Xrotation")]
+    np.testing.assert_allclose(np.degrees(found), WRAPPED % 360.0, rtol=1e-15)
+    assert ("LeftLeg_Yrotation" in body.joint_names) == bool(second)
 
 
 def test_what_a_file_does_not_say_is_asked_or_told(tmp_path):
@@ -212,15 +236,36 @@ def test_what_a_file_does_not_say_is_asked_or_told(tmp_path):
 
 def test_the_content_tells_the_format_and_other_bodies_have_no_such_motion(tmp_path):
     text = bvh_text(np.zeros((2, len(columns()))), STEP)
-    assert load(write(tmp_path / "skeleton.dat", "\ufeff\n" + text), isolate=True).n_shape == 63
+    assert load(write(tmp_path / "skeleton.dat", "\ufeff\n" + text), isolate=True).n_shape == 84
     with pytest.raises(TrajectoryError, match=r"skeleton of its own, and cat is not from such a file"):
         sp.read_shape_path(write(tmp_path / "m.bvh", text), sp.load_body("cat"))
 
 
-def test_another_order_of_channels_is_no_motion_of_this_body(body, tmp_path):
-    other = bvh_text(np.zeros((2, len(columns()))), STEP, ("Xrotation", "Yrotation", "Zrotation"))
-    with pytest.raises(TrajectoryError, match=r"line 2: bone 'Hips' turns in the order Hips_Xrotation.*load the body"):
-        sp.read_shape_path(write(tmp_path / "m.bvh", other), body)
+def one_channel(rows):
+    """A file in which the left knee has one channel."""
+    text = re.sub(r"(JOINT LeftLeg\n.*\n.*\n\s+)CHANNELS 3 .*", r"\1CHANNELS 1 Xrotation", skeleton_text())
+    kept = [k for k, name in enumerate(columns()) if not re.match(r"LeftLeg_[ZY]", name)]
+    frames = "\n".join(" ".join(map(repr, row)) for row in rows[:, kept].tolist())
+    return f"{text}MOTION\nFrames: {len(rows)}\nFrame Time: {STEP}\n{frames}\n"
+
+
+def test_one_channel_turns_a_ball_joint_and_three_no_hinge(body, tmp_path):
+    rows = np.zeros((7, len(columns())))
+    rows[:, columns().index("LeftLeg_Xrotation")] = WRAPPED
+    one, three = write(tmp_path / "one.bvh", one_channel(rows)), write(tmp_path / "three.bvh", bvh_text(rows, STEP))
+    found, same = (sp.read_shape_path(file, body) for file in (one, three))
+    np.testing.assert_array_equal(found.shape(found.breaks), same.shape(same.breaks))
+    with pytest.raises(TrajectoryError, match=r"bone 'LeftLeg' turns by LeftLeg_Zrotation, .* file by LeftLeg_Xrot"):
+        sp.read_shape_path(three, load(one))
+
+
+def test_bones_with_other_axes_are_no_motion_of_this_body(body, tmp_path):
+    """The offset of a bone turned by a right angle."""
+    turned = edited("OFFSET 0.4 -8.3 0.0", "OFFSET 8.3 0.4 0.0")
+    with pytest.raises(
+        TrajectoryError, match=r"bone 'LeftLeg' is at 8.3 0.4 0 of 'LeftUpLeg', .* at 0.4 -8.3 0: .*load"
+    ):
+        sp.read_shape_path(write(tmp_path / "m.bvh", turned), body)
 
 
 @pytest.mark.parametrize(
@@ -257,6 +302,11 @@ def edited(old, new, count=1):
     return text.replace(old, new, count)
 
 
+def without_first(text):
+    """Each frame with a number less."""
+    return text.replace(FRAME, FRAME[4:])
+
+
 FRAME = " ".join(["0.0"] * len(columns()))
 FAULTS = {
     "cut off": (lambda: skeleton_text()[:900].rpartition("\n")[0], "the file ends where"),
@@ -266,14 +316,19 @@ FAULTS = {
     "no opening brace": (lambda: edited("JOINT Spine\n\t\t{", "JOINT Spine"), "Spine: { is needed"),
     "an unknown channel": (lambda: edited("Zrotation", "Wrotation"), "the channel 'Wrotation' is unknown"),
     "a wrong count": (lambda: edited("CHANNELS 3", "CHANNELS 4"), "CHANNELS 4 are said, and 3 follow"),
-    "a channel twice": (lambda: edited("CHANNELS 3 Zrotation", "CHANNELS 3 Xrotation"), "stands twice"),
+    "a hinge twice": (
+        lambda: edited("CHANNELS 3 Zrotation Yrotation Xrotation", "CHANNELS 2 Xrotation Xrotation"),
+        "stands twice",
+    ),
+    "a place twice": (lambda: edited("CHANNELS 6 Xposition", "CHANNELS 6 Yposition"), "stands twice"),
     "root without turns": (
-        lambda: edited(
-            "CHANNELS 6 Xposition Yposition Zposition Zrotation", "CHANNELS 5 Xposition Yposition Zposition"
+        lambda: without_first(
+            edited("CHANNELS 6 Xposition Yposition Zposition Zrotation", "CHANNELS 5 Xposition Yposition Zposition")
         ),
         "three rotations are needed",
     ),
-    "root on a plane": (lambda: edited("CHANNELS 6 Xposition", "CHANNELS 5"), "three positions or none"),
+    "root on a plane": (lambda: without_first(edited("CHANNELS 6 Xposition", "CHANNELS 5")), "three positions or none"),
+    "a number beyond all others": (lambda: edited(FRAME, FRAME[:-3] + "1e200"), "1e+200 in a frame"),
     "no number": (lambda: edited("OFFSET 0.0 2.9", "OFFSET 0.0 2,9"), "'2,9' is no finite number"),
     "two numbers": (lambda: edited("OFFSET 0.0 2.9 -0.2", "OFFSET 0.0 2.9"), "OFFSET and three numbers"),
     "far away": (lambda: edited("OFFSET 0.0 2.9", "OFFSET 0.0 1e200"), "an offset above"),

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.cli.texts.result_text import body_lines
-from shapephase.errors import OpenPathError, ShapeError, TrajectoryError
+from shapephase.errors import OpenPathError, ShapeError, TrajectoryError, TrajectoryWarning
 from shapephase.plotting.pages.motion_data import body_data
 from shapephase.shape_space.shape_geodesic import shape_geodesic
 from support.ball_bodies import BALLS, THREE_HINGES, Hinges
@@ -229,6 +229,34 @@ def test_angles_are_turns_in_the_order_of_their_columns(body, tmp_path, order):
     seen, expected = (Rotation.from_quat(one.shape(t)[:, :4]).as_matrix() for one in (found.path, path))
     np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-9)
     assert found.record["columns"]["shoulder.w"] == ", ".join(f"shoulder.r{axis}_deg" for axis in order)
+
+
+def test_channels_of_bvh_files_name_angles_of_a_table(body, tmp_path):
+    times, shapes = samples(21)
+    turns = Rotation.from_quat(shapes[:, :4]).as_euler("YZX", degrees=True)
+    header = ["time", *(f"shoulder_{axis}rotation_deg" for axis in "YZX"), *body.joint_names[4:]]
+    found = sp.read_recorded_motion(written(tmp_path, header, np.column_stack([times, turns, shapes[:, 4:]])), body)
+    seen = Rotation.from_quat(found.path.shape(times)[:, :4]).as_matrix()
+    np.testing.assert_allclose(seen, Rotation.from_quat(shapes[:, :4]).as_matrix(), rtol=0, atol=1e-12)
+
+
+def test_three_hinges_go_on_where_angles_of_a_rotation_jump(load_urdf, tmp_path):
+    """Angles as SciPy chooses them, the second within a right angle: the motion whose second goes up to 1.9 rad."""
+    hinges = load_urdf(THREE_HINGES)
+    times = np.linspace(0.0, 1.0, 61)
+    angles = swing(times)
+    for ball in (slice(0, 3), slice(3, 6)):
+        angles[:, ball] = Rotation.from_euler("XYZ", angles[:, ball]).as_euler("XYZ")
+    names = [*(f"shoulder{axis}" for axis in "xyz"), *(f"neck{axis}" for axis in "xyz"), "elbow"]
+    header = ["time", *(f"{name}_deg" for name in names)]
+    file = written(tmp_path, header, np.column_stack([times, np.degrees(angles)]))
+    with pytest.warns(
+        TrajectoryWarning, match=r"shoulderx, shouldery, shoulderz jump, .* \(4 such steps\).*ball joint"
+    ):
+        recorded = sp.read_recorded_motion(file, hinges)
+    columns = [hinges.joint_index(name) for name in names]
+    found = recorded.path.shape(times)[:, columns]
+    np.testing.assert_allclose(found - found[0], swing(times) - swing(times)[0], rtol=0, atol=1e-12)
 
 
 def test_commands_and_exports_know_them(body, tmp_path):

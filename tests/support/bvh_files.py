@@ -5,6 +5,7 @@ The numbers are our own, of a person of 1.74 m in units of 0.05 m. Written and p
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -51,10 +52,13 @@ def bones() -> list[tuple[str, str | None, tuple[float, float, float], tuple[flo
     return found
 
 
-def skeleton_text(turns: tuple[str, ...] = ZYX) -> str:
-    """The part above MOTION."""
+def skeleton_text(turns: tuple[str, ...] = ZYX, nodes: Sequence[str] = ()) -> str:
+    """The part above MOTION; of nodes above the root, their names, each with places and turns."""
     lines: list[str] = ["HIERARCHY"]
     listed = bones()
+    for depth, node in enumerate(nodes):
+        kind = "JOINT" if depth else "ROOT"
+        lines += [f"{kind} {node}", "{", "OFFSET 0 0 0", f"CHANNELS 6 Xposition Yposition Zposition {' '.join(turns)}"]
 
     def write(name: str, depth: int) -> None:
         pad = "\t" * depth
@@ -62,7 +66,7 @@ def skeleton_text(turns: tuple[str, ...] = ZYX) -> str:
         places = "Xposition Yposition Zposition " if parent is None else ""
         count = len(turns) + 3 * (parent is None)
         lines.extend([
-            f"{pad}{'JOINT' if parent else 'ROOT'} {name}",
+            f"{pad}{'JOINT' if parent or nodes else 'ROOT'} {name}",
             f"{pad}{{",
             f"{pad}\tOFFSET {' '.join(map(repr, offset))}",
             f"{pad}\tCHANNELS {count} {places}{' '.join(turns)}",
@@ -77,7 +81,7 @@ def skeleton_text(turns: tuple[str, ...] = ZYX) -> str:
         lines.append(f"{pad}}}")
 
     write("Hips", 0)
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *["}"] * len(nodes)]) + "\n"
 
 
 def columns(turns: tuple[str, ...] = ZYX) -> list[str]:
@@ -86,10 +90,10 @@ def columns(turns: tuple[str, ...] = ZYX) -> list[str]:
     return places + [f"{name}_{turn}" for name, *_ in bones() for turn in turns]
 
 
-def bvh_text(rows: np.ndarray, step: float, turns: tuple[str, ...] = ZYX) -> str:
+def bvh_text(rows: np.ndarray, step: float, turns: tuple[str, ...] = ZYX, nodes: Sequence[str] = ()) -> str:
     """A whole file of frames (N, c) [units and degrees]."""
     frames = "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
-    return f"{skeleton_text(turns)}MOTION\nFrames: {len(rows)}\nFrame Time: {step!r}\n{frames}\n"
+    return f"{skeleton_text(turns, nodes)}MOTION\nFrames: {len(rows)}\nFrame Time: {step!r}\n{frames}\n"
 
 
 def posed(row: np.ndarray, turns: tuple[str, ...] = ZYX) -> dict[str, np.ndarray]:

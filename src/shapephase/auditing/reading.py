@@ -244,16 +244,20 @@ def _of_biorbd(body: Body, times: Array, places: Array, rates: Array | None, nam
         )
     if rates is not None and rates.shape != places.shape:
         raise ShapeError(f"Qdot: expected shape {places.shape} as that of Q, got {rates.shape}")
+    if body.ball_joints:
+        raise TrajectoryError(
+            f"Q of a model with quaternions is not read ({body.ball_joints[0]} has one); write columns by name, or q "
+            "with the quaternion x y z w of each"
+        )
     axes = "xyz" if body.base_angles is None else body.base_angles[1]
-    turned = np.broadcast_to(np.eye(3), (len(places), 3, 3))
+    angles = places[:, 3:_ROOT]
     rate = np.zeros((len(places), 3))
-    for k, axis in enumerate(axes):
-        unit = np.eye(3)["xyz".index(axis)]
-        turn = so3.exp(places[:, 3 + k, None] * unit)
-        turned = turned @ turn
-        if rates is not None:
+    if rates is not None:
+        for k, axis in enumerate(axes):
             # What was there before is seen from axes that have turned on.
-            rate = so3.apply(so3.transpose(turn), rate) + rates[:, 3 + k, None] * unit
+            turn = so3.matrix_from_euler(angles[:, [k]], axis)
+            rate = so3.apply(so3.transpose(turn), rate) + rates[:, 3 + k, None] * np.eye(3)["xyz".index(axis)]
+    turned = so3.matrix_from_euler(angles, axes)
     given = {} if rates is None else {"rate": rate, "velocity": rates[:, :3], "joint_rates": rates[:, _ROOT:]}
     return FloatingTrajectory(
         times=times,

@@ -17,6 +17,7 @@ from ..error_bars.recorded_momentum import momentum_from_recording
 from ..errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
 from ..letters import what_came
 from ..reconstruction.reconstruction import reconstruct
+from ..shape_space.ball_columns import ball_columns, near_signs
 from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
 from ._airborne import AirbornePart, airborne_part
@@ -112,6 +113,7 @@ def audit(
     if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
         raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {what_came(trajectories)}")
     within = None if tolerance is None else positive_argument(tolerance, "tolerance", "a ratio")
+    runs = [_with_near_signs(body, run) for run in runs]
     parts = [_airborne(body, run, flight) for run in runs]
     flown = [run.part(part.first, part.past) for run, part in zip(runs, parts, strict=True)]
     seen = [observed(body, run, noise) for run in flown]
@@ -134,6 +136,16 @@ def audit(
         step_order=order,
         notes=notes,
     )
+
+
+def _with_near_signs(body: Body, run: FloatingTrajectory) -> FloatingTrajectory:
+    """The same, each quaternion of a ball joint with the sign that is nearer to the sample before: it is smoothed."""
+    balls = ball_columns(body.joint_names)
+    if not balls or run.shapes.shape[1] != body.n_shape:
+        return run
+    signs = near_signs(run.shapes, balls)
+    rates = None if run.joint_rates is None else run.joint_rates * signs
+    return replace(run, shapes=run.shapes * signs, joint_rates=rates)
 
 
 def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]) -> AirbornePart:

@@ -26,7 +26,7 @@ def body_card(self: Body) -> Card:
     rows = [
         ("mass", numbers(self.mass, "kg")),
         ("links", f"{len(self.link_names)}"),
-        ("joints", f"{self.n_shape}{f': {named}' if named else ''}"),
+        ("joints", f"{self.n_joints}{f': {named}' if named else ''}"),
         ("centre of mass", numbers(self.centre_of_mass(shape), "m")),
         ("principal moments", numbers(moments, "kg m^2")),
     ]

@@ -108,8 +108,13 @@ class Body:
 
     @property
     def n_shape(self) -> int:
-        """The number of independent joints."""
+        """The number of coordinates of the independent joints: one of each axis, four of a ball joint."""
         return len(self.joint_names)
+
+    @property
+    def n_joints(self) -> int:
+        """The number of independent joints, where a ball joint is one."""
+        return self.n_shape - 3 * len(self.ball_joints)
 
     @property
     def ball_joints(self) -> tuple[str, ...]:
@@ -148,7 +153,7 @@ class Body:
 
     def __repr__(self) -> str:
         """One line for people."""
-        return f"Body({self.name!r}, {self.n_shape} joints, {self.mass:.6g} kg)"
+        return f"Body({self.name!r}, {self.n_joints} joints, {self.mass:.6g} kg)"
 
     _repr_html_ = card_html
     _card = body_card

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,7 +48,7 @@ def write_bvh(
     """Write base and joints as a BVH file: a skeleton at zero coordinates, and angles of every bone in time.
 
     Bones are named as the joints that move them, the root as the body; a bone ends in the centre of mass of its link. A
-    joint that slides has places instead of an offset. Angles are in degrees.
+    ball joint moves one bone. A joint that slides has places instead of an offset. Angles are in degrees.
 
     Parameters
     ----------
@@ -108,51 +109,56 @@ def _rest_orientations(chain: JointChain) -> Array:
     return found
 
 
-def _order(chain: JointChain) -> list[int]:
-    """Joints as a skeleton lists them: each before what hangs on it, and that before the next."""
-    found: list[int] = []
-    waiting = [joint for joint, parent in enumerate(chain.parents) if parent == 0][::-1]
+class _Bone(NamedTuple):
+    """What one joint of a skeleton moves: joints of the chain from `first` to `last`, of a ball joint its three."""
+
+    name: str
+    first: int
+    last: int
+    depth: int
+
+
+def _bones(chain: JointChain) -> list[_Bone]:
+    """As a skeleton lists them: each before what hangs on it, and that before the next."""
+    balls = {ball.row: ball for ball in chain.follows.balls}
+    found: list[_Bone] = []
+    waiting = [(joint, 1) for joint, parent in enumerate(chain.parents) if parent == 0][::-1]
     while waiting:
-        joint = waiting.pop()
-        found.append(joint)
-        waiting += [below for below, parent in enumerate(chain.parents) if parent == joint + 1][::-1]
+        joint, depth = waiting.pop()
+        ball = balls.get(joint)
+        name, last = (chain.names[joint], joint) if ball is None else (ball.name, ball.rows.stop - 1)
+        found.append(_Bone(re.sub(r"\s", "_", name), joint, last, depth))
+        waiting += [(below, depth + 1) for below, parent in enumerate(chain.parents) if parent == last + 1][::-1]
     return found
 
 
 def _skeleton(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> list[str]:
-    chain, lines = whole.body.chain, []
-    names = [re.sub(r"\s", "_", name) for name in (whole.body.name, *chain.names)]
-    depths = [0]
-    for parent in chain.parents:
-        depths.append(depths[parent] + 1)
-    previous = 0
-    for frame in [0, *(joint + 1 for joint in _order(chain))]:
-        lines += [f"{'  ' * depth}}}" for depth in range(previous, depths[frame], -1)]
-        if frame and depths[frame] <= previous:
-            lines.append(f"{'  ' * depths[frame]}}}")
-        pad, joint = "  " * depths[frame], frame - 1
-        slides = frame > 0 and bool(chain.slides[joint].any())
-        parent = 0 if frame == 0 else chain.parents[joint]
-        offset = np.zeros(3) if frame == 0 or slides else rest[parent] @ chain.places[joint]
-        placed = frame == 0 or slides
+    chain = whole.body.chain
+    root = _Bone(re.sub(r"\s", "_", whole.body.name), -1, -1, 0)
+    lines, previous = [], 0
+    for bone in [root, *_bones(chain)]:
+        lines += [f"{'  ' * depth}}}" for depth in range(previous, bone.depth - 1, -1) if bone.depth]
+        pad, frame, slides = "  " * bone.depth, bone.last + 1, bool(bone.depth and chain.slides[bone.first].any())
+        placed = slides or not bone.depth
+        offset = np.zeros(3) if placed else rest[chain.parents[bone.first]] @ chain.places[bone.first]
         channels = f"CHANNELS 6 {_PLACES} {_TURNS}" if placed else f"CHANNELS 3 {_TURNS}"
-        lines += [f"{pad}{'JOINT' if frame else 'ROOT'} {names[frame]}", f"{pad}{{"]
+        lines += [f"{pad}{'JOINT' if bone.depth else 'ROOT'} {bone.name}", f"{pad}{{"]
         lines += [f"{pad}  OFFSET {_numbers(scale * axes @ offset)}", f"{pad}  {channels}"]
         if frame not in chain.parents:
             tip = rest[frame] @ chain.centres[frame]
             tip = tip if np.linalg.norm(tip) > _SHORTEST else np.zeros(3)
             lines += [f"{pad}  End Site", f"{pad}  {{", f"{pad}    OFFSET {_numbers(scale * axes @ tip)}", f"{pad}  }}"]
-        previous = depths[frame]
+        previous = bone.depth
     return [*lines, *(f"{'  ' * depth}}}" for depth in range(previous, -1, -1))]
 
 
 def _channels(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> list[Array]:
     """Columns of all bones in the order of the skeleton."""
     chain = whole.body.chain
-    # The first of the three hinges of a ball joint has all of its turn, the others none.
     balls = {ball.row: ball.turns(whole.shapes) for ball in chain.follows.balls}
     found = [scale * whole.position @ axes.T, _degrees(axes @ whole.attitude @ axes.T)]
-    for joint in _order(chain):
+    for bone in _bones(chain):
+        joint = bone.first
         coordinate, parent = whole.joints[:, joint], rest[chain.parents[joint]]
         if chain.slides[joint].any():
             along = chain.places[joint] + coordinate[:, None] * (chain.turns[joint] @ chain.slides[joint])

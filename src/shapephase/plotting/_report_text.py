@@ -58,7 +58,7 @@ def is_rigid(motion: Motion) -> bool:
 
 def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
     """What happened, in sentences."""
-    name = f"The body ({body.name}, {body.n_shape} joints, {body.mass:.4g} kg)" if body else "The body"
+    name = f"The body ({body.name}, {body.n_joints} joints, {body.mass:.4g} kg)" if body else "The body"
     loop = "and ends in the shape it began with" if result.is_loop else "and ends in another shape than it began with"
     words = [f"{name} changes its shape for {motion.duration:g} s {loop}."]
     if is_rigid(motion):

@@ -31,14 +31,17 @@ def ball_columns(names: Sequence[str] | None) -> tuple[slice, ...]:
 
 def neighbours_signs(samples: Array, balls: Sequence[slice]) -> Array:
     """The samples (N, n), quaternions with the sign that is nearer to the one before."""
-    if not balls:
-        return samples
-    found = samples.copy()
+    return samples * near_signs(samples, balls) if balls else samples
+
+
+def near_signs(samples: Array, balls: Sequence[slice]) -> Array:
+    """By what samples (N, n) are to be multiplied so that each quaternion is near the one before: (N, n), 1 or -1."""
+    signs = np.ones_like(samples)
     for ball in balls:
         four = samples[:, ball]
         flips = np.where(np.sum(four[1:] * four[:-1], axis=1) < 0.0, -1.0, 1.0)
-        found[1:, ball] *= np.cumprod(flips)[:, None]
-    return found
+        signs[1:, ball] = np.cumprod(flips)[:, None]
+    return signs
 
 
 def factors_between(end: Array, start: Array, balls: Sequence[slice]) -> Array:

@@ -67,6 +67,17 @@ SPELLINGS = {
 }
 
 
+@pytest.mark.parametrize("order", ["xyz", "xzy", "yxz", "yzx", "zxy", "zyx"])
+def test_angles_on_either_branch_are_the_same_attitude(order: str, tmp_path):
+    """Every other sample on the branch that no program chooses, and whole turns off."""
+    angles = TURNS.as_euler(order.upper())
+    angles[::2] = angles[::2] * [1.0, -1.0, 1.0] + np.pi * np.array([1.0, 1.0, -1.0])
+    angles[1::3] += 2.0 * np.pi * np.array([1.0, -1.0, 0.0])
+    names = [f"base_{('roll', 'pitch', 'yaw')['xyz'.index(axis)]} [deg]" for axis in order]
+    found = attitude(csv(tmp_path / "m.csv", names, np.degrees(angles)), base_order=order)
+    np.testing.assert_allclose(found, TURNS.as_matrix(), atol=1e-13)
+
+
 @pytest.mark.parametrize("case", SPELLINGS)
 def test_an_attitude_in_every_spelling(case: str, tmp_path):
     """To the rounding of a product of three rotations: all digits of the numbers are in the file."""

@@ -1,4 +1,8 @@
-"""A human from a BVH file: its skeleton as links and hinges, with the masses of a person's segments."""
+"""A human from a BVH file: its skeleton as links and ball joints, with the masses of a person's segments.
+
+A bone with three channels of rotation is a rotation, whatever their order: many triples are the same one, and programs
+write any of them. One or two channels are hinges.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +10,8 @@ import numpy as np
 
 from ...errors import ModelFileError
 from .._link_tree import Joint, Link, LinkTree, from_the_root
-from .bvh_text import Bone, BvhFaultError, Skeleton, axis_of, bvh_skeleton
-from .human_segments import Segment, height_of, segments_of
+from .bvh_text import Bone, BvhFaultError, Skeleton, bvh_skeleton, check_base, check_lengths
+from .human_segments import Person, Segment, person_of
 
 _MASS = 70.0
 """[kg] of a person of whom nobody has said it: a usual one of reference persons."""
@@ -19,7 +23,9 @@ _AXES = dict(zip("xyz", np.eye(3), strict=True))
 def bvh_tree(
     content: bytes, name: str, where: str, length_unit: float | None = None, person_mass: float | None = None
 ) -> LinkTree:
-    """Links and hinges of a skeleton, in the order of its file.
+    """Links and joints of a skeleton, in the order of its file.
+
+    What the base hangs on moves it, and is no part of the tree.
 
     length_unit : length of a unit of the file [m]; needed
     person_mass : [kg]; None: 70 kg, with a note
@@ -32,18 +38,25 @@ def bvh_tree(
     try:
         skeleton = bvh_skeleton(content)
         if length_unit is None:
-            raise BvhFaultError(_unit_question(skeleton), skeleton.bones[0].line)
-        segments = segments_of(skeleton, _MASS if person_mass is None else person_mass, length_unit)
+            raise BvhFaultError(_unit_question(person_of(skeleton, _MASS, 1.0).height), skeleton.bones[0].line)
+        person = person_of(skeleton, _MASS if person_mass is None else person_mass, length_unit)
+        check_base(skeleton, person.base)
+        check_lengths(skeleton, person.moving[1:])
     except BvhFaultError as error:
         raise ModelFileError(f"{where}:{error.line}: {error}") from None
     notes = []
     if person_mass is None:
         notes.append(f"{where}:1: the person is taken to have {_MASS:g} kg; person_mass (--person-mass) says another")
-    return _tree(skeleton, segments, name, where, length_unit, notes)
+    if person.frame is not None:
+        notes.append(
+            f"{where}:{skeleton.lines[person.frame]}: segments are laid out in this frame, at "
+            f"{person.frame * skeleton.step:.4g} s, in which trunk and legs are straightest; the person is "
+            f"{person.height:.2f} m tall"
+        )
+    return _tree(skeleton, person, name, where, length_unit, notes)
 
 
-def _unit_question(skeleton: Skeleton) -> str:
-    height = height_of(skeleton)
+def _unit_question(height: float) -> str:
     tall = ", ".join(f"{unit:g} ({what}): {height * unit:.2f} m" for what, unit in _LIKELY.items())
     return (
         f"a BVH file has no unit of length: give length_unit (--length-unit), the metres of one. The skeleton measures "
@@ -51,58 +64,56 @@ def _unit_question(skeleton: Skeleton) -> str:
     )
 
 
-def _tree(
-    skeleton: Skeleton, segments: list[Segment], name: str, where: str, metre: float, notes: list[str]
-) -> LinkTree:
-    bones = skeleton.bones
-    moves = {bone for segment in segments for bone in skeleton.above(segment.bone)}
-    links: dict[str, Link] = {}
-    joints: list[Joint] = []
+def _tree(skeleton: Skeleton, person: Person, name: str, where: str, metre: float, notes: list[str]) -> LinkTree:
+    bones, links, joints = skeleton.bones, {}, []
     frames: set[str] = set()
-    for number, bone in enumerate(bones):
-        at = f"{where}:{bone.line}"
-        links[bone.name] = _link(bone.name, at, [segment for segment in segments if segment.bone == number])
-        if bone.parent is None:
+    below = [number for number in range(len(bones)) if person.base in skeleton.above(number)]
+    for number in below:
+        bone, at = bones[number], f"{where}:{bones[number].line}"
+        links[bone.name] = _link(bone.name, at, [segment for segment in person.segments if segment.bone == number])
+        if number == person.base:
             continue
-        parent, place = bones[bone.parent].name, metre * bone.offset
-        channels = bone.turns if number in moves else ()
-        for order, channel in enumerate(channels or ("fixed",)):
-            last = order >= len(channels) - 1
-            child = bone.name if last else f"{bone.name}__{channel}"
+        assert bone.parent is not None
+        parent, place, turn = bones[bone.parent].name, metre * bone.offset, np.eye(3)
+        moves = _joints_of(bone)
+        if number not in person.moving:
+            # It stays as it is in the frame in which segments are laid out.
+            turn = person.turns[bone.parent].T @ person.turns[number]
+            moves = [(f"{bone.name}_fixed", "fixed", "x")]
+        for order, (joint, kind, axis) in enumerate(moves):
+            last = order == len(moves) - 1
+            child = bone.name if last else f"{bone.name}__{axis}"
             if not last:
                 links[child] = Link(child, at)
                 frames.add(child)
             joints.append(
                 Joint(
-                    name=f"{bone.name}_{channel}",
+                    name=joint,
                     where=at,
-                    kind="revolute" if channels else "fixed",
+                    kind=kind,
                     parent=parent,
                     child=child,
                     place=place,
-                    turn=np.eye(3),
-                    axis=_AXES[axis_of(channel) if channels else "x"],
+                    turn=turn,
+                    axis=_AXES[axis],
                     after=np.zeros(3),
                 )
             )
             parent, place = child, np.zeros(3)
-    idle = [bone.name for number, bone in enumerate(bones) if number not in moves and bone.turns]
+    idle = [bones[number].name for number in below if number not in person.moving and bones[number].turns]
     if idle:
         notes.append(f"{where}:1: without mass, these bones do not move: {', '.join(idle)}")
     first, _ = from_the_root(links, joints, where)
     sorted_links = {first: links[first]} | {joint.child: links[joint.child] for joint in joints}
-    root = bones[0]
-    places = tuple(f"{root.name}_{axis}position" for axis in "XYZ")
-    return LinkTree(
-        name,
-        sorted_links,
-        tuple(joints),
-        frames=frozenset(frames),
-        notes=tuple(notes),
-        base_angles=(tuple(f"{root.name}_{turn}" for turn in root.turns), "".join(map(axis_of, root.turns))),
-        base_slides=places if len(root.channels) > len(root.turns) else None,
-        length_unit=metre,
-    )
+    return LinkTree(name, sorted_links, tuple(joints), frames=frozenset(frames), notes=tuple(notes), length_unit=metre)
+
+
+def _joints_of(bone: Bone) -> list[tuple[str, str, str]]:
+    """Name, kind and axis of the joints that move a bone."""
+    if bone.is_ball:
+        return [(bone.name, "ball", "x")]
+    hinges = [(name, "revolute", axis) for name, (axis, _) in zip(bone.hinge_names, bone.turns, strict=True)]
+    return hinges or [(f"{bone.name}_fixed", "fixed", "x")]
 
 
 def _link(name: str, where: str, carried: list[Segment]) -> Link:
@@ -116,8 +127,3 @@ def _link(name: str, where: str, carried: list[Segment]) -> Link:
         apart = segment.centre - centre
         inertia += segment.inertia + segment.mass * (apart @ apart * np.eye(3) - np.outer(apart, apart))
     return Link(name, where, mass, centre, inertia)
-
-
-def column_names(bone: Bone) -> tuple[str, ...]:
-    """Of its channels: those that turn it are its joints."""
-    return tuple(f"{bone.name}_{channel}" for channel in bone.channels)

@@ -1,18 +1,20 @@
 """BVH: a skeleton at zero angles and the angles of its bones, frame by frame, as a strict reader finds them.
 
-The format has no unit of length. Its angles are in degrees, of hinges in one point, each turned by those before it.
+The format has no unit of length. Its angles are in degrees, about axes in one point, each turned by those before it:
+three of them are a rotation, of which many triples are the same.
 """
 
 from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...arrays import Array
+from ... import so3
+from ...arrays import FARTHEST, Array
 
 _START = b"HIERARCHY"
 _PLACES = ("Xposition", "Yposition", "Zposition")
@@ -64,13 +66,28 @@ class Bone:
     tip: Array | None
 
     @property
-    def turns(self) -> tuple[str, ...]:
-        """The channels that turn it, in their order."""
-        return tuple(word for word in self.channels if word in _TURNS)
+    def turns(self) -> tuple[tuple[str, int], ...]:
+        """Axes "x", "y" or "z" of its turns in their order, and where the angles stand in a frame."""
+        return tuple(
+            (word[0].lower(), self.column + place) for place, word in enumerate(self.channels) if word in _TURNS
+        )
 
-    def columns(self, words: Sequence[str]) -> list[int]:
-        """Where channels of these words stand in a frame."""
-        return [self.column + self.channels.index(word) for word in words]
+    @property
+    def slides(self) -> tuple[tuple[int, int], ...]:
+        """Coordinates 0, 1 or 2 of its place that have a channel, and where they stand in a frame."""
+        return tuple(
+            (_PLACES.index(word), self.column + place) for place, word in enumerate(self.channels) if word in _PLACES
+        )
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether it turns about all axes, in whatever order: then its angles are a rotation, and no hinges."""
+        return len(self.turns) > 2
+
+    @property
+    def hinge_names(self) -> tuple[str, ...]:
+        """Of the hinges that its channels of rotation would be, each by itself."""
+        return tuple(f"{self.name}_{axis.upper()}rotation" for axis, _ in self.turns)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,14 +106,46 @@ class Skeleton:
     lines: Sequence[int]
     step: float
 
-    @property
-    def places(self) -> Array:
-        """Of all joints at zero angles, from the root's: (k, 3) [units]."""
-        found = np.zeros((len(self.bones), 3))
-        for number, bone in enumerate(self.bones):
-            if bone.parent is not None:
-                found[number] = found[bone.parent] + bone.offset
+    def turned(self, number: int, frames: Array) -> Array:
+        """How a bone is turned in the axes of the one that it hangs on: frames (M, c) -> (M, 3, 3)."""
+        turns = self.bones[number].turns
+        angles = np.radians(frames[:, [column for _, column in turns]])
+        return so3.matrix_from_euler(angles, "".join(axis for axis, _ in turns))
+
+    def placed(self, number: int, frames: Array) -> Array:
+        """Where a bone's joint is in the axes of the one that it hangs on: frames (M, c) -> (M, 3) [units]."""
+        bone = self.bones[number]
+        places = np.tile(bone.offset, (len(frames), 1))
+        for axis, column in bone.slides:
+            places[:, axis] = frames[:, column]
+        return places
+
+    def poses(self, numbers: Iterable[int], frames: Array) -> dict[int, tuple[Array, Array]]:
+        """Turns (M, 3, 3) and places (M, 3) [units] of bones and of all that they hang on, seen from the root's joint.
+
+        Every bone is at its OFFSET; axes are those of the room.
+        """
+        found: dict[int, tuple[Array, Array]] = {}
+        for number in sorted({above for each in numbers for above in self.above(each)}):
+            turn, parent = self.turned(number, frames), self.bones[number].parent
+            place = np.zeros((len(frames), 3))
+            if parent is not None:
+                above_turn, above_place = found[parent]
+                turn, place = above_turn @ turn, above_place + above_turn @ self.bones[number].offset
+            found[number] = turn, place
         return found
+
+    def base_motion(self, base: int) -> tuple[Array, Array | None]:
+        """Turns (N, 3, 3) and places (N, 3) [units] of a bone in the room, those that it hangs on multiplied in.
+
+        The places are None where no channel has them.
+        """
+        turn, place = np.eye(3), np.zeros((len(self.frames), 3))
+        for number in self.above(base)[::-1]:
+            place = place + so3.apply(turn, self.placed(number, self.frames))
+            turn = turn @ self.turned(number, self.frames)
+        moves = any(self.bones[number].slides for number in self.above(base))
+        return turn, place if moves else None
 
     def below(self, number: int) -> list[int]:
         """The bones that hang on one."""
@@ -116,18 +165,13 @@ def is_bvh(content: bytes) -> bool:
     return content[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()[: len(_START)].upper() == _START
 
 
-def axis_of(channel: str) -> str:
-    """The letter of the axis of a channel: "Zrotation" -> "z"."""
-    return channel[0].lower()
-
-
 def bvh_skeleton(content: bytes) -> Skeleton:
     """Read a file.
 
     Raises
     ------
     BvhFaultError
-        For whatever is no BVH, has other numbers than it says, or moves bones along their parents.
+        For whatever is no BVH, or has other numbers than it says.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -148,9 +192,7 @@ def bvh_skeleton(content: bytes) -> Skeleton:
         raise lines.fault(f"Frame Time: {step:g} s between frames; a time above 0 is needed")
     width = sum(len(bone.channels) for bone in bones)
     frames, at = _frames(lines, int(count), width)
-    skeleton = Skeleton(bones=bones, frames=frames, lines=at, step=step)
-    _check_places(skeleton)
-    return skeleton
+    return Skeleton(bones=bones, frames=frames, lines=at, step=step)
 
 
 class _Lines:
@@ -229,10 +271,6 @@ class _Hierarchy:
             raise self.lines.fault(f"more than {_MOST_BONES} bones, as in no skeleton")
         self._open(name, brace)
         offset, channels = self._offset(name), self._channels(name)
-        if parent is None and len(channels) - len(set(_PLACES) & set(channels)) != len(_TURNS):
-            raise self.lines.fault(f"root {name!r}: three rotations are needed, got {' '.join(channels) or 'none'}")
-        if parent is None and 0 < len(set(_PLACES) & set(channels)) < len(_PLACES):
-            raise self.lines.fault(f"root {name!r}: three positions or none are needed, got {' '.join(channels)}")
         self.names.add(name)
         bone = Bone(name=name, line=line, parent=parent, offset=offset, channels=channels, column=self.width, tip=None)
         self.bones.append(bone)
@@ -273,8 +311,10 @@ class _Hierarchy:
                 )
         if words[1] != str(len(channels)):
             raise self.lines.fault(f"{name}: CHANNELS {words[1][:_SHOWN]} are said, and {len(channels)} follow")
-        if len(set(channels)) < len(channels):
-            raise self.lines.fault(f"{name}: a channel stands twice; three different axes can be read")
+        places = [channel for channel in channels if channel in _PLACES]
+        turns = [channel for channel in channels if channel in _TURNS]
+        if len(set(places)) < len(places) or (len(turns) == 2 and len(set(turns)) == 1):
+            raise self.lines.fault(f"{name}: a channel stands twice; two different ones are needed")
         return tuple(channels)
 
 
@@ -311,21 +351,36 @@ def _frames(lines: _Lines, count: int, width: int) -> tuple[Array, list[int]]:
             raise lines.fault(f"{len(words)} numbers in a frame, and the skeleton has {width} channels")
         if len(at) == count:
             raise lines.fault(f"Frames: {count} are said, and more follow")
-        values.extend(_quick_numbers(line, words) or _numbers(words, lines))
+        numbers = _quick_numbers(line, words) or _numbers(words, lines)
+        if max(map(abs, numbers), default=0.0) > FARTHEST:
+            raise lines.fault(f"{max(numbers, key=abs):.6g} in a frame; up to {FARTHEST:g} can be resolved")
+        values.extend(numbers)
         at.append(lines.number)
     if len(at) < count:
         raise lines.fault(f"Frames: {count} are said, and {len(at)} follow; the file is cut off")
     return np.frombuffer(values, dtype=np.float64).reshape(-1, width) if at else np.empty((0, width)), at
 
 
-def _check_places(skeleton: Skeleton) -> None:
-    """Raise BvhFaultError where a bone below the root moves along: its length would change."""
-    for bone in skeleton.bones[1:]:
-        words = [word for word in bone.channels if word in _PLACES]
-        if not words or not len(skeleton.frames):
+def check_base(skeleton: Skeleton, base: int) -> None:
+    """Raise BvhFaultError where a bone and those it hangs on do not say how it is turned and where it is."""
+    way = [skeleton.bones[number] for number in skeleton.above(base)]
+    turns = [axis for bone in way for axis, _ in bone.turns]
+    if len(turns) < len(_TURNS):
+        words = " ".join(word for bone in way for word in bone.channels) or "none"
+        raise BvhFaultError(f"root {way[0].name!r}: three rotations are needed, got {words}", way[0].line)
+    for bone in way:
+        if 0 < len(bone.slides) < len(_PLACES):
+            words = " ".join(bone.channels)
+            raise BvhFaultError(f"root {bone.name!r}: three positions or none are needed, got {words}", bone.line)
+
+
+def check_lengths(skeleton: Skeleton, numbers: Sequence[int]) -> None:
+    """Raise BvhFaultError where one of these bones moves along its parent: its length would change."""
+    for bone in (skeleton.bones[number] for number in numbers):
+        if not bone.slides or not len(skeleton.frames):
             continue
-        apart = skeleton.frames[:, bone.columns(words)] - bone.offset[["XYZ".index(word[0]) for word in words]]
-        off = np.abs(apart).max(axis=1)
+        axes, columns = (list(each) for each in zip(*bone.slides, strict=True))
+        off = np.abs(skeleton.frames[:, columns] - bone.offset[axes]).max(axis=1)
         worst = int(np.argmax(off))
         if off[worst] > _STAYS * max(1.0, float(np.abs(bone.offset).max())):
             raise BvhFaultError(

@@ -2,6 +2,9 @@
 
 Masses, centres of mass and radii of gyration are those of men by P. de Leva, J. Biomechanics 29 (1996) 1223-1230,
 table 4. Limbs are as long as their bones; trunk and head take their length from the distance of hips and shoulders.
+
+All of it is laid out where the joints are in one frame of the file, that of the straightest posture. How the axes of
+bones lie has no part in it: zero angles are no posture where bones have axes of their own.
 """
 
 from __future__ import annotations
@@ -64,10 +67,17 @@ _CALLED = {
 """Behind their side, the names that most files have."""
 _MAY_LACK = {"hand": "forearm"}
 """Segments that the bone above carries where they have none of their own."""
+_MOST_POSTURES = 2000
+"""Frames that are compared, the first and the last among them: a person stands straight for longer than a frame."""
+_AS_STRAIGHT = 5e-3
+"""Share of the length from shoulders to feet: knees bent by 15 degrees take off so much."""
+_AS_WIDE = 1e-6
+"""Share of a span: files have six digits, and of frames that they cannot tell apart the first counts."""
 
 
 class Segment(NamedTuple):
-    """What a bone carries: mass [kg], centre from the bone's joint (3,) [m], inertia about it (3, 3) [kg m^2]."""
+    """What a bone carries, in its axes: mass [kg], centre from its joint (3,) [m], inertia about that centre (3, 3)
+    [kg m^2]."""
 
     bone: int
     mass: float
@@ -75,8 +85,33 @@ class Segment(NamedTuple):
     inertia: Array
 
 
-def segments_of(skeleton: Skeleton, mass: float, metre: float) -> list[Segment]:
-    """All sixteen of them, in axes of the skeleton at zero angles.
+class Person(NamedTuple):
+    """A skeleton with the masses of a person.
+
+    Attributes
+    ----------
+    segments : all sixteen of them, each in axes of its bone
+    base : the nearest bone that carries all of these, itself or by bones that hang on it
+    moving : the base and the bones between it and the segments, parents before children
+    frame : number of the frame in which they were laid out; None: at zero angles, of a file without frames
+    turns : (k, 3, 3) of all bones in that frame, axes of the room
+    height : from the lowest to the highest joint or end of head, trunk and legs in that frame, along the trunk [m]
+    """
+
+    segments: list[Segment]
+    base: int
+    moving: list[int]
+    frame: int | None
+    turns: Array
+    height: float
+
+
+def person_of(skeleton: Skeleton, mass: float, metre: float) -> Person:
+    """The segments of a person on a skeleton.
+
+    They are laid out in the frame of the straightest posture: of the frames in which trunk and legs, from shoulders to
+    ankles, are as long as in any other but for half a percent, the one with the largest span of the arms. That is the
+    T-pose, where a file has one.
 
     mass : of the person [kg]
     metre : length of a unit of the file [m]
@@ -86,25 +121,23 @@ def segments_of(skeleton: Skeleton, mass: float, metre: float) -> list[Segment]:
     BvhFaultError
         If a bone is not found by its name, or has no length.
     """
-    return _Person(skeleton, mass, metre).segments()
+    return _Layout(skeleton, mass, metre).person()
 
 
-def height_of(skeleton: Skeleton) -> float:
-    """The largest extent of a skeleton along one of its axes at zero angles [units]."""
-    ends = [
-        place + bone.tip for place, bone in zip(skeleton.places, skeleton.bones, strict=True) if bone.tip is not None
-    ]
-    return float(np.ptp(np.array([*skeleton.places, *ends]), axis=0).max())
-
-
-class _Person:
-    """A skeleton whose bones have been found."""
-
+class _Layout:
     def __init__(self, skeleton: Skeleton, mass: float, metre: float) -> None:
-        self.skeleton, self.mass, self.metre = skeleton, mass, metre
-        self.places = metre * skeleton.places
+        self.skeleton, self.mass = skeleton, mass
         self.plain = [_plain(bone.name) for bone in skeleton.bones]
         self.bones = {(side, part): self._limb(side, part) for side in _SIDES for part in _NAMES}
+        self.frame, frames = self._straightest()
+        poses = skeleton.poses(range(len(skeleton.bones)), frames)
+        self.turns = np.array([turn[0] for turn, _ in poses.values()])
+        self.places = metre * np.array([place[0] for _, place in poses.values()])
+        self.tips = {
+            number: metre * self.turns[number] @ bone.tip
+            for number, bone in enumerate(skeleton.bones)
+            if bone.tip is not None
+        }
         thighs, arms = (self._middle(part) for part in ("thigh", "upper_arm"))
         self.up = self._direction(arms - thighs, "the hips and the shoulders are in one place")
         across = self.places[self.bones["left", "thigh"]] - self.places[self.bones["right", "thigh"]]
@@ -112,7 +145,43 @@ class _Person:
         self.front = np.cross(self.left, self.up)
         self.hips, self.trunk = thighs, float(np.linalg.norm(arms - thighs)) / _SHOULDERS
 
-    def segments(self) -> list[Segment]:
+    def person(self) -> Person:
+        segments = self._segments()
+        ways = [self.skeleton.above(segment.bone) for segment in segments]
+        base = next(bone for bone in ways[0] if all(bone in way for way in ways))
+        moving = sorted({bone for way in ways for bone in way if base in self.skeleton.above(bone)})
+        arms = {self.bones[side, "upper_arm"] for side in _SIDES}
+        whole = {bone: {*self.skeleton.above(bone)} for bone in range(len(self.skeleton.bones))}
+        upright = [bone for bone, way in whole.items() if base in way and not arms & way]
+        ends = [self.places[bone] + self.tips.get(bone, np.zeros(3)) for bone in upright]
+        heights = np.array([*self.places[upright], *ends]) @ self.up
+        return Person(segments, base, moving, self.frame, self.turns, float(np.ptp(heights)))
+
+    def _straightest(self) -> tuple[int | None, Array]:
+        """Number and channels (1, c) of the frame of the straightest posture."""
+        whole = self.skeleton.frames
+        if not len(whole):
+            return None, np.zeros((1, whole.shape[1]))
+        numbers = np.unique(np.linspace(0, len(whole) - 1, _MOST_POSTURES).round().astype(np.int64))
+        poses = self.skeleton.poses(list(self.bones.values()), whole[numbers])
+
+        def both(part: str) -> Array:
+            return np.stack([poses[self.bones[side, part]][1] for side in _SIDES])
+
+        hips, ankles, hands = both("thigh"), both("foot"), both("hand")
+        trunk = both("upper_arm").mean(axis=0) - hips.mean(axis=0)
+        # Legs apart are as straight as legs side by side.
+        down = hips.mean(axis=0) - ankles.mean(axis=0)
+        legs = np.linalg.norm(hips - ankles, axis=-1).mean(axis=0)
+        lengths = np.linalg.norm(down, axis=-1)
+        factors = np.divide(legs, lengths, out=np.zeros_like(legs), where=lengths > 0.0)
+        straight = np.linalg.norm(trunk + factors[:, None] * down, axis=-1)
+        spans = np.linalg.norm(hands[0] - hands[1], axis=-1)
+        spans[straight < (1.0 - _AS_STRAIGHT) * straight.max()] = 0.0
+        best = int(numbers[np.argmax(spans >= (1.0 - _AS_WIDE) * spans.max())])
+        return best, whole[[best]]
+
+    def _segments(self) -> list[Segment]:
         found = self._torso()
         for side in _SIDES:
             upper, forearm, thigh, shank, foot = (
@@ -189,7 +258,9 @@ class _Person:
         mass = row.part * self.mass
         moments = mass * (np.array(row.radii) * length) ** 2
         inertia = axes.T @ (moments[:, None] * axes)
-        return Segment(bone, mass, centre - self.places[bone], 0.5 * (inertia + inertia.T))
+        turn = self.turns[bone]
+        inertia = turn.T @ (0.5 * (inertia + inertia.T)) @ turn
+        return Segment(bone, mass, turn.T @ (centre - self.places[bone]), inertia)
 
     def _towards(self, bone: int) -> Array:
         """From a bone's joint to the next one that is elsewhere, or to the end of the bone: (3,) [m]; or zeros."""
@@ -198,9 +269,9 @@ class _Person:
             at = waiting.pop(0)
             if at != bone and np.any(self.places[at] != self.places[bone]):
                 return self.places[at] - self.places[bone]
-            tip = self.skeleton.bones[at].tip
+            tip = self.tips.get(at)
             if tip is not None and tip.any():
-                return self.metre * tip
+                return self.places[at] + tip - self.places[bone]
             waiting += self.skeleton.below(at)
         return np.zeros(3)
 

@@ -459,4 +459,4 @@ def _comment(body: Body, found: Plan) -> str:
 
 def _heading(body: Body, duration: float, momentum: tuple[float, float, float]) -> str:
     numbers = " ".join(f"{value:g}" for value in momentum)
-    return f"{body.name}: {duration:g} s, {body.n_shape} joints, momentum ({numbers}) kg m^2/s"
+    return f"{body.name}: {duration:g} s, {body.n_joints} joints, momentum ({numbers}) kg m^2/s"

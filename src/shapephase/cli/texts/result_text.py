@@ -25,7 +25,7 @@ def split_heading(body: Body, motion_name: str, motion: Motion) -> str:
     start = so3.quat_from_matrix(motion.initial_attitude)
     turned = "" if start[3] == 1.0 else f", attitude at the start ({' '.join(f'{v:.6g}' for v in start + 0.0)})"
     return (
-        f"{body.name} along {motion_name}: {motion.duration:g} s, {body.n_shape} joints, {body.mass:.6g} kg, "
+        f"{body.name} along {motion_name}: {motion.duration:g} s, {body.n_joints} joints, {body.mass:.6g} kg, "
         f"momentum ({momentum}) kg m^2/s{turned}"
     )
 
@@ -101,10 +101,12 @@ def body_lines(summary: BodySummary) -> list[str]:
         f"{'joint':<{width}}  {'kind':<10}{'lower':>12}{'upper':>12}{'range':>16}",
     ]
     for joint in summary.joints:
+        if joint.kind == "ball" and not joint.name.endswith(_FIRST_OF_FOUR):
+            continue
         limits = "".join(f"{_limit(value):>12}" for value in (joint.lower, joint.upper))
         span = _limit(joint.upper - joint.lower)
-        unit = "" if joint.kind == "ball" else joint.unit
-        lines.append(f"{joint.name:<{width}}  {joint.kind:<10}{limits} {unit:<3}{span:>12}")
+        unit, name = ("", _of_ball(joint.name)) if joint.kind == "ball" else (joint.unit, joint.name)
+        lines.append(f"{name:<{width}}  {joint.kind:<10}{limits} {unit:<3}{span:>12}")
     if summary.followers:
         width = max(map(len, ("follower", *summary.followers)))
         lines += [
@@ -140,10 +142,14 @@ def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMo
         lines.insert(1, f"{'recorded':24}{len(recorded.times)} samples, {recorded.format}")
         if recorded.base_attitude is not None:
             lines.append(f"{'base':24}recorded too")
+    balls = {name for ball in body.chain.follows.balls for name in ball.names}
+    moved = {_of_ball(name) for name in balls - {*summary.still_joints}}
+    still = [_of_ball(name) if name in balls else name for name in summary.still_joints]
+    still = [name for name in dict.fromkeys(still) if name not in moved]
     for title, names in (
         ("beyond their limits", summary.joints_beyond_limits),
         ("beyond their rates", summary.joints_beyond_rates),
-        ("at rest", summary.still_joints),
+        ("at rest", still),
     ):
         lines += [f"{title:24}{', '.join(names)}"] if names else []
     return lines
@@ -203,6 +209,8 @@ def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple
 _MOST_NAMED = 4
 # After the point of a direction.
 _DIRECTION_DIGITS = 7
+_FIRST_OF_FOUR = ".x"
+"""The end of the name of a ball joint's first number, in whose row it is shown."""
 _PATH_KEYS = {"joints_beyond_limits": "beyond", "joints_beyond_rates": "too_fast", "still_joints": "resting"}
 """JSON keys that are shorter than the names of the fields."""
 
@@ -210,6 +218,11 @@ _PATH_KEYS = {"joints_beyond_limits": "beyond", "joints_beyond_rates": "too_fast
 def path_data(summary: PathSummary) -> dict[str, Any]:
     """A summary of a joint motion as JSON can hold it."""
     return {_PATH_KEYS.get(key, key): value for key, value in plain(summary).items()}
+
+
+def _of_ball(name: str) -> str:
+    """The ball joint that a name of one of its four numbers is of."""
+    return name.rpartition(".")[0]
 
 
 def _numbers(values: Array) -> str:

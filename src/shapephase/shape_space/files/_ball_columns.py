@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,11 +14,16 @@ from ...body.body import Body
 from ...errors import TrajectoryError
 from ..ball_columns import ball_columns, neighbours_signs
 from ._labels import ANGLES, SI, Label, label
-from ._recording import Recording
+from ._recording import Recording, warn
 
 _AXES = "xyz"
+_TURN = re.compile(r"(?P<joint>.+)(?:\.r(?P<small>[xyz])|_(?P<large>[XYZ])rotation)", re.DOTALL)
 _OFF_UNIT = 0.1
 """A quaternion's length may be off one by so much: smooth curves between unit quaternions are shorter."""
+_ACROSS = 1e-6
+"""Cosine of the angle between axes that are at right angles."""
+_JUMP = 0.5 * np.pi
+"""[rad] Two hinges that go farther from one sample to the next jump, if the link turns by less than a third of it."""
 _MOST_ANGLE = 2.0 * np.pi
 """[rad] An angle beyond it, of which nobody has said the unit, is rather in degrees."""
 
@@ -28,7 +34,8 @@ def with_quaternions(
     """The recording with quaternions of ball joints in the place of angles; and which columns each is made of.
 
     The columns `shoulder.rz`, `shoulder.rx`, `shoulder.ry` of a ball joint, in the order in which they stand, are turns
-    about z, x and y, each about its axis as those before have turned it.
+    about z, x and y, each about its axis as those before have turned it; so are `shoulder_Zrotation` and so on, as
+    tables that are made of BVH files name them.
 
     names : label -> name of the joint, as a caller has said
 
@@ -44,9 +51,10 @@ def with_quaternions(
         for text in table.columns:
             target = names.get(text, text)
             parts = Label("", None) if target is None else label(target)
-            axis = parts.name[-1:]
-            if not axis or axis not in _AXES or parts.name != f"{joint}.r{axis}" or parts.name in body.joint_names:
+            match = _TURN.fullmatch(parts.name)
+            if match is None or match["joint"] != joint or parts.name in body.joint_names:
                 continue
+            axis = (match["small"] or match["large"]).lower()
             if axis in found:
                 both = f"columns {found[axis][0]!r} and {text!r} are both {parts.name}"
                 raise TrajectoryError(f"{table.where}: {both}; keep one")
@@ -57,9 +65,8 @@ def with_quaternions(
         lacking = [f"{joint}.r{axis}" for axis in _AXES if axis not in found]
         if lacking:
             raise TrajectoryError(f"{table.where}: ball joint {joint} turns about three axes; add {', '.join(lacking)}")
-        turned = np.broadcast_to(np.eye(3), (len(recording.times), 3, 3))
-        for axis, (_, angles) in found.items():
-            turned = turned @ so3.exp(angles[:, None] * np.eye(3)[_AXES.index(axis)])
+        angles = np.stack([values for _, values in found.values()], axis=-1)
+        turned = so3.matrix_from_euler(angles, "".join(found))
         taken = [text for text, _ in found.values()]
         columns, said = {text: each for text, each in table.columns.items() if text not in taken}, ", ".join(taken)
         for part, values in zip("xyzw", so3.quat_from_matrix(turned).T, strict=True):
@@ -117,3 +124,72 @@ def continued_balls(shapes: Array, body: Body, recording: Recording) -> Array:
                 f"{lengths[worst]:.6g}; 1 is needed"
             )
     return neighbours_signs(shapes, balls)
+
+
+@dataclass(frozen=True)
+class _HingeTriple:
+    """Three hinges in one point about axes at right angles: columns of the shape, and axes (3, 3) as rows at zero."""
+
+    columns: list[int]
+    axes: Array
+
+    def turns(self, angles: Array) -> Array:
+        """(N, 3) -> (N, 3, 3)."""
+        first, second, third = (so3.exp(angles[:, k, None] * self.axes[k]) for k in range(3))
+        return first @ second @ third
+
+
+def continued_hinges(shapes: Array, body: Body, recording: Recording) -> Array:
+    """Shapes (N, n) whose triples of hinges in one point go on to the nearest of their angles, where these jump.
+
+    Angles a, b, c about axes at right angles are the same turn as a + pi, pi - b, c + pi and those whole turns apart.
+    Programs that write the three angles of a rotation go from one to the other where the first and third axis meet.
+
+    Warns
+    -----
+    TrajectoryWarning
+        With the first sample at which they do: the hinges then go near that place, where they are far from a rotation.
+    """
+    if len(shapes) < 2:
+        return shapes
+    for triple in _hinge_triples(body):
+        angles = shapes[:, triple.columns]
+        turns = triple.turns(angles)
+        # Of a change of branch the first and the third go half a turn; a whole turn of one alone is as it is written.
+        swift = np.sort(np.abs(np.diff(angles, axis=0)), axis=1)[:, 1]
+        jumps = np.flatnonzero((swift > _JUMP) & (so3.angle(so3.transpose(turns[:-1]) @ turns[1:]) < swift / 3.0))
+        if not len(jumps):
+            continue
+        for k in range(1, len(angles)):
+            first, second, third = angles[k]
+            both = np.array([angles[k], [first + np.pi, np.pi - second, third + np.pi]])
+            both += 2.0 * np.pi * np.rint((angles[k - 1] - both) / (2.0 * np.pi))
+            angles[k] = both[np.argmin(np.abs(both - angles[k - 1]).max(axis=1))]
+        shapes = shapes.copy()
+        shapes[:, triple.columns] = angles
+        names = ", ".join(body.joint_names[column] for column in triple.columns)
+        sample = int(jumps[0]) + 1
+        warn(
+            f"{recording.place(sample)}: {names} jump, and what they move does not ({len(jumps)} such steps): they go "
+            "on to the nearest angles of the same rotation. Between samples, three hinges are a few degrees off a "
+            "rotation where their first and third axis meet; a ball joint in their place is not"
+        )
+    return shapes
+
+
+def _hinge_triples(body: Body) -> list[_HingeTriple]:
+    chain, found, taken = body.chain, [], set()
+    for joint in range(len(chain.names) - 2):
+        three = range(joint, joint + 3)
+        row = all(chain.parents[k + 1] == k + 1 and not chain.places[k + 1].any() for k in three[:2])
+        names = [chain.names[k] for k in three]
+        if not row or taken & {*three} or not {*names} <= {*body.joint_names} or chain.slides[joint : joint + 3].any():
+            continue
+        second = chain.turns[joint + 1]
+        axes = np.array(
+            [chain.axes[joint], second @ chain.axes[joint + 1], second @ chain.turns[joint + 2] @ chain.axes[joint + 2]]
+        )
+        if np.abs(axes @ axes.T - np.eye(3)).max() < _ACROSS:
+            found.append(_HingeTriple([body.joint_index(name) for name in names], axes))
+            taken |= {*three}
+    return found

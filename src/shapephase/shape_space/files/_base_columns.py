@@ -291,7 +291,7 @@ class BaseColumns:
                 turned = _by_quaternions(values[:, [group.parts.index(part) for part in "xyzw"]], self.recording)
             else:
                 order = self.choices.order or group.order
-                turned = _by_angles(values, group.parts, order)
+                turned = so3.matrix_from_euler(values[:, [group.parts.index(axis) for axis in order]], order)
                 record |= {"order": order, "order_said": self.choices.order is not None}
         if "order" not in record and (group is None or group.kind == "quaternion"):
             self._check_parts(turned)
@@ -416,12 +416,3 @@ def _by_quaternions(quaternions: Array, recording: Recording) -> Array:
             f"{recording.place(worst)}: the quaternion x y z w of the base has the norm {norms[worst]:.6g}; 1 is needed"
         )
     return so3.matrix_from_quat(quaternions / norms[:, None])
-
-
-def _by_angles(angles: Array, parts: str, order: str) -> Array:
-    """Turns one after the other, each about its axis as those before have turned it: (N, 3) [rad] -> (N, 3, 3)."""
-    turned = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    for axis in order:
-        unit = np.eye(3)[_AXES.index(axis)]
-        turned = turned @ so3.exp(angles[:, parts.index(axis), None] * unit)
-    return turned

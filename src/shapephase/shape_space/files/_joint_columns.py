@@ -13,7 +13,7 @@ from ...arrays import FARTHEST, Array, Integers
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
 from ...letters import what_came
-from ._ball_columns import continued_balls, with_quaternions
+from ._ball_columns import continued_balls, continued_hinges, with_quaternions
 from ._base_columns import BaseChoices, BaseColumns, BaseMotion
 from ._labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, in_square_brackets, label, quantity
 from ._recording import LONGEST_NAME, Recording
@@ -140,6 +140,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
         _check_reach(shapes[:, joint], joint, body, recording)
         if joint in found and joint not in known:
             check_unit(shapes[:, joint], joint, body, recording)
+    shapes = continued_hinges(shapes, body, recording)
     for joint in range(body.n_shape):
         warn_of_values(shapes[:, joint], joint, body, recording)
     shapes = continued_balls(shapes, body, recording)

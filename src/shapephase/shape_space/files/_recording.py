@@ -46,6 +46,7 @@ class Table:
     unread : name -> what it is, of arrays and other entries of the file that are no columns
     nameless : how columns of an array without names became those of joints; None: they have names
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
+    zero_pose : whether all angles of the first sample are zero: the pose that exporters put before a motion
     """
 
     where: str
@@ -64,6 +65,7 @@ class Table:
     unread: Mapping[str, str] = field(default_factory=dict)
     unnamed: Sequence[str] = ()
     nameless: NamelessJoints | None = None
+    zero_pose: bool = False
 
     def check_column(self, label: str) -> None:
         """Raise TrajectoryError for the first entry of a column that is no finite number."""
@@ -84,7 +86,9 @@ class Table:
             for name in ("times", "clock", "base_quat_xyzw", "base_position")
         }
         columns = {label: values[samples] for label, values in self.columns.items()}
-        return replace(self, columns=columns, rows=[self.rows[k] for k in places], faults=faults, **part)
+        zero_pose = self.zero_pose and places[:1] == [0]
+        rows = [self.rows[k] for k in places]
+        return replace(self, columns=columns, rows=rows, faults=faults, zero_pose=zero_pose, **part)
 
 
 @dataclass(frozen=True, eq=False)

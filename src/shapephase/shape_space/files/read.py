@@ -31,6 +31,7 @@ from ._joint_columns import JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
 from ._recording import LONGEST_NAME, Recording, Table
 from ._sample_origins import resampled
+from ._sample_steps import warn_of_fast_turns, without_first_pose
 from ._surroundings import surrounded
 from ._swings import check_swings
 from ._times import doubtful_steps, recording_of, trim_argument
@@ -120,7 +121,8 @@ def read_recorded_motion(
       coupled ones that are no joints of the body are left out.
     - `.mat`, `.h5`: vectors `time` and one for each joint, or a matrix `shapes` beside `joint_names`; on top or in a
       structure.
-    - `.bvh`: the bones' angles, for the body that `load_body` makes of such a file.
+    - `.bvh`: the bones' turns, for the body that `load_body` makes of such a file. A first frame with all angles at zero,
+      from which a joint goes over five times as far as in any step of the next second, is left out.
     - `.c3d`: the angles that a model computed, `LKneeAngles_x` and so on; no markers.
     - `.npz`: `time` (N,), `shapes` (N, n), `joint_names` (n,); the base as `base_quat_xyzw` (N, 4), `base_position`
       (N, 3).
@@ -191,7 +193,8 @@ def read_recorded_motion(
     Warns
     -----
     TrajectoryWarning
-        For what can be read and is probably not meant: limits left, gaps, jumps of a whole turn.
+        For what can be read and is probably not meant: limits left, gaps, jumps of a whole turn, a first sample that is
+        far from the second, ball joints that turn by over a third of a turn from one sample to the next.
 
     Examples
     --------
@@ -216,7 +219,10 @@ def read_recorded_motion(
     choices = JointChoices(
         names=mapping, base=base, degrees=degrees, rest=rest, rest_missing=rest_missing, ignore_extra=ignore_extra
     )
-    recording, motion, free = in_flight(recording, matched(recording, body, choices), body, flying)
+    motion = matched(recording, body, choices)
+    recording, motion = without_first_pose(recording, motion, body)
+    warn_of_fast_turns(recording, motion, body)
+    recording, motion, free = in_flight(recording, motion, body, flying)
     try:
         noise = _noise_levels(smooth, body)
         samples = Recorded(recording.times, motion.shapes, noise, body.joint_names)

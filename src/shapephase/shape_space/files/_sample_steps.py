@@ -1,0 +1,104 @@
+"""Steps from one sample of a recording to the next: a first pose apart from the motion, turns too fast to follow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ... import so3
+from ...arrays import Array
+from ...body.body import Body
+from ._joint_columns import Matched
+from ._labels import IN_A_SECOND
+from ._recording import Recording, warn
+from ._times import part_of
+
+_APART = 5.0
+"""Times the largest rate of the next second: a body that moves on does not slow down so much from its first step on."""
+_NEXT = 1.0
+"""[s]"""
+_FEWEST = 4
+"""Steps in it: fewer are no recording, of which one expects small steps."""
+_NO_POSE = 0.02
+"""[rad or m] A smaller first step is noise, or a body that moves very little."""
+_UNRESOLVED = 2.0 * np.pi / 3.0
+"""[rad] From one sample to the next, the short way: turns up to twice as long the other way round show as much."""
+
+
+def without_first_pose(recording: Recording, motion: Matched, body: Body) -> tuple[Recording, Matched]:
+    """The motion without a pose of zero angles that is apart from all others, which exporters put before it.
+
+    Warns
+    -----
+    TrajectoryWarning
+        Where that pose is left out, and where another first sample is as far from the second.
+    """
+    later = recording.times[1:-1] - recording.times[1] if len(recording.times) > 2 else np.zeros(0)
+    count = int(np.count_nonzero(later < _NEXT))
+    if count < _FEWEST:
+        return recording, motion
+    few = motion.kept(np.arange(count + 2))
+    lengths = np.diff(recording.times[: count + 2])
+    for what, unit, steps in _steps(few, body):
+        rates = steps.max(axis=1, initial=0.0) / lengths
+        if not (rates[0] > _APART * rates[1:].max() and steps[0].max() > _NO_POSE):
+            continue
+        name, far = what[int(np.argmax(steps[0]))], float(steps[0].max())
+        far, unit = (float(np.degrees(far)), "deg") if unit == "rad" else (far, unit)
+        often = f"over {_APART:g} times the largest step of the next {_NEXT:g} s"
+        moved = f"{name} goes {far:.3g} {unit} to the next {recording.table.row}, {often}"
+        if recording.table.zero_pose:
+            warn(f"{recording.place(0)}: left out: all angles are zero, and {moved}: a pose put before the motion")
+            samples = np.arange(1, len(recording.times))
+            return part_of(recording, samples), motion.kept(samples)
+        warn(
+            f"{recording.place(0)}: {moved}: is the first {recording.table.row} a pose that is no part of the motion? "
+            "Leave it out with trim (--trim)"
+        )
+        break
+    return recording, motion
+
+
+def warn_of_fast_turns(recording: Recording, motion: Matched, body: Body) -> None:
+    """Issue a TrajectoryWarning where a ball joint turns by about half a turn from one sample to the next."""
+    balls = body.chain.follows.balls
+    if not balls or len(recording.times) < 2:
+        return
+    steps = np.stack([_angles(ball.turns(motion.shapes)) for ball in balls], axis=1)
+    sample, column = divmod(int(np.argmax(steps)), len(balls))
+    if steps[sample, column] < _UNRESOLVED:
+        return
+    row, before = recording.table.row, recording.table.rows[sample]
+    clock = recording.first + recording.times[sample + 1] * IN_A_SECOND[recording.time_unit]
+    others = int(np.count_nonzero(steps >= _UNRESOLVED)) - 1
+    warn(
+        f"{recording.place(sample + 1)}: {balls[column].name} turns by {np.degrees(steps[sample, column]):.3g} deg "
+        f"from {row} {before}, at {clock:.6g} {recording.time_unit}{f' ({others} more such steps)' if others else ''}: "
+        "samples so far apart do not say which way round; the shorter way is taken"
+    )
+
+
+def _steps(motion: Matched, body: Body) -> list[tuple[list[str], str, Array]]:
+    """Names of what turns and of what slides, and how far each goes from sample to sample: (N - 1, k) [rad or m]."""
+    shapes, base = motion.shapes, motion.base
+    turning: list[tuple[str, Array]] = []
+    sliding: list[tuple[str, Array]] = []
+    for joint, (name, unit) in enumerate(zip(body.joint_names, body.joint_units, strict=True)):
+        if unit in ("rad", "m"):
+            (turning if unit == "rad" else sliding).append((name, np.abs(np.diff(shapes[:, joint]))))
+    for ball in body.chain.follows.balls:
+        turning.append((ball.name, _angles(ball.turns(shapes))))
+    if base.attitude is not None:
+        turning.append(("the base", _angles(base.attitude)))
+    if base.position is not None:
+        sliding.append(("the base", np.linalg.norm(np.diff(base.position, axis=0), axis=1)))
+    return [
+        ([name for name, _ in kind], unit, np.stack([steps for _, steps in kind], axis=1, dtype=np.float64))
+        if kind
+        else ([], unit, np.zeros((len(shapes) - 1, 0)))
+        for kind, unit in ((turning, "rad"), (sliding, "m"))
+    ]
+
+
+def _angles(turns: Array) -> Array:
+    """Between neighbours: (N, 3, 3) -> (N - 1,) [rad]."""
+    return so3.angle(so3.transpose(turns[:-1]) @ turns[1:])
