@@ -37,6 +37,7 @@ from .dynamics.swinging import FreeHinges, free_hinges
 from .dynamics.torques import JointTorques, joint_torques
 from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_bars.inertia_errors import InertiaErrors
+from .error_bars.recorded_flight import RecordedFlight, motion_from_recording
 from .error_bars.recorded_momentum import RecordedMomentum, momentum_from_recording
 from .error_bars.result_derivatives import Derivatives, ResultDerivative, derivatives
 from .errors import (
@@ -127,6 +128,7 @@ __all__ = [
     "PathSummary",
     "PhaseSplit",
     "Reach",
+    "RecordedFlight",
     "RecordedMomentum",
     "RecordedMotion",
     "ResultDerivative",
@@ -188,6 +190,7 @@ __all__ = [
     "momentum_from_rate",
     "momentum_from_recording",
     "momentum_returns",
+    "motion_from_recording",
     "motion_page",
     "optimal_control",
     "parallel_transport",

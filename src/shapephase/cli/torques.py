@@ -59,5 +59,6 @@ def torques_command(
             found.write_csv(out)
             say_written(out)
     text = torque_lines(found.loads, flown.motion, flown.body, motion)
+    text[0] += flown.beginning
     data = torque_data(found, flown.motion, flown.body, motion) | recording_data(flown.recorded)
     return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

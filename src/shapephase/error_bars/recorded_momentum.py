@@ -187,7 +187,7 @@ def momentum_from_recording(
         raise
     found = _estimated(fit, at, noise, tolerance)
     if not found.conserved:
-        warnings.warn(_not_conserved(found.momenta), TrajectoryWarning, stacklevel=2)
+        warn_of_drift(found)
     return found
 
 
@@ -238,12 +238,14 @@ def _estimated(fit: _Fitted, times: Array, noise: float | None, tolerance: float
     )
 
 
-def _not_conserved(momenta: Array) -> str:
-    """From where to where a momentum goes, (N, 3), in words."""
-    first, last = (" ".join(f"{value:.4g}" for value in momenta[row]) for row in (0, -1))
-    return (
+def warn_of_drift(fit: RecordedMomentum) -> None:
+    """Issue a TrajectoryWarning that says from where to where a momentum goes."""
+    first, last = (" ".join(f"{value:.4g}" for value in fit.momenta[row]) for row in (0, -1))
+    warnings.warn(
         f"the momentum is not constant: it goes from ({first}) to ({last}) kg m^2/s, so that nothing conserved was "
-        "recorded; the bars hold it at every time. Is the body in the air all the time, and are its masses right?"
+        "recorded; the bars hold it at every time. Is the body in the air all the time, and are its masses right?",
+        TrajectoryWarning,
+        stacklevel=3,
     )
 
 

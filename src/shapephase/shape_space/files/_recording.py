@@ -42,6 +42,7 @@ class Table:
     faults : label -> sample -> what stands there and is no number, of the first of them
     base_quat_xyzw : (N, 4) as recorded, or None
     base_position : (N, 3) [m] or None
+    up : the axis that the kind of file has upwards; None: it has none
     unread : name -> what it is, of arrays and other entries of the file that are no columns
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
     """
@@ -59,6 +60,7 @@ class Table:
     faults: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
     base_quat_xyzw: Array | None = None
     base_position: Array | None = None
+    up: str | None = None
     unread: Mapping[str, str] = field(default_factory=dict)
     unnamed: Sequence[str] = ()
 

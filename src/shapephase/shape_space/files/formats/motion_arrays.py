@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +92,8 @@ def _mujoco(arrays: dict[str, Any], where: Path, joint_names: Sequence[str], tim
     times = _mujoco_times(arrays, where, len(qpos), timestep)
     quaternions = qpos[:, 3:_FREE_JOINT][:, _SCALAR_FIRST] if free else None
     positions = qpos[:, :3] if free else None
-    return _table(where, "MuJoCo qpos", times, qpos[:, free:], names, quaternions, positions, arrays)
+    table = _table(where, "MuJoCo qpos", times, qpos[:, free:], names, quaternions, positions, arrays)
+    return replace(table, up="z")
 
 
 def _mujoco_times(arrays: dict[str, Any], where: Path, count: int, timestep: float | None) -> Array:
