@@ -38,6 +38,7 @@ from .dynamics.torque_errors import TorqueErrors, torque_errors
 from .dynamics.torques import JointTorques, joint_torques
 from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_bars.inertia_errors import InertiaErrors
+from .error_bars.recorded_flight import RecordedFlight, motion_from_recording
 from .error_bars.recorded_momentum import RecordedMomentum, momentum_from_recording
 from .error_bars.result_derivatives import Derivatives, ResultDerivative, derivatives
 from .errors import (
@@ -130,6 +131,7 @@ __all__ = [
     "PathSummary",
     "PhaseSplit",
     "Reach",
+    "RecordedFlight",
     "RecordedMomentum",
     "RecordedMotion",
     "ResultDerivative",
@@ -192,6 +194,7 @@ __all__ = [
     "momentum_from_rate",
     "momentum_from_recording",
     "momentum_returns",
+    "motion_from_recording",
     "motion_page",
     "optimal_control",
     "parallel_transport",

@@ -23,10 +23,11 @@ from ..integrator.fast.switch import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import RunProgress
 from ..shape_space.files._base_columns import ESTIMATE
+from ..shape_space.files._flight import ANY_GRAVITY, RECORDED
 from ..shape_space.files.mapping_files import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
-from .options import AS_RECORDED, AS_WRITTEN, AT_REST, BodyOptions, FlightOptions, RecordingOptions
+from .options import AS_RECORDED, AS_WRITTEN, BodyOptions, FlightOptions, RecordingOptions
 
 if TYPE_CHECKING:
     from ..error_bars.recorded_momentum import RecordedMomentum
@@ -52,6 +53,7 @@ class Flight:
     ----------
     recorded : None where the joints are not from a file
     fitted : its momentum, where it was fitted to the recorded base
+    momentum_by : "fit", "given", or "nothing" of a recording that does not say it
     """
 
     motion: Motion
@@ -59,6 +61,29 @@ class Flight:
     path: ShapePath
     recorded: RecordedMotion | None
     fitted: RecordedMomentum | None = None
+    momentum_by: str = "given"
+
+    @property
+    def beginning(self) -> str:
+        """What the first line of output says of a recording: its flight, or that its momentum is not known."""
+        if self.recorded is None:
+            return ""
+        if self.momentum_by == "nothing":
+            return ", zero as nothing of the base is recorded and no --momentum is given"
+        record = self.recorded.record
+        if self.recorded.flight is None and self.fitted is None:
+            return ""
+        whole = record["samples"] == record["samples_in_file"]
+        return (
+            f", {'all' if whole else 'flight'} from {record['first_time']:.9g} to {record['last_time']:.9g} "
+            f"{record['time_unit']}"
+        )
+
+    @property
+    def up(self) -> str | None:
+        """The axis that is up in the recording, where its fall says so."""
+        fall = None if self.recorded is None or self.recorded.flight is None else self.recorded.flight.fall
+        return None if fall is None else fall.up.removeprefix("+")
 
 
 def flight(
@@ -80,39 +105,36 @@ def flight(
     """
     start = _start(motion, options)
     goal = tolerance_argument(tolerance)
-    momentum = finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
+    momentum = None if options.momentum is None else finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
     loaded = body_argument(body, floating)
     for link in (gauge_link(gauge), trail):
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
-    if recording.flight and options != AT_REST:
-        raise ShapeError("--momentum and --attitude are fitted to the recorded base with --flight; leave them out")
-    if recording.base_axes == ESTIMATE and not recording.flight:
-        raise ShapeError(f"--base-axes {ESTIMATE}: the axes are found by the fit to a flight; give --flight, too")
-    path, recorded = joint_motion(motion, loaded, recording)
+    path, recorded = joint_motion(motion, loaded, recording, given=momentum is not None)
     expect_work(samples=_SAMPLES_A_BREAK * len(path.breaks))
-    deformation = articulated(loaded, path)
-    if recorded is None or recorded.flight is None:
-        moved = reconstruct(deformation, momentum, start, tolerance=goal, progress=progress)
-        return Flight(motion=moved, body=loaded, path=path, recorded=recorded)
-    from ..error_bars.recorded_momentum import momentum_from_recording
+    if recorded is None:
+        zero = np.zeros(3) if momentum is None else momentum
+        moved = reconstruct(articulated(loaded, path), zero, start, tolerance=goal, progress=progress)
+        return Flight(motion=moved, body=loaded, path=path, recorded=None)
+    from ..error_bars.recorded_flight import motion_from_recording
 
-    assert recorded.base_attitude is not None
-    fitted = momentum_from_recording(
-        deformation,
-        recorded.times,
-        recorded.base_attitude,
+    flown = motion_from_recording(
+        loaded,
+        recorded,
+        momentum=momentum,
+        attitude=start,
         tolerance=goal,
         find_axes=recording.base_axes == ESTIMATE,
+        progress=progress,
     )
-    return Flight(motion=fitted.motion, body=loaded, path=path, recorded=recorded, fitted=fitted)
+    return Flight(flown.motion, loaded, path, recorded, flown.fitted, flown.momentum_by)
 
 
-def _start(motion: str, options: FlightOptions) -> Array:
+def _start(motion: str, options: FlightOptions) -> Array | None:
     """The attitude at the start (3, 3): the one that is given, or that with which a motion of the library begins."""
     if options.attitude is not None:
         return so3.quat_argument(options.attitude, "attitude")
-    return so3.matrix_from_quat(np.array(MOTIONS[motion].attitude)) if _is_named(motion) else np.eye(3)
+    return so3.matrix_from_quat(np.array(MOTIONS[motion].attitude)) if _is_named(motion) else None
 
 
 def _is_named(motion: str) -> bool:
@@ -131,12 +153,15 @@ def body_argument(body: str, floating: BodyOptions) -> Body:
 
 
 def joint_motion(
-    motion: str, body: Body, recording: RecordingOptions = AS_RECORDED
+    motion: str, body: Body, recording: RecordingOptions = AS_RECORDED, *, given: bool | None = None
 ) -> tuple[ShapePath, RecordedMotion | None]:
-    """The path of a motion, and its record if it comes from a file."""
+    """The path of a motion, and its record if it comes from a file.
+
+    given : whether its momentum is given, and not to be found from the base; None: no momentum is needed
+    """
     if _is_named(motion):
         for field in fields(recording):
-            if getattr(recording, field.name) != field.default:
+            if field.name != "up" and getattr(recording, field.name) != field.default:
                 option = f"--{field.name.replace('_', '-')}"
                 raise ShapeError(f"{option} is for recorded motions; {motion} is a motion of the library")
         path, owner = named_motion(motion), MOTIONS[motion].body
@@ -152,7 +177,8 @@ def joint_motion(
     said = vars(recording) | {
         "names": column_names(recording.names),
         "rest": _rest(recording.rest),
-        "flight": flight_words(recording.flight),
+        "flight": flight_words(recording.flight) or (RECORDED if given is False else None),
+        "gravity": ANY_GRAVITY if given and recording.gravity is None else recording.gravity,
     }
     recorded = read_recorded_motion(motion, body, **said)
     return recorded.path, recorded

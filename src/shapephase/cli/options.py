@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
-
-
-def _spaced(value: Sequence[float]) -> str:
-    """A default as one types it."""
-    return " ".join(f"{number:g}" for number in value)
-
 
 BodyArgument = Annotated[
     str,
@@ -32,12 +25,12 @@ MotionArgument = Annotated[
     ),
 ]
 Momentum = Annotated[
-    tuple[float, float, float],
+    tuple[float, float, float] | None,
     Parameter(
         negative_iterable="",
-        show_default=_spaced,
-        help="Angular momentum about the centre of mass, inertial axes, in kg m^2/s; for example "
-        "`--momentum 0 0 0.02`.",
+        show_default=False,
+        help="Angular momentum about the centre of mass, inertial axes, in kg m^2/s; without it, that of a recorded "
+        "base, fitted to its free flight; else zero. For example `--momentum 0 0 0.02`.",
     ),
 ]
 Gauge = Annotated[
@@ -63,8 +56,8 @@ UpAxis = Annotated[
     Parameter(
         allow_leading_hyphen=True,  # "-z" is an axis
         show_default=False,
-        help="The axis that is up in 3-D: x, y, z, -x, -y or -z, without unit; without it z, or y for a body whose "
-        "left and right are across z. For example `--up y`.",
+        help="The axis that is up, of a recording and in 3-D: x, y, z, -x, -y or -z, without unit; without it that of "
+        "the recorded fall, else z, or y for a body whose left and right are across z. For example `--up y`.",
     ),
 ]
 FigureFile = Annotated[
@@ -152,13 +145,13 @@ class BodyOptions:
 class FlightOptions:
     """How the body flies: its momentum, and its attitude at the start."""
 
-    momentum: Momentum = (0.0, 0.0, 0.0)
+    momentum: Momentum = None
     attitude: Annotated[
         tuple[float, float, float, float] | None,
         Parameter(
             negative_iterable="",
             show_default=False,
-            help="Of the base at the start, a quaternion x y z w without unit; if not given, that of a library's "
+            help="Of the base at the start, a quaternion x y z w; if not given, as recorded, or that of a library's "
             "motion (cats begin on their back), else 0 0 0 1. For example `--attitude 1 0 0 0`.",
         ),
     ] = None
@@ -300,12 +293,21 @@ class RecordingOptions:
         tuple[str, ...],
         _motion_option(
             "Keep the free flight only, and fit the momentum to the recorded attitude of the base: auto (where the "
-            "centre of mass falls freely), all, or its first and last time, in s or the unit of the file; for example "
+            "centre of mass falls freely), all, or its first and last time, in s or the unit of the file; without it, "
+            "where the base is recorded and no --momentum is given, auto, or all where nothing falls. For example "
             "`--flight auto` or `--flight 12.5 13.9`.",
             negative_iterable="",
             consume_multiple=True,
         ),
     ] = ()
+    gravity: Annotated[
+        float | None,
+        _motion_option(
+            "By which the body falls in flight, in m/s^2; without it 9.81, and another fall is an error, as it says "
+            "that a unit of length or the frame rate is another. For example `--gravity 3.7`."
+        ),
+    ] = None
+    up: UpAxis = None
 
 
 @Parameter(name="*")

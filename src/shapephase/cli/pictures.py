@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import ShapeError, unknown_name
 from .options import (
@@ -19,11 +20,13 @@ from .options import (
     MotionArgument,
     PrintOptions,
     RecordingOptions,
-    UpAxis,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import put, say_written
+
+if TYPE_CHECKING:
+    from .motion import Flight
 
 
 def view_command(
@@ -37,7 +40,6 @@ def view_command(
     video: Path | None = None,
     trail: str | None = None,
     speed: float | None = None,
-    up: UpAxis = None,
     recording: RecordingOptions = AS_RECORDED,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome | None:
@@ -63,7 +65,7 @@ def view_command(
     from . import motion as motions
     from .texts.recording_text import recording_data
 
-    up_axis(up, None)
+    up_axis(recording.up, None)
     if speed is not None and not 0.0 < speed < math.inf:
         raise ShapeError(f"--speed: seconds of motion in a second of playing, above 0, are needed, got {speed:g}")
     aside = check_writable(html, "--html", ".html")
@@ -73,6 +75,7 @@ def view_command(
     with steps(2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, flight, recording, progress=work.watch, trail=trail, floating=floating)
+        up = recording.up or flown.up
         if html is not None or video is not None:
             work.begin("recording the animation")
             if html is not None:
@@ -84,10 +87,12 @@ def view_command(
             files = {"html": html, "video": video}
             data = {name: str(file) for name, file in files.items() if file is not None}
             data |= recording_data(flown.recorded)
-            return Outcome("", data, aside=aside, made_from=flown.motion.deformation.made_from)
+            return Outcome(_heading(flown, motion), data, aside=aside, made_from=flown.motion.deformation.made_from)
     live = view(flown.motion, trail=trail, speed=speed, up=up, notebook=False)
     if live is not None:
         with live:
+            if flown.recorded is not None:
+                put(_heading(flown, motion))
             put(f"{live.url}  (Ctrl-C to stop)")
             live.wait()
     return None
@@ -121,13 +126,26 @@ def plot_command(
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
     check_writable(out, "--out", ".svg", ".pdf", ".png")
-    if FIGURES[kind].with_momentum and not any(flight.momentum):
-        raise ShapeError(f"the figure {kind!r} needs an angular momentum: give one by --momentum")
+    if FIGURES[kind].with_momentum and flight.momentum is not None and not any(flight.momentum):
+        raise _no_momentum(kind)
     with steps(2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, flight, recording, progress=work.watch, gauge=gauge, floating=floating)
+        if FIGURES[kind].with_momentum and not flown.motion.momentum.any():
+            raise _no_momentum(kind)
         work.begin(f"drawing {kind.replace('_', ' ')}")
         write_figure(kind, flown.motion, out, flown.path, gauge)
         say_written(out)
     data = {"figure": str(out)} | recording_data(flown.recorded)
-    return Outcome("", data, made_from=flown.motion.deformation.made_from)
+    return Outcome(_heading(flown, motion), data, made_from=flown.motion.deformation.made_from)
+
+
+def _no_momentum(kind: str) -> ShapeError:
+    return ShapeError(f"the figure {kind!r} needs an angular momentum: give one by --momentum")
+
+
+def _heading(flown: Flight, motion: str) -> str:
+    """Of a recording, its momentum and its flight; nothing of other motions."""
+    from .texts.result_text import split_heading
+
+    return "" if flown.recorded is None else split_heading(flown.body, motion, flown.motion) + flown.beginning

@@ -20,7 +20,6 @@ from .options import (
     RecordingOptions,
     ReportFile,
     Tolerance,
-    UpAxis,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -45,7 +44,6 @@ def split_command(
     samples: Path | None = None,
     phases: Path | None = None,
     html: ReportFile = None,
-    up: UpAxis = None,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Split the rotation of a free body into shape holonomy and Montgomery phase.
@@ -79,13 +77,17 @@ def split_command(
     if html is not None:
         from ..plotting.pages.up_axis import up_axis
 
-        up_axis(up, None)
+        up_axis(recording.up, None)
     with steps(13 if html else 2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge, floating=floating)
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
         bars = error_bars(flown.motion, errors, flown.recorded, flown.fitted)
+        if flown.fitted is None or bars is None:
+            lines, data = recorded_base_text(flown.motion, flown.recorded)
+        else:
+            lines, data = fit_lines(flown.fitted, bars), fit_data(flown.fitted)
         if out is not None:
             flown.motion.save(out)
             say_written(out)
@@ -106,17 +108,13 @@ def split_command(
                 html,
                 shape_path=flown.path,
                 title=title,
-                up=up,
+                up=recording.up or flown.up,
                 error_bars=error_bar_lines(result, bars, flown.recorded, errors),
-                recording=recording_lines(flown.body, flown.recorded),
+                recording=[*lines, *recording_lines(flown.body, flown.recorded)],
                 noise=joint_noise(flown.body, errors),
                 begin=work.begin,
             )
             say_written(html)
-    if flown.fitted is None or bars is None:
-        lines, data = recorded_base_text(flown.motion, flown.recorded)
-    else:
-        lines, data = fit_lines(flown.fitted, bars), fit_data(flown.fitted)
     names = flown.body.joint_names
     gap = path_gap(flown.body, flown.path.matched(names, flown.body.name))
     open_by = "" if result.is_loop else f"{gap_text(flown.body, gap)} from its start"
@@ -126,6 +124,7 @@ def split_command(
         *lines,
         *recording_lines(flown.body, flown.recorded),
     ]
+    text[0] += flown.beginning
     data = split_data(flown.body, motion, flown.motion, result) | error_bar_data(bars) | data
     data |= recording_data(flown.recorded)
     return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

@@ -61,5 +61,6 @@ def torques_command(
         work.begin("error bars")
         bars, of_bars = load_bars(flown.motion, found.loads, flown.recorded)
     text = torque_lines(found.loads, flown.motion, flown.body, motion, bars) + ([of_bars] if of_bars else [])
+    text[0] += flown.beginning
     data = torque_data(found, flown.motion, flown.body, motion, bars) | recording_data(flown.recorded)
     return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

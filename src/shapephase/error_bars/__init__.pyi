@@ -1,16 +1,19 @@
 from .covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .inertia_errors import InertiaErrors
+from .recorded_flight import RecordedFlight, motion_from_recording
 from .recorded_momentum import RecordedMomentum, momentum_from_recording
 from .result_derivatives import Derivatives, ResultDerivative, derivatives
 
 __all__ = [
     "Derivatives",
     "InertiaErrors",
+    "RecordedFlight",
     "RecordedMomentum",
     "ResultDerivative",
     "Uncertainty",
     "derivatives",
     "momentum_from_recording",
+    "motion_from_recording",
     "sampled_uncertainty",
     "uncertainty",
 ]

@@ -155,10 +155,11 @@ def one_rotation(motion: Motion) -> SteppedRotation:
     return stepped.finest if isinstance(stepped, GroupedRotations) else stepped
 
 
-def responses(motion: Motion, times: Array) -> Array:
+def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
     """How the attitude turns at each time by turns of the start and by changes of the momentum, inertial axes.
 
-    (N,) ascending -> (N, 3, 6): the first three columns by the start, the last three by the momentum.
+    (N,) ascending -> (N, 3, 6 + 3 modes): the first three columns by the start, the next three by the momentum, each
+    three more by one that changes like the next Legendre polynomial from the first to the last of the times.
     """
     stepped = one_rotation(motion)
     edges = _pieces(stepped, np.union1d(motion.deformation.breaks, times))
@@ -171,10 +172,14 @@ def responses(motion: Motion, times: Array) -> Array:
     scaled = widths[:, None, None, None] * turning.reshape(len(widths), _NODES, 3, 3)
     slopes = scaled @ so3.hat(motion.momentum)
     # Within a piece: from its start, and by a unit of momentum.
-    from_start, by_momentum = _within(slopes), _within(slopes, np.einsum("ij,pjab->piab", matrix, scaled))
+    changes = (scaled[..., None, :] * legendre(at, times, modes).reshape(len(widths), _NODES, 1, -1, 1)).reshape(
+        len(widths), _NODES, 3, -1
+    )
+    from_start, by_momentum = _within(slopes), _within(slopes, np.einsum("ij,pjab->piab", matrix, changes))
     across = np.eye(3) + np.einsum("j,pjab->pab", shares, slopes @ from_start)
-    added = np.einsum("j,pjab->pab", shares, scaled + slopes @ by_momentum)
-    found, reached = np.empty((len(edges), 3, 6)), np.eye(3, 6)
+    added = np.einsum("j,pjab->pab", shares, changes + slopes @ by_momentum)
+    columns = 6 + 3 * modes
+    found, reached = np.empty((len(edges), 3, columns)), np.eye(3, columns)
     found[0] = reached
     for piece in range(len(widths)):
         reached = across[piece] @ reached
@@ -182,6 +187,13 @@ def responses(motion: Motion, times: Array) -> Array:
         found[piece + 1] = reached
     # Of edges that differ from a time by rounding one was kept.
     return found[np.searchsorted(0.5 * (edges[1:] + edges[:-1]), times)]
+
+
+def legendre(at: Array, times: Array, modes: int) -> Array:
+    """Legendre polynomials of orders 0 to `modes` from the first to the last of the times: (M,) -> (M, 1 + modes)."""
+    since = 2.0 * (at - times[0]) / max(float(times[-1] - times[0]), np.finfo(float).tiny) - 1.0
+    # Before and after, nothing was recorded that could say how they go on.
+    return np.polynomial.legendre.legvander(np.clip(since, -1.0, 1.0), modes)
 
 
 def _pieces(stepped: SteppedRotation, breaks: Array) -> Array:
@@ -215,13 +227,13 @@ def _adjoint(slopes: Array, widths: Array) -> tuple[Array, Array]:
 
 
 def _within(scaled: Array, given: Array | None = None) -> Array:
-    """X_i - sum_j a_ij scaled_j X_j = given_i at the nodes of each piece; None: one: (P, m, 3, 3) -> (P, m, 3, 3)."""
+    """X_i - sum_j a_ij scaled_j X_j = given_i at the nodes of each piece; None: one: (P, m, 3, c) -> (P, m, 3, c)."""
     _, _, matrix = _rule()
     count, m = scaled.shape[:2]
     # Rows count nodes and components.
     system = -np.einsum("ij,pjab->piajb", matrix, scaled).reshape(count, 3 * m, 3 * m) + np.eye(3 * m)
-    right = np.tile(np.eye(3), (m, 1)) if given is None else given.reshape(count, 3 * m, 3)
-    return np.linalg.solve(system, right).reshape(count, m, 3, 3)
+    right = np.tile(np.eye(3), (m, 1)) if given is None else given.reshape(count, 3 * m, -1)
+    return np.linalg.solve(system, right).reshape(count, m, 3, -1)
 
 
 @lru_cache(maxsize=1)

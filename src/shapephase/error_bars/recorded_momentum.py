@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations, product
@@ -15,10 +16,11 @@ from ..arguments import check_flag, check_object, number_argument, times_argumen
 from ..arrays import Array, copied_when_read, finite_array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..display import short_repr
-from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
+from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..reconstruction.recorded_base import W_FIRST, read_w_first
-from ._along_motion import responses
+from ._along_motion import legendre, responses
+from ._residual_noise import drift_modes, held, most_modes, residual_noise
 
 # Rounds of Gauss and Newton; a flight of many turns takes ten.
 _MOST_ROUNDS = 40
@@ -42,6 +44,10 @@ _VAGUE_AXES = 0.3
 _FIRST_TIMES = 6
 # [rad] A recording that stays so far from every motion of the body is none of its flights.
 _NO_FLIGHT = 0.5
+# Of the tolerance of the reconstruction: residuals below are rounding.
+_ROUNDED = 10.0
+# Of the momentum and of what the joints carry: a change that is smaller is no news.
+_CONSTANT = 0.01
 
 
 @copied_when_read("initial_attitude", "base_axes")
@@ -56,9 +62,16 @@ class RecordedMomentum:
     momentum_covariance : (3, 3) [(kg m^2/s)^2], as `uncertainty` takes it
     attitude_covariance : (3, 3) of the turn of the start, base axes [rad^2], as `uncertainty` takes it
     covariance : (6, 6) of both, the turn of the start first, as `uncertainty` takes it: by the noise of the recorded
-        attitudes alone; with that of the joints it is `uncertainty(fit.motion, start=fit, joints=...).start`
+        attitudes alone, with its correlation in time, and by a momentum that changes; with the noise of the joints it
+        is `uncertainty(fit.motion, start=fit, joints=...).start`
     by_attitudes : (6, 3 N) their change by turns of the recorded attitudes, base axes
     noise : of each component of a recorded attitude, given or as the fit leaves it [rad]
+    noise_correlation : of the noise of neighbouring attitudes, as the fit leaves it: 0 for white noise
+    widening : by which this correlation makes the bars of the momentum longer than white noise does, at most
+    momenta : (N, 3) the momentum at each time, the recorder's axes [kg m^2/s]: constant where the residuals are noise,
+        else as it changes
+    conserved : whether the momentum is constant, as far as the residuals show: to a hundredth of itself and of what
+        the joints carry, or within noise
     residuals : (N, 3) from reconstructed to recorded attitudes, rotation vectors in base axes [rad]
     motion : the one that was fitted
     times : (N,) of the recorded attitudes [s]
@@ -81,7 +94,11 @@ class RecordedMomentum:
     covariance: Array
     by_attitudes: Array
     noise: float
+    noise_correlation: float
+    widening: float
     residuals: Array
+    momenta: Array
+    conserved: bool
     motion: Motion
     times: Array
     base_axes: Array
@@ -116,7 +133,7 @@ def momentum_from_recording(
     times : (N,) within it, ascending, three or more [s]
     attitudes : (N, 3, 3), base axes to the recorder's; nearer to each other than half a turn
     noise : standard deviation of each component of a recorded attitude [rad]; None: what the fit leaves, which holds
-        what noise of the joints turns the reconstruction by, too
+        what noise of the joints turns the reconstruction by, too. Bars are never shorter than what the fit leaves says
     tolerance : of the reconstruction [rad]
     find_axes : whether the attitudes are those of axes that are fixed to the base in an unknown way, which is fitted
         too: from the way on with which the momentum, roughly, stays most constant
@@ -132,9 +149,16 @@ def momentum_from_recording(
         If the fit does not settle: the recording is no free flight of this body, or too coarse; or if it does not tell
         the axes.
 
+    Warns
+    -----
+    TrajectoryWarning
+        If the momentum changes: what is left over of the attitudes is no noise. Bars then hold the momentum at every
+        time.
+
     Notes
     -----
-    Equation :eq:`moved-fit` of the documentation.
+    Noise that is correlated in time, as trackers and filters leave it, makes the bars longer, by an autoregressive
+    process whose correlation is not known either. Equation :eq:`moved-fit` of the documentation.
     Source: theory.md section 8 (the response of the attitude to start and momentum).
 
     Examples
@@ -161,11 +185,39 @@ def momentum_from_recording(
         if _is_flight_with_w_first(deformation, at, recorded, tolerance, find_axes=find_axes):
             raise TrajectoryError(f"the recorded base is no flight of this body; {W_FIRST}") from error
         raise
+    found = _estimated(fit, at, noise, tolerance)
+    if not found.conserved:
+        warn_of_drift(found)
+    return found
+
+
+def _estimated(fit: _Fitted, times: Array, noise: float | None, tolerance: float) -> RecordedMomentum:
+    """The fit with what its residuals say about noise and about a momentum that changes."""
     residuals, slopes, motion = fit.residuals, fit.slopes, fit.motion
-    if noise is None:
-        noise = float(np.sqrt((residuals**2).sum() / (residuals.size - slopes.shape[1])))
-    covariance = np.asarray(noise**2 * np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
-    of_axes = covariance[UNKNOWNS:, UNKNOWNS:] if find_axes else np.zeros((3, 3))
+    white = np.asarray(np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
+    seen = float(np.sqrt((residuals**2).sum() / (residuals.size - slopes.shape[1])))
+    modes, by_modes = 0, np.empty((residuals.size, 0))
+    # What the tolerance of the reconstruction leaves is rounding.
+    if _spread(residuals) > _ROUNDED * tolerance:
+        turned = responses(motion, times, most_modes(len(times)))[:, :, UNKNOWNS:]
+        by_modes = (so3.transpose(motion.attitude(times)) @ turned).reshape(residuals.size, -1)
+        modes = drift_modes(residuals, slopes, by_modes)
+    left = residual_noise(residuals, np.hstack([slopes, by_modes[:, : 3 * modes]]))
+    covariance = left.covariance(slopes)
+    widening = float(np.sqrt(np.diag(covariance / (left.weights @ left.variances * white))[3:UNKNOWNS].max()))
+    if noise is not None:
+        covariance = covariance + max(noise**2 - seen**2, 0.0) * white
+    momenta, conserved = np.tile(motion.momentum, (len(times), 1)), True
+    if modes:
+        seen = float(np.sqrt(left.weights @ left.variances))
+        changes = (left.weights @ left.parameters).reshape(-1, 3)[[1, *range(-modes, 0)]]
+        deviations = legendre(times, times, modes) @ changes
+        covariance[3:UNKNOWNS, 3:UNKNOWNS] += held(deviations)
+        momenta = momenta + deviations
+        _, carried = motion.deformation.description.sample(times)
+        turning = np.linalg.norm(motion.momentum) + np.sqrt((carried**2).sum(axis=1).mean())
+        conserved = bool(np.linalg.norm(deviations, axis=1).max() <= _CONSTANT * turning)
+    free = fit.slopes.shape[1] > UNKNOWNS
     return RecordedMomentum(
         momentum=motion.momentum,
         initial_attitude=motion.initial_attitude,
@@ -173,12 +225,27 @@ def momentum_from_recording(
         attitude_covariance=covariance[:3, :3],
         covariance=covariance[:UNKNOWNS, :UNKNOWNS],
         by_attitudes=np.asarray(np.linalg.pinv(slopes)[:UNKNOWNS], dtype=np.float64),
-        noise=noise,
+        noise=seen if noise is None else noise,
+        noise_correlation=left.correlation,
+        widening=widening,
         residuals=residuals,
+        momenta=momenta,
+        conserved=conserved,
         motion=motion,
-        times=at,
+        times=times,
         base_axes=fit.axes,
-        axes_covariance=of_axes,
+        axes_covariance=covariance[UNKNOWNS:, UNKNOWNS:] if free else np.zeros((3, 3)),
+    )
+
+
+def warn_of_drift(fit: RecordedMomentum) -> None:
+    """Issue a TrajectoryWarning that says from where to where a momentum goes."""
+    first, last = (" ".join(f"{value:.4g}" for value in fit.momenta[row]) for row in (0, -1))
+    warnings.warn(
+        f"the momentum is not constant: it goes from ({first}) to ({last}) kg m^2/s, so that nothing conserved was "
+        "recorded; the bars hold it at every time. Is the body in the air all the time, and are its masses right?",
+        TrajectoryWarning,
+        stacklevel=3,
     )
 
 

@@ -25,6 +25,8 @@ _MOST_PARTS = 10
 """Stretches of a flight of which the table has a column."""
 _BAR_DIGITS = 2
 """Digits of a bar that are shown."""
+_WIDER = 1.1
+"""By which bars have to be longer than those of white noise for that to be printed."""
 _ROUNDING = 1e-12
 """[rad or m] from samples to the path that goes through them."""
 
@@ -64,8 +66,12 @@ def fit_lines(fitted: RecordedMomentum, errors: Uncertainty) -> list[str]:
     lines = [
         "",
         f"{'momentum, fitted':24}{momentum}   kg m^2/s",
-        f"{'to the recorded base':24}{len(angles)} attitudes with {noise:.3g} deg of noise about each axis",
+        f"{'to the recorded base':24}{len(angles)} attitudes with {noise:.3g} deg of noise about each axis"
+        f"{_correlated(fitted)}",
     ]
+    if np.ptp(fitted.momenta, axis=0).any():
+        first, last = (", ".join(f"{v:.{digits}f}" for v in fitted.momenta[row]) for row in (0, -1))
+        lines.append(f"{'  not constant':24}from {first} to {last}   kg m^2/s; the bars hold it at every time")
     if fitted.axes_covariance.any():
         turned = " ".join(f"{v + 0.0:.4f}" for v in so3.quat_from_matrix(fitted.base_axes))
         off = np.degrees(np.sqrt(np.trace(fitted.axes_covariance)))
@@ -93,6 +99,10 @@ def fit_data(fitted: RecordedMomentum) -> dict[str, Any]:
         "initial_attitude_quat_xyzw": so3.quat_from_matrix(fitted.initial_attitude).tolist(),
         "covariance_of_attitude_and_momentum": fitted.covariance.tolist(),
         "noise_rad": fitted.noise,
+        "noise_correlation": fitted.noise_correlation,
+        "widening_by_correlation": fitted.widening,
+        "conserved": fitted.conserved,
+        "momenta_kg_m2_s": fitted.momenta.tolist(),
         "base_axes": fitted.base_axes.tolist(),
         "base_axes_covariance_rad2": fitted.axes_covariance.tolist(),
         "times_s": fitted.times.tolist(),
@@ -103,6 +113,13 @@ def fit_data(fitted: RecordedMomentum) -> dict[str, Any]:
         "recorded_base_difference_rad": float(fitted.angles[worst]),
         "recorded_base_difference_time_s": float(fitted.times[worst]),
     }
+
+
+def _correlated(fitted: RecordedMomentum) -> str:
+    """What a correlation of the noise does to the bars, where that shows."""
+    if fitted.widening < _WIDER:
+        return ""
+    return f", correlated in time: bars up to {fitted.widening:.2g} times those of white noise"
 
 
 def _rms(angles: Array) -> float:

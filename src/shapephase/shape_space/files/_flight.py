@@ -9,12 +9,15 @@ from typing import Any
 import numpy as np
 
 from ... import so3
+from ...arguments import positive_argument
+from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
-from ...errors import ShapeError, TrajectoryError
+from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
 from ._base_columns import ESTIMATE
-from ._free_fall import FreeFall, free_fall
+from ._fall_units import check_gravity, check_parabola, slipped_fall
+from ._free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, free_fall
 from ._joint_columns import Matched
 from ._recording import Recording
 from ._times import part_of, samples_within, trim_argument
@@ -23,6 +26,10 @@ AUTO = "auto"
 """Instead of two times: the flight is found by the fall of the centre of mass."""
 ALL = "all"
 """Instead of two times: the body is free all the time."""
+RECORDED = "recorded"
+"""Instead of two times: where the base is recorded, its fall; without places or a fall all of it; else no flight."""
+ANY_GRAVITY = "any"
+"""Instead of a gravity: units of length and time are not doubted."""
 # Of a flight, to which six numbers are fitted.
 _FEWEST = 3
 
@@ -36,6 +43,7 @@ class Flight:
     first_time, last_time : as the file tells the time
     by : "auto", "all" or "times": how it was found
     fall : how the centre of mass falls there, where the flight was found by it
+    asked : whether it was asked for; else the recorded base has to show that it is one
 
     Examples
     --------
@@ -47,6 +55,7 @@ class Flight:
     last_time: float
     by: str
     fall: FreeFall | None = None
+    asked: bool = True
 
     __repr__ = short_repr
 
@@ -56,21 +65,46 @@ class Flight:
         found = {"first_time": self.first_time, "last_time": self.last_time, "by": self.by}
         if self.fall is not None:
             found |= {"up": self.fall.up, "centre_noise_m": self.fall.noise, "off_parabola_rms_m": self.fall.off}
+            found |= {"gravity_m_s2": self.fall.gravity, "gravity_bar_m_s2": self.fall.gravity_bar}
         return found
 
 
-def flight_argument(flight: str | Sequence[float] | None) -> str | tuple[float, float] | None:
-    """A user's flight. Raises ShapeError."""
-    if flight is None or (isinstance(flight, str) and flight in (AUTO, ALL)):
-        return flight
+@dataclass(frozen=True)
+class FlightChoices:
+    """How a flight is found in a recording: what a caller has said, checked.
+
+    Attributes
+    ----------
+    said : a word, two times, or None: no flight is asked for
+    up : the axis that points up, or None for that of the format
+    gravity : [m/s^2]; or None: units are not doubted
+    """
+
+    said: str | tuple[float, float] | None = None
+    up: str | None = None
+    gravity: float | None = GRAVITY
+
+
+def flight_choices(flight: str | Sequence[float] | None, up: str | None, gravity: float | str | None) -> FlightChoices:
+    """A user's flight, axis and gravity. Raises ShapeError, UnknownNameError."""
+    if up is not None and (not isinstance(up, str) or up not in UP_AXES):
+        raise unknown_name("axis", up, UP_AXES)
+    if gravity is None or isinstance(gravity, str):
+        if gravity not in (None, ANY_GRAVITY):
+            raise ShapeError(f"gravity: a number of m/s^2, or {ANY_GRAVITY!r}, is needed, got {what_came(gravity)}")
+        pull = GRAVITY if gravity is None else None
+    else:
+        pull = positive_argument(gravity, "gravity", "an acceleration in m/s^2")
+    if flight is None or (isinstance(flight, str) and flight in (AUTO, ALL, RECORDED)):
+        return FlightChoices(flight, up, pull)
     if isinstance(flight, str) or not isinstance(flight, Sequence | np.ndarray) or len(flight) != 2:
-        raise ShapeError(f"flight: {AUTO!r}, {ALL!r} or two times are needed, got {what_came(flight)}")
+        raise ShapeError(f"flight: {AUTO!r}, {ALL!r}, {RECORDED!r} or two times are needed, got {what_came(flight)}")
     first, last = flight
-    return trim_argument((first, last), "flight")
+    return FlightChoices(trim_argument((first, last), "flight"), up, pull)
 
 
 def in_flight(
-    recording: Recording, motion: Matched, body: Body, said: str | tuple[float, float] | None
+    recording: Recording, motion: Matched, body: Body, choices: FlightChoices
 ) -> tuple[Recording, Matched, Flight | None]:
     """The part of a recording and of its motion that is the flight; all of them where nobody asks for one.
 
@@ -78,45 +112,66 @@ def in_flight(
     ------
     TrajectoryError
         If the attitude of the base was not recorded, or, where the flight is to be found, its position; if none is
-        found, or less than three samples are in it.
+        found, or less than three samples are in it; if it falls otherwise than by gravity, as units make it.
     """
-    if said is None:
+    said, where, base = choices.said, recording.table.where, motion.base
+    if said is None or (said == RECORDED and base.attitude is None):
         return recording, motion, None
-    where, base = recording.table.where, motion.base
     if base.attitude is None:
         raise TrajectoryError(
             f"{where}: a flight is fitted to the recorded attitude of the base, and there is none; columns such as "
             "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed"
         )
-    fall = None
-    if said == AUTO:
-        fall = _fall(recording, motion, body)
-        samples = np.arange(fall.first, fall.last + 1)
-    elif isinstance(said, tuple):
-        samples = samples_within(recording, said)
-    else:
-        samples = np.arange(len(recording.times))
+    fall, by = None, "times" if isinstance(said, tuple) else ALL
+    samples = samples_within(recording, said) if isinstance(said, tuple) else np.arange(len(recording.times))
+    centres = None if said == AUTO else _places(motion, body)
+    if said == AUTO or (said == RECORDED and centres is not None):
+        fall = _fall(recording, motion, body, choices)
+        if fall is not None:
+            samples, by = np.arange(fall.first, fall.last + 1), AUTO
+    elif centres is not None and choices.gravity is not None and len(samples) >= _FEWEST:
+        # Three samples are always a parabola.
+        noise = centre_noise(recording.times, centres)
+        check_parabola(recording.times[samples], centres[samples], noise, choices.gravity, where)
     if len(samples) < _FEWEST:
         raise TrajectoryError(
             f"{where}: {len(samples)} samples are in the flight, three or more are needed; the recording goes from "
             f"{recording.first:.9g} to {recording.last:.9g} {recording.time_unit}"
         )
-    by = "times" if isinstance(said, tuple) else said
     part = part_of(recording, samples)
-    return part, motion.kept(samples), Flight(part.first, part.last, by, fall)
+    return part, motion.kept(samples), Flight(part.first, part.last, by, fall, said != RECORDED)
 
 
-def _fall(recording: Recording, motion: Matched, body: Body) -> FreeFall:
-    where, base = recording.table.where, motion.base
+def _places(motion: Matched, body: Body) -> Array | None:
+    """Places of the centre of mass, the recorder's axes, where they are known: (N, 3) [m]."""
+    base = motion.base
+    if base.position is None or base.attitude is None or (base.record or {}).get("axes") == ESTIMATE:
+        return None
+    return base.position + so3.apply(base.attitude, body.centre_of_mass(motion.shapes))
+
+
+def _fall(recording: Recording, motion: Matched, body: Body, choices: FlightChoices) -> FreeFall | None:
+    """The fall of a recording; None where there is none and none was asked for."""
+    where, base, gravity = recording.table.where, motion.base, choices.gravity or GRAVITY
     if base.position is None or base.attitude is None:
         raise TrajectoryError(
             f"{where}: a flight is found by the fall of the centre of mass, and the position of the base is not "
             "recorded; give its times: flight=(first, last) (--flight FIRST LAST), or flight='all' (--flight all)"
         )
-    if base.record is not None and base.record["axes"] == ESTIMATE:
+    centres = _places(motion, body)
+    if centres is None:
         raise TrajectoryError(
             f"{where}: where the centre of mass is, is not known before the axes of the base are; give the times of "
             "the flight: flight=(first, last) (--flight FIRST LAST)"
         )
-    centres = base.position + so3.apply(base.attitude, body.centre_of_mass(motion.shapes))
-    return free_fall(recording.times, centres, where)
+    times, up = recording.times, choices.up or recording.table.up
+    rate, missing = 1.0 / float(np.median(np.diff(times))), None
+    try:
+        fall = free_fall(times, centres, where, up=up, gravity=gravity)
+    except TrajectoryError as error:
+        missing, fall = error, slipped_fall(times, base.position, centres - base.position, gravity, up)
+    if fall is not None and choices.gravity is not None:
+        check_gravity(fall, choices.gravity, rate, where)
+    if fall is None and missing is not None and choices.said == AUTO:
+        raise missing
+    return fall

@@ -1,7 +1,8 @@
 """The stretch of a recording on which the body falls freely: its centre of mass accelerates as gravity alone makes it.
 
-Less what gravity does, the centre of mass then goes along a straight line. No direction is taken for the vertical: the
-axis of the recorder that gives the longest fall is it.
+Less what gravity does, the centre of mass then goes along a straight line. Up is one direction for the whole recording:
+the one that is given, else that axis of the recorder with the longest fall. No axis points down unless that is said:
+what accelerates upwards by g pushes off, or lands.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from ...arrays import Array, Integers, Mask
 from ...errors import TrajectoryError
 
-_GRAVITY = 9.81
+GRAVITY = 9.81
 """[m/s^2] On earth it differs by a quarter of a per cent, which moves nothing by a millimetre within a second."""
 _MODEL = 0.002
 """[m] A centre of mass that is computed from a body's masses wanders by about this much as the body changes shape."""
@@ -30,6 +31,12 @@ _CUT = 2.0
 """Standard deviations: for so long a contact that accelerates the body by g may last unseen, and that much is cut."""
 _FEWEST = 6
 """Samples of a window."""
+_WANDER = 0.01
+"""[m] By which the computed centre of mass may sag in the middle of a flight: segments are not rigid, and not known."""
+_SAME = 0.03
+"""Of gravity: a measured fall that differs by less is searched for as it is."""
+UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
+"""Directions that may be up."""
 _AT_ONCE = 1024
 """Windows: memory."""
 _NORMAL_MEDIAN = 0.6745
@@ -46,6 +53,7 @@ class FreeFall:
     up : the axis of the recorder that points up, as "+y"
     noise : of each coordinate of the centre of mass, by which it was found [m]
     off : how far the centre of mass is from its parabola, rms of a coordinate [m]
+    gravity, gravity_bar : how fast it falls, and the standard deviation of that, with 1 cm of wander [m/s^2]
     """
 
     first: int
@@ -53,6 +61,8 @@ class FreeFall:
     up: str
     noise: float
     off: float
+    gravity: float
+    gravity_bar: float
 
     @property
     def ends(self) -> tuple[int, int]:
@@ -83,7 +93,7 @@ class _Windows(NamedTuple):
         return 3.0 * (self.ends - self.starts - 1).astype(np.float64)
 
 
-def free_fall(times: Array, centres: Array, where: str) -> FreeFall:
+def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None, gravity: float = GRAVITY) -> FreeFall:
     """The longest stretch on which a centre of mass falls freely.
 
     Parameters
@@ -91,35 +101,98 @@ def free_fall(times: Array, centres: Array, where: str) -> FreeFall:
     times : (N,) ascending [s]
     centres : (N, 3) of mass, axes of the recorder, one of which is vertical [m]
     where : the file, for messages
+    up : the axis that points up, one of UP_AXES; None: x, y or z, whichever has the longest fall
+    gravity : [m/s^2]
 
     Raises
     ------
     TrajectoryError
-        If there is none that is long enough to tell it from rest.
+        If there is none that is long enough to tell it from rest; or, without `up`, if a longer one has an axis that
+        points down.
     """
-    noise = float(np.hypot(_white_noise(times, centres), _MODEL))
-    window = float(np.sqrt(_CLEAR * noise / (0.5 * _GRAVITY * _OF_A_PARABOLA)))
-    windows = _windows(times, centres, window)
-    longest: FreeFall | None = None
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            pull = 0.5 * sign * _GRAVITY
-            squares = windows.squares + 2.0 * pull * windows.mixed[:, axis] + pull**2 * windows.parabola
-            falls = squares <= noise**2 * (windows.free + _CHANCE * np.sqrt(2.0 * windows.free))
-            straight = centres.copy()
-            straight[:, axis] += pull * (times - times[0]) ** 2
-            found = _longest(times, straight, windows, falls, noise, window)
-            if found is not None and (longest is None or _lasts(times, found) > _lasts(times, longest.ends)):
-                inside = slice(found[0], found[1] + 1)
-                off = _off_line(times[inside], straight[inside])
-                longest = FreeFall(found[0], found[1], f"{'+' if sign > 0 else '-'}{'xyz'[axis]}", noise, off)
+    noise = centre_noise(times, centres)
+    if up is not None:
+        longest = falls_along(times, centres, up, gravity)
+        downwards = None
+    else:
+        found = {axis: falls_along(times, centres, axis, gravity) for axis in UP_AXES}
+        longest, downwards = (_longer([found[axis] for axis in part], times) for part in (UP_AXES[:3], UP_AXES[3:]))
+    if downwards is not None and (longest is None or _lasts(times, downwards.ends) > _lasts(times, longest.ends)):
+        first, last = times[downwards.first], times[downwards.last]
+        raise TrajectoryError(
+            f"{where}: from {first:.4g} to {last:.4g} s after its start the body accelerates by g along "
+            f"{downwards.up[1]}: it pushes off or lands there, or that axis points down. If it does, give up "
+            f"(--up {downwards.up}); else give the times of the flight: flight=(first, last) (--flight FIRST LAST)"
+        )
     if longest is None:
         raise TrajectoryError(
-            f"{where}: nowhere does the centre of mass fall freely for {window:.2g} s or more (it is known to "
-            f"{1e3 * noise:.2g} mm). Are the axes of the base right (base_axes, --base-axes)? If so, and there is a "
-            "flight, give its times: flight=(first, last) (--flight FIRST LAST)"
+            f"{where}: nowhere does the centre of mass fall freely for {_shortest(noise, gravity):.2g} s or more (it "
+            f"is known to {1e3 * noise:.2g} mm; "
+            f"{'x, y or z' if up is None else up} up; {gravity:.4g} m/s^2). Are the axes of the base right "
+            "(base_axes, --base-axes)? If so, and there is a flight, give its times: flight=(first, last) "
+            "(--flight FIRST LAST)"
         )
     return longest
+
+
+def centre_noise(times: Array, centres: Array) -> float:
+    """By which a coordinate of the centre of mass is known [m]."""
+    return float(np.hypot(_white_noise(times, centres), _MODEL))
+
+
+def falls_along(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
+    """The longest fall with one axis up; where it is measured to be another than `gravity`, as it is measured."""
+    found = _fall(times, centres, up, gravity)
+    if found is not None and abs(found.gravity - gravity) > max(_SAME * gravity, found.gravity_bar):
+        as_measured = _fall(times, centres, up, found.gravity) if found.gravity > 0.0 else None
+        if as_measured is not None and _lasts(times, as_measured.ends) > _lasts(times, found.ends):
+            return as_measured
+    return found
+
+
+def _shortest(noise: float, gravity: float) -> float:
+    """How long a fall has to be to be told from rest [s]."""
+    return float(np.sqrt(_CLEAR * noise / (0.5 * gravity * _OF_A_PARABOLA)))
+
+
+def _longer(found: list[FreeFall | None], times: Array) -> FreeFall | None:
+    return max((fall for fall in found if fall is not None), key=lambda fall: _lasts(times, fall.ends), default=None)
+
+
+def _fall(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
+    """The longest stretch on which the centre of mass falls by one acceleration."""
+    noise = centre_noise(times, centres)
+    window = _shortest(noise, gravity)
+    windows = _windows(times, centres, window)
+    sign, axis = (-1.0 if up.startswith("-") else 1.0), "xyz".index(up[-1])
+    pull = 0.5 * sign * gravity
+    squares = windows.squares + 2.0 * pull * windows.mixed[:, axis] + pull**2 * windows.parabola
+    falls = squares <= noise**2 * (windows.free + _CHANCE * np.sqrt(2.0 * windows.free))
+    straight = centres.copy()
+    straight[:, axis] += pull * (times - times[0]) ** 2
+    found = _longest(times, straight, windows, falls, noise, window, gravity)
+    if found is None:
+        return None
+    inside = slice(found[0], found[1] + 1)
+    measured, bar = measured_fall(times[inside], centres[inside], noise)
+    return FreeFall(
+        found[0],
+        found[1],
+        f"{'-' if sign < 0.0 else '+'}{'xyz'[axis]}",
+        noise,
+        _off_line(times[inside], straight[inside]),
+        float(-sign * measured[axis]),
+        bar,
+    )
+
+
+def measured_fall(times: Array, centres: Array, noise: float) -> tuple[Array, float]:
+    """Acceleration of a centre of mass (3,), and its standard deviation with the wander of the centre [m/s^2]."""
+    duration = float(times[-1] - times[0])
+    powers = np.vander((times - times.mean()) / duration, 3)
+    acceleration = 2.0 * np.linalg.lstsq(powers, centres, rcond=None)[0][0] / duration**2
+    white = 2.0 * noise * float(np.sqrt(np.linalg.inv(powers.T @ powers)[0, 0])) / duration**2
+    return acceleration, float(np.hypot(white, 8.0 * _WANDER / duration**2))
 
 
 def _white_noise(times: Array, centres: Array) -> float:
@@ -135,13 +208,15 @@ def _white_noise(times: Array, centres: Array) -> float:
 
 
 def _longest(
-    times: Array, straight: Array, windows: _Windows, falls: Mask, noise: float, window: float
+    times: Array, straight: Array, windows: _Windows, falls: Mask, noise: float, window: float, gravity: float
 ) -> tuple[int, int] | None:
     """First and last sample of the longest stretch along which a curve is straight."""
     runs = np.flatnonzero(np.diff(np.concatenate([[False], falls, [False]]).astype(int))).reshape(-1, 2)
     best: tuple[int, int] | None = None
     for first, past in runs.tolist():
-        found = _bounded(times, straight, int(windows.starts[first]), int(windows.ends[past - 1]), noise, window)
+        found = _bounded(
+            times, straight, int(windows.starts[first]), int(windows.ends[past - 1]), noise, window, gravity
+        )
         if found is not None and (best is None or _lasts(times, found) > _lasts(times, best)):
             best = found
     return best
@@ -152,10 +227,10 @@ def _lasts(times: Array, ends: tuple[int, int]) -> float:
 
 
 def _bounded(
-    times: Array, straight: Array, first: int, last: int, noise: float, window: float
+    times: Array, straight: Array, first: int, last: int, noise: float, window: float, gravity: float
 ) -> tuple[int, int] | None:
     """The same stretch with its ends where the line is left, less what a contact may last unseen."""
-    cut = float(np.sqrt(2.0 * _CUT * noise / _GRAVITY))
+    cut = float(np.sqrt(2.0 * _CUT * noise / gravity))
     start = _end_of_line(-times[::-1], straight[::-1], len(times) - 1 - first, noise, window)
     ends = (len(times) - 1 - start, _end_of_line(times, straight, last, noise, window))
     low = ends[0] if ends[0] == 0 else int(np.searchsorted(times, times[ends[0]] + cut))

@@ -43,6 +43,7 @@ class Table:
     faults : label -> sample -> what stands there and is no number, of the first of them
     base_quat_xyzw : (N, 4) as recorded, or None
     base_position : (N, 3) [m] or None
+    up : the axis that the kind of file has upwards; None: it has none
     unread : name -> what it is, of arrays and other entries of the file that are no columns
     nameless : how columns of an array without names became those of joints; None: they have names
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
@@ -62,6 +63,7 @@ class Table:
     faults: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
     base_quat_xyzw: Array | None = None
     base_position: Array | None = None
+    up: str | None = None
     unread: Mapping[str, str] = field(default_factory=dict)
     unnamed: Sequence[str] = ()
     nameless: NamelessJoints | None = None

@@ -25,7 +25,7 @@ from ...letters import what_came
 from ...provenance import provenance
 from ..shape_path import ShapePath
 from ._base_columns import base_choices
-from ._flight import Flight, flight_argument, in_flight
+from ._flight import Flight, flight_choices, in_flight
 from ._inputs import read_input
 from ._joint_columns import JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
@@ -109,6 +109,8 @@ def read_recorded_motion(
     base_order: str | None = None,
     base_axes: ArrayLike | str | None = None,
     flight: str | Sequence[float] | None = None,
+    up: str | None = None,
+    gravity: float | str | None = None,
 ) -> RecordedMotion:
     """Read a recorded motion: the joints, and the base where it was recorded.
 
@@ -121,8 +123,8 @@ def read_recorded_motion(
       coupled ones that are no joints of the body are left out.
     - `.mat`, `.h5`: vectors `time` and one for each joint, or a matrix `shapes` beside `joint_names`; on top or in a
       structure.
-    - `.bvh`: the bones' turns, for the body that `load_body` makes of such a file. A first frame with all angles at zero,
-      from which a joint goes over five times as far as in any step of the next second, is left out.
+    - `.bvh`: the bones' turns, for the body that `load_body` makes of such a file. A first frame with all angles at
+      zero, from which a joint goes over five times as far as in any step of the next second, is left out.
     - `.c3d`: the angles that a model computed, `LKneeAngles_x` and so on; no markers.
     - `.npz`: `time` (N,), `shapes` (N, n), `joint_names` (n,); the base as `base_quat_xyzw` (N, 4), `base_position`
       (N, 3).
@@ -177,7 +179,12 @@ def read_recorded_motion(
         `momentum_from_recording` to find; None: the same axes, but "x,-z,y" for `pelvis_tilt` and so on (OpenSim: x
         forward, y up; URDF: x forward, z up)
     flight : what is kept is a free flight: "auto", the longest stretch on which the centre of mass falls freely; its
-        first and last time, as the file tells the time; "all"; None: what is kept may be anything
+        first and last time, as the file tells the time; "all"; "recorded": as "auto" where the attitude of the base is
+        recorded, all of it where its places are not recorded or do not fall, and what is kept may be anything where
+        nothing of the base is recorded; None: what is kept may be anything
+    up : the recorder's axis that points up: "x", "y", "z", "-x", "-y" or "-z"; None: that of the format (OpenSim y,
+        MuJoCo and ROS z), else x, y or z, whichever has the longest fall
+    gravity : by which the body falls in a flight [m/s^2]; None: 9.81; "any": units are not doubted
 
     Raises
     ------
@@ -186,7 +193,9 @@ def read_recorded_motion(
     UnknownNameError
         If a column is no joint of the body, or the file's ending is unknown.
     TrajectoryError
-        For any other fault of the file; row and column or joint are named. For a unit that can only be guessed.
+        For any other fault of the file; row and column or joint are named. For a unit that can only be guessed; for a
+        flight that falls by another acceleration than gravity, by more than a tenth of it and three error bars of its
+        own (with 1 cm of wander of the centre of mass), with the slips of units of length or frame rates that fit.
     MissingExtraError
         For ROS without the extra `ros`; for `.xlsx`, `.parquet`, `.c3d`, HDF5 without the extra `data`.
 
@@ -204,7 +213,7 @@ def read_recorded_motion(
     2.0 0.0
     """
     check_object(body, "Body", "body")
-    kept, flying = trim_argument(trim), flight_argument(flight)
+    kept, flying = trim_argument(trim), flight_choices(flight, up, gravity)
     base = base_choices(base_order, base_axes)
     within = close_argument(close)
     rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
@@ -291,6 +300,8 @@ def read_shape_path(
     base_order: str | None = None,
     base_axes: ArrayLike | str | None = None,
     flight: str | Sequence[float] | None = None,
+    up: str | None = None,
+    gravity: float | str | None = None,
 ) -> ShapePath:
     """The path of `read_recorded_motion`: a C2 spline, periodic where the last sample equals the first.
 
@@ -326,6 +337,8 @@ def read_shape_path(
         base_order=base_order,
         base_axes=base_axes,
         flight=flight,
+        up=up,
+        gravity=gravity,
     ).path
 
 

@@ -110,7 +110,7 @@ def _simulated(arrays: dict[str, Any], where: Path, body: Body, timestep: float 
         quaternions, positions = values[:, 3:FREE_JOINT][:, _SCALAR_FIRST], values[:, :3]
     kind = "MuJoCo qpos" if kind == "qpos" else "Isaac Lab joint_pos"
     table = _table(where, kind, times, values[:, free:], names, quaternions, positions, arrays)
-    return replace(table, nameless=found)
+    return replace(table, nameless=found, up="z")
 
 
 def _first_body(arrays: dict[str, Any], where: Path, count: int) -> tuple[Array | None, Array | None]:

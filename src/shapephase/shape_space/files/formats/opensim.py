@@ -48,7 +48,7 @@ def read_opensim(where: Path, data: bytes) -> Table:
             raise TrajectoryError(f"{where}: two columns are the coordinate {plain}, one is {name!r}; keep one")
         columns[plain] = values
         faults[plain] = found.faults.get(name, {})
-    return replace(found, columns=columns, faults=faults)
+    return replace(found, columns=columns, faults=faults, up="y")
 
 
 def _header(lines: Iterator[tuple[int, str]], where: Path) -> dict[str, str]:

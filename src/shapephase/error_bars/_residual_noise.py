@@ -1,0 +1,160 @@
+"""Noise of what a least-squares fit leaves of recorded attitudes: how far it is correlated, and whether it is noise.
+
+Noise of each axis is taken for a stationary process whose correlation is one of three kinds, of any length: it dies out
+exponentially (a tracker), it is the mean of neighbours, or a filter's bell. The restricted likelihood of each (which
+counts what the fit has taken out of the residuals) weighs it; whatever follows is averaged over all.
+
+Sources: Patterson and Thompson, Biometrika 58 (1971) 545, the restricted likelihood; Berger and Yang, Econometric
+Theory 10 (1994) 461, the prior of an exponential one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array
+
+_EXPONENTIAL = np.sin((np.arange(36) + 0.5) / 36.0 * np.pi - 0.5 * np.pi)
+"""Correlations of neighbours, even in their arcsines: there the reference prior is flat. The last is 0.999."""
+_LENGTHS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0, 32.0])
+"""Samples of a mean, or until a bell is 1/e: shorter is nearly white, longer hardly noise."""
+_OWN = 0.01
+"""Of the variance of a mean or a bell is white: no recording is so smooth, and digits are rounded."""
+_BLOCK = 128
+"""Samples that are weighed together, four times the longest mean; blocks count as independent."""
+_CHANCE = 0.001
+"""With which residuals that are noise are taken for a momentum that changes."""
+_MOST_MODES = 6
+"""Legendre polynomials of a momentum in time: more resolve less than a tenth of the flight."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualNoise:
+    """How likely each kind and length of correlation is, and what follows of the parameters with it.
+
+    Attributes
+    ----------
+    weights : (F,) of the correlations; their sum is one
+    variances : (F,) of each residual [rad^2], the larger of what is left of whitened and of plain residuals: where the
+        kind does not fit, as of a filter's stop band, whitened ones say too little
+    parameters : (F, m) by generalised least squares
+    precisions : (F, m, m) inverse covariances of the parameters, where residuals have variance one
+    free : numbers less parameters
+    """
+
+    weights: Array
+    variances: Array
+    parameters: Array
+    precisions: Array
+    free: int
+
+    @property
+    def correlation(self) -> float:
+        """Of neighbouring residuals, on average."""
+        return float(self.weights @ _correlations(2)[:, 1])
+
+    def covariance(self, slopes: Array) -> Array:
+        """Covariance of the parameters of an ordinary least-squares fit: slopes (3 N, m) -> (m, m)."""
+        return _by_correlation(slopes) @ (self.weights * self.variances)
+
+    def chance(self, last: int) -> float:
+        """Probability that the last few parameters come out so far from zero although they are zero: the F test."""
+        from scipy.special import fdtrc
+
+        there = self.parameters[:, -last:]
+        known = np.linalg.inv(np.linalg.inv(self.precisions)[:, -last:, -last:])
+        ratios = np.einsum("fa,fab,fb->f", there, known, there) / (last * self.variances)
+        return float(self.weights @ fdtrc(last, self.free, ratios))
+
+
+def residual_noise(residuals: Array, slopes: Array) -> ResidualNoise:
+    """Noise of residuals (N, 3) [rad] that parameters with slopes (3 N, m) may explain in part."""
+    count, unknowns = len(residuals), slopes.shape[1]
+    rows = np.concatenate([residuals[:, :, None], slopes.reshape(count, 3, unknowns)], axis=2)
+    blocks = np.array_split(rows, -(-count // _BLOCK))
+    longest = len(blocks[0])
+    lags = np.abs(np.subtract.outer(np.arange(longest), np.arange(longest)))
+    roots = np.linalg.cholesky(_correlations(longest)[:, lags])
+    whitened = np.linalg.inv(roots)
+    moments, volumes = np.zeros((len(roots), unknowns + 1, unknowns + 1)), np.zeros(len(roots))
+    diagonals = np.log(np.diagonal(roots, axis1=1, axis2=2))
+    for block in blocks:
+        size = len(block)
+        white = whitened[:, :size, :size] @ block.reshape(size, -1)
+        white = white.reshape(len(roots), 3 * size, unknowns + 1)
+        moments += np.swapaxes(white, 1, 2) @ white
+        volumes += 3.0 * diagonals[:, :size].sum(axis=1)
+    precisions, right = moments[:, 1:, 1:], moments[:, 1:, 0]
+    parameters = np.asarray(np.linalg.solve(precisions, right[:, :, None])[:, :, 0], dtype=np.float64)
+    free = 3 * count - unknowns
+    plain = residuals.ravel() - slopes @ np.linalg.lstsq(slopes, residuals.ravel(), rcond=None)[0]
+    taken = np.einsum("abf,ba->f", _by_correlation(slopes), slopes.T @ slopes)
+    left = np.maximum(moments[:, 0, 0] - (right * parameters).sum(axis=1), np.finfo(float).tiny)
+    likelihood = -0.5 * (free * np.log(left) + np.linalg.slogdet(precisions)[1]) - volumes
+    weights = np.exp(likelihood - likelihood.max()) * _priors()
+    return ResidualNoise(
+        weights=weights / weights.sum(),
+        variances=np.maximum(left / free, (plain @ plain) / (3 * count - taken)),
+        parameters=parameters,
+        precisions=precisions,
+        free=free,
+    )
+
+
+def _by_correlation(slopes: Array) -> Array:
+    """Covariances of an ordinary least-squares fit, where residuals have variance one: (3 N, m) -> (m, m, F)."""
+    answers = np.linalg.pinv(slopes).reshape(slopes.shape[1], -1, 3)
+    count = answers.shape[1]
+    size = 1 << (2 * count - 1).bit_length()
+    waves = np.fft.rfft(answers, size, axis=1)
+    by_lag = np.fft.irfft(np.einsum("afc,bfc->abf", waves, waves.conj()), size, axis=2)[:, :, :count]
+    by_lag += np.swapaxes(by_lag, 0, 1)
+    by_lag[:, :, 0] *= 0.5
+    return by_lag @ _correlations(count).T
+
+
+def _correlations(count: int) -> Array:
+    """Of residuals so many samples apart, for each kind and length: (F, count)."""
+    lags = np.arange(count)
+    means = np.maximum(1.0 - lags / _LENGTHS[:, None], 0.0)
+    bells = np.exp(-((lags / _LENGTHS[:, None]) ** 2))
+    own = (1.0 - _OWN) * np.concatenate([means, bells]) + _OWN * (lags == 0)
+    return np.concatenate([_EXPONENTIAL[:, None] ** lags, own])
+
+
+def _priors() -> Array:
+    """One half for the exponential ones, which white noise is one of, and a quarter for each of the others."""
+    half, quarter = 0.5 / len(_EXPONENTIAL), 0.25 / len(_LENGTHS)
+    return np.concatenate([np.full(len(_EXPONENTIAL), half), np.full(2 * len(_LENGTHS), quarter)])
+
+
+def drift_modes(residuals: Array, slopes: Array, by_modes: Array) -> int:
+    """How many Legendre polynomials of the momentum in time the residuals ask for; 0 where they are noise.
+
+    residuals (N, 3) [rad], slopes (3 N, m), by_modes (3 N, 3 K): change of the attitudes by each polynomial's momentum.
+    One more polynomial counts where chance brings as much in less than one of 1000 cases, also together with the next.
+    """
+    modes = 0
+    for tried in range(1, by_modes.shape[1] // 3 + 1):
+        if tried > modes + 2 or 3 * len(residuals) <= slopes.shape[1] + 3 * (tried + 1):
+            break
+        noise = residual_noise(residuals, np.hstack([slopes, by_modes[:, : 3 * tried]]))
+        if noise.chance(3 * (tried - modes)) < _CHANCE:
+            modes = tried
+    return modes
+
+
+def most_modes(count: int) -> int:
+    """Legendre polynomials that are tried of a momentum in time, with so many attitudes."""
+    return min(_MOST_MODES, max(count // 3 - 1, 0))
+
+
+def held(deviations: Array) -> Array:
+    """A covariance (3, 3) whose standard deviation along each principal axis of deviations (N, 3) is the largest there.
+
+    Along any other axis the largest deviation is at most sqrt(3) standard deviations, fewer than those of a 95 % bar.
+    """
+    _, axes = np.linalg.eigh(deviations.T @ deviations)
+    return (axes * np.abs(deviations @ axes).max(axis=0) ** 2) @ axes.T

@@ -1,0 +1,153 @@
+"""The motion of a body as it was recorded: by the momentum that its recorded base shows, or by one that is given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import check_flag, check_object
+from ..arrays import finite_array
+from ..body.body import Body
+from ..deformation.deformation import articulated
+from ..display import short_repr
+from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..run_progress import RunProgress
+from ..shape_space.files._flight import ALL
+from ..shape_space.files.read import RecordedMotion
+from ..warning_filters import quiet
+from .recorded_momentum import RecordedMomentum, momentum_from_recording, warn_of_drift
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedFlight:
+    """A recording as a motion.
+
+    Attributes
+    ----------
+    motion : of the body along the recorded path
+    momentum_by : "fit" to the recorded attitudes of the base, "given", or "nothing": it is zero, as nothing of the base
+        is recorded and none is given
+    fitted : the fit, where there is one
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> sp.export_motion(motion, "turn.csv")
+    >>> flown = sp.motion_from_recording(cat, sp.read_recorded_motion("turn.csv", cat))
+    >>> print(flown.momentum_by, flown.motion.momentum.round(5) + 0.0)
+    fit [0.    0.    0.005]
+    """
+
+    motion: Motion
+    momentum_by: str
+    fitted: RecordedMomentum | None = None
+
+    __repr__ = short_repr
+
+
+def motion_from_recording(
+    body: Body,
+    recorded: RecordedMotion,
+    *,
+    momentum: ArrayLike | None = None,
+    attitude: ArrayLike | None = None,
+    tolerance: float = 1e-9,
+    find_axes: bool = False,
+    progress: Callable[[RunProgress], Any] | None = None,
+) -> RecordedFlight:
+    """The motion of a recorded body: what every command makes of a recording.
+
+    Where the attitude of the base was recorded, the momentum is fitted to it. A momentum that is given wins; the motion
+    then starts at the recorded attitude. Zero is taken only where nothing of the base was recorded.
+
+    Parameters
+    ----------
+    recorded : as `read_recorded_motion` gives it; with its flight="recorded" only what is a flight
+    momentum : (3,) the recorder's axes [kg m^2/s]; None: as the recorded base shows, or zero
+    attitude : (3, 3) or quaternion (4,) x y z w of the start, beside a momentum; None: as recorded, or the identity
+    tolerance : of the attitude [rad]
+    find_axes : as for `momentum_from_recording`
+    progress : called while it is reconstructed
+
+    Raises
+    ------
+    ShapeError
+        For an attitude beside a momentum that is fitted, or axes to be found without a fit.
+    TrajectoryError
+        If nobody said that the recording is a flight, and its base is none: the fit does not settle, or what it leaves
+        is no noise.
+    AccuracyNotReached
+        If the fit to a flight that was asked for does not settle.
+
+    Warns
+    -----
+    TrajectoryWarning
+        If the momentum of a flight changes.
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> sp.write_shape_path(loop, "joints.csv")
+    >>> print(sp.motion_from_recording(cat, sp.read_recorded_motion("joints.csv", cat)).momentum_by)
+    nothing
+    """
+    check_object(body, "Body", "body")
+    check_object(recorded, "RecordedMotion", "recorded")
+    check_flag(find_axes, "find_axes")
+    if momentum is not None:
+        momentum = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    deformation, attitudes = articulated(body, recorded.path), recorded.base_attitude
+    if momentum is None and attitudes is not None:
+        if attitude is not None:
+            raise ShapeError(
+                "the attitude at the start is fitted to the recorded base, with the momentum; leave it out "
+                "(--attitude), or give the momentum, too (--momentum)"
+            )
+        fitted = _fit(body, recorded, tolerance, find_axes=find_axes)
+        return RecordedFlight(fitted.motion, "fit", fitted)
+    if find_axes:
+        raise ShapeError(
+            "the axes of the base are found by the fit of a momentum to its recorded attitude: leave the momentum out "
+            "(--momentum), or give the axes (--base-axes)"
+        )
+    if attitude is None and attitudes is not None:
+        attitude = attitudes[0]
+    start = np.zeros(3) if momentum is None else momentum
+    moved = reconstruct(deformation, start, attitude, tolerance=tolerance, progress=progress)
+    return RecordedFlight(moved, "nothing" if momentum is None else "given")
+
+
+def _fit(body: Body, recorded: RecordedMotion, tolerance: float, *, find_axes: bool) -> RecordedMomentum:
+    flight, attitudes = recorded.flight, recorded.base_attitude
+    assert attitudes is not None
+    assumed = flight is None or not flight.asked
+    deformation = articulated(body, recorded.path)
+    try:
+        with quiet(category=TrajectoryWarning):
+            fitted = momentum_from_recording(
+                deformation, recorded.times, attitudes, tolerance=tolerance, find_axes=find_axes
+            )
+    except (AccuracyNotReached, TrajectoryError) as error:
+        if assumed:
+            raise _no_flight(recorded, str(error)) from error
+        raise
+    if not fitted.conserved:
+        if assumed and (flight is None or flight.by == ALL):
+            raise _no_flight(recorded, "what the fit leaves of the recorded base is no noise")
+        warn_of_drift(fitted)
+    return fitted
+
+
+def _no_flight(recorded: RecordedMotion, why: str) -> TrajectoryError:
+    return TrajectoryError(
+        f"{recorded.record['file']}: the attitude of the base is recorded, and no momentum is given, but no free "
+        f"flight with one momentum is found: {why}. Give the times of the flight: flight=(first, last) (--flight FIRST "
+        "LAST); or flight='all' (--flight all), if the body is free all the time; or momentum=[0, 0, 0] "
+        "(--momentum 0 0 0), if the recorded base is not to count"
+    )

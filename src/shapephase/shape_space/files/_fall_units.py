@@ -1,0 +1,123 @@
+"""What a measured fall says about the units of a recording: 9.81 m/s^2 over it, against slips that are usual."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...arrays import Array
+from ...errors import TrajectoryError
+from ._free_fall import UP_AXES, FreeFall, falls_along, measured_fall
+
+_LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
+"""[m] Units that are mixed up."""
+_RATES = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 200, 240, 250, 300, 400, 480, 500, 1000)
+"""[1/s] Frame rates that are usual."""
+_MOST_TIMES, _MOST_LENGTHS = 10.0, 40.0
+"""Of the frame rate and of the lengths that are written: slips that show in the fall are by less."""
+_MOST_SAMPLES = 3000
+"""Time: samples among which a fall by another gravity is looked for."""
+_OFF = 0.1
+"""Of gravity: a fall that differs by less may be right."""
+_BARS = 3.0
+"""Standard deviations of the measured fall by which it has to differ, too."""
+_FITS = 0.04
+"""Of gravity: a slip that explains the fall so well is named."""
+_LONG = 0.8
+"""[m] g t^2 of a fall that may be one by another acceleration: ten times its bar by wander, 0.29 s on earth."""
+_PARABOLA = 0.02
+"""[m] rms from a parabola, beyond the noise, of what is no fall at all."""
+
+
+def check_gravity(fall: FreeFall, gravity: float, rate: float, where: str) -> None:
+    """Raise TrajectoryError where a fall is not by the gravity that is expected, and name the slips that fit."""
+    _check(fall.gravity, fall.gravity_bar, gravity, rate, where)
+
+
+def check_parabola(times: Array, centres: Array, noise: float, gravity: float, where: str) -> None:
+    """The same of a stretch that is given: where it is a parabola, and bent enough for that to be seen."""
+    if len(times) < 4:
+        return
+    acceleration, bar = measured_fall(times, centres, noise)
+    powers = np.vander(times - times.mean(), 3)
+    left = centres - powers @ np.linalg.lstsq(powers, centres, rcond=None)[0]
+    size = float(np.linalg.norm(acceleration))
+    # What is not bent has no weight, or is too short to tell.
+    if size > _BARS * bar and np.sqrt((left**2).mean()) < np.hypot(noise, _PARABOLA):
+        _check(size, bar, gravity, 1.0 / float(np.median(np.diff(times))), where)
+
+
+def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up: str | None) -> FreeFall | None:
+    """The longest fall by an acceleration that a slip makes of gravity, its samples those of the recording.
+
+    positions (N, 3) of the base, arms (N, 3) from there to the centre of mass, both the recorder's axes [m].
+    """
+    stride = 1 + len(times) // _MOST_SAMPLES
+    seen, rate = times[::stride], 1.0 / float(np.median(np.diff(times)))
+    best: tuple[FreeFall, float] | None = None
+    for trial in _trials(rate):
+        centres = positions[::stride] + trial.arms * arms[::stride]
+        for axis in UP_AXES[:3] if up is None else (up,):
+            found = falls_along(seen, centres, axis, gravity * trial.gravity)
+            if found is None:
+                continue
+            lasts = float(seen[found.last] - seen[found.first])
+            long = found.gravity / trial.lengths * lasts**2 > _LONG
+            if long and (best is None or lasts / trial.times > 1.05 * best[1]):
+                best = found, lasts / trial.times
+    if best is None:
+        return None
+    return replace(best[0], first=stride * best[0].first, last=stride * best[0].last)
+
+
+class _Trial(NamedTuple):
+    """A slip: what it makes of gravity and of times; and by what lengths of the recording and of arms are off."""
+
+    gravity: float
+    times: float
+    lengths: float
+    arms: float
+
+
+def _trials(rate: float) -> Iterator[_Trial]:
+    for size in _LENGTHS.values():
+        for other in _LENGTHS.values():
+            share = size / other
+            if size != other and 1.0 / _MOST_LENGTHS < share < _MOST_LENGTHS:
+                # Lengths of the body are from the same file, or they are right, and its arms scale with what is not.
+                yield _Trial(gravity=share, times=1.0, lengths=share, arms=1.0)
+                yield _Trial(gravity=share, times=1.0, lengths=share, arms=share)
+    for known in _RATES:
+        speed = known / rate
+        if 1.0 / _MOST_TIMES < speed < _MOST_TIMES and abs(speed**2 - 1.0) > _OFF:
+            yield _Trial(gravity=1.0 / speed**2, times=speed, lengths=1.0, arms=1.0)
+
+
+def _check(measured: float, bar: float, gravity: float, rate: float, where: str) -> None:
+    off = abs(measured - gravity)
+    if off <= _OFF * gravity or off <= _BARS * bar:
+        return
+    slips = list(_slips(measured, bar, gravity, rate))
+    named = "; or ".join(slips) if slips else "no usual slip of a unit makes that of it"
+    raise TrajectoryError(
+        f"{where}: the centre of mass falls with {measured:.3g} ± {bar:.2g} m/s^2, {gravity:.4g} is expected: {named}. "
+        "Correct the unit of length (of a BVH file length_unit, --length-unit) or the times; where this is right, give "
+        f"gravity={measured:.3g} (--gravity {measured:.3g}), or the momentum (--momentum)"
+    )
+
+
+def _slips(measured: float, bar: float, gravity: float, rate: float) -> Iterator[str]:
+    """The slips that make so much of gravity, in words."""
+    share, within = measured / gravity, max(_FITS, 2.0 * bar / gravity)
+    for read, size in _LENGTHS.items():
+        for true, other in _LENGTHS.items():
+            if abs(size / other / share - 1.0) < min(within, _OFF):
+                yield f"lengths in {true} were read as {read}"
+    speed = float(np.sqrt(1.0 / share))
+    for known in _RATES:
+        if abs(speed * rate / known - 1.0) < 0.5 * min(within, _OFF):
+            yield f"{known} frames a second were read as {rate:.4g}"
+            return
