@@ -27,6 +27,7 @@ from ..display import card_html, card_text, short_repr
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
+from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler, Samplers
 from ..letters import what_came
 from ..shape_space.body_path import path_gap
@@ -217,6 +218,16 @@ class Deformation:
         if pointwise:
             smoothness = replace(smoothness, knots=None)
         return Samplers(known.sample, **vars(smoothness), directly=known.channels)
+
+    def step_limits(self) -> StepLimits:
+        """How long steps of time may be that pass over nothing that is known of the deformation, nor of what it is
+        seen from."""
+        known: Any = self.description
+        found = known.smoothness(self.breaks).step_limits
+        while hasattr(known, "original"):
+            known = known.original
+            found = found.and_those(known.smoothness(self.breaks).step_limits)
+        return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,10 @@ Effort = Callable[[float, Array, Array], ArrayLike]
 """Time, coordinates (k,) and rates (k,) of the free hinges -> what springs and dampers do to them (k,) [N m or N]."""
 # Of the tolerance: how far polynomials between knots may be from what was integrated [rad or m].
 _SHARE = 0.03
+# Of the duration: times nearer to each other are one.
+_SAME_TIME = 1e-12
+# Times, besides the ends and middles of what limits steps, at which the fastest joint is looked for.
+_LOOKS = 65
 # Pieces between knots; more are not made.
 _MOST_PIECES = 20_000
 # Where a piece is compared with what was integrated.
@@ -123,9 +127,19 @@ def free_hinges(
     if mu.ndim > 1 or start.ndim > 2:
         raise ShapeError("free hinges swing in one motion at a time; give one momentum and attitude")
     swing = _Swing(body, route, columns, effort, mu)
-    breaks = route.smoothness.breaks
-    scales = np.concatenate([np.ones(len(names)), np.full(len(names), 1.0 / route.duration) + np.abs(starts[1])])
-    found = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _SHARE * goal)
+    known = route.smoothness
+    limits, breaks = known.step_limits, known.breaks
+    if known.resolved is not None:
+        # Accelerations are then slopes of series, which jump by their rounding from panel to panel.
+        breaks = np.union1d(breaks, limits.edges)
+        breaks = breaks[np.append(True, np.diff(breaks) > _SAME_TIME * route.duration)]
+        breaks[-1] = route.duration
+    # What the driven joints' own rates make of the hinges' for a time counts as far as it moves them.
+    looked = np.union1d(limits.edges, np.linspace(0.0, route.duration, _LOOKS))
+    fastest = np.abs(route.curve(np.union1d(looked, 0.5 * (looked[:-1] + looked[1:])))[1]).max(initial=0.0)
+    rates = np.full(len(names), 1.0 / route.duration + fastest) + np.abs(starts[1])
+    scales = np.concatenate([np.ones(len(names)), rates])
+    found = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _SHARE * goal, limits)
     whole = _path_of(swing, found, breaks, goal)
     motion = reconstruct(articulated(body, whole), mu, attitude, tolerance=goal)
     times = found.error_times
@@ -146,38 +160,43 @@ class _Swing:
     effort: Effort | None
     momentum: Array
 
-    def rates(self, t: float, turned: Array, states: Array) -> tuple[Array, Array]:
+    def rates(self, times: Array, turned: Array, states: Array) -> tuple[Array, Array]:
         """As `driven_attitude` asks for; states are the coordinates of the hinges and then their rates."""
-        count = len(self.columns)
-        omega, accelerations = self.accelerations(t, turned, states[:count], states[count:])
-        return omega, np.concatenate([states[count:], accelerations])
+        omega, accelerations = self.accelerations(times, turned, states)
+        return omega, np.concatenate([states[:, len(self.columns) :], accelerations], axis=1)
 
-    def accelerations(self, t: float, turned: Array, swung: Array, swinging: Array) -> tuple[Array, Array]:
-        """Angular velocity of the base (3,) and accelerations of the hinges (k,)."""
-        at, count = np.array([t]), len(self.columns)
-        (shape, rate), acceleration = self.route.curve(at), self.route.acceleration(at)
-        shape[0, self.columns], rate[0, self.columns] = swung, swinging
-        inertia, matrix, inertia_rate, matrix_rate = (one[0] for one in self.body.sample_rates(shape, rate))
-        inverse = inverse_inertia(inertia)
-        pi = self.momentum @ turned
-        omega = inverse @ (pi - matrix @ rate[0])
+    def accelerations(self, times: Array, turned: Array, states: Array) -> tuple[Array, Array]:
+        """Angular velocities of the base (N, 3) and accelerations of the hinges (N, k)."""
+        count = len(self.columns)
+        (shape, rate), acceleration = self.route.curve(times), self.route.acceleration(times)
+        shape[:, self.columns], rate[:, self.columns] = states[:, :count], states[:, count:]
+        inertia, matrix, inertia_rate, matrix_rate = self.body.sample_rates(shape, rate)
+        inverse = inverse_inertia(inertia, times)
+        pi = so3.apply(so3.transpose(turned), self.momentum)
+        omega = so3.apply(inverse, pi - so3.apply(matrix, rate))
         # The efforts are linear in the accelerations: those of none, and of one of each hinge.
-        tried = np.repeat(acceleration, count + 1, axis=0)
-        tried[np.arange(1, count + 1), self.columns] += 1.0
-        still = np.cross(pi, omega) - inertia_rate @ omega - matrix_rate @ rate[0]
-        spins, slopes = np.broadcast_to(omega, (count + 1, 3)), (still - tried @ matrix.T) @ inverse
-        efforts, _ = falling_efforts(
-            self.body, np.repeat(shape, count + 1, axis=0), np.repeat(rate, count + 1, axis=0), tried, spins, slopes
-        )
-        own = efforts[:, self.columns]
-        given = np.zeros(count)
-        if self.effort is not None:
-            given = np.asarray(self.effort(t, swung, swinging), dtype=np.float64)
-            if given.shape != (count,) or not np.isfinite(given).all():
-                raise ShapeError(
-                    f"effort: {count} finite numbers are needed, at t = {t:.9g} s it gave {what_came(given)}"
-                )
-        return omega, np.linalg.solve((own[1:] - own[0]).T, given - own[0])
+        tried = np.repeat(acceleration[:, None], count + 1, axis=1)
+        tried[:, np.arange(1, count + 1), self.columns] += 1.0
+        still = np.cross(pi, omega) - so3.apply(inertia_rate, omega) - so3.apply(matrix_rate, rate)
+        slopes = so3.apply(inverse[:, None], still[:, None] - so3.apply(matrix[:, None], tried))
+        shapes, rates, spins = (np.repeat(one, count + 1, axis=0) for one in (shape, rate, omega))
+        tried, slopes = tried.reshape(shapes.shape), slopes.reshape(-1, 3)
+        efforts, _ = falling_efforts(self.body, shapes, rates, tried, spins, slopes)
+        own = efforts[:, self.columns].reshape(-1, count + 1, count)
+        given = np.array([self._given(float(t), state) for t, state in zip(times, states, strict=True)])
+        by_one = np.swapaxes(own[:, 1:] - own[:, :1], 1, 2)
+        found = np.linalg.solve(by_one, (given - own[:, 0])[..., None])[..., 0]
+        return omega, np.asarray(found, dtype=np.float64)
+
+    def _given(self, t: float, state: Array) -> Array:
+        """What springs and dampers do: (2 k,) -> (k,)."""
+        count = len(self.columns)
+        if self.effort is None:
+            return np.zeros(count)
+        given = np.asarray(self.effort(t, state[:count], state[count:]), dtype=np.float64)
+        if given.shape != (count,) or not np.isfinite(given).all():
+            raise ShapeError(f"effort: {count} finite numbers are needed, at t = {t:.9g} s it gave {what_came(given)}")
+        return given
 
 
 def _path_of(swing: _Swing, found: DrivenAttitude, breaks: Array, tolerance: float) -> ShapePath:
@@ -186,8 +205,8 @@ def _path_of(swing: _Swing, found: DrivenAttitude, breaks: Array, tolerance: flo
     count = len(swing.columns)
     while True:
         left, right = inside(knots[:-1], knots[1:])
-        ends = [_all_joints(swing, found, times) for times in (left, right)]
-        coefficients = _quintics(np.diff(knots), *ends[0], *ends[1])
+        starts, ends = _all_joints(swing, found, left, knots[:-1]), _all_joints(swing, found, right, knots[1:])
+        coefficients = _quintics(np.diff(knots), *starts, *ends)
         curve = PiecewisePolynomial(knots, coefficients)
         times = (knots[:-1, None] + np.diff(knots)[:, None] * np.array(_PLACES)).ravel()
         shapes, rates = swing.route.curve(times)
@@ -208,15 +227,16 @@ def _path_of(swing: _Swing, found: DrivenAttitude, breaks: Array, tolerance: flo
     )  # fmt: skip
 
 
-def _all_joints(swing: _Swing, found: DrivenAttitude, times: Array) -> tuple[Array, Array, Array]:
-    """Coordinates, rates and accelerations: (N,) -> (N, n) each."""
+def _all_joints(swing: _Swing, found: DrivenAttitude, times: Array, knots: Array) -> tuple[Array, Array, Array]:
+    """Coordinates, rates and accelerations at knots (N,), by those at times just on one side of them: (N, n) each."""
     count = len(swing.columns)
     (shapes, rates), accelerations = swing.route.curve(times), swing.route.acceleration(times)
-    states, attitudes = found.states(times), found.attitude(times)
+    states = found.states(times)
     shapes[:, swing.columns], rates[:, swing.columns] = states[:, :count], states[:, count:]
-    for row, (t, turned, state) in enumerate(zip(times, attitudes, states, strict=True)):
-        accelerations[row, swing.columns] = swing.accelerations(float(t), turned, state[:count], state[count:])[1]
-    return shapes, rates, accelerations
+    accelerations[:, swing.columns] = swing.accelerations(times, found.attitude(times), states)[1]
+    # What a fast joint moves in between is more than rounding.
+    away = (knots - times)[:, None]
+    return shapes + away * rates, rates + away * accelerations, accelerations
 
 
 def _quintics(widths: Array, r: Array, v: Array, a: Array, s: Array, w: Array, b: Array) -> Array:

@@ -5,18 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 
-from .. import so3
 from ..arrays import Array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, TrajectoryError, unknown_name
-from ..integrator.dop853 import dop853_rotation
+from ..integrator.dop853 import dop853_attitude
 from ..integrator.fast import engine
+from ..integrator.forced.driven_attitude import DrivenAttitude
 from ..integrator.many_rotations import rotations_of_each
 from ..rigid_body.euler_top import EulerTop
 
@@ -28,8 +27,6 @@ _MOST_STEPS = 10_000_000
 """More would fill the memory of a workstation."""
 _MOST_PIECES = 400_000
 """Stretches between the breaks of a motion: some five gigabytes of memory where each of them bends."""
-_LEAST_RTOL = 1e-12
-"""SciPy's DOP853 gains nothing from a tighter relative tolerance."""
 
 
 class Solution(Protocol):
@@ -121,41 +118,39 @@ def _rounding(top: EulerTop, duration: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Dop853Rotation:
-    """S(t) by SciPy's integrator, one dense output for each motion of the batch."""
+    """S(t) by SciPy's integrator, of a batch.
 
-    dense: tuple[Callable[[Array], Array], ...]
+    Attributes
+    ----------
+    turns : one for each motion of the batch
+    times : (K + 1,) ends of the steps of all [s]
+    """
+
+    turns: tuple[DrivenAttitude, ...]
     times: Array
-    error_estimate: Array
-    evaluations: int
 
     __post_init__ = lock_arrays
 
+    @property
+    def error_estimate(self) -> Array:
+        """(B,) [rad]."""
+        return np.array([turn.attitude_errors[-1] for turn in self.turns])
+
+    @property
+    def evaluations(self) -> int:
+        """Of I and L_o, in all runs."""
+        return sum(turn.evaluations for turn in self.turns)
+
     def rotation(self, t: Array) -> Array:
-        return np.stack([so3.matrix_from_quat(one(t)) for one in self.dense])
+        """(N,) -> (B, N, 3, 3)."""
+        return np.stack([turn.attitude(t) for turn in self.turns])
 
 
 def dop853_solution(deformation: Deformation, at_start: Array, tolerance: float) -> Dop853Rotation:
-    """Two runs for each start, one ten times as tight; their difference bounds the error of the looser one."""
-    dense, estimates, evaluations = [], [], 0
-    rtol = max(0.01 * tolerance, _LEAST_RTOL)
-    pieces = max(2, 64 // (len(deformation.breaks) - 1))
-    times = np.unique(np.concatenate([np.linspace(a, b, pieces) for a, b in pairwise(deformation.breaks)]))
-    for start in at_start:
-        loose, first = dop853_rotation(deformation.description.sample, deformation.breaks, start, rtol)
-        tight, second = dop853_rotation(deformation.description.sample, deformation.breaks, start, 0.1 * rtol)
-        between = times[:-1] + 0.37 * np.diff(times)
-        there = np.concatenate([times, between])
-        gap = so3.angle(so3.transpose(so3.matrix_from_quat(loose(there))) @ so3.matrix_from_quat(tight(there)))
-        dense.append(tight)
-        estimates.append(float(gap.max()) + 1e-13)
-        evaluations += first + second
-    worst = max(estimates)
-    if worst > tolerance:
-        raise AccuracyNotReached(
-            f"DOP853 reached {worst:.3g} rad where {tolerance:.3g} was requested; loosen the tolerance or use "
-            "method='spectral'"
-        )
-    return Dop853Rotation(tuple(dense), times, np.array(estimates), evaluations)
+    """The rotations from these body momenta at the start, (B, 3). Raises AccuracyNotReached as `driven_attitude`."""
+    sample, breaks, limits = deformation.description.sample, deformation.breaks, deformation.step_limits()
+    turns = tuple(dop853_attitude(sample, breaks, start, tolerance, limits) for start in at_start)
+    return Dop853Rotation(turns, np.unique(np.concatenate([breaks, *(turn.times for turn in turns)])))
 
 
 def _by_interpolant(

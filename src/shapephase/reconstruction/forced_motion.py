@@ -119,13 +119,8 @@ class ForcedMotion:
         attitudes, momenta = self.attitude(flat), self.body_momentum(flat)
         rates = so3.apply(inverse_inertia(inertia, flat), momenta - internal)
         shapes = _shapes(self.deformation)(flat)
-        found = [
-            self.torque_law.in_base_axes(
-                TorqueState(time=float(s), attitude=r, rate=w, shape=shape, inertia=tensor, momentum=pi)
-            )
-            for s, r, w, shape, tensor, pi in zip(flat, attitudes, rates, shapes, inertia, momenta, strict=True)
-        ]
-        return np.reshape(found, (*times.shape, 3))
+        found = _pushes(self.torque_law, flat, attitudes, rates, shapes, inertia, momenta)
+        return found.reshape(*times.shape, 3)
 
     def work(self, t: ArrayLike) -> Array:
         """Of the torque since the start, the integral of torque . omega: times (...) -> (...) [J]."""
@@ -206,24 +201,33 @@ def reconstruct_forced(
     breaks = np.union1d(deformation.breaks, law.edges(deformation.duration))
     sample, shapes = deformation.description.sample, _shapes(deformation)
 
-    def rates(t: float, turned: Array, states: Array) -> tuple[Array, Array]:
-        at = np.array([t])
-        inertia, internal = sample(at)
-        pi = states[:3] @ turned
-        omega = inverse_inertia(inertia, at)[0] @ (pi - internal[0])
-        state = TorqueState(
-            time=t, attitude=turned, rate=omega, shape=shapes(at)[0], inertia=inertia[0], momentum=pi
-        )  # fmt: skip
-        push = law.in_base_axes(state)
-        return omega, np.append(turned @ push, push @ omega)
+    def rates(times: Array, turned: Array, states: Array) -> tuple[Array, Array]:
+        inertia, internal = sample(times)
+        pi = so3.apply(so3.transpose(turned), states[:, :3])
+        omega = so3.apply(inverse_inertia(inertia, times), pi - internal)
+        push = _pushes(law, times, turned, omega, shapes(times), inertia, pi)
+        return omega, np.column_stack([so3.apply(turned, push), np.sum(push * omega, axis=-1)])
 
     tensor = sample(np.zeros(1))[0][0]
     least = float(np.linalg.eigvalsh(inverse_inertia(tensor))[0])
     # What turns the body by a radian in all of the time, beside what it has.
     size = float(np.linalg.norm(spatial)) + 1.0 / (least * deformation.duration)
     scales = np.array([size, size, size, size**2 * least])
-    found = driven_attitude(rates, breaks, start, np.append(spatial, 0.0), scales, tolerance)
+    limits = deformation.step_limits()
+    found = driven_attitude(rates, breaks, start, np.append(spatial, 0.0), scales, tolerance, limits)
     return ForcedMotion(deformation, law, spatial, start, tolerance, found)
+
+
+def _pushes(law: ExternalTorque, *states: Array) -> Array:
+    """The torque, base axes, in states given by their times, attitudes, rates, shapes, inertias, momenta: (N, 3)."""
+    return np.array(
+        [
+            law.in_base_axes(
+                TorqueState(time=float(t), attitude=turned, rate=omega, shape=shape, inertia=tensor, momentum=pi)
+            )
+            for t, turned, omega, shape, tensor, pi in zip(*states, strict=True)
+        ]
+    )
 
 
 def _shapes(deformation: Deformation) -> Callable[[Array], Array]:

@@ -20,6 +20,10 @@ from .curves import (
     Widened,
 )
 
+# Of the largest coefficient, and in units of the rounding of times: what a series is resolved to by the scan.
+_ROUNDING = 32.0 * float(np.finfo(float).eps)
+_TIME_ROUNDING = 8.0
+
 
 def exact_accelerations(curve: Curve, times: Array) -> Array | None:
     """r'' of a curve at times of its interval: (N,) -> (N, n); None where a function of a user is in it.
@@ -69,9 +73,23 @@ def resolved_accelerations(resolved: ResolvedPath, loops: int, times: Array) -> 
     rows = resolved.leaves
     n_shape = resolved.coefficients.shape[2] // 2
     edges = np.append(resolved.left[rows], resolved.right[rows[-1]])
-    rates = PiecewiseChebyshev(edges, resolved.coefficients[rows][:, :, n_shape:])
+    rates = PiecewiseChebyshev(edges, _without_noise(resolved.coefficients[rows][:, :, n_shape:], edges))
     loop = np.minimum(np.floor(times / resolved.duration), loops - 1)
     return rates.derivative()(times - loop * resolved.duration)
+
+
+def _without_noise(series: Array, edges: Array) -> Array:
+    """Series (P, k, n) without their last terms as far as these are what times are rounded by.
+
+    Differentiated, they would be large where panels meet.
+    """
+    degrees, widths = np.arange(series.shape[1])[:, None], np.diff(edges)[:, None]
+    sizes = np.abs(series)
+    largest = sizes.max(axis=1)
+    slopes = 2.0 / widths * (degrees * sizes).max(axis=1)
+    noise = _ROUNDING * largest + _TIME_ROUNDING * np.spacing(edges[-1]) * slopes
+    tails = np.cumsum(sizes[:, ::-1], axis=1)[:, ::-1]
+    return np.where(tails > noise[:, None], series, 0.0)
 
 
 def _fourier(curve: Fourier, times: Array) -> Array:

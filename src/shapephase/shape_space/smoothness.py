@@ -6,9 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ..arrays import Array
+from ..integrator.limited_steps import StepLimits
 from ..integrator.recorded.knot_path import KnotPath
 from ..integrator.resolved import ResolvedPath
+
+# A panel's series has five swings at most that are not rounding: each takes one step or more of twelve evaluations.
+_STEPS_OF_A_PANEL = 4.0
+# Of the fastest swing.
+_STEPS_OF_A_SWING = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,3 +50,17 @@ class Smoothness:
     checked: bool = False
     knots: KnotPath | None = None
     known: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def step_limits(self) -> StepLimits:
+        """How long steps of time may be that pass over nothing that is known to happen."""
+        if self.resolved is not None:
+            rows, loop = self.resolved.leaves, self.resolved.duration
+            edges = np.append(self.resolved.left[rows], loop)
+            return StepLimits.of_parts(edges, _STEPS_OF_A_PANEL).repeated(round(self.breaks[-1] / loop))
+        if self.oscillations is None:
+            return StepLimits.of_parts(self.breaks[[0, -1]], 1.0)
+        steps = _STEPS_OF_A_SWING * max(self.oscillations, 0.5)
+        if self.smooth_loop:
+            return StepLimits.of_parts(self.breaks[[0, -1]], steps * self.loops)
+        return StepLimits.of_parts(self.breaks, steps)

@@ -4,52 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
 from ... import so3
 from ...arrays import Array, lock_arrays
-from ...chebyshev import inside
 from ...display import short_repr
 from ...errors import AccuracyNotReached
+from ...sphere import gauss_nodes
+from ..limited_steps import Run, StepLimits, limited_run
 
-Rates = Callable[[float, Array, Array], tuple[Array, Array]]
-"""Time, attitude (3, 3), other states (k,) -> angular velocity, body axes (3,), and the rates of the others (k,)."""
-# Relative tolerance of the first run as a part of what is asked for: its error is about as large as that then.
+Rates = Callable[[Array, Array, Array], tuple[Array, Array]]
+"""Times (N,), attitudes (N, 3, 3), other states (N, k) -> angular velocities, body axes (N, 3), and rates (N, k)."""
+# Tolerance of the first run as a part of what is asked for: its error is about as large as that then.
 _FIRST = 0.01
 # Of a run against the one before it: the difference of both is the error of the first, ten times that of the second.
 _SHARPER = 0.1
-# SciPy gains nothing from less.
-_LEAST = 3e-14
+# SciPy takes no smaller relative tolerance; below, that of small numbers gains as much again.
+_LEAST_RELATIVE = 3e-14
+_LEAST = 3e-15
 # [rad] Rounding of some thousand steps.
 _ROUNDING = 1e-13
-# Of the duration: longer steps could pass over what lasts for a short time only.
+# Of the duration: longer steps gain nothing.
 _LONGEST = 1.0 / 64.0
 # Of the longest step, in each run that is ten times as sharp: the method is of order eight, and two runs with the same
 # steps would make the same errors.
 _SHORTER = 0.75
+# Of the difference before: with the least tolerance, steps are made shorter as long as that gains as much.
+_GAIN = 0.4
 # Times at which two runs are compared.
 _MOST_COMPARED = 4000
-
-
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """One run, a dense output between two breaks each."""
-
-    breaks: Array
-    pieces: tuple[Callable[[Array], Array], ...]
-    times: Array
-    evaluations: int
-
-    def __call__(self, t: Array) -> Array:
-        """Quaternions and scaled other states: (N,) -> (N, 4 + k)."""
-        piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.pieces) - 1)
-        values: Array = np.empty((len(t), len(self.pieces[0](self.breaks[:1])[:, 0])))
-        for number in np.unique(piece):
-            rows = piece == number
-            values[rows] = self.pieces[number](t[rows]).T
-        values[:, :4] = so3.normalised(values[:, :4])
-        return values
+# Of the duration: the slope is seen at times no farther apart, those of the scan of a path; what lasts twice as long is
+# not missed.
+_SEEN = 1.0 / 4000.0
+# Of an interval: the largest gap between eight Gauss points.
+_GAP = 0.1835
+# In units of a run's tolerance: the change over a step differs by 2 at most (14 for work) from the integral of the
+# slope along the step in motions that nothing was passed over.
+_PASSED_OVER = 20.0
+# Parts of a step that passed over something.
+_PARTS = 8.0
+# Rounds in which something was passed over: so many narrow stretches can follow from each other.
+_MOST_ROUNDS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +63,7 @@ class DrivenAttitude:
     evaluations : of the rates, in all runs
     """
 
-    run: _Run
+    run: Run
     scales: Array
     error_times: Array
     attitude_errors: Array
@@ -96,12 +93,21 @@ class DrivenAttitude:
 
 
 def driven_attitude(
-    rates: Rates, breaks: Array, attitude: Array, states: Array, scales: Array, tolerance: float
+    rates: Rates,
+    breaks: Array,
+    attitude: Array,
+    states: Array,
+    scales: Array,
+    tolerance: float,
+    limits: StepLimits | None = None,
 ) -> DrivenAttitude:
     """Integrate R' = R hat(omega) and y' = g, both given by `rates`, restarted at the breaks.
 
-    Runs are repeated, each with a tenth of the tolerance of the one before, until two of them agree. Their difference
-    is the estimate of the error, and grows as the motion magnifies errors.
+    Runs are repeated, each with a tenth of the tolerance of the one before and shorter steps, until two of them agree.
+    Their difference is the estimate of the error, and grows as the motion magnifies errors. Two runs may both step over
+    something short. So the slope is integrated once more along each run, by Gauss's rule at times 1/4,000 of the
+    duration apart: where that is not the change over a step, steps are made shorter. Narrower things are found by
+    limits only.
 
     Parameters
     ----------
@@ -110,74 +116,114 @@ def driven_attitude(
     states : (k,) at the start
     scales : (k,) size that matters of each
     tolerance : of the attitude, and of the other states in their scales [rad]
+    limits : of steps, by what is known of the rates; None: nothing
 
     Raises
     ------
     AccuracyNotReached
-        If the sharpest two runs disagree by more than the tolerance.
+        If the sharpest two runs disagree by more than the tolerance, or the rates change too often in short times.
 
     Examples
     --------
     >>> from shapephase.integrator.forced.driven_attitude import driven_attitude
     >>> def rates(t, attitude, states):
-    ...     return np.array([0.0, 0.0, states[0]]), np.ones(1)  # a turn that speeds up
+    ...     return np.column_stack([0.0 * t, 0.0 * t, states[:, 0]]), np.ones((len(t), 1))  # a turn that speeds up
     >>> found = driven_attitude(rates, np.array([0.0, 1.0]), np.eye(3), np.zeros(1), np.ones(1), 1e-9)
     >>> print(f"{float(sp.so3.angle(found.attitude(np.array([1.0]))[0])):.9f}")
     0.500000000
     """
-    sharpness = max(_FIRST * tolerance, _LEAST / _SHARPER)
+
+    def slopes(times: Array, values: Array) -> Array:
+        omega, others = rates(times, so3.matrix_from_quat(so3.normalised(values[:, :4])), values[:, 4:] * scales)
+        # By the quaternion as it is: the turn is then right whatever its length has drifted to.
+        (a, b, c, w), (p, q, r) = values[:, :4].T, omega.T
+        turning = [w * p + b * r - c * q, w * q + c * p - a * r, w * r + a * q - b * p, -a * p - b * q - c * r]
+        return np.column_stack([*(0.5 * one for one in turning), others / scales])
+
     start = np.concatenate([so3.quat_from_matrix(attitude), states / scales])
-    longest = _LONGEST * float(breaks[-1])
-    last = _integrated(rates, breaks, start, scales, sharpness, longest)
-    evaluations = last.evaluations
-    while True:
-        sharpness, longest = sharpness * _SHARPER, longest * _SHORTER
-        run = _integrated(rates, breaks, start, scales, sharpness, longest)
+    whole = StepLimits.of_parts(breaks[[0, -1]], 1.0 / _LONGEST)
+    limits = whole if limits is None else limits.and_those(whole)
+    evaluations = 0
+
+    def run_of(sharpness: float, limits: StepLimits) -> Run:
+        nonlocal evaluations
+        rtol = max(sharpness, _LEAST_RELATIVE)
+        run = limited_run(lambda t, y: slopes(np.array([t]), y[None])[0], breaks, start, limits, rtol, sharpness)
         evaluations += run.evaluations
-        middles = 0.5 * (run.times[:-1] + run.times[1:])
-        times = np.union1d(run.times, middles)
+        return run
+
+    for _ in range(_MOST_ROUNDS):
+        last, run, times, errors = _agreeing_runs(run_of, tolerance, limits)
+        worst = float(errors[-1].max())
+        # One of two that disagree may have passed over what the other one met.
+        shorter = [_shorter_steps(slopes, one) for one in ((run,) if worst <= tolerance else (last, run))]
+        found = [one for one in shorter if one is not None]
+        if not found:
+            break
+        limits = reduce(StepLimits.and_those, found, limits)
+    else:
+        raise AccuracyNotReached(
+            f"what drives the motion changes too often in short times: in {_MOST_ROUNDS} rounds steps passed over "
+            "something; give the times of pulses as breaks, or shorten the motion"
+        )
+    if worst > tolerance:
+        late = times[int(np.argmax(errors.max(axis=1) > tolerance))]
+        raise AccuracyNotReached(
+            f"two integrations disagree by {worst:.3g} rad where {tolerance:.3g} was requested, from {late:.6g} s "
+            "on: the motion magnifies its errors; loosen the tolerance or shorten the motion"
+        )
+    return DrivenAttitude(run, scales, times, errors[:, 0], errors[:, 1:] * scales, evaluations)
+
+
+def _agreeing_runs(
+    run_of: Callable[[float, StepLimits], Run], tolerance: float, limits: StepLimits
+) -> tuple[Run, Run, Array, Array]:
+    """Two runs that agree, or the sharpest two; times (M,), and their largest difference so far (M, 1 + k)."""
+    sharpness, before = max(_FIRST * tolerance, _LEAST / _SHARPER), np.inf
+    last = run_of(sharpness, limits)
+    while True:
+        limits = limits.times(_SHORTER)
+        if sharpness * _SHARPER < 0.9 * _LEAST:
+            # No tolerance makes steps shorter now.
+            limits = limits.and_those(StepLimits(last.times, _SHORTER * np.diff(last.times)))
+        else:
+            sharpness *= _SHARPER
+        run = run_of(sharpness, limits)
+        times = np.union1d(run.times, 0.5 * (run.times[:-1] + run.times[1:]))
         if len(times) > _MOST_COMPARED:
             times = times[np.unique(np.linspace(0, len(times) - 1, _MOST_COMPARED).astype(int))]
         one, other = last(times), run(times)
         apart = so3.angle(so3.transpose(so3.matrix_from_quat(one[:, :4])) @ so3.matrix_from_quat(other[:, :4]))
         errors = np.maximum.accumulate(np.column_stack([apart, np.abs(one - other)[:, 4:]]), axis=0) + _ROUNDING
         worst = float(errors[-1].max())
-        if worst <= tolerance:
-            return DrivenAttitude(run, scales, times, errors[:, 0], errors[:, 1:] * scales, evaluations)
-        if sharpness * _SHARPER < 0.9 * _LEAST:
-            late = times[int(np.argmax(errors.max(axis=1) > tolerance))]
-            raise AccuracyNotReached(
-                f"two integrations disagree by {worst:.3g} rad where {tolerance:.3g} was requested, from {late:.6g} s "
-                "on: the motion magnifies its errors; loosen the tolerance or shorten the motion"
-            )
-        last = run
+        if worst <= tolerance or (sharpness * _SHARPER < 0.9 * _LEAST and worst > _GAIN * before):
+            return last, run, times, errors
+        last, before = run, worst
 
 
-def _integrated(rates: Rates, breaks: Array, start: Array, scales: Array, sharpness: float, longest: float) -> _Run:
-    from scipy.integrate import solve_ivp
+def _shorter_steps(slopes: Callable[[Array, Array], Array], run: Run) -> StepLimits | None:
+    """Limits within the steps of a run that passed over something; None: none did."""
+    passed_over = _defects(slopes, run).max(axis=1) > _PASSED_OVER * run.rtol
+    if not passed_over.any():
+        return None
+    return StepLimits(run.times, np.where(passed_over, np.diff(run.times) / _PARTS, np.inf))
 
-    inner = inside(breaks[:-1], breaks[1:])
 
-    def slope(t: float, y: Array, left: float, right: float) -> Array:
-        unit = so3.normalised(y[:4])
-        omega, others = rates(min(max(t, left), right), so3.matrix_from_quat(unit), y[4:] * scales)
-        (a, b, c, w), (p, q, r) = unit.tolist(), omega.tolist()
-        turning = [w * p + b * r - c * q, w * q + c * p - a * r, w * r + a * q - b * p, -a * p - b * q - c * r]
-        return np.concatenate([0.5 * np.array(turning), others / scales])
+def _defects(slopes: Callable[[Array, Array], Array], run: Run) -> Array:
+    """By how much the changes over steps miss the integral of the slope along them: (K, 4 + k).
 
-    state, pieces, times, evaluations = start, [], [breaks[:1]], 0
-    for a, b, left, right in zip(breaks[:-1], breaks[1:], *inner, strict=True):
-        # SciPy asks for the float next to zero, which is an underflow to those who want to be told.
-        with np.errstate(under="ignore"):
-            run = solve_ivp(
-                slope, (a, b), state, "DOP853", dense_output=True, rtol=sharpness, atol=sharpness, max_step=longest,
-                args=(left, right),
-            )  # fmt: skip
-        if not run.success:
-            raise AccuracyNotReached(f"DOP853 stopped at t = {run.t[-1]:.9g} s: {run.message}")
-        pieces.append(run.sol)
-        times.append(run.t[1:])
-        evaluations += run.nfev
-        state = run.y[:, -1].copy()
-        state[:4] = so3.normalised(state[:4])
-    return _Run(breaks, tuple(pieces), np.concatenate(times), evaluations)
+    Zero for steps that are too short to pass over anything.
+    """
+    steps, duration = np.diff(run.times), run.times[-1]
+    found = np.zeros((len(steps), len(run(run.times[:1])[0])))
+    long = np.flatnonzero(steps > _SEEN * duration)
+    if len(long):
+        parts = np.ceil(steps[long] * _GAP / (_SEEN * duration)).astype(int)
+        first = np.cumsum(parts) - parts
+        width = np.repeat(steps[long] / parts, parts)
+        left = np.repeat(run.times[long], parts) + width * (np.arange(len(width)) - np.repeat(first, parts))
+        nodes, weights = gauss_nodes(left, left + width)
+        at_nodes = slopes(nodes.ravel(), run(nodes.ravel())).reshape(*nodes.shape, -1)
+        integrals = np.add.reduceat(np.einsum("pm,pmk->pk", weights, at_nodes), first, axis=0)
+        found[long] = np.abs(run(run.times[long + 1]) - run(run.times[long]) - integrals)
+    return found
