@@ -12,7 +12,10 @@ from .virtual_base import joint_coordinates
 if TYPE_CHECKING:
     from .body import Body
 
-MUJOCO, ISAAC, ISAAC_BY_NAME, OWN = "mujoco", "isaac", "isaac-by-name", "body"
+MUJOCO = "mujoco"
+ISAAC = "isaac"
+ISAAC_BY_NAME = "isaac-by-name"
+OWN = "body"
 WORDS = (MUJOCO, ISAAC, ISAAC_BY_NAME, OWN)
 """What a caller may ask for."""
 TITLES = {

@@ -18,7 +18,8 @@ from ._link_tree import Joint, Link
 from .couplings.ball_joints import coordinate_names
 from .couplings.coupling import Coupling
 
-ANYWHERE, IN_A_PLANE = "floating", "planar"
+ANYWHERE = "floating"
+IN_A_PLANE = "planar"
 """Kinds of joints that only a base has."""
 _PARTS = (("_TX", "prismatic", 0), ("_TY", "prismatic", 1), ("_RZ", "revolute", 2))
 """What MuJoCo makes of a planar joint: names after its own, kinds, and axes about a z that is the joint's axis."""
