@@ -118,3 +118,19 @@ def test_a_smoothed_recording_has_the_bars_of_its_noise_and_says_what_smoothing_
         assert part in text
     given = json.loads(said(capfd, "split", "diver", take, *options, "--smooth-penalty", "1e-5", "--json"))
     assert set(given["recording"]["smoothing"]["penalty_s5"].values()) == {1e-5}
+
+
+def test_torques_of_a_recording_have_bars_or_say_that_none_are_known(capfd, take):
+    data = json.loads(said(capfd, "torques", "diver", take, *MOMENTUM, "--smooth", "0.2deg", "--json"))
+    body = sp.load_body("diver")
+    path = sp.read_shape_path(take, body, smooth="0.2deg")
+    motion = sp.reconstruct(sp.articulated(body, path), [2.0, 3.0, 20.0])
+    loads = sp.joint_torques(motion).loads
+    bars = sp.torque_errors(sp.joint_torques(motion, loads.peak_time)).torque.diagonal()
+    np.testing.assert_allclose(data["standard_deviations"]["peak_torque"], bars, rtol=1e-6)
+    text = said(capfd, "torques", "diver", take, *MOMENTUM, "--smooth", "0.2deg")
+    for line in text.splitlines():
+        if line.startswith(body.joint_names):
+            # Peak, per kg, two shares of limits, rate, power and work.
+            assert line.count("±") == 7
+    assert "± not known" in said(capfd, "torques", "diver", take, *MOMENTUM)
