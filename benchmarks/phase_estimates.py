@@ -27,8 +27,8 @@ from .random_motions import Trial
 
 GAUGES = ("base", "horizontal", "given")
 QUANTITIES = (
-    "total_rotation", "holonomy", "dynamical_rotation", "tilt", "montgomery_phase", "dynamic_phase", "solid_angle",
-    "momentum_gap",
+    "total_rotation", "holonomy", "dynamical_rotation", "closing_tilt", "montgomery_phase", "dynamic_phase",
+    "solid_angle", "momentum_gap",
 )  # fmt: skip
 _NODES = np.polynomial.legendre.leggauss(16)
 _MOST_PANELS = 200
@@ -63,7 +63,7 @@ class ExactSplit:
     total_rotation: np.ndarray
     holonomy: np.ndarray
     dynamical_rotation: np.ndarray
-    tilt: np.ndarray
+    closing_tilt: np.ndarray
     montgomery_phase: np.longdouble
     dynamic_phase: np.longdouble
     solid_angle: np.longdouble
@@ -202,7 +202,7 @@ def _disagreement(curve: ExactCurve, gauge: str) -> float:
     if gauge == "given":
         frame, _ = swinging(float(curve.times[-1]))(curve.times[[0, -1]].astype(np.longdouble))
         turn = turn @ frame[1].T @ frame[0]
-    turn = turn @ found.tilt.T
+    turn = turn @ found.closing_tilt.T
     vector = 0.5 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     angle = np.arctan2(curve.direction[0] @ vector, (np.trace(turn) - 1) / 2)
     return distance(found.montgomery_phase, angle, 2.0)
@@ -233,7 +233,7 @@ def exact_split(curve: ExactCurve, gauge: str | Callable[[np.ndarray], tuple[np.
         total_rotation=total,
         holonomy=holonomy,
         dynamical_rotation=total @ holonomy.T,
-        tilt=seen @ _between(corners[-1], corners[0]) @ seen.T,
+        closing_tilt=seen @ _between(corners[-1], corners[0]) @ seen.T,
         montgomery_phase=dynamic - area,
         dynamic_phase=dynamic,
         solid_angle=area,

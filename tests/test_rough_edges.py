@@ -100,7 +100,7 @@ def test_every_command_takes_hostile_names(tmp_path, monkeypatch, capsys):
     """Names with commas and semicolons, too: the motion is an NPZ file, whose columns are no line of text."""
     (tmp_path / "star.urdf").write_text(star_urdf(OF_FILES), encoding="utf-8")
     body = sp.load_body(tmp_path / "star.urdf")
-    sp.write_shape_path(swinging(body), tmp_path / "star.npz", np.linspace(0.0, 1.0, 5))
+    sp.write_shape_path(swinging(body), tmp_path / "star.npz", np.linspace(0.0, 1.0, 21))
     monkeypatch.chdir(tmp_path)
     for arguments in (
         "check star.urdf star.npz --json",

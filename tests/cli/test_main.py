@@ -47,7 +47,15 @@ def test_json_holds_the_split(capsys):
     start = np.diag([-1.0, -1.0, 1.0])
     motion = sp.reconstruct(sp.articulated(sp.load_body("cat"), cat_righting()), [0.01, -0.02, 0.0], start)
     split = sp.split(motion)
-    for name in ("total_rotation", "holonomy", "dynamical_rotation", "tilt", "montgomery_phase", "residual", "gauge"):
+    for name in (
+        "total_rotation",
+        "holonomy",
+        "dynamical_rotation",
+        "closing_tilt",
+        "montgomery_phase",
+        "residual",
+        "gauge",
+    ):
         assert np.all(np.array(data[name]) == np.array(getattr(split, name)))
     for name, error in data["error_estimates"].items():
         assert error == getattr(split.error_estimates, name)
@@ -73,9 +81,16 @@ def test_every_number_of_the_table_has_its_error_beside_it(capsys):
     command = (*CAT, "--momentum", 1e-6, 0, 0)
     data = json.loads(run(capsys, *command, "--tolerance", 1e-5, "--json"))
     lines = {line[:24].strip(): line for line in run(capsys, *command, "--tolerance", 1e-5).splitlines()}
-    rows = {"total rotation", "shape holonomy", "dynamical rotation", "Montgomery phase", "dynamic phase", "tilt"}
+    rows = {
+        "total rotation",
+        "shape holonomy",
+        "dynamical rotation",
+        "Montgomery phase",
+        "dynamic phase",
+        "tilt of the closing",
+    }
     for row in rows | {"geometric phase", "momentum gap"}:
-        name = row.lower().replace(" ", "_").replace("shape_", "")
+        name = row.lower().replace("tilt of the closing", "closing tilt").replace(" ", "_").replace("shape_", "")
         assert lines[row][40:51] == f"{data['error_estimates'][name]:11.1e}"
     turn = so3.angle(np.array(data["dynamical_rotation"]))
     known = data["error_estimates"]["dynamical_rotation"] / turn

@@ -97,7 +97,7 @@ def test_near_the_opposite_point_the_closing_makes_errors_large(away: float):
         assert error - curve.uncertainty <= getattr(found.error_estimates, name), name
     # The error of the end, times the cotangent of half of what is left to the opposite point.
     expected = 2.0 * float(found.error_estimates.momentum_gap) / away
-    assert 0.9 * min(expected, np.pi) < found.error_estimates.tilt < 1.2 * expected
+    assert 0.9 * min(expected, np.pi) < found.error_estimates.closing_tilt < 1.2 * expected
     for name in ("solid_angle", "montgomery_phase"):
         assert getattr(found.error_estimates, name) < 1.2 * expected + 10.0 * motion.error_estimate
     assert found.error_estimates.dynamic_phase < 20.0 * motion.error_estimate
@@ -228,7 +228,7 @@ def test_phases_in_time_and_of_arcs_are_within_their_estimates(name: str, gauge:
     for part in ("dynamic_phase", "montgomery_phase", "solid_angle", "polygon_angle", "total_phase", "momentum_gap"):
         gap = np.abs(sphere.wrapped(getattr(mine, part) - getattr(theirs, part)))
         assert np.all(gap <= getattr(mine.error_estimates, part) + getattr(theirs.error_estimates, part)), part
-    for part in ("tilt", "total_tilt"):
+    for part in ("closing_tilt", "total_closing_tilt"):
         gap = so3.angle(so3.transpose(getattr(mine, part)) @ getattr(theirs, part))
         assert np.all(gap <= getattr(mine.error_estimates, part) + getattr(theirs.error_estimates, part)), part
 

@@ -81,7 +81,7 @@ def test_closed_in_the_base_gauge(name: str):
         assert apart(turn(UP, split.montgomery_phase), split.total_rotation) < 1e-9
         # In this gauge theta_M already holds the shape's part.
         assert apart(turn(UP, split.montgomery_phase) @ split.holonomy, split.total_rotation) > 1e-2
-        assert apart(split.tilt, np.eye(3)) < 1e-9
+        assert apart(split.closing_tilt, np.eye(3)) < 1e-9
 
 
 @pytest.mark.parametrize("name", full_but(["example:human", "cat"], "example:human"))
@@ -97,7 +97,7 @@ def test_closed_in_the_horizontal_gauge(name: str):
         assert split.residual < 1e-9
         assert apart(turn(UP, split.montgomery_phase) @ split.holonomy, total) < 1e-9
         assert apart(turn(UP, split.montgomery_phase), total) > 1e-2
-        assert apart(split.tilt, np.eye(3)) < 1e-9
+        assert apart(split.closing_tilt, np.eye(3)) < 1e-9
         assert apart(split.dynamical_rotation, turn(UP, split.montgomery_phase)) < 1e-9
 
 
@@ -132,10 +132,10 @@ def test_any_attitude(name: str, seed: int):
         split = sp.split(motion, gauge)
         phase = turn(axis, split.montgomery_phase)
         after = split.holonomy if gauge == "horizontal" else np.eye(3)
-        assert apart(phase @ split.tilt @ after, total) < 1e-10
+        assert apart(phase @ split.closing_tilt @ after, total) < 1e-10
         assert apart(split.dynamical_rotation @ split.holonomy, total) < 1e-12
         assert split.momentum_gap > 1e-3
-        tilt = Rotation.from_matrix(split.tilt).as_rotvec()
+        tilt = Rotation.from_matrix(split.closing_tilt).as_rotvec()
         assert abs(tilt @ axis) < 1e-12
         assert abs(np.linalg.norm(tilt) - split.momentum_gap) < 1e-12
         assert split.residual < 1e-10
@@ -156,7 +156,7 @@ def test_open_momentum_is_closed_by_the_great_circle(name: str):
         assert abs(split.dynamic_phase - truth.dynamic_phase[gauge]) < 3e-11
         assert abs(wrapped(split.solid_angle - truth.solid_angle[gauge])) < 3e-11
         closing = geodesic_turn(frame @ truth.attitude[-1].T @ axis, start.T @ axis)
-        assert apart(split.tilt, start @ closing @ start.T) < 3e-11
+        assert apart(split.closing_tilt, start @ closing @ start.T) < 3e-11
         assert apart(split.holonomy, start @ lift @ start.T) < 3e-11
     assert apart(start @ sp.holonomy(body, loop.path, 1e-12) @ start.T, start @ lift @ start.T) < 3e-11
 
@@ -274,7 +274,7 @@ def test_principal_gauge(name: str):
     frames = seen.frame([0.0, 2.0])
     first, last = motion.initial_attitude @ frames[0].T, motion.final_attitude @ frames[1].T
     axis = motion.momentum / np.linalg.norm(motion.momentum)
-    assert apart(turn(axis, split.montgomery_phase) @ split.tilt, last @ first.T) < 1e-10
+    assert apart(turn(axis, split.montgomery_phase) @ split.closing_tilt, last @ first.T) < 1e-10
     assert split.residual < 1e-10
     base = sp.split(motion, "base")
     np.testing.assert_array_equal(split.total_rotation, base.total_rotation)
@@ -367,7 +367,7 @@ def test_zero_momentum_has_no_phase(gauge: str):
         assert getattr(split, phase) == 0.0
     assert split.residual == split.momentum_gap == 0.0
     np.testing.assert_array_equal(split.dynamical_rotation, np.eye(3))
-    np.testing.assert_array_equal(split.tilt, np.eye(3))
+    np.testing.assert_array_equal(split.closing_tilt, np.eye(3))
     assert apart(split.holonomy, split.total_rotation) < 1e-9
     assert apart(split.total_rotation, motion.final_attitude @ attitude.T) < 1e-15
 
@@ -381,7 +381,11 @@ def test_a_momentum_too_small_to_matter_still_has_its_direction(size: float):
     assert apart(motion.final_attitude, still.final_attitude) < 1e-9
     for gauge in ("horizontal", "base"):
         split = sp.split(motion, gauge)
-        about = turn(direction, split.montgomery_phase) @ split.tilt if split.has_phase else split.dynamical_rotation
+        about = (
+            turn(direction, split.montgomery_phase) @ split.closing_tilt
+            if split.has_phase
+            else split.dynamical_rotation
+        )
         after = split.holonomy if gauge == "horizontal" or not split.has_phase else np.eye(3)
         assert apart(about @ after, split.total_rotation) < 1e-9
 
@@ -399,7 +403,7 @@ def test_an_open_path_has_a_lift_but_no_loop():
     assert apart(split.holonomy, attitude @ truth.lift[-1] @ attitude.T) < 3e-11
     assert apart(split.total_rotation, truth.attitude[-1] @ attitude.T) < 3e-11
     axis = momentum / 0.05
-    assert apart(turn(axis, split.montgomery_phase) @ split.tilt @ split.holonomy, split.total_rotation) < 1e-10
+    assert apart(turn(axis, split.montgomery_phase) @ split.closing_tilt @ split.holonomy, split.total_rotation) < 1e-10
 
 
 def test_particles_that_end_turned_have_a_closure():
@@ -443,7 +447,7 @@ def test_a_batch_is_split_like_its_members():
         for i, j in np.ndindex(3, 3):
             single = sp.split(sp.reconstruct(deformation, momenta[i], attitudes[j], tolerance=1e-11), gauge)
             assert split.has_phase[i, j] == single.has_phase
-            for field in ("total_rotation", "holonomy", "dynamical_rotation", "tilt"):
+            for field in ("total_rotation", "holonomy", "dynamical_rotation", "closing_tilt"):
                 assert apart(getattr(split, field)[i, j], getattr(single, field)) < 3e-11
             for field in ("dynamic_phase", "solid_angle", "montgomery_phase", "montgomery_angle", "momentum_gap"):
                 assert abs(getattr(split, field)[i, j] - getattr(single, field)) < 3e-11

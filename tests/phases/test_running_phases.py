@@ -239,14 +239,14 @@ def check_arcs(motion, arcs, gauge, tolerance=1e-10):
     axis = unit(motion.momentum)
     attitudes = motion.attitude(arcs.times) @ np.swapaxes(frames_of(motion, gauge, arcs.times), 1, 2)
     for k, (first, last) in enumerate(pairwise(attitudes)):
-        assert apart(turn(axis, arcs.montgomery_phase[k]) @ arcs.tilt[k], last @ first.T) < tolerance
-        vector = Rotation.from_matrix(arcs.tilt[k]).as_rotvec()
+        assert apart(turn(axis, arcs.montgomery_phase[k]) @ arcs.closing_tilt[k], last @ first.T) < tolerance
+        vector = Rotation.from_matrix(arcs.closing_tilt[k]).as_rotvec()
         assert abs(vector @ axis) < 1e-12
         assert abs(np.linalg.norm(vector) - arcs.momentum_gap[k]) < 1e-12
         here, there = first.T @ axis, last.T @ axis
         assert abs(arcs.momentum_gap[k] - np.arctan2(np.linalg.norm(np.cross(here, there)), here @ there)) < tolerance
     total = attitudes[-1] @ attitudes[0].T
-    assert apart(turn(axis, float(arcs.total_phase)) @ arcs.total_tilt, total) < tolerance
+    assert apart(turn(axis, float(arcs.total_phase)) @ arcs.total_closing_tilt, total) < tolerance
     np.testing.assert_array_equal(arcs.montgomery_phase, arcs.dynamic_phase - arcs.solid_angle)
     np.testing.assert_array_equal(arcs.geometric_phase, -arcs.solid_angle)
 
@@ -263,7 +263,7 @@ def test_random_arcs_add_up_to_the_whole(name, gauge):
     assert one.total_phase == pytest.approx(whole.montgomery_phase, abs=1e-12)
     assert one.montgomery_phase[0] == one.total_phase
     assert one.polygon_angle == 0.0
-    assert apart(one.tilt[0], whole.tilt) < 1e-14
+    assert apart(one.closing_tilt[0], whole.closing_tilt) < 1e-14
     check_arcs(motion, one, gauge)
     for count in (1, 2, 5, 17):
         cuts = np.concatenate([[0.0], np.sort(random.uniform(0.0, 2.0, count)), [2.0]])
@@ -273,7 +273,7 @@ def test_random_arcs_add_up_to_the_whole(name, gauge):
         assert arcs.dynamic_phase.sum() == pytest.approx(whole.dynamic_phase, abs=1e-12)
         assert arcs.total_phase == pytest.approx(arcs.montgomery_phase.sum() - arcs.polygon_angle, abs=1e-12)
         assert arcs.total_phase == pytest.approx(whole.montgomery_phase, abs=1e-11)
-        assert apart(arcs.total_tilt, whole.tilt) < 1e-12
+        assert apart(arcs.total_closing_tilt, whole.closing_tilt) < 1e-12
 
 
 @pytest.mark.parametrize("gauge", ["base", "horizontal"])
@@ -299,7 +299,7 @@ def test_part_of_a_motion():
     check_arcs(motion, arcs, "base")
     whole = arc_phases(motion, [0.31, 1.7], "base")
     assert whole_spheres(whole.total_phase - arcs.total_phase) < 1e-11
-    assert apart(whole.total_tilt, arcs.total_tilt) < 1e-12
+    assert apart(whole.total_closing_tilt, arcs.total_closing_tilt) < 1e-12
     running = running_phases(motion, cuts, "base")
     np.testing.assert_allclose(np.diff(running.dynamic_phase), arcs.dynamic_phase, rtol=0, atol=1e-13)
 
@@ -314,7 +314,7 @@ def test_each_loop_of_a_closed_orbit_has_the_same_phase(name):
     assert np.abs(arcs.montgomery_phase - arcs.montgomery_phase[0]).max() < 1e-9
     assert whole_spheres(arcs.montgomery_phase[0] - once.montgomery_phase) < 1e-8
     assert arcs.momentum_gap.max() < 1e-9
-    assert apart(arcs.tilt, np.eye(3)) < 1e-9
+    assert apart(arcs.closing_tilt, np.eye(3)) < 1e-9
     assert abs(arcs.polygon_angle) < 1e-9
     assert abs(arcs.total_phase - 20.0 * arcs.montgomery_phase[0]) < 1e-8
     # Seen from the lift, each loop of the curve is the one before, turned by the holonomy.
@@ -353,13 +353,13 @@ def test_arcs_with_opposite_or_nearly_opposite_ends(off, wiggle):
     axis = np.array([0.6, 0.8, 0.0])
     for k in range(2):
         total = attitudes[k + 1] @ attitudes[k].T
-        assert apart(turn(axis, arcs.montgomery_phase[k]) @ arcs.tilt[k], total) < 1e-11
+        assert apart(turn(axis, arcs.montgomery_phase[k]) @ arcs.closing_tilt[k], total) < 1e-11
     assert np.all(arcs.momentum_gap < 2.0)
     total = attitudes[2] @ attitudes[0].T
-    assert apart(turn(axis, float(arcs.total_phase)) @ arcs.total_tilt, total) < near
+    assert apart(turn(axis, float(arcs.total_phase)) @ arcs.total_closing_tilt, total) < near
     split = sp.split(motion, gauge)
     assert split.momentum_gap == pytest.approx(np.pi - abs(off), abs=1e-12)
-    assert apart(turn(axis, float(split.montgomery_phase)) @ split.tilt, total) < near
+    assert apart(turn(axis, float(split.montgomery_phase)) @ split.closing_tilt, total) < near
     assert whole_spheres(split.montgomery_phase - arcs.total_phase) < 1e-11
     assert split.residual < 1e-12
 
@@ -537,8 +537,8 @@ def test_without_momentum_there_is_no_phase(gauge):
         np.testing.assert_array_equal(getattr(running, field), np.zeros(9))
     for field in ("dynamic_phase", "geometric_phase", "montgomery_phase", "solid_angle", "momentum_gap"):
         np.testing.assert_array_equal(getattr(arcs, field), np.zeros(8))
-    np.testing.assert_array_equal(arcs.tilt, np.broadcast_to(np.eye(3), (8, 3, 3)))
-    np.testing.assert_array_equal(arcs.total_tilt, np.eye(3))
+    np.testing.assert_array_equal(arcs.closing_tilt, np.broadcast_to(np.eye(3), (8, 3, 3)))
+    np.testing.assert_array_equal(arcs.total_closing_tilt, np.eye(3))
     assert arcs.total_phase == arcs.polygon_angle == running.residual == 0.0
     assert np.isfinite(running.reference).all()
     rolled = parallel_transport(motion, times, asked)
@@ -564,8 +564,8 @@ def test_batches_are_their_members(gauge):
     assert running.reference.shape == (3, 2, 3)
     assert running.residual.shape == arcs.total_phase.shape == arcs.polygon_angle.shape == (3, 2)
     assert arcs.montgomery_phase.shape == arcs.momentum_gap.shape == (3, 2, 2)
-    assert arcs.tilt.shape == (3, 2, 2, 3, 3)
-    assert arcs.total_tilt.shape == (3, 2, 3, 3)
+    assert arcs.closing_tilt.shape == (3, 2, 2, 3, 3)
+    assert arcs.total_closing_tilt.shape == (3, 2, 3, 3)
     assert rolled.shape == (3, 2, 2, 3, 3, 3)
     assert dynamic_phase_from_energy(batch).shape == (3, 2)
     for i, j in np.ndindex(3, 2):
@@ -577,8 +577,8 @@ def test_batches_are_their_members(gauge):
         np.testing.assert_allclose(running.solid_angle[i, j], alone.solid_angle, rtol=0, atol=3e-11)
         np.testing.assert_allclose(arcs.montgomery_phase[i, j], cut.montgomery_phase, rtol=0, atol=3e-11)
         assert abs(arcs.total_phase[i, j] - cut.total_phase) < 3e-11
-        assert apart(arcs.tilt[i, j], cut.tilt) < 3e-11
-        assert apart(arcs.total_tilt[i, j], cut.total_tilt) < 3e-11
+        assert apart(arcs.closing_tilt[i, j], cut.closing_tilt) < 3e-11
+        assert apart(arcs.total_closing_tilt[i, j], cut.total_closing_tilt) < 3e-11
         assert apart(rolled[i, j], parallel_transport(one, times, asked)) < 3e-11
         assert dynamic_phase_from_energy(batch)[i, j] == pytest.approx(dynamic_phase_from_energy(one), abs=3e-11)
 
@@ -661,11 +661,11 @@ def check_split(motion, gauge, near=1e-10):
     again = sp.split(other, "base")
     axis = unit(motion.momentum)
     total = other.final_attitude @ other.initial_attitude.T
-    assert apart(turn(axis, float(split.montgomery_phase)) @ split.tilt, total) < near
+    assert apart(turn(axis, float(split.montgomery_phase)) @ split.closing_tilt, total) < near
     assert split.dynamic_phase == pytest.approx(again.dynamic_phase, abs=near)
     assert whole_spheres(split.solid_angle - again.solid_angle) < near
     assert split.momentum_gap == pytest.approx(again.momentum_gap, abs=near)
-    assert apart(split.tilt, again.tilt) < near
+    assert apart(split.closing_tilt, again.closing_tilt) < near
     assert split.residual < near
     truth = sp.split(motion, "base")
     for field in ("total_rotation", "holonomy", "dynamical_rotation"):
@@ -689,7 +689,7 @@ def test_frames_of_the_body(name, gauge):
     first, last = seen_from(motion, asked).deformation.frame([0.0, 2.0])
     assert apart(first, last) < 1e-10
     axis = unit(motion.momentum)
-    assert apart(turn(axis, float(split.montgomery_phase)) @ split.tilt, split.total_rotation) < 1e-10
+    assert apart(turn(axis, float(split.montgomery_phase)) @ split.closing_tilt, split.total_rotation) < 1e-10
     assert abs(split.dynamic_phase - base.dynamic_phase) > 1e-3
 
 
@@ -698,7 +698,7 @@ def test_the_base_link_is_the_base_gauge():
     base, same = sp.split(motion, "base"), sp.split(motion, "link:trunk_front")
     for field in ("dynamic_phase", "solid_angle", "montgomery_phase", "momentum_gap"):
         assert getattr(same, field) == pytest.approx(getattr(base, field), abs=1e-11)
-    assert apart(same.tilt, base.tilt) < 1e-12
+    assert apart(same.closing_tilt, base.closing_tilt) < 1e-12
 
 
 def test_another_link_turns_by_its_own_pose():
@@ -710,7 +710,7 @@ def test_another_link_turns_by_its_own_pose():
     arcs = arc_phases(motion, times, "link:right_hand")
     axis = unit(motion.momentum)
     for k, (first, last) in enumerate(pairwise(links)):
-        assert apart(turn(axis, arcs.montgomery_phase[k]) @ arcs.tilt[k], last @ first.T) < 1e-10
+        assert apart(turn(axis, arcs.montgomery_phase[k]) @ arcs.closing_tilt[k], last @ first.T) < 1e-10
     rolled = parallel_transport(motion, times, "link:right_hand")
     phases = running_phases(motion, times, "link:right_hand")
     assert apart(turns_about(axis, phases.dynamic_phase) @ rolled, links) < 1e-10
@@ -798,7 +798,7 @@ def test_ten_random_gauges(name):
         assert apart(split.dynamical_rotation @ split.holonomy, split.total_rotation) < 1e-12
         first, last = gauge(np.array([0.0, 2.0]))[0]
         turned = motion.final_attitude @ last.T @ first @ motion.initial_attitude.T
-        assert apart(turn(axis, float(split.montgomery_phase)) @ split.tilt, turned) < 1e-10
+        assert apart(turn(axis, float(split.montgomery_phase)) @ split.closing_tilt, turned) < 1e-10
         assert split.residual < 1e-12
         phases.append(split.montgomery_angle)
         if seed < 3:

@@ -189,8 +189,8 @@ def test_every_gauge_has_the_same_total_rotation_and_its_identity(case: Case):
         assert apart(split.dynamical_rotation @ split.holonomy, total) < (EXACT if size > 0.0 else 1e-9)
     if size > 0.0:
         about = [rotation_about(case.momentum / size, split.montgomery_phase) for split in (horizontal, base)]
-        assert apart(about[0] @ horizontal.tilt @ horizontal.holonomy, total) < 1e-10
-        assert apart(about[1] @ base.tilt, total) < 1e-10
+        assert apart(about[0] @ horizontal.closing_tilt @ horizontal.holonomy, total) < 1e-10
+        assert apart(about[1] @ base.closing_tilt, total) < 1e-10
 
 
 def rotation_about(axis: np.ndarray, angle: float) -> np.ndarray:

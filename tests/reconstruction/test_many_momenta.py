@@ -119,7 +119,7 @@ def test_what_follows_is_put_together_by_row():
         assert np.allclose(split.montgomery_phase[row], sp.split(alone).montgomery_phase, rtol=0.0, atol=1e-10)
         assert np.allclose(split.holonomy[row], sp.split(alone).holonomy, rtol=0.0, atol=1e-10)
         assert np.allclose(running.solid_angle[row], sp.running_phases(alone, times).solid_angle, rtol=0.0, atol=1e-10)
-        assert np.allclose(arcs.tilt[row], sp.arc_phases(alone, times).tilt, rtol=0.0, atol=1e-10)
+        assert np.allclose(arcs.closing_tilt[row], sp.arc_phases(alone, times).closing_tilt, rtol=0.0, atol=1e-10)
         assert np.allclose(carried[row], sp.parallel_transport(alone, times), rtol=0.0, atol=1e-10)
         assert np.allclose(sensitivity.by_attitude[row], alone.sensitivity.by_attitude, rtol=1e-8)
         assert np.allclose(motion.solid_angle(times)[row], alone.solid_angle(times), rtol=0.0, atol=1e-10)

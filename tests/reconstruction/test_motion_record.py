@@ -100,7 +100,7 @@ def test_a_loaded_motion_knows_where_its_base_is(pair):
 def test_a_loaded_motion_is_split_alike(pair, gauge: str):
     motion, loaded = pair
     ours, theirs = sp.split(motion, gauge), sp.split(loaded, gauge)
-    for field in ("total_rotation", "holonomy", "dynamical_rotation", "tilt"):
+    for field in ("total_rotation", "holonomy", "dynamical_rotation", "closing_tilt"):
         assert apart(getattr(theirs, field), getattr(ours, field)) < 1e-9
     for field in ("montgomery_phase", "dynamic_phase", "solid_angle", "momentum_gap"):
         np.testing.assert_allclose(getattr(theirs, field), getattr(ours, field), rtol=0, atol=1e-9)

@@ -170,3 +170,16 @@ def test_noise_of_the_joints_moves_the_samples_of_a_recording(tmp_path):
     expected = np.sqrt(np.diag(sp.uncertainty(motion, joints=1e-4).final_attitude))
     turns = sp.so3.log(found @ motion.final_attitude.T)
     np.testing.assert_allclose(turns.std(axis=0), expected, rtol=0.25)
+
+
+def test_a_study_of_before_names_the_tilt_of_the_closing_as_it_did():
+    """A name of an output that has another now, in study files and in the arrays of their stores."""
+    study = sp.study.Study("cat_two_halves", "cat_righting", {"momentum_z": [0.1]}, outputs=("tilt", "closing_tilt"))
+    former, named = study.resolved_outputs
+    assert (former.name, former.shape, named.name) == ("tilt", (3, 3), "closing_tilt")
+    body = sp.load_body("cat_two_halves")
+    motion = sp.reconstruct(sp.articulated(body, sp.examples.kane_scher(0.3, 0.5)), [0.0, 0.01, 0.02])
+    parts = sp.split(motion)
+    axis = np.array([0.0, 0.01, 0.02]) / np.hypot(0.01, 0.02)
+    whole = sp.so3.exp(float(parts.montgomery_phase) * axis) @ former.of(motion, parts) @ parts.holonomy
+    np.testing.assert_allclose(whole, parts.total_rotation, rtol=0, atol=1e-9)

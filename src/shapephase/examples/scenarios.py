@@ -304,7 +304,7 @@ def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
 
     Returns
     -------
-    the first of `closed_orbits`, in the base gauge: `split(closed_orbit("cat"))` has no tilt
+    the first of `closed_orbits`, in the base gauge: `split(closed_orbit("cat"))` has no tilt of the closing
 
     Raises
     ------

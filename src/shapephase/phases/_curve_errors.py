@@ -290,7 +290,7 @@ def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> Split
         dynamic_phase=of(whole.dynamic),
         geometric_phase=of(whole.area),
         solid_angle=of(whole.area),
-        tilt=of(whole.tilt),
+        closing_tilt=of(whole.tilt),
         momentum_gap=of(whole.gap),
         closing_phase=of(np.minimum(whole.area + swept.area, 2.0 * np.pi)),
     )
@@ -344,9 +344,9 @@ def arc_errors(motion: Motion, curve: MomentumCurve, cuts: Array, residuals: tup
         geometric_phase=of(parts.area),
         montgomery_phase=of(parts.phase),
         solid_angle=of(parts.area),
-        tilt=of(parts.tilt),
+        closing_tilt=of(parts.tilt),
         momentum_gap=of(parts.gap),
         polygon_angle=of_all(corners),
         total_phase=of_all(whole.phase),
-        total_tilt=of_all(whole.tilt),
+        total_closing_tilt=of_all(whole.tilt),
     )

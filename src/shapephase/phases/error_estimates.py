@@ -13,11 +13,12 @@ class SplitErrors:
     """Estimates of the errors of a `PhaseSplit`, each of what its name says; fields have the motion's batch axes.
 
     Near the point opposite its start, the end of the momentum's curve turns the closing great circle round by any
-    small displacement, and what depends on that circle may be off by any angle: up to pi for a tilt, 2 pi for phases.
+    small displacement, and what depends on that circle may be off by any angle: up to pi for the tilt of the closing,
+    2 pi for phases.
 
     Attributes
     ----------
-    total_rotation, holonomy, dynamical_rotation, wheel_rotation, tilt : angle from the true rotation [rad]
+    total_rotation, holonomy, dynamical_rotation, wheel_rotation, closing_tilt : angle from the true rotation [rad]
     montgomery_phase, dynamic_phase, geometric_phase, closing_phase : modulo 4 pi [rad]
     montgomery_angle : modulo 2 pi [rad]
     solid_angle : modulo 4 pi [sr]
@@ -40,7 +41,7 @@ class SplitErrors:
     dynamic_phase: Array
     geometric_phase: Array
     solid_angle: Array
-    tilt: Array
+    closing_tilt: Array
     momentum_gap: Array
     closing_phase: Array
 
@@ -69,7 +70,7 @@ class RunningErrors:
 
 @dataclass(frozen=True, eq=False)
 class ArcErrors:
-    """Estimates of the errors of `ArcPhases`, named and shaped as there, modulo 4 pi; for tilts angles [rad].
+    """Estimates of the errors of `ArcPhases`, named and shaped as there, modulo 4 pi; angles of rotations [rad].
 
     Examples
     --------
@@ -83,10 +84,10 @@ class ArcErrors:
     geometric_phase: Array
     montgomery_phase: Array
     solid_angle: Array
-    tilt: Array
+    closing_tilt: Array
     momentum_gap: Array
     polygon_angle: Array
     total_phase: Array
-    total_tilt: Array
+    total_closing_tilt: Array
 
     __repr__ = short_repr

@@ -49,8 +49,8 @@ class PhaseSplit:
     All rotations are in inertial axes; fields have the motion's batch axes in front. With mu the unit vector of
     the momentum (where there is some), seen from the gauge's frame,
 
-        exp(montgomery_phase hat(mu)) tilt = dynamical_rotation            in the horizontal gauge,
-        exp(montgomery_phase hat(mu)) tilt = total_rotation                in the base gauge of a closed joint path,
+        exp(montgomery_phase hat(mu)) closing_tilt = dynamical_rotation    in the horizontal gauge,
+        exp(montgomery_phase hat(mu)) closing_tilt = total_rotation        in the base gauge of a closed joint path,
         total_rotation = dynamical_rotation holonomy                       always.
 
     Attributes
@@ -68,7 +68,8 @@ class PhaseSplit:
     geometric_phase : minus the solid angle [rad]
     solid_angle : signed, of the momentum curve in this gauge, closed by the great circle; counted from the
         region of the sphere farthest from the curve [sr]
-    tilt : (3, 3) transport along the closing great circle; the identity when the momentum closes in this gauge
+    closing_tilt : (3, 3) transport along the closing great circle; the identity when the momentum closes in this gauge.
+        No tilt of an athlete, which is an angle of the attitude (`Motion.somersault_tilt_twist`)
     momentum_gap : angle between the ends of the momentum curve in this gauge [rad]
     closing_phase : what the closing great circle adds to the geometric phase; the rest is swept by the momentum
         itself, about the direction opposite the region that is not counted [rad]
@@ -101,7 +102,7 @@ class PhaseSplit:
     dynamic_phase: Array
     geometric_phase: Array
     solid_angle: Array
-    tilt: Array
+    closing_tilt: Array
     momentum_gap: Array
     closing_phase: Array
     shape_gap: float

@@ -127,7 +127,7 @@ def split(
         dynamic_phase=dynamic.reshape(batch)[()],
         geometric_phase=(0.0 - area).reshape(batch)[()],
         solid_angle=area.reshape(batch)[()],
-        tilt=tilt.reshape(matrix),
+        closing_tilt=tilt.reshape(matrix),
         momentum_gap=(closed.gap * has_phase).reshape(batch)[()],
         closing_phase=(0.0 - closed.closing * has_phase).reshape(batch)[()],
         shape_gap=deformation.shape_gap,
@@ -286,10 +286,10 @@ class ArcPhases:
 
     With R the attitude of the gauge's frame, arc k of K from times[k] to times[k + 1] turns it by
 
-        R(times[k + 1]) R(times[k])^T = exp(montgomery_phase[k] hat(mu)) tilt[k],
+        R(times[k + 1]) R(times[k])^T = exp(montgomery_phase[k] hat(mu)) closing_tilt[k],
 
     and the arcs add up: total_phase = the sum of their Montgomery phases - polygon_angle is the phase of the whole,
-    and total_tilt its tilt.
+    and total_closing_tilt the tilt of its closing.
 
     Attributes
     ----------
@@ -297,11 +297,11 @@ class ArcPhases:
     gauge : the frame from which the momentum was seen
     dynamic_phase, geometric_phase, montgomery_phase : (K,) each arc closed by its great circle [rad]
     solid_angle : (K,) minus the geometric phase [sr]
-    tilt : (K, 3, 3) transport along the closing great circles, inertial axes
+    closing_tilt : (K, 3, 3) transport along the closing great circles, inertial axes
     momentum_gap : (K,) angles between the ends of the arcs [rad]
     polygon_angle : signed area of the closed polygon of those great circles [sr]
     total_phase : of all arcs as one [rad]
-    total_tilt : (3, 3)
+    total_closing_tilt : (3, 3)
     error_estimates : of each of these numbers
 
     Examples
@@ -318,11 +318,11 @@ class ArcPhases:
     geometric_phase: Array
     montgomery_phase: Array
     solid_angle: Array
-    tilt: Array
+    closing_tilt: Array
     momentum_gap: Array
     polygon_angle: Array
     total_phase: Array
-    total_tilt: Array
+    total_closing_tilt: Array
     error_estimates: ArcErrors
 
     __repr__ = short_repr
@@ -403,11 +403,11 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
         geometric_phase=(0.0 - area).reshape(arcs),
         montgomery_phase=phase.reshape(arcs),
         solid_angle=area.reshape(arcs),
-        tilt=tilts.reshape(*arcs, 3, 3),
+        closing_tilt=tilts.reshape(*arcs, 3, 3),
         momentum_gap=(so3.angle_between(ends[:, :-1], ends[:, 1:]) * moving).reshape(arcs),
         polygon_angle=polygon.reshape(batch)[()],
         total_phase=total.reshape(batch)[()],
-        total_tilt=tilt[:, 0].reshape(*batch, 3, 3),
+        total_closing_tilt=tilt[:, 0].reshape(*batch, 3, 3),
         error_estimates=arc_errors(motion, curve, cuts, residuals),
     )
 

@@ -64,7 +64,7 @@ def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> l
             _phase_line("  dynamic phase", result.dynamic_phase, errors.dynamic_phase),
             _phase_line("  geometric phase", result.geometric_phase, errors.geometric_phase),
             *closing,
-            rotation_line("tilt", result.tilt, errors.tilt),
+            rotation_line("tilt of the closing", result.closing_tilt, errors.closing_tilt),
             _phase_line("momentum gap", result.momentum_gap, errors.momentum_gap),
             f"{'residual':24}{result.residual:16.2e} rad   (the phase by its formula, less that of the attitude)",
         ]
@@ -96,7 +96,8 @@ def closing_text(result: PhaseSplit) -> str:
     gap, added = float(result.momentum_gap), float(result.closing_phase)
     return (
         f"The momentum does not close: a great circle of {degrees_text(gap)} from its end to its start closes it. "
-        f"That adds {degrees_text(added, sign=True)} to the geometric phase, and a tilt by the angle of the gap."
+        f"That adds {degrees_text(added, sign=True)} to the geometric phase, and the tilt of the "
+        "closing, a turn by the angle of the gap."
     )
 
 

@@ -30,7 +30,11 @@ CONVENTIONS = (
     ("quaternion", "", "x y z w, w not negative"),
     ("momentum", "", "about the centre of mass, inertial axes, constant"),
     ("phase", "", "angle about the momentum, right-hand rule; solid angles are signed, seen from outside"),
-    ("split", "", "total rotation = exp(Montgomery phase about the momentum) tilt holonomy, in the horizontal gauge"),
+    (
+        "split",
+        "",
+        "total rotation = exp(Montgomery phase about the momentum) closing tilt holonomy, in the horizontal gauge",
+    ),
 )
 # [rad] A smaller turn has no axis worth showing.
 _NO_TURN = 1e-12
@@ -93,8 +97,8 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
         closing = f"{np.degrees(float(result.closing_phase)):z.2f}°"
         words.append(
             f"There the momentum's direction ended {np.degrees(gap):.2f}° from where it began. The great circle back "
-            f"to the start closes its curve, and adds {closing} of the geometric phase; beside the phase, the body is "
-            f"tilted by {_turn(result.tilt)}."
+            f"to the start closes its curve, and adds {closing} of the geometric phase; beside the phase it turns the "
+            f"body by {_turn(result.closing_tilt)} across the momentum, the tilt of the closing."
         )
     return words
 
@@ -189,7 +193,7 @@ def split_rows(result: PhaseSplit) -> list[Row]:
         _phase("Dynamic phase", result.dynamic_phase, errors.dynamic_phase, ""),
         _phase("Geometric phase", result.geometric_phase, errors.geometric_phase, f"solid angle {area} sr"),
         *closing,
-        _rotation("Tilt", result.tilt, errors.tilt),
+        _rotation("Tilt of the closing", result.closing_tilt, errors.closing_tilt),
         _phase("Momentum gap", result.momentum_gap, errors.momentum_gap, "between its directions at start and end"),
     ]
 

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import so3
 from ..arguments import check_keywords, times_argument
 from ..arrays import Array, finite_array
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
 from ..errors import MissingExtraError, ShapeError
 from ..offers import offered
-from .attitude_angles import continued_rotation_vectors, euler_angles, somersault_tilt_twist
+from .athlete_axes import AthleteAxes, athlete_axes
+from .attitude_angles import Chart, EulerAngles, RotationVectors, continued_angles, euler_chart
 from .motion_record import write_table
 
 _COLUMNS = (
@@ -23,7 +25,7 @@ _COLUMNS = (
 )  # fmt: skip
 # Rows of a table.
 _ROWS = 201
-# Parts of a step between which angles are continued: no turn of a step is missed.
+# Parts of a step between which angles are continued at least: no turn of a step is missed.
 _PARTS = 8
 
 
@@ -35,17 +37,21 @@ class MotionViews:
     def rotation_vector(self: Any, t: ArrayLike) -> Array:
         """The attitude as a rotation vector, continued past half turns: times (...) -> batch + (..., 3) [rad].
 
-        It begins within a half turn, and may become longer than that. Only where the attitude comes back to the
-        identity after whole turns it may jump: there every axis will do.
+        It begins within a half turn, and may become longer than that. It is continued along the motion itself, so what
+        it is at a time does not depend on the other times. Where the attitude comes back to the identity after whole
+        turns, to 1e-10 rad or its error estimate, every axis will do, and it goes straight on.
         """
-        return self._continued(t, continued_rotation_vectors)
+        return self._continued(t, RotationVectors())
 
     def euler_angles(self: Any, t: ArrayLike, sequence: str = "ZYX") -> Array:
         """The attitude as Euler angles of any sequence, continuous in time: times (...) -> batch + (..., 3) [rad].
 
         R is the product of turns about the axes of `sequence` in their order: capitals are axes of the body as it has
-        turned so far (intrinsic), small letters inertial ones (extrinsic). The first angle begins in (-pi, pi], and
-        where the middle one reaches its end (the gimbals lock) the other continuation is taken.
+        turned so far (intrinsic), small letters inertial ones (extrinsic). The outer angles begin in (-pi, pi]. All are
+        continued along the motion itself, as finely as it needs near the ends of the middle one, where the gimbals lock
+        and the outer ones turn fast: what they are at a time does not depend on the other times. A motion that goes
+        through such an end, to 1e-10 rad or the attitude's error estimate, goes straight through: the middle angle goes
+        on beyond it.
 
         Parameters
         ----------
@@ -56,32 +62,90 @@ class MotionViews:
         UnknownNameError
             For another sequence.
         """
-        return self._continued(t, lambda attitudes: euler_angles(attitudes, sequence))
+        return self._continued(t, euler_chart(sequence))
 
-    def somersault_tilt_twist(
-        self: Any, t: ArrayLike, *, lateral: str = "x", longitudinal: str = "z"
-    ) -> tuple[Array, Array, Array]:
-        """Somersault, tilt and twist as biomechanists count them: times (...) -> batch + (...) each [rad].
+    def athlete_axes(
+        self: Any,
+        *,
+        lateral: str | ArrayLike | None = None,
+        longitudinal: str | ArrayLike | None = None,
+        somersault: str | ArrayLike | None = None,
+        up: str | ArrayLike | None = None,
+    ) -> AthleteAxes:
+        """The axes by which `somersault_tilt_twist` counts, and where each comes from; `print` says it in words.
 
-        The somersault is a turn about the lateral axis as it is in space, the twist about the longitudinal axis of the
-        body, and the tilt about the third between them. All begin within half a turn and go on without a jump; in
-        revolutions they are divided by 2 pi.
+        Each may be given, by its name ("x" to "-z") or as three numbers. The athlete's own are found otherwise,
+        whatever way the laboratory's axes point.
 
         Parameters
         ----------
-        lateral : "x", "y" or "z", the body's axis from side to side
-        longitudinal : the one from feet to head
+        lateral : from the right side to the left, base axes; of what is given the part across the longitudinal one.
+            None: by the places of links called left and right; of a body without such links as the axis of the
+            somersault lies in it at the start, so that tilt and twist begin with 0
+        longitudinal : from the feet to the head, base axes. None: the axis of least inertia of the whole body at its
+            straightest in this motion, where the least moment is the smallest part of the next one
+        somersault : inertial axes; of what is given the horizontal part. None: that of the momentum; where it is
+            smaller than the upright part, or without momentum, of the lateral axis at the start. It points to the left
+            of the body at the start, so a forward somersault counts up, a backward one down
+        up : inertial axes. None: as the recording fell from which the motion is, else "z"
 
         Raises
         ------
-        UnknownNameError
-            For other axes, or twice the same.
+        UnknownNameError, ShapeError
+            For other axes, or a lateral one along the longitudinal one.
+        WrongObjectError
+            If an axis cannot be found and has to be given; for a deformation seen from a gauge.
+
+        Examples
+        --------
+        >>> dive = sp.examples.full_dive()
+        >>> print(sp.reconstruct(dive.deformation, dive.momentum).athlete_axes().somersault.round(6))
+        [0. 1. 0.]
+        """
+        return athlete_axes(self, lateral, longitudinal, somersault, up)
+
+    def somersault_tilt_twist(
+        self: Any,
+        t: ArrayLike,
+        *,
+        lateral: str | ArrayLike | None = None,
+        longitudinal: str | ArrayLike | None = None,
+        somersault: str | ArrayLike | None = None,
+        up: str | ArrayLike | None = None,
+    ) -> tuple[Array, Array, Array]:
+        """Somersault, tilt and twist as biomechanists count them: times (...) -> batch + (...) each [rad].
+
+        The somersault is a turn about a horizontal axis in space, the twist about the longitudinal axis of the body,
+        and the tilt about the axis to its front between them. Somersault and twist begin within half a turn, and all go
+        on without a jump, as `euler_angles`; in revolutions they are divided by 2 pi.
+
+        Parameters
+        ----------
+        lateral, longitudinal, somersault, up : as for `athlete_axes`, which says what they are where they are not given
+
+        Raises
+        ------
+        UnknownNameError, ShapeError, WrongObjectError
+            As `athlete_axes`.
 
         Notes
         -----
         Source: Yeadon 1990, J. Biomech. 23, 59: angles in the order somersault, tilt, twist.
+
+        Examples
+        --------
+        >>> dive = sp.examples.full_dive()
+        >>> motion = sp.reconstruct(dive.deformation, dive.momentum)
+        >>> somersault, tilt, twist = (np.ptp(one) for one in motion.somersault_tilt_twist([0.0, motion.duration]))
+        >>> print(f"{somersault / (2 * np.pi):.4f} somersaults, {twist / (2 * np.pi):.4f} twists")
+        1.5000 somersaults, 1.0000 twists
         """
-        angles = self._continued(t, lambda attitudes: somersault_tilt_twist(attitudes, lateral, longitudinal))
+        axes = athlete_axes(self, lateral, longitudinal, somersault, up)
+        # Columns: to the front, to the left, up.
+        here = np.stack([axes.frontal, axes.lateral, np.broadcast_to(axes.longitudinal, axes.lateral.shape)], axis=-1)
+        upward = np.broadcast_to(axes.up, axes.somersault.shape)
+        there = np.stack([np.cross(axes.somersault, upward), axes.somersault, upward], axis=-1)
+        angles = self._continued(t, EulerAngles("YXZ"), (so3.quat_from_matrix(there), so3.quat_from_matrix(here)))
         return angles[..., 0], angles[..., 1], angles[..., 2]
 
     def write_csv(self: Any, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike) -> None:
@@ -198,12 +262,23 @@ class MotionViews:
         columns = [t, *quaternions.T, *self.angular_velocity(t).T, *self.base_position(t, **fall).T]
         return dict(zip(_COLUMNS, columns, strict=True))
 
-    def _continued(self: Any, t: ArrayLike, angles: Any) -> Array:
-        """Three numbers of each attitude, continued from the start through all steps: (...) -> batch + (..., 3)."""
+    def _continued(self: Any, t: ArrayLike, chart: Chart, seen: tuple[Array, Array] | None = None) -> Array:
+        """Three numbers of each attitude, continued from the start: times (...) -> batch + (..., 3).
+
+        `seen`: quaternions of axes in space and in the body, by which the attitude is seen.
+        """
         times = times_argument(t, self.duration)
         ends = self.solution.times
         between = ends[:-1, None] + np.diff(ends)[:, None] * np.arange(_PARTS) / _PARTS
-        every = np.union1d(np.append(between.ravel(), ends[-1]), times.ravel())
-        attitudes = self.attitude(every).reshape(-1, len(every), 3, 3)
-        found = np.array([angles(one) for one in attitudes])[:, np.searchsorted(every, times.ravel())]
+
+        def quaternions(some: Array) -> Array:
+            found = self.quat_xyzw(some)
+            if seen is not None:
+                there, here = (one[..., None, :] for one in seen)
+                found = so3.quat_product(so3.quat_product(so3.quat_inverse(there), found), here)
+            return found.reshape(-1, len(some), 4)
+
+        every = np.append(between.ravel(), ends[-1])
+        error = float(np.max(self.error_estimate, initial=0.0))
+        found = continued_angles(quaternions, every, times.ravel(), chart, error)
         return found.reshape(*self.batch, *times.shape, 3)

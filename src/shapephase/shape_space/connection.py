@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +18,7 @@ from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.stepped import SteppedRotation
+from ._path_series import evenly_divided, panel_edges
 from .body_path import check_closed, path_sampler
 from .shape_path import CLOSED, ShapePath
 from .unit_doubts import followed_by
@@ -328,7 +328,7 @@ def holonomy_derivative(
         scale = np.einsum("nak,nmk->n", np.abs(along) + np.abs(across) + np.abs(bracket), np.abs(changes))
         return np.einsum("nak,nmk->nma", by_joint, changes), scale
 
-    return turned, moved_start + _integral(carried_curvature, route.breaks, goal)
+    return turned, moved_start + integral(carried_curvature, panel_edges(route, route.loops), goal)
 
 
 def _variation_at(variation: Callable[[Array], ArrayLike], times: Array, n_shape: int) -> Array:
@@ -338,18 +338,19 @@ def _variation_at(variation: Callable[[Array], ArrayLike], times: Array, n_shape
     return values
 
 
-def _integral(function: Callable[[Array], tuple[Array, Array]], breaks: Array, tolerance: float) -> Array:
-    """The integral of a function smooth between breaks, by Gauss on ever shorter panels.
+def integral(function: Callable[[Array], tuple[Array, Array]], edges: Array, tolerance: float) -> Array:
+    """The integral of a function smooth between edges, by Gauss on ever shorter panels.
 
     The function returns its values (N, m, 3), and the magnitude of what they are differences of (N,): the tolerance is
-    relative to the integral of that.
+    relative to the integral of that. Between edges it must not swing often (`panel_edges`): two coarse rules that are
+    both blind for a swing would agree.
     """
     nodes, weights_of_panel = _GAUSS_RULE
     last, change, goal = None, np.inf, 0.0
     for pieces in _PIECES:
-        edges = np.concatenate([np.linspace(a, b, pieces + 1)[:-1] for a, b in pairwise(breaks)] + [breaks[-1:]])
-        half = 0.5 * np.diff(edges)
-        times = edges[:-1, None] + half[:, None] * (nodes + 1.0)
+        panels = evenly_divided(edges, pieces)
+        half = 0.5 * np.diff(panels)
+        times = panels[:-1, None] + half[:, None] * (nodes + 1.0)
         weights = (half[:, None] * weights_of_panel).ravel()
         values, scales = function(times.ravel())
         total = np.einsum("n,nma->ma", weights, values)
@@ -361,6 +362,6 @@ def _integral(function: Callable[[Array], tuple[Array, Array]], breaks: Array, t
             return total
         last = total
     raise AccuracyNotReached(
-        f"the derivative of the holonomy still changes by {change:.3g} rad where {goal:.3g} is needed; declare the "
+        f"the integral along the path still changes by {change:.3g} rad where {goal:.3g} is needed; declare the "
         "times where the variation jumps as breaks of the path, or loosen the tolerance"
     )

@@ -7,7 +7,6 @@ is taken as Chebyshev series on panels that halve until they follow it; zeros of
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -18,23 +17,13 @@ from ..body.body import Body
 from ..body.couplings.ball_joints import BallJoint
 from ..body.couplings.coordinate_map import CoordinateMap
 from ..body.particles.point_masses import ParticleBody
-from ..chebyshev import inside, nodes_on, values_to_coefficients
 from ..errors import TrajectoryError
+from ._path_series import merged, panel_edges, resolved_series
 from .curves import Curve, PiecewisePolynomial
 from .shape_path import ShapePath
 
-_DEGREE = 16
-"""Of the series on a panel: five times that of a spline's pieces."""
-_RESOLVED = 1e-13
-"""Of the largest coefficient: the last ones of a series that follows the path."""
-_LAST = 3
-"""Coefficients that tell."""
-_MOST_HALVINGS = 16
-"""Of a stretch between breaks; what is rougher is followed no better."""
 _ROUNDING = 64.0 * np.finfo(float).eps
 """Of a coordinate's size: what rounding may leave of it where it goes through a knot."""
-_SAME_TIME = 1e-12
-"""Of the duration: times nearer to each other are one."""
 _AT_KNOT = 1e-9
 """[rad or m, or of the largest knot] by which a joint may be off a knot at the time found."""
 _NEARLY_REAL = 1e-6
@@ -63,13 +52,12 @@ def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
         route = replace(route, breaks=_loop_ends(route), loops=1, smooth_loop=False, scanner=None)
     if follows.is_smooth:
         return route
-    known = _merged(route.smoothness.breaks, _loop_ends(route))
-    first_loop = known[known <= route.duration / route.loops * (1.0 + _SAME_TIME)]
-    found = crossing_times(follows, route.curve, first_loop)
+    found = crossing_times(follows, route.curve, panel_edges(route))
     if not len(found):
         return route
+    known = merged(route.smoothness.breaks, _loop_ends(route))
     starts = route.duration / route.loops * np.arange(route.loops)
-    breaks = _merged(known, (starts[:, None] + found).ravel())
+    breaks = merged(known, (starts[:, None] + found).ravel())
     return replace(route, breaks=breaks, smooth_loop=False, scanner=None)
 
 
@@ -95,7 +83,7 @@ def crossing_times(follows: CoordinateMap, curve: Curve, edges: Array) -> Array:
 
     Parameters
     ----------
-    edges : (M,) times between which the curve is smooth [s]
+    edges : (M,) times between which the curve is smooth and swings once at most, as `panel_edges` [s]
     """
     found = np.zeros(0)
     for joint, knots, kinked in follows.knotted:
@@ -105,7 +93,7 @@ def crossing_times(follows: CoordinateMap, curve: Curve, edges: Array) -> Array:
             return coordinates[:, joint], rates[:, joint]
 
         # A joint that follows others itself is smooth between their crossings only.
-        found = _merged(found, _crossings(followed, _merged(edges, found), knots, kinked=kinked))
+        found = merged(found, _crossings(followed, merged(edges, found), knots, kinked=kinked))
     return found
 
 
@@ -120,7 +108,8 @@ def at_knots(follows: CoordinateMap, curve: Curve, times: Array) -> Mask:
 
 
 def _crossings(followed: Curve, edges: Array, knots: Array, *, kinked: bool) -> Array:
-    left, right, series = _resolved(followed, edges)
+    left, right, panels = resolved_series(lambda times: followed(times)[0], edges)
+    series = panels[:, :, 0]
     size = float(np.abs(series).sum(axis=1).max(initial=0.0))
     reach = np.abs(series[:, 1:]).sum(axis=1)
     moving = reach > _ROUNDING * size
@@ -142,28 +131,6 @@ def _crossings(followed: Curve, edges: Array, knots: Array, *, kinked: bool) -> 
     return np.sort(found[(found > edges[0]) & (found < edges[-1])])
 
 
-def _resolved(followed: Curve, edges: Array) -> tuple[Array, Array, Array]:
-    """Panels and the Chebyshev series of a coordinate on them: (P,), (P,), (P, _DEGREE + 1)."""
-    left, right = edges[:-1], edges[1:]
-    done: list[tuple[Array, Array, Array]] = []
-    size = 0.0
-    for halving in range(_MOST_HALVINGS + 1):
-        times = nodes_on(*inside(left, right), _DEGREE)
-        values = followed(times.ravel())[0].reshape(times.shape)
-        series = values @ values_to_coefficients(_DEGREE).T
-        size = max(size, float(np.abs(values).max(initial=0.0)))
-        fine = np.abs(series[:, -_LAST:]).max(axis=1) <= _RESOLVED * size
-        if halving == _MOST_HALVINGS:
-            fine[:] = True
-        done.append((left[fine], right[fine], series[fine]))
-        left, right = left[~fine], right[~fine]
-        if not len(left):
-            break
-        middle = 0.5 * (left + right)
-        left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
-    return tuple(np.concatenate(parts) for parts in zip(*done, strict=True))  # pyright: ignore[reportReturnType]
-
-
 def _zeros(series: Array, value: float) -> Array:
     """Where a series has a value, in [-1, 1]."""
     sizes = np.abs(series)
@@ -183,18 +150,4 @@ def _winds(body: Body, route: ShapePath) -> bool:
 
 
 def _loop_ends(route: ShapePath) -> Array:
-    return _merged(route.breaks, route.duration / route.loops * np.arange(1, route.loops))
-
-
-def _merged(known: Array, more: Any) -> Array:
-    """Times of both, ascending; of those that are nearly the same the known one."""
-    if not len(known):
-        known, more = more[:1], more[1:]
-    if not len(more):
-        return known
-    near = _SAME_TIME * max(float(known[-1]), float(np.max(more)))
-    place = np.searchsorted(known, more)
-    before, behind = known[np.maximum(place - 1, 0)], known[np.minimum(place, len(known) - 1)]
-    new = np.sort(more[(np.abs(more - before) > near) & (np.abs(more - behind) > near)])
-    kept = new[np.concatenate([[True], np.diff(new) > near])] if len(new) else new
-    return np.sort(np.concatenate([known, kept]))
+    return merged(route.breaks, np.arange(1.0, route.loops) * (route.duration / route.loops))

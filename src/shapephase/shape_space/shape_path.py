@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,13 @@ from ..arguments import (
     positive_argument,
     times_argument,
 )
-from ..arrays import Array, check_reach, finite_array, lock_arrays
+from ..arrays import Array, check_reach, finite_array, lock_arrays, read_only
 from ..display import card_html, card_text
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
 from ._card import shape_path_card
+from ._path_series import spline_times
 from .ball_columns import ball_columns, factors_between, neighbours_signs
 from .curves import (
     CLOSED,
@@ -366,7 +366,7 @@ class ShapePath:
             breaks,
             self.n_shape,
             names,
-            _larger(self.oscillations, other.oscillations),
+            _most_swings(self, other),
             scanner=JoinedScan([self, other]) if following is other.curve else None,
         )
 
@@ -397,13 +397,20 @@ class ShapePath:
             self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops, scanner=DerivedScan(self)
         )
 
-    @property
+    @cached_property
     def sample_times(self) -> Array:
-        """Times whose samples describe the path: a spline's knots, which do so exactly, or some 400: (N,) [s]."""
-        if isinstance(self.curve, PiecewisePolynomial) and len(self.curve.coefficients) == 4:
-            return self.breaks
-        pieces = [np.linspace(a, b, 400 // (len(self.breaks) - 1) + 2) for a, b in pairwise(self.breaks)]
-        return np.unique(np.concatenate(pieces))
+        """Times of a table that describes the path: (N,) [s].
+
+        The cubic spline through the samples, as a reader of the table makes it, is the path to 1e-9 rad or m (of its
+        largest value where that is above 1): a spline's own knots, some 400 times for each swing of a series, and ever
+        nearer ones towards a kink.
+
+        Raises
+        ------
+        TrajectoryError
+            If that takes more than a million times; also as `scan`.
+        """
+        return read_only(spline_times(self))
 
     def matched(self, joint_names: Sequence[str], owner: str) -> ShapePath:
         """The same path with its columns in the order of `joint_names`, found by name where the path has names.
@@ -514,5 +521,9 @@ def _joined_names(first: ShapePath, second: ShapePath) -> tuple[str, ...] | None
     return named.pop() if named else None
 
 
-def _larger(a: float | None, b: float | None) -> float | None:
-    return None if a is None or b is None else max(a, b)
+def _most_swings(*paths: ShapePath) -> float | None:
+    """The most oscillations between two breaks of paths; a smooth loop repeated has no breaks between its loops."""
+    found = [path.oscillations for path in paths if path.oscillations is not None]
+    if len(found) < len(paths):
+        return None
+    return max(swings * (path.loops if path.smooth_loop else 1) for swings, path in zip(found, paths, strict=True))

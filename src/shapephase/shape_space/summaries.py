@@ -13,13 +13,12 @@ from ..body.body import Body
 from ..body.couplings.coupling import described
 from ..display import short_repr
 from ..inertia_tensor import principal_axes, triangle_defect
+from ._path_series import joint_extremes, times_of_fastest
 from .body_path import path_gap
 from .shape_path import CLOSED, ShapePath
 from .unit_doubts import followed_by
 
 _KINDS = {"rad": "revolute", "m": "prismatic", "1": "ball"}
-_SAMPLES = 401
-"""Even times at which extremes are sought, beside the breaks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +117,9 @@ class PathSummary:
     ----------
     duration : [s]
     breaks : how many times, ends included, between which it is smooth
-    lowest, highest : (n,) of each joint, at 401 times and the breaks [rad or m]
-    fastest : (n,) largest rate of each joint there [rad/s or m/s]
-    fastest_at : (n,) when that is [s]
+    lowest, highest : (n,) of each joint over the whole path, to 1e-14 of its size [rad or m]
+    fastest : (n,) largest rate of each joint, as exactly [rad/s or m/s]
+    fastest_at : (n,) when that is in the first loop, to a twentieth of a panel on which the path swings once [s]
     joints_beyond_limits : names of the joints that leave their limits
     joints_beyond_rates : names of the joints that are faster than the rate limits of the body's file
     still_joints : names of the joints that do not move
@@ -194,7 +193,14 @@ def body_summary(body: Body) -> BodySummary:
 
 
 def path_summary(body: Body, path: ShapePath) -> PathSummary:
-    """What there is to know of a joint motion for a body. Raises TrajectoryError, UnknownNameError for other joints.
+    """What there is to know of a joint motion for a body.
+
+    Raises
+    ------
+    TrajectoryError, UnknownNameError
+        For a path of other joints.
+    NoisyPathError, AccuracyNotReached
+        If a path known only as a function is too rough for its extremes to be found (`ShapePath.scan`).
 
     Examples
     --------
@@ -206,12 +212,10 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     route = followed_by(body, path)
-    times = np.union1d(np.linspace(0.0, route.duration, _SAMPLES), route.breaks)
-    shapes, rates = route.curve(times)
-    lowest, highest, fastest = shapes.min(axis=0), shapes.max(axis=0), np.abs(rates).max(axis=0)
+    lowest, highest, fastest = joint_extremes(route)
     lower, upper = body.joint_limits.T
     # A joint that is driven up to its limit is not beyond it, whatever rounding has done to the samples.
-    slack = CLOSED * (1.0 + np.abs(shapes).max(axis=0))
+    slack = CLOSED * (1.0 + np.maximum(np.abs(lowest), np.abs(highest)))
     outside = (lowest < lower - slack) | (highest > upper + slack)
     gap = path_gap(body, route)
     names = np.array(body.joint_names)
@@ -221,7 +225,7 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
         lowest=lowest,
         highest=highest,
         fastest=fastest,
-        fastest_at=times[np.abs(rates).argmax(axis=0)],
+        fastest_at=times_of_fastest(route),
         joints_beyond_limits=tuple(names[outside].tolist()),
         joints_beyond_rates=tuple(names[fastest > (1.0 + CLOSED) * body.rate_limits].tolist()),
         still_joints=tuple(names[fastest == 0.0].tolist()),

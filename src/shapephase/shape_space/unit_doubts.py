@@ -10,6 +10,7 @@ from ..arrays import Array
 from ..body.body import Body
 from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryWarning
+from ._path_series import evenly_divided, panel_edges
 from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import route_along
 from .shape_path import ShapePath
@@ -20,8 +21,11 @@ _FAR_BEYOND = 0.2
 """Of the width of a joint's limits: a recording with noise leaves them by less."""
 _HALF_TURN = np.pi
 """[rad] By less than this beyond its limits a joint may go in radians, where someone tries what limits forbid."""
-_LOOKS = 17
-"""Even times at which a path is looked at that is neither a spline nor a series."""
+_LOOKS = 65
+"""Times of the first loop at which a path is looked at that is known only as a function; multiples of the golden ratio,
+which no swing of it repeats."""
+_LOOKS_OF_A_SWING = 8
+"""At such times a sine is within 8 % of its largest value."""
 
 
 def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:
@@ -80,5 +84,8 @@ def _farthest(path: ShapePath) -> float:
 
 
 def _looked_at(path: ShapePath) -> Array:
-    known = isinstance(path.curve, PiecewisePolynomial)
-    return path.breaks if known else np.linspace(0.0, path.duration, _LOOKS)
+    if isinstance(path.curve, PiecewisePolynomial):
+        return path.breaks
+    if path.oscillations is not None:
+        return evenly_divided(panel_edges(path), _LOOKS_OF_A_SWING)
+    return path.duration / path.loops * np.mod(0.6180339887498949 * np.arange(_LOOKS), 1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -112,7 +112,7 @@ _ALL = (
     _field("dynamic_phase", (), "rad", "of the rate along the momentum"),
     _field("geometric_phase", (), "rad", "minus the solid angle"),
     _field("solid_angle", (), "sr", "of the momentum's curve in the gauge"),
-    _field("tilt", _ROTATION, "", "transport along the closing great circle"),
+    _field("closing_tilt", _ROTATION, "", "transport along the closing great circle"),
     _field("momentum_gap", (), "rad", "between the ends of the momentum's curve"),
     _field("closing_phase", (), "rad", "what the closing great circle adds"),
     _field("shape_gap", (), "rad or m", "between the ends of the path"),
@@ -124,6 +124,8 @@ _ALL = (
         "of the return map at the magnitude of the momentum: unit vectors, then NaN",
     ),
 )  # fmt: skip
+_FORMER = {"tilt": "closing_tilt"}
+"""Names that studies and stores had for outputs before."""
 OUTPUTS: Mapping[str, Output] = {output.name: output for output in _ALL}
 """What a study can say by name: the end, its error, every field of `split`, fixed points of the return map.
 
@@ -143,8 +145,8 @@ def outputs_argument(given: Sequence[str | Output], taken: Sequence[str]) -> tup
         if isinstance(one, Output):
             found.append(one)
         else:
-            check_choice(one, "output", OUTPUTS)
-            found.append(OUTPUTS[one])
+            check_choice(one, "output", {*OUTPUTS, *_FORMER})
+            found.append(OUTPUTS[one] if one in OUTPUTS else replace(OUTPUTS[_FORMER[one]], name=one))
     names = [output.name for output in found]
     if not found:
         raise StudyError("outputs: at least one is needed")

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from ...optimal_control.plan import Plan, Progress
     from ...optimal_control.plan_options import Limits
 
-# Samples of the file written: at 1 s they are 0.5 ms apart, far below the pieces of a plan.
-_SAMPLES = 2001
 # What stands for the limits that a body's file states.
 _OF_THE_FILE = "body"
 # What a part of a limit is of, where that is not plain.
@@ -168,8 +166,6 @@ def plan_command(
     out
         Write the joint motion to this CSV file; without it none is written. For example `--out plan.csv`.
     """
-    import numpy as np
-
     from ...body.catalog import load_body
     from ...optimal_control.plan_options import Search
     from ...optimal_control.planning import plan_reorientation
@@ -224,9 +220,7 @@ def plan_command(
         if status:
             warnings.warn(status, stacklevel=2)
         if out is not None:
-            # Dense samples: a reader that joins the ends of a closed path smoothly then changes next to nothing.
-            times = np.linspace(0.0, found.path.duration, _SAMPLES)
-            write_shape_path(found.path, out, times, comment=_comment(loaded, found))
+            write_shape_path(found.path, out, comment=_comment(loaded, found))
             say_written(out)
         if html is not None:
             from ...plotting.report import write_report

@@ -216,8 +216,8 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
     Warns
     -----
     TrajectoryWarning
-        Where one step is more than a hundred times as long, or as short, as most, or where numbers so far from zero
-        resolve the steps badly.
+        Where one step is more than a hundred times as long, or as short, as most and as those beside it, or where
+        numbers so far from zero resolve the steps badly.
     """
     if len(times) < 2:
         raise TrajectoryError(f"{where}: two samples or more are needed, got {len(times)}")
@@ -241,12 +241,16 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
             f"{steps.min():.3g} s; subtract the start before the file is written"
         )
     usual = float(np.median(steps))
-    longest, shortest = int(np.argmax(steps)), int(np.argmin(steps))
-    for i, odd, what in (
-        (longest, steps[longest] > _UNEVEN_STEPS * usual, "a gap in the recording? The path is interpolated across it"),
-        (shortest, steps[shortest] * _UNEVEN_STEPS < usual, "the same sample twice? Rates there may be far too large"),
+    # Steps that shrink or grow one by one, as towards a kink, are meant.
+    longer = np.maximum(np.append(steps[1:], 0.0), np.append(0.0, steps[:-1]))
+    gaps = steps > _UNEVEN_STEPS * np.maximum(usual, longer)
+    twice = _UNEVEN_STEPS * steps < np.minimum(usual, longer)
+    for odd, what in (
+        (gaps, "a gap in the recording? The path is interpolated across it"),
+        (twice, "the same sample twice? Rates there may be far too large"),
     ):
-        if odd:
+        if odd.any():
+            i = int(np.argmax(np.where(odd, np.abs(np.log(steps / usual)), -1.0)))
             warn(
                 f"{where}: {steps[i]:.6g} s between {row} {rows[i]} and {row} {rows[i + 1]}, where the usual step is "
                 f"{usual:.6g} s: {what}"

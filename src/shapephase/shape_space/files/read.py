@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,10 +20,11 @@ from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...body.joint_orders import WORDS
 from ...display import short_repr
-from ...errors import ShapeError, TrajectoryError, unknown_name
+from ...errors import ShapeError, TrajectoryError, TrajectoryWarning, unknown_name
 from ...files import output_target, write_whole
 from ...letters import what_came
 from ...provenance import provenance
+from .._path_series import spline_error
 from ..shape_path import ShapePath
 from ._base_columns import base_choices
 from ._flight import Flight, flight_choices, in_flight
@@ -43,6 +45,8 @@ from .smoothing import Recorded, Smoothing, prepared_path
 _WRITTEN = (".csv", ".npz", ".tsv")
 _MOST_SHOWN = 200
 """Columns that an error about an unknown one lists."""
+_FAR_OFF = 1e-3
+"""[rad or m] by which a table at times that were given may miss a path between its rows without a warning."""
 _MOST_SAMPLES = 2_000_000
 """Memory: samples of a path that is resampled, as lines of a table."""
 
@@ -351,7 +355,8 @@ def write_shape_path(
 
     Parameters
     ----------
-    times : (N,) of the samples [s]; None: `path.sample_times`. A spline is read back as it was.
+    times : (N,) of the samples, ascending [s]; None: `path.sample_times`, so that what is read back is the path to 1e-9
+        rad or m (of its largest value where that is above 1), a spline as it was
     comment : what stands above the table, each of its lines behind `#`; in NPZ, in the provenance
 
     Labels of a table say a unit, `[s]` or `[SI]` (rad or m), where `read_shape_path` would ask for it: of times more
@@ -360,9 +365,14 @@ def write_shape_path(
     Raises
     ------
     TrajectoryError
-        If the path has no joint names.
+        If the path has no joint names, times do not ascend, or a table of the path takes more than a million rows.
     UnknownNameError
         For an unknown ending of the file.
+
+    Warns
+    -----
+    TrajectoryWarning
+        If the times given are so few that what is read back is more than 0.001 rad or m from the path.
 
     Examples
     --------
@@ -380,7 +390,11 @@ def write_shape_path(
         check_text(comment, "comment", "a text")
     if path.joint_names is None:
         raise TrajectoryError("a motion file names its joints, and this path has no joint names; make it with them")
-    t = path.sample_times if times is None else finite_array(times, "times", (None,), unit="s")
+    if times is None:
+        t = path.sample_times
+    else:
+        t = finite_array(times, "times", (None,), unit="s")
+        _check_rows(path, t)
     shapes = path.shape(t)
     if suffix == ".npz":
         made_from = {"joints": list(path.joint_names), "recording": None if path.record is None else dict(path.record)}
@@ -405,6 +419,20 @@ def write_shape_path(
     writer.writerow(["time [s]" if len(t) > 1 and doubtful_steps(t) else "time", *labels])
     writer.writerows([[repr(float(v)) for v in row] for row in np.column_stack([t, shapes])])
     write_whole(where, lambda stream: stream.write(text.getvalue().encode()))
+
+
+def _check_rows(path: ShapePath, times: Array) -> None:
+    """Warn where the spline through rows at these times is far from the path. Raises TrajectoryError as `spline`."""
+    off, when = spline_error(path, times)
+    worst = int(np.argmax(off))
+    if off[worst] > _FAR_OFF:
+        name = path.joint_names[worst] if path.joint_names else worst
+        warnings.warn(
+            f"{len(times)} rows do not describe this path: read back, joint {name} is {off[worst]:.3g} rad or m off at "
+            f"{when[worst]:.6g} s. Leave times out for as many rows as it needs, or give more of them",
+            TrajectoryWarning,
+            stacklevel=3,
+        )
 
 
 def _mapping(names: Mapping[str, str | None] | None, table: Table) -> dict[str, str | None]:

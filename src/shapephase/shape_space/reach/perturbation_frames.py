@@ -16,8 +16,10 @@ from ...body.body import Body
 from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
+from .._path_series import panel_edges, turn_of_a_loop
 from ..body_path import check_closed
-from ..connection import mechanical_connection
+from ..connection import integral, mechanical_connection
+from ..knot_crossings import route_along
 from ..shape_path import ShapePath
 
 _MOST_DEGREE = 6
@@ -32,8 +34,8 @@ _STEPS = 40
 """Corrections of the frame at most: near the best one each is a hundredth of the last, or less."""
 _SMALL_STEP = 1e-11
 """[rad] of a correction, which ends them."""
-_PER_PIECE = 64
-"""Gauss points between two breaks of a path."""
+_TURN_TOLERANCE = 1e-12
+"""Of the integral of the connection's size: where halving the panels of a path changes no more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,18 +96,32 @@ class MinimumPerturbation:
     def first_order_turn(self, path: ShapePath) -> Array:
         """The turn of a loop by one integral of the connection in this frame, exp(-integral of A): -> (3, 3).
 
-        Seen from the base at the start, as `holonomy`. Raises OpenPathError for a path that is no loop.
+        Seen from the base at the start, as `holonomy`. The integral is right to 1e-12 of that of the connection's size,
+        whatever the loop: it is taken on the panels on which the path is resolved, halved until it changes no more.
+
+        Raises
+        ------
+        OpenPathError
+            For a path that is no loop.
+        AccuracyNotReached
+            If the integral still changes, as where the joints go far beyond the region of the frame.
         """
         check_object(path, "ShapePath", "path")
-        route = path.matched(self.body.joint_names, self.body.name)
+        route = route_along(self.body, path)
         check_closed(self.body, route)
-        nodes, weights = np.polynomial.legendre.leggauss(_PER_PIECE)
-        half = 0.5 * np.diff(route.breaks)
-        times = (route.breaks[:-1, None] + half[:, None] * (nodes + 1.0)).ravel()
-        shapes, rates = route.curve(times)
-        turned = (half[:, None] * weights).ravel() @ so3.apply(self._reached(shapes)[1], rates)
-        start = self.frame(route.shape(0.0))
-        return start.T @ so3.exp(-turned) @ start
+
+        def turning(times: Array) -> tuple[Array, Array]:
+            shapes, rates = route.curve(times)
+            columns = self._reached(shapes)[1]
+            sizes = np.einsum("nak,nk->n", np.abs(columns), np.abs(rates))
+            return so3.apply(columns, rates)[:, None], sizes
+
+        # A joint that winds is elsewhere in the region of the frame in the next loop.
+        wound = turn_of_a_loop(route).any()
+        loops = route.loops if wound else 1
+        total = integral(turning, panel_edges(route, loops), _TURN_TOLERANCE)[0] * (route.loops // loops)
+        start, end = self.frame(route.shape(np.array([0.0, route.duration])))
+        return start.T @ so3.exp(-total) @ end
 
     def _reached(self, shape: ArrayLike) -> tuple[Array, Array]:
         r = finite_array(shape, "shape")

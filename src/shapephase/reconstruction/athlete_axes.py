@@ -1,0 +1,282 @@
+"""The axes by which somersaults, tilt and twists of an athlete are counted: his own, whatever the laboratory's are."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import so3
+from ..arrays import Array, finite_array, lock_arrays
+from ..body._link_motions import link_motions
+from ..body.body import Body
+from ..deformation._physical_validity import least_over
+from ..display import short_repr
+from ..errors import ShapeError, WrongObjectError, unknown_name
+from ..inertia_tensor import principal_axes
+from ..shape_space._path_series import panel_edges
+from ..shape_space.shape_path import ShapePath
+
+if TYPE_CHECKING:
+    from .reconstruction import Motion
+
+NAMED = {
+    sign + axis: factor * np.eye(3)[k] for sign, factor in (("", 1.0), ("-", -1.0)) for k, axis in enumerate("xyz")
+}
+"""Axes by their names."""
+_NO_DIRECTION = 1e-6
+"""Of a unit vector: a shorter part of it has no direction."""
+_SIDES = re.compile(
+    r"(?<![A-Za-z])([Ll]eft|[Rr]ight|LEFT|RIGHT)(?![a-z])|(?<![A-Za-z])([lrLR])(?![A-Za-z])|(Left|Right)|^([lr])(?=[A-Z])"
+)
+"""What tells sides in the name of a link: left_arm, LeftArm, l_hip, hip_r, rThigh."""
+_ABOVE, _BELOW = re.compile(r"(?i)head|skull|neck"), re.compile(r"(?i)foot|feet|toe|shank|calf|tibia|ankle")
+"""Links at the upper and the lower end of a body."""
+
+
+_NO_SIDES = (
+    "{}: which axis goes from right to left is not known, as no two links of one trunk are called left and right; give "
+    "it: lateral='y', or three numbers in axes of the base"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class AthleteAxes:
+    """The axes by which somersaults, tilt and twists are counted, and where they come from.
+
+    Attributes
+    ----------
+    lateral : (3,) from the right side of the body to the left, base axes; of a batch, batch + (3,)
+    longitudinal : (3,) from the feet to the head, base axes
+    somersault : batch + (3,) horizontal, inertial axes; where the body begins it points to the left rather than right
+    up : (3,) inertial axes
+    reasons : what each of the four is, in words
+
+    Examples
+    --------
+    >>> dive = sp.examples.full_dive()
+    >>> motion = sp.reconstruct(dive.deformation, dive.momentum)
+    >>> axes = motion.athlete_axes()
+    >>> axes.somersault.round(6).tolist(), axes.reasons["somersault"]
+    ([0.0, 1.0, 0.0], 'the horizontal part of the momentum')
+    """
+
+    lateral: Array
+    longitudinal: Array
+    somersault: Array
+    up: Array
+    reasons: dict[str, str]
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+    def __str__(self) -> str:
+        """All four in words, with their directions."""
+        return (
+            f"somersaults about {self.reasons['somersault']}{_shown(self.somersault, 'inertial')}, twists about "
+            f"{self.reasons['longitudinal']}{_shown(self.longitudinal, 'base')}, from right to left: "
+            f"{self.reasons['lateral']}{_shown(self.lateral, 'base')}; up is {self.reasons['up']}"
+        )
+
+    @property
+    def frontal(self) -> Array:
+        """The axis of the tilt, from back to front, base axes: (3,) or batch + (3,)."""
+        return so3.cross(self.lateral, self.longitudinal)
+
+
+def athlete_axes(
+    motion: Motion,
+    lateral: str | ArrayLike | None,
+    longitudinal: str | ArrayLike | None,
+    somersault: str | ArrayLike | None,
+    up: str | ArrayLike | None,
+) -> AthleteAxes:
+    """As `Motion.athlete_axes`."""
+    reasons: dict[str, str] = {}
+    upward = _upward(motion, up, reasons)
+    trunk = _Trunk.of(motion)
+    if longitudinal is None:
+        long = trunk.long_axis()
+        reasons["longitudinal"] = "the axis of least inertia of the whole body at its straightest"
+    else:
+        long = _axis(longitudinal, "longitudinal axis", reasons)
+    side = None
+    if lateral is not None:
+        side = _across(_axis(lateral, "lateral axis", reasons), long)
+        if side is None:
+            raise unknown_name("longitudinal axis", "along the lateral one", ["another axis"])
+    elif trunk.body is not None and (found := _from_right_to_left(trunk.body, trunk.shape)) is not None:
+        side = _across(found, long)
+        reasons["lateral"] = "as the links called right and left lie"
+    start = motion.initial_attitude
+    about = _somersault(motion, somersault, upward, start, side, reasons)
+    if side is None:
+        seen = so3.apply(so3.transpose(start), about)
+        across = seen - np.sum(seen * long, axis=-1, keepdims=True) * long
+        length = np.linalg.norm(across, axis=-1, keepdims=True)
+        if np.any(length < _NO_DIRECTION):
+            raise WrongObjectError(_NO_SIDES.format(motion.deformation.label))
+        side = across / length
+        reasons["lateral"] = "as the axis of the somersault lies in the body at the start"
+    return AthleteAxes(lateral=side, longitudinal=long, somersault=about, up=upward, reasons=reasons)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trunk:
+    """A body at its straightest: locked inertia (3, 3), and of one with joints the body and its shape (n,)."""
+
+    inertia: Array
+    body: Body | None
+    shape: Array
+
+    @classmethod
+    def of(cls, motion: Motion) -> _Trunk:
+        description = motion.deformation.description
+        if hasattr(description, "original"):
+            raise WrongObjectError(
+                "motion: somersaults are counted by axes of a base, and this deformation is seen from a gauge; "
+                "reconstruct the one without the gauge"
+            )
+
+        def width(times: Array) -> Array:
+            moments = np.linalg.eigvalsh(description.sample(times)[0])
+            return moments[:, 0] / moments[:, 1]
+
+        body, path = getattr(description, "body", None), getattr(description, "path", None)
+        if isinstance(body, Body) and isinstance(path, ShapePath):
+            when = np.array([least_over(width, panel_edges(path))[1]])
+            return cls(description.sample(when)[0][0], body, path.curve(when)[0][0])
+        when = np.array([least_over(width, motion.deformation.breaks)[1]])
+        return cls(description.sample(when)[0][0], None, np.zeros(0))
+
+    def long_axis(self) -> Array:
+        """The axis of least inertia, towards the head; without one away from the feet, else along the base's z."""
+        moments, axes = principal_axes(self.inertia)
+        if moments[1] - moments[0] <= _NO_DIRECTION * moments[1]:
+            raise WrongObjectError(
+                "motion: two moments of inertia of the body are equal where it is straightest, so no axis is the long "
+                "one; give it: longitudinal='z', or three numbers in axes of the base"
+            )
+        axis = axes[:, 0]
+        heights = axis if self.body is None else _upwards(self.body, self.shape, axis)
+        sizes = np.abs(heights)
+        # Of the base's own axes z counts before y and x.
+        leading = heights[-1] if sizes[-1] > _NO_DIRECTION * sizes.max() else heights[int(np.argmax(sizes))]
+        return axis * (1.0 if leading >= 0.0 else -1.0)
+
+
+def _upwards(body: Body, shape: Array, axis: Array) -> Array:
+    """How far along an axis the head is, or the feet are behind; without either the axis itself, in base axes."""
+    motions = link_motions(body.chain, shape[None], np.zeros_like(shape)[None])
+    for pattern, sign in ((_ABOVE, 1.0), (_BELOW, -1.0)):
+        frames = [frame for link, (frame, _) in body.chain.link_frames.items() if pattern.search(link)]
+        if frames:
+            return sign * motions.places[0, frames].mean(axis=0)[None] @ axis
+    return axis
+
+
+def _from_right_to_left(body: Body, shape: Array) -> Array | None:
+    """Along the sum of the ways between joints of one trunk whose links differ by their side only: (3,), base axes."""
+    chain = body.chain
+    sides: dict[tuple[int, str], dict[str, int]] = {}
+    for link, (frame, _) in chain.link_frames.items():
+        told = _SIDES.search(link)
+        if told is None or frame == 0:
+            continue
+        which = next(group for group in told.groups() if group)[0].lower()
+        rest = link[: told.start()] + "*" + link[told.end() :]
+        sides.setdefault((chain.parents[frame - 1], rest.lower()), {}).setdefault(which, frame - 1)
+    turns = link_motions(chain, shape[None], np.zeros_like(shape)[None]).turns[0]
+    ways = [
+        turns[parent] @ (chain.places[pair["l"]] - chain.places[pair["r"]])
+        for (parent, _), pair in sides.items()
+        if len(pair) == 2
+    ]
+    whole = np.sum(ways, axis=0) if ways else np.zeros(3)
+    length = float(np.linalg.norm(whole))
+    return whole / length if length > _NO_DIRECTION * float(sum(np.linalg.norm(way) for way in ways) or 1.0) else None
+
+
+def _somersault(
+    motion: Motion,
+    given: str | ArrayLike | None,
+    up: Array,
+    start: Array,
+    side: Array | None,
+    reasons: dict[str, str],
+) -> Array:
+    """The axis of the somersault: batch + (3,), inertial axes."""
+    momentum = motion.momentum
+    batch = momentum.shape
+    left = None if side is None else np.broadcast_to(so3.apply(start, side), batch)
+    if given is not None:
+        about = np.broadcast_to(_axis(given, "somersault", reasons), batch)
+        return _horizontal(about, up, "somersault: a horizontal axis is needed, and this one points up or down")
+    upright = np.abs(momentum @ up)
+    flat = momentum - (momentum @ up)[..., None] * up
+    tumbles = (np.linalg.norm(flat, axis=-1) >= upright) & (np.linalg.norm(momentum, axis=-1) > 0.0)
+    by_momentum = "the horizontal part of the momentum"
+    by_side = "the axis from right to left at the start, made horizontal"
+    if not tumbles.all() and left is None:
+        raise WrongObjectError(_NO_SIDES.format(motion.deformation.label))
+    said = [by_momentum] * bool(tumbles.any()) + [by_side] * (not tumbles.all())
+    reasons["somersault"] = ", or ".join(said)
+    about = flat if left is None else np.where(tumbles[..., None], flat, left)
+    axis = _horizontal(
+        about,
+        up,
+        "the axis from right to left is upright at the start, and the momentum is none or upright, so no horizontal "
+        "axis is that of a somersault; give it: somersault='x', or three numbers in inertial axes",
+    )
+    if left is None:
+        return axis
+    towards = np.sum(axis * left, axis=-1, keepdims=True)
+    return axis * np.where(towards < -_NO_DIRECTION, -1.0, 1.0)
+
+
+def _horizontal(axis: Array, up: Array, otherwise: str) -> Array:
+    flat = axis - np.sum(axis * up, axis=-1, keepdims=True) * up
+    length = np.linalg.norm(flat, axis=-1, keepdims=True)
+    if np.any(length <= _NO_DIRECTION * np.linalg.norm(axis, axis=-1, keepdims=True)):
+        raise ShapeError(otherwise)
+    return flat / length
+
+
+def _upward(motion: Motion, given: str | ArrayLike | None, reasons: dict[str, str]) -> Array:
+    if given is not None:
+        return _axis(given, "up", reasons)
+    recording = motion.deformation.made_from.get("recording") or {}
+    recorded = str((recording.get("flight") or {}).get("up", "")).removeprefix("+")
+    name = recorded if recorded in NAMED else "z"
+    reasons["up"] = f"{name}, as the recording falls" if recorded in NAMED else f"{name}, as nothing else was said"
+    return NAMED[name].copy()
+
+
+def _axis(given: str | ArrayLike, what: str, reasons: dict[str, str]) -> Array:
+    """A unit vector by its name, or of three numbers. Raises UnknownNameError, ShapeError."""
+    if isinstance(given, str):
+        if given not in NAMED:
+            raise unknown_name(what, given, list(NAMED))
+        reasons[what.split()[0]] = f"{given}, as given"
+        return NAMED[given].copy()
+    vector = finite_array(given, what, (3,))
+    length = float(np.linalg.norm(vector))
+    if vector.ndim != 1 or length == 0.0:
+        raise ShapeError(f"{what}: a name of {', '.join(NAMED)} or three numbers (3,), not all zero, are needed")
+    reasons[what.split()[0]] = "as given"
+    return vector / length
+
+
+def _across(axis: Array, other: Array) -> Array | None:
+    """The part of a unit vector across another, of length one; None where there is none."""
+    across = axis - (axis @ other) * other
+    length = float(np.linalg.norm(across))
+    return across / length if length > _NO_DIRECTION else None
+
+
+def _shown(axis: Array, frame: str) -> str:
+    numbers = " ".join(f"{value + 0.0:.3f}" for value in np.round(axis, 3)) if axis.ndim == 1 else ""
+    return f" ({numbers}, {frame} axes)" if numbers else ""
