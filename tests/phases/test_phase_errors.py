@@ -245,7 +245,7 @@ def test_a_batch_has_the_estimates_of_its_motions(gauge: str):
         for field in fields(alone):
             one, of_batch = getattr(alone, field.name), getattr(together, field.name)
             assert of_batch.shape == (3,)
-            if momentum.any():
+            if momentum.any() and field.name != "wheel_rotation":
                 assert 0.0 < of_batch[row] < 1e-6
             elif field.name not in ("total_rotation", "holonomy"):
                 assert one == of_batch[row] == 0.0
