@@ -118,8 +118,8 @@ def read_recorded_motion(
       coupled ones that are no joints of the body are left out.
     - `.mat`, `.h5`: vectors `time` and one for each joint, or a matrix `shapes` beside `joint_names`; on top or in a
       structure.
-    - `.bvh`: the bones' turns, for the body that `load_body` makes of such a file. A first frame with all angles at zero,
-      from which a joint goes over five times as far as in any step of the next second, is left out.
+    - `.bvh`: the bones' turns, for the body that `load_body` makes of such a file. A first frame with all angles at
+      zero, from which a joint goes over five times as far as in any step of the next second, is left out.
     - `.c3d`: the angles that a model computed, `LKneeAngles_x` and so on; no markers.
     - `.npz`: `time` (N,), `shapes` (N, n), `joint_names` (n,); the base as `base_quat_xyzw` (N, 4), `base_position`
       (N, 3).
