@@ -358,7 +358,7 @@ def test_what_is_written_of_a_person_is_read_back(tmp_path):
 
 CASES = Path(__file__).parents[1] / "cases"
 SQUAT_TURN = (-0.00294847, -0.08212917, -0.01447316)
-"""[rad] By steps of fourth order in NumPy and SciPy: quaternions of all bones splined, momenta of all segments summed."""
+"""[rad] By steps of fourth order in NumPy and SciPy: quaternions of bones splined, momenta of segments summed."""
 
 
 @pytest.mark.parametrize(
