@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -353,3 +354,29 @@ def test_what_is_written_of_a_person_is_read_back(tmp_path):
     np.testing.assert_allclose(again.locked_inertia(again.shape()), body.locked_inertia(body.shape()), atol=1e-12)
     np.testing.assert_allclose(found.path.shape(found.times), recorded.path.shape(found.times), rtol=0, atol=1e-9)
     np.testing.assert_allclose(found.base_attitude, motion.attitude(found.times), rtol=0, atol=1e-14)
+
+
+CASES = Path(__file__).parents[1] / "cases"
+SQUAT_TURN = (-0.00294847, -0.08212917, -0.01447316)
+"""[rad] By steps of fourth order in NumPy and SciPy: quaternions of bones splined, momenta of segments summed."""
+
+
+@pytest.mark.parametrize(
+    ("name", "samples", "turn"),
+    [
+        ("bvh_plain", 25, SQUAT_TURN),
+        ("bvh_across_gimbal_lock", 25, SQUAT_TURN),
+        ("bvh_node_above", 25, SQUAT_TURN),
+        ("bvh_axes_of_bones", 25, SQUAT_TURN),
+        ("bvh_first_pose", 25, (-0.00366069, 0.0, 0.0)),
+    ],
+)
+def test_what_the_shape_alone_does_in_files_of_one_kind_each(name, samples, turn):
+    """Of one motion in four spellings, and of another behind a first pose; to the differences of that integration."""
+    body = load(CASES / f"{name}.bvh", **CENTIMETRE)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", TrajectoryWarning)
+        recorded = sp.read_recorded_motion(CASES / f"{name}.bvh", body)
+    assert len(recorded.times) == samples
+    motion = sp.reconstruct(sp.articulated(body, recorded.path), [0.0, 0.0, 0.0])
+    np.testing.assert_allclose(sp.so3.log(motion.attitude(motion.duration)), turn, rtol=0, atol=3e-8)

@@ -231,6 +231,20 @@ def test_angles_are_turns_in_the_order_of_their_columns(body, tmp_path, order):
     assert found.record["columns"]["shoulder.w"] == ", ".join(f"shoulder.r{axis}_deg" for axis in order)
 
 
+def test_noise_of_joints_is_that_of_their_turns(body):
+    """A ball joint and a hinge whose samples are off by so much about each axis: one number, and an array by column.
+
+    The quaternion of a turn by d, near that of no turn, is off by d/2 in each of its numbers that change.
+    """
+    times, shapes = samples(21)
+    path = sp.ShapePath.spline(times, shapes, joint_names=body.joint_names)
+    motion = sp.reconstruct(sp.articulated(body, path), MOMENTUM)
+    by_column = np.array([0.005] * 8 + [0.01])
+    bars = [np.diag(sp.uncertainty(motion, joints=noise).final_attitude) for noise in (0.01, "0.01rad", by_column)]
+    np.testing.assert_allclose(bars[0], bars[2], rtol=1e-12)
+    np.testing.assert_allclose(bars[1], bars[2], rtol=1e-12)
+
+
 def test_channels_of_bvh_files_name_angles_of_a_table(body, tmp_path):
     times, shapes = samples(21)
     turns = Rotation.from_quat(shapes[:, :4]).as_euler("YZX", degrees=True)

@@ -13,7 +13,6 @@ from .. import so3
 from ..arguments import check_choice, check_object, names_argument, positive_argument
 from ..arrays import FARTHEST, Array, finite_array
 from ..body.body import Body
-from ..body.couplings.ball_joints import COORDINATES, RATES
 from ..body.joint_orders import WORDS
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError, unknown_name
@@ -40,11 +39,11 @@ class FloatingTrajectory:
     ----------
     times : (N,) ascending [s]
     quaternion : (N, 4) x y z w of the base, base axes to the world's
-    shapes : (N, n) joints in the body's order [rad or m]; of a ball joint its quaternion x, y, z, w
+    shapes : (N, n) joints in the body's order [rad or m]; of a ball joint its quaternion x, y, z, w, with any sign
     position : (N, 3) of the base's origin, world axes [m], or None
     rate : (N, 3) angular velocity of the base [rad/s], or None
     velocity : (N, 3) of the base's origin [m/s], or None
-    joint_rates : (N, n) [rad/s or m/s], or None
+    joint_rates : (N, n) derivatives of the shapes [rad/s or m/s], or None
     rate_axes, velocity_axes : "world" or "base": in which axes these two are
     step : of the integrator that made it [s]; None: that between samples
     name : for people
@@ -129,9 +128,9 @@ class FloatingTrajectory:
         Parameters
         ----------
         times : (N,) [s]
-        qpos : (N, 7 + n) place, quaternion w x y z, joints; of a ball joint its quaternion w x y z
-        qvel : (N, 6 + n), or None; of a ball joint its angular velocity in axes of the child
-        joint_names : in the order of these arrays, a ball joint by its own name; None: in that of `joint_order`
+        qpos : (N, 7 + n) place, quaternion w x y z, joints
+        qvel : (N, 6 + n), or None
+        joint_names : in the order of these arrays; None: in that of `joint_order`
         joint_order : "mujoco", "isaac", "isaac-by-name" or "body", as `read_recorded_motion` has them; None: "mujoco",
             the order in which MuJoCo compiles the body's file
         step : of the integrator [s]; None: that between samples
@@ -157,8 +156,8 @@ class FloatingTrajectory:
         if joint_names is None:
             width = finite_array(qpos, "qpos", (None, None)).shape[1]
             nameless = nameless_joints(body, width, "qpos", joint_order)
-            joint_names = _whole_joints(body, nameless.names)
-        places, rates = _arrays(body, qpos, qvel, joint_names, ("qpos", "qvel"), "wxyz")
+            joint_names = nameless.names
+        places, rates = _arrays(body, qpos, qvel, joint_names, ("qpos", "qvel"))
         given = _rates(rates, "base", "world")
         quaternion = np.roll(places[:, 3:_POSE], -1, axis=1)
         return FloatingTrajectory(
@@ -188,9 +187,9 @@ class FloatingTrajectory:
         Parameters
         ----------
         times : (N,) [s]
-        q : (N, 7 + n) place, quaternion x y z w, joints, each by one number; of a ball joint its quaternion x y z w
-        v : (N, 6 + n), or None; of a ball joint its angular velocity in axes of the child
-        joint_names : in the order of these arrays, a ball joint by its own name; None: in the body's order
+        q : (N, 7 + n) place, quaternion x y z w, joints, each by one number
+        v : (N, 6 + n), or None
+        joint_names : in the order of these arrays; None: in the body's order
         step : of the integrator [s]; None: that between samples
 
         Raises
@@ -205,7 +204,7 @@ class FloatingTrajectory:
         >>> sp.FloatingTrajectory.from_pinocchio(cat, np.linspace(0.0, 1.0, 21), q).quaternion[0].tolist()
         [0.0, 0.0, 0.0, 1.0]
         """
-        places, rates = _arrays(body, q, v, joint_names, ("q", "v"), "xyzw")
+        places, rates = _arrays(body, q, v, joint_names, ("q", "v"))
         given = _rates(rates, "base", "base")
         return FloatingTrajectory(
             times=finite_array(times, "times", (None,), unit="s"),
@@ -261,54 +260,29 @@ def _check_size(values: Array | None, what: str, most: float) -> None:
         raise TrajectoryError(f"{what}: sample {sample} has {np.abs(values[sample]).max():.6g}; up to {most:g} is read")
 
 
-def _whole_joints(body: Body, names: Sequence[str]) -> list[str]:
-    """Joints by their names, a ball joint by its own instead of those of its four numbers."""
-    balls = {part: ball.name for ball in body.chain.follows.balls for part in ball.names}
-    return list(dict.fromkeys(balls.get(name, name) for name in names))
-
-
 def _arrays(
-    body: Body,
-    places: ArrayLike,
-    rates: ArrayLike | None,
-    names: Sequence[str] | None,
-    labels: tuple[str, str],
-    parts: str,
+    body: Body, places: ArrayLike, rates: ArrayLike | None, names: Sequence[str] | None, labels: tuple[str, str]
 ) -> tuple[Array, Array | None]:
-    """Both arrays with their joints in the body's order, and quaternions x y z w with their own rates.
-
-    parts : the order of the numbers of a ball joint's quaternion
-    """
+    """Both arrays with their joints in the body's order."""
     check_object(body, "Body", "body")
-    balls = {ball.name: ball for ball in body.chain.follows.balls}
-    own = _whole_joints(body, body.joint_names)
-    order = list(own if names is None else names_argument(names, "joint_names", "names of joints"))
-    for joint in own:
+    if body.ball_joints:
+        raise ShapeError(
+            f"{labels[0]}: arrays of bodies with ball joints are not read, for quaternions may stand in another order "
+            f"there; {body.name} has {', '.join(body.ball_joints)}. Give `shapes` with columns as body.joint_names"
+        )
+    order = list(body.joint_names if names is None else names_argument(names, "joint_names", "names of joints"))
+    for joint in body.joint_names:
         if order.count(joint) > 1:
             raise ShapeError(f"joint_names: {joint!r} stands {order.count(joint)} times")
         if joint not in order:
             raise unknown_name("joint among joint_names", joint, order)
-    first = np.cumsum([_POSE, *(len(COORDINATES) if joint in balls else 1 for joint in order)])
-    full = finite_array(places, labels[0], (None, int(first[-1])))
-    found = [full[:, :_POSE]]
-    for joint in own:
-        start = int(first[order.index(joint)])
-        columns = [start + parts.index(part) for part in COORDINATES] if joint in balls else [start]
-        found.append(full[:, columns])
-    posed = np.hstack(found)
+    columns = [order.index(joint) for joint in body.joint_names]
+    full = finite_array(places, labels[0], (None, _POSE + len(order)))
+    found = np.hstack([full[:, :_POSE], full[:, _POSE:][:, columns]])
     if rates is None:
-        return posed, None
-    first = np.cumsum([_TWIST, *(len(RATES) if joint in balls else 1 for joint in order)])
-    turned = finite_array(rates, labels[1], (len(full), int(first[-1])))
-    found = [turned[:, :_TWIST]]
-    for joint in own:
-        start = int(first[order.index(joint)])
-        if joint in balls:
-            frame = balls[joint].frame(posed[:, _POSE:])
-            found.append(so3.apply(frame, turned[:, start : start + len(RATES)]))
-        else:
-            found.append(turned[:, [start]])
-    return posed, np.hstack(found)
+        return found, None
+    turned = finite_array(rates, labels[1], (len(full), _TWIST + len(order)))
+    return found, np.hstack([turned[:, :_TWIST], turned[:, _TWIST:][:, columns]])
 
 
 def _rates(rates: Array | None, rate_axes: str, velocity_axes: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from ..body.family import BodyFamily
 from ..errors import ShapeError, unknown_name
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.files._labels import amounts
+from ..shape_space.files._labels import NO_UNIT, amounts
 from ..shape_space.path_samples import columns_without_samples, path_samples
 from ..shape_space.summaries import body_summary
 from .inertia_errors import InertiaErrors
@@ -70,6 +70,9 @@ def inputs_of(
         given = _by_joint(body, joints) if isinstance(joints, str) else finite_array(joints, "joints")
         if given.shape in ((), (path.n_shape,)):
             each = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
+            if given.ndim == 0:
+                # The numbers of a quaternion go by half of its turn.
+                each[np.array(body.joint_units, dtype=str) == NO_UNIT] *= 0.5
             if given.ndim == 0 or isinstance(joints, str):
                 each[columns_without_samples(path)] = 0.0
             samples = np.tile(each**2, through.count)

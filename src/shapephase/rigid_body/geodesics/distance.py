@@ -97,7 +97,7 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
 
     By left invariance that from R_0 to R_1 is R_0 times the one to R_0^T R_1. At points of the cut locus one of several
     is found. For three different moments nothing proves that none was missed (`certified`), and where the way turns
-    more than once about the axis of the smallest moment, longer than 2 pi sqrt(I_1), many geodesics have nearly the same
+    more than once about the axis of the smallest moment, longer than 2 pi sqrt(I_1), many geodesics have nearly equal
     length: there a shorter one may have been.
 
     Raises
