@@ -34,7 +34,7 @@ from .deformation.deformation import Deformation, DeformationFamily, articulated
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge
 from .dynamics.loads import JointLoads
 from .dynamics.swinging import FreeHinges, free_hinges
-from .dynamics.torque_errors import TorqueErrors, torque_errors
+from .dynamics.torque_noise import TorqueErrors, torque_errors
 from .dynamics.torques import JointTorques, joint_torques
 from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_bars.inertia_errors import InertiaErrors
@@ -87,7 +87,7 @@ from .shape_space.connection import (
 from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .shape_space.many_paths import FinalAttitudes, final_attitudes
-from .shape_space.path_errors import PathErrors, path_errors
+from .shape_space.path_noise import PathErrors, path_errors
 from .shape_space.reach.holonomy_algebra import Reach, reachable
 from .shape_space.reach.manipulators import dynamic_manipulability, generalised_jacobian, reaction_null_space
 from .shape_space.reach.perturbation_frames import MinimumPerturbation, minimum_perturbation

@@ -1,6 +1,6 @@
 from .loads import JointLoads
 from .swinging import FreeHinges, free_hinges
-from .torque_errors import LoadErrors, TorqueErrors, load_errors, torque_errors
+from .torque_noise import LoadErrors, TorqueErrors, load_errors, torque_errors
 from .torques import JointTorques, joint_torques
 from .wheels import wheel_speeds
 

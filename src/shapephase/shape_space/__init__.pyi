@@ -10,7 +10,7 @@ from .connection import (
 )
 from .curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .many_paths import FinalAttitudes, final_attitudes
-from .path_errors import PathErrors, path_errors
+from .path_noise import PathErrors, path_errors
 from .shape_path import ShapePath
 from .summaries import BodySummary, JointSummary, PartSummary, PathSummary, body_summary, path_summary
 

@@ -17,11 +17,6 @@ from .shape_path import ShapePath
 # The quintic of least jerk from 0 to 1: the powers 3, 4, 5 of the share of the time.
 _REST_TO_REST = (10.0, -15.0, 6.0)
 
-# Of the variance that noise gives to the estimated bias, beside its square, which holds that variance once already, in
-# the mean. Of 30 motions with 100 draws, bars of 95 % for accelerations at the ends held in less than 90 % in 4 with
-# none of it and in more than 98 % in 5 with all of it.
-_OPEN = 0.5
-
 
 class PathBasis(NamedTuple):
     """A path at N times by the coefficients of its polynomials.
@@ -190,8 +185,8 @@ class PathSamples:
     @property
     def rules(self) -> tuple[Callable[[Array], Array], ...]:
         """From derivatives by the values at the knots to those by the samples: of what noise does to these values, and
-        of what error bars hold of that to their bias."""
-        return self.by_samples, lambda by_knots: np.sqrt(_OPEN) * self.bias_by_samples(by_knots)
+        to the estimate of their bias."""
+        return self.by_samples, self.bias_by_samples
 
     def _through(self, rule: Callable[[Array], Array], by_knots: Array) -> Array:
         n_shape = len(self.order)

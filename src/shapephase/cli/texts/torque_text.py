@@ -9,7 +9,7 @@ import numpy as np
 from ...body.body import Body
 from ...display import number_with_bar
 from ...dynamics.loads import JointLoads
-from ...dynamics.torque_errors import LoadErrors, load_errors
+from ...dynamics.torque_noise import LoadErrors, load_errors
 from ...dynamics.torques import JointTorques
 from ...errors import WrongObjectError
 from ...plain_data import plain

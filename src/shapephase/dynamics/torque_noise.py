@@ -14,7 +14,7 @@ from ..display import short_repr
 from ..errors import ShapeError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.path_errors import path_errors, summed_errors
+from ..shape_space.path_noise import path_errors, summed_errors
 from ._driven_motion import BY_JOINTS, drive
 from .loads import JointLoads
 from .moving_body import needed_body_and_path
