@@ -101,8 +101,9 @@ class BodyOptions:
         str | None,
         Parameter(
             show_default=False,
-            help="Of an MJCF file: free removes the hinges and slides between the world and the body, as planar "
-            "walkers have them, without unit; without it they are an error. For example `--root free`.",
+            help="Of a URDF, xacro or MJCF file: free removes all joints between the world, or a root without mass, "
+            "and the body, without unit; without it a single one, as of an arm that is bolted down, is an error, and "
+            "several are the free base. For example `--root free`.",
         ),
     ] = None
     root_body: Annotated[
