@@ -174,18 +174,18 @@ class _Swing:
         inverse = inverse_inertia(inertia, times)
         pi = so3.apply(so3.transpose(turned), self.momentum)
         omega = so3.apply(inverse, pi - so3.apply(matrix, rate))
-        # The efforts are linear in the accelerations: those of none, and of one of each hinge.
-        tried = np.repeat(acceleration[:, None], count + 1, axis=1)
-        tried[:, np.arange(1, count + 1), self.columns] += 1.0
         still = np.cross(pi, omega) - so3.apply(inertia_rate, omega) - so3.apply(matrix_rate, rate)
-        slopes = so3.apply(inverse[:, None], still[:, None] - so3.apply(matrix[:, None], tried))
-        shapes, rates, spins = (np.repeat(one, count + 1, axis=0) for one in (shape, rate, omega))
-        tried, slopes = tried.reshape(shapes.shape), slopes.reshape(-1, 3)
-        efforts, _ = falling_efforts(self.body, shapes, rates, tried, spins, slopes)
-        own = efforts[:, self.columns].reshape(-1, count + 1, count)
+        slopes = so3.apply(inverse, still - so3.apply(matrix, acceleration))
+        efforts, _ = falling_efforts(self.body, shape, rate, acceleration, omega, slopes)
+        # Efforts are linear in accelerations: those of one of each hinge from rest, which the others may be far above.
+        shapes = np.repeat(shape, count, axis=0)
+        ones = np.tile(np.eye(shape.shape[1])[self.columns], (len(times), 1))
+        answers = -so3.apply(np.repeat(inverse, count, axis=0), so3.apply(np.repeat(matrix, count, axis=0), ones))
+        rest = np.zeros_like(shapes)
+        by_one, _ = falling_efforts(self.body, shapes, rest, ones, np.zeros_like(answers), answers)
+        by_one = np.swapaxes(by_one[:, self.columns].reshape(-1, count, count), 1, 2)
         given = np.array([self._given(float(t), state) for t, state in zip(times, states, strict=True)])
-        by_one = np.swapaxes(own[:, 1:] - own[:, :1], 1, 2)
-        found = np.linalg.solve(by_one, (given - own[:, 0])[..., None])[..., 0]
+        found = np.linalg.solve(by_one, (given - efforts[:, self.columns])[..., None])[..., 0]
         return omega, np.asarray(found, dtype=np.float64)
 
     def _given(self, t: float, state: Array) -> Array:
@@ -213,7 +213,7 @@ def _path_of(swing: _Swing, found: DrivenAttitude, breaks: Array, tolerance: flo
         states = found.states(times)
         shapes[:, swing.columns], rates[:, swing.columns] = states[:, :count], states[:, count:]
         off = np.abs(curve(times)[0] - shapes).max(initial=0.0)
-        off = max(off, swing.route.duration * np.abs(curve(times)[1] - rates).max(initial=0.0) * _SHARE)
+        off = max(off, np.abs(curve(times)[1] - rates).max(initial=0.0) / found.scales[count:].min() * _SHARE)
         if off <= _SHARE * tolerance:
             break
         if 2 * len(knots) > _MOST_PIECES:
