@@ -64,6 +64,7 @@ from .phases.phases import (
 )
 from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
+from .phases.turn_counts import TurnCounts, turn_counts
 from .plotting import plots
 from .plotting.viewer import motion_page, view
 from .reconstruction.external_torque import ExternalTorque, TorqueState
@@ -138,6 +139,7 @@ __all__ = [
     "ShapePhaseError",
     "TorqueState",
     "TrajectoryWarning",
+    "TurnCounts",
     "Uncertainty",
     "UnphysicalInertiaWarning",
     "arc_phases",
@@ -220,6 +222,7 @@ __all__ = [
     "stokes_holonomy",
     "stroboscopic_map",
     "study",
+    "turn_counts",
     "uncertainty",
     "view",
     "write_shape_path",
