@@ -66,6 +66,7 @@ from .phases.phases import (
 )
 from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
+from .phases.turn_counts import TurnCounts, turn_counts
 from .plotting import plots
 from .plotting.viewer import motion_page, view
 from .reconstruction.external_torque import ExternalTorque, TorqueState
@@ -144,6 +145,7 @@ __all__ = [
     "TorqueErrors",
     "TorqueState",
     "TrajectoryWarning",
+    "TurnCounts",
     "Uncertainty",
     "UnphysicalInertiaWarning",
     "arc_phases",
@@ -229,6 +231,7 @@ __all__ = [
     "stroboscopic_map",
     "study",
     "torque_errors",
+    "turn_counts",
     "uncertainty",
     "view",
     "write_shape_path",

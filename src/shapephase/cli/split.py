@@ -63,7 +63,8 @@ def split_command(
 
     from ..exports.tables import ENDINGS, export_motion
     from ..phases.phases import running_phases, split
-    from ..phases.split_text import split_lines
+    from ..phases.split_text import split_lines, wrapped
+    from ..phases.turn_counts import turn_counts
     from ..shape_space.body_path import path_gap
     from . import motion as motions
     from .texts.error_bar_text import error_bar_data, error_bar_lines, error_bars, joint_noise
@@ -115,16 +116,18 @@ def split_command(
                 begin=work.begin,
             )
             say_written(html)
+    turns = turn_counts(flown.motion, result)
     names = flown.body.joint_names
     gap = path_gap(flown.body, flown.path.matched(names, flown.body.name))
     open_by = "" if result.is_loop else f"{gap_text(flown.body, gap)} from its start"
     text = [
         *split_lines(result, split_heading(flown.body, motion, flown.motion), open_by),
+        *wrapped(str(turns)),
         *error_bar_lines(result, bars, flown.recorded, errors),
         *lines,
         *recording_lines(flown.body, flown.recorded),
     ]
     text[0] += flown.beginning
     data = split_data(flown.body, motion, flown.motion, result) | error_bar_data(bars) | data
-    data |= recording_data(flown.recorded)
+    data |= turns.to_dict() | recording_data(flown.recorded)
     return Outcome("\n".join(text), data, aside=aside, made_from=flown.motion.deformation.made_from)

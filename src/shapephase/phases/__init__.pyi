@@ -14,6 +14,7 @@ from .phases import (
 )
 from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
+from .turn_counts import TurnCounts, turn_counts
 
 __all__ = [
     "ArcErrors",
@@ -29,6 +30,7 @@ __all__ = [
     "RunningPhases",
     "SplitErrors",
     "SplitMotion",
+    "TurnCounts",
     "arc_phases",
     "closed_orbits",
     "continued_orbits",
@@ -43,4 +45,5 @@ __all__ = [
     "running_phases",
     "split",
     "stroboscopic_map",
+    "turn_counts",
 ]

@@ -80,8 +80,12 @@ def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> l
         f"{'error estimate':24}{about.error_estimate:16.2e} rad   (of the attitude, at all times)",
         f"{'evaluations':24}{about.evaluations:16d}       (of the body, each at one time)",
     ]
-    said = closing_text(result)
-    return [*lines, *(["", *textwrap.wrap(said, _WIDTH)] if said else [])]
+    return [*lines, *wrapped(closing_text(result))]
+
+
+def wrapped(words: str) -> list[str]:
+    """Words as lines as wide as the table, below an empty one; none where nothing is said."""
+    return ["", *textwrap.wrap(words, _WIDTH)] if words else []
 
 
 def is_open(result: PhaseSplit) -> bool:

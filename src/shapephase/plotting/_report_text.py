@@ -19,6 +19,7 @@ from ..dynamics.torques import joint_torques
 from ..errors import WrongObjectError
 from ..phases.phases import PhaseSplit
 from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
+from ..phases.turn_counts import turn_counts
 from ..provenance import provenance
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_noise import path_errors, stated_noise
@@ -68,7 +69,8 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
     if is_rigid(motion):
         words = [f"The body is rigid and turns for {motion.duration:g} s."]
     if not result.has_phase and not result.has_wheels:
-        words.append(f"There is no angular momentum: the shape alone turned it by {_turn(result.total_rotation)}.")
+        turned = _turn(result.total_rotation)
+        words.append(f"There is no angular momentum: the shape alone turned it by {turned}, but for whole turns.")
         return words
     size = float(np.linalg.norm(motion.momentum))
     momentum = f"the angular momentum of {size:.4g} kg m²/s"
@@ -76,13 +78,16 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
         momentum = f"{momentum} with that stored in wheels" if result.has_phase else "the momentum stored in wheels"
     alone = (
         f"The shape alone turned it by {_turn(result.holonomy)}; {momentum} added "
-        f"{_turn(result.dynamical_rotation)}. Both together turned it by {_turn(result.total_rotation)}."
+        f"{_turn(result.dynamical_rotation)}. Both together turned it by {_turn(result.total_rotation)}, but for whole "
+        "turns."
     )
     if not result.has_phase:
         return [*words, "There is no total angular momentum.", alone]
     if is_rigid(motion):
-        alone = f"The angular momentum of {size:.4g} kg m²/s turned it by {_turn(result.total_rotation)}."
+        turned = _turn(result.total_rotation)
+        alone = f"The angular momentum of {size:.4g} kg m²/s turned it by {turned}, but for whole turns."
     words.append(alone)
+    words += [said for said in (str(turn_counts(motion, result)),) if said]
     phase, dynamic, geometric = (
         f"{np.degrees(float(value)):z.2f}°"
         for value in (result.montgomery_phase, result.dynamic_phase, result.geometric_phase)

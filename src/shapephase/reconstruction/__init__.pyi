@@ -1,4 +1,5 @@
 from ._solvers import Solution
+from .athlete_axes import AthleteAxes
 from .external_torque import ExternalTorque, TorqueState
 from .forced_motion import ForcedMotion
 from .motion_family import MotionFamily
@@ -6,6 +7,7 @@ from .reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate
 from .recorded_base import BaseDifference, base_difference
 
 __all__ = [
+    "AthleteAxes",
     "BaseDifference",
     "ExternalTorque",
     "ForcedMotion",

@@ -37,6 +37,7 @@ _ABOVE, _BELOW = re.compile(r"(?i)head|skull|neck"), re.compile(r"(?i)foot|feet|
 """Links at the upper and the lower end of a body."""
 
 
+_BY_LINKS = "as the links called right and left lie"
 _NO_SIDES = (
     "{}: which axis goes from right to left is not known, as no two links of one trunk are called left and right; give "
     "it: lateral='y', or three numbers in axes of the base"
@@ -82,6 +83,11 @@ class AthleteAxes:
         )
 
     @property
+    def by_links(self) -> bool:
+        """Whether the sides are those of links called left and right, as people and animals have them."""
+        return self.reasons["lateral"] == _BY_LINKS
+
+    @property
     def frontal(self) -> Array:
         """The axis of the tilt, from back to front, base axes: (3,) or batch + (3,)."""
         return so3.cross(self.lateral, self.longitudinal)
@@ -110,7 +116,7 @@ def athlete_axes(
             raise unknown_name("longitudinal axis", "along the lateral one", ["another axis"])
     elif trunk.body is not None and (found := _from_right_to_left(trunk.body, trunk.shape)) is not None:
         side = _across(found, long)
-        reasons["lateral"] = "as the links called right and left lie"
+        reasons["lateral"] = _BY_LINKS
     start = motion.initial_attitude
     about = _somersault(motion, somersault, upward, start, side, reasons)
     if side is None:
