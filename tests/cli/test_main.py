@@ -202,14 +202,19 @@ def test_a_recorded_base_is_compared(capsys, tmp_path):
         joint_names=np.array(path.joint_names),
         base_quat_xyzw=base,
     )
-    data = json.loads(run(capsys, "split", "cat", tmp_path / "m.npz", "--momentum", 0, 0, 0.02, "--json"))
+    momentum = (turned @ [0.0, 0.0, 0.02]).tolist()
+    data = json.loads(run(capsys, "split", "cat", tmp_path / "m.npz", "--momentum", *momentum, "--json"))
     assert data["recorded_base_difference_rad"] < 1e-7
+    final = turned @ motion.final_attitude
+    np.testing.assert_allclose(so3.matrix_from_quat(np.array(data["final_attitude_quat_xyzw"])), final, atol=1e-7)
     assert set(data["sha256"]) == {"body", "path"}
-    other = json.loads(run(capsys, "split", "cat", tmp_path / "m.npz", "--json"))
+    other = json.loads(run(capsys, "split", "cat", tmp_path / "m.npz", "--momentum", 0, 0, 0, "--json"))
     ours = sp.reconstruct(sp.articulated(body, path), np.zeros(3)).attitude(times)
     apart = so3.angle(so3.transpose(ours[0].T @ ours) @ motion.attitude(0.0).T @ motion.attitude(times))
     assert other["recorded_base_difference_rad"] == pytest.approx(apart.max(), abs=1e-6)
-    assert "base as recorded" in run(capsys, "split", "cat", tmp_path / "m.npz")
+    fitted = run(capsys, "split", "cat", tmp_path / "m.npz")
+    assert "all from 0 to 0.5 s" in fitted.splitlines()[0]
+    assert "base as recorded" in fitted
 
 
 def test_robots_lists_bodies_and_motions(capsys):

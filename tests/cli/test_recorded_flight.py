@@ -6,11 +6,15 @@ import json
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom, chi2
 
 import shapephase as sp
 from shapephase.cli.main import main
+from support import bvh_files
+from support.motion_writers import write_delimited
 from support.recorded_flights import ATTITUDE_NOISE, FLIGHT, TAKE_OFF, Y_UP, momentum, simulated, write_take
 
 # What is computed is the same with and without machine code, which is quicker.
@@ -89,10 +93,10 @@ def test_axes_that_nobody_knows_are_fitted(take, capsys):
 
 def test_options_that_do_not_go_together(take, capsys):
     for arguments, words in (
-        (["--flight", "auto", "--momentum", "0", "0", "1"], "--momentum and --attitude are fitted"),
-        (["--base-axes", "estimate"], "give --flight, too"),
+        (["--flight", "auto", "--attitude", "0", "0", "0", "1"], "attitude at the start is fitted"),
+        (["--base-axes", "estimate", "--momentum", "0", "0", "1"], "leave the momentum out"),
         (["--flight", "1", "x"], "--flight: auto, all or two times"),
-        (["--flight", "soon"], "'auto', 'all' or two times"),
+        (["--flight", "soon"], "'auto', 'all', 'recorded' or two times"),
         (["--flight", "0", "2.1", "--tolerance", "1e-6"], "is it a free flight of this body"),
     ):
         with pytest.raises(SystemExit):
@@ -120,3 +124,84 @@ def test_two_bars_cover_the_simulated_momentum(takes: int, tmp_path):
         inside[seed] = np.abs(fit.momentum - momentum()) < 2.0 * np.sqrt(np.diag(fit.momentum_covariance))
     least, most = (0.92, 0.98) if takes >= 400 else (binom.ppf(1e-5, takes, 0.9545) / takes, 1.0)
     assert np.all((inside.mean(axis=0) >= least) & (inside.mean(axis=0) <= most)), inside.mean(axis=0)
+
+
+@pytest.fixture(scope="module")
+def flight_file(tmp_path_factory):
+    """A diver with 60 kg m^2/s, his trunk's attitude by SciPy's integration: 41 rows, turned as a whole."""
+    times = np.linspace(0.0, 0.8, 41)
+    arms = np.column_stack([1.2 + 0.9 * np.sin(5.0 * times), -1.0 + 0.6 * np.sin(5.0 * times + 0.7)])
+    spline = CubicSpline(times, arms)
+
+    def rate(time, quaternion):
+        shape, rates = spline(time), spline(time, 1)
+        spin = np.linalg.solve(
+            DIVER.locked_inertia(shape),
+            Rotation.from_quat(quaternion).inv().apply(GIVEN) - DIVER.momentum_matrix(shape) @ rates,
+        )
+        turned = np.append(quaternion[3] * spin + np.cross(quaternion[:3], spin), -quaternion[:3] @ spin)
+        return 0.5 * turned
+
+    solved = solve_ivp(rate, (0.0, 0.8), START, t_eval=times, rtol=1e-9, atol=1e-10)
+    file = tmp_path_factory.mktemp("flights") / "flight.csv"
+    write_delimited(file, ["qx", "qy", "qz", "qw", *DIVER.joint_names], times, np.column_stack([solved.y.T, arms]))
+    return file, Rotation.from_quat(solved.y[:, -1])
+
+
+GIVEN, START = np.array([4.0, 60.0, 6.0]), Rotation.from_rotvec([0.3, -0.5, 0.8]).as_quat()
+
+
+@pytest.mark.parametrize("options", [(), ("--momentum", "4", "60", "6"), ("--flight", "all")])
+def test_a_recorded_base_is_used_in_silence_by_nobody(options, flight_file, capsys):
+    """The attitude at the end is SciPy's; with a momentum that is given, the motion starts as recorded."""
+    file, end = flight_file
+    found = answer(capsys, "split", "diver", file, *options)
+    np.testing.assert_allclose(found["momentum_kg_m2_s"], GIVEN, atol=1e-4)
+    off = end * Rotation.from_quat(found["final_attitude_quat_xyzw"]).inv()
+    assert off.magnitude() < 1e-5
+
+
+@pytest.mark.parametrize("command", [("torques",), ("view", "--html", "a.html"), ("plot", "phases", "--out", "a.svg")])
+def test_every_command_says_the_flight_first(command, flight_file, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    name, *options = command
+    kind = [options.pop(0)] if name == "plot" else []
+    main([name, *kind, "diver", str(flight_file[0]), *options])
+    first = capsys.readouterr().out.splitlines()[0]
+    assert "momentum (4 60 6) kg m^2/s, all from 0 to 0.8 s" in first
+
+
+def test_without_a_base_zero_is_said(flight_file, tmp_path, capsys):
+    rows = [",".join(line.split(",")[:1] + line.split(",")[5:]) for line in flight_file[0].read_text().splitlines()]
+    (tmp_path / "joints.csv").write_text("\n".join(rows) + "\n")
+    main(["split", "diver", str(tmp_path / "joints.csv")])
+    assert (
+        "momentum (0 0 0) kg m^2/s, zero as nothing of the base is recorded" in capsys.readouterr().out.splitlines()[0]
+    )
+
+
+def test_a_base_that_no_momentum_turns_is_an_error_that_names_the_ways_out(tmp_path, capsys):
+    """The rate of a rigid body doubles: no free flight."""
+    times = np.linspace(0.0, 0.8, 41)
+    turned = Rotation.from_rotvec(np.outer(3.0 * (times + times**2 / 1.6), [0.0, 1.0, 0.0])).as_quat()
+    file, labels = tmp_path / "push.csv", ["qx", "qy", "qz", "qw", *DIVER.joint_names]
+    write_delimited(file, labels, times, np.column_stack([turned, np.tile([0.3, -0.3], (41, 1))]))
+    with pytest.raises(SystemExit):
+        main(["split", "diver", str(file)])
+    words = capsys.readouterr().err
+    for option in ("--flight FIRST LAST", "--flight all", "--momentum 0 0 0"):
+        assert option in words
+    main(["split", "diver", str(file), "--flight", "all"])
+    shown = capsys.readouterr()
+    assert "not constant" in shown.out
+    assert "nothing conserved was recorded" in shown.err
+
+
+@pytest.mark.parametrize(("unit", "doubted"), [(1.0, False), (2.54, True), (0.4, True)])
+def test_check_says_how_tall_the_person_is(unit: float, doubted: bool, tmp_path, capsys):
+    """The skeleton is that of a person of 1.74 m, in units of five centimetres."""
+    file = bvh_files.write(tmp_path / "person.bvh", bvh_files.bvh_text(np.zeros((3, len(bvh_files.columns()))), 0.01))
+    main(["check", str(file), "--length-unit", str(unit * bvh_files.UNIT), "--json"])
+    found = json.loads(capsys.readouterr().out)
+    assert found["body"]["person_height_m"] == pytest.approx(1.74 * unit, rel=0.1)
+    assert any("m tall" in warning for warning in found["warnings"]) == doubted

@@ -28,6 +28,10 @@ _NARROWEST_MASS = 0.01
 _WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)
 # Of moments of inertia, relative to those about the base's origin: what rounding leaves of zero.
 _ON_A_LINE = 1e-12
+# [m] People are taller, and smaller.
+_SMALLEST_PERSON, _TALLEST_PERSON = 0.9, 2.4
+# Of a person's height, that is below the ankle and above the head's joint (Drillis and Contini 1964).
+_BEYOND_JOINTS = 0.039 + 0.130
 # Names in one message.
 _MOST_NAMED = 10
 
@@ -63,7 +67,40 @@ def implausible(body: Body) -> tuple[str, ...]:
         _judge_density(links, frame, mass, edges, widths.get(frame), shapes.get(frame, ()))
     _judge_neighbours(links, chain.parents, masses)
     _judge_lengths(links, chain.places, chain.centres)
-    return (*links.sentences(), *_line_doubts(body), *_limit_doubts(body))
+    return (*links.sentences(), *_line_doubts(body), *_limit_doubts(body), *_height_doubts(body))
+
+
+def person_height(body: Body) -> float | None:
+    """How tall the person of a motion capture file stands [m], to a tenth; None of other bodies.
+
+    From ankle to hip and on to the head's joint along the bones, whatever the pose, and what is beyond them.
+    """
+    if body.length_unit is None:
+        return None
+    chain = body.chain
+    along = np.zeros(len(chain.masses))
+    for child, parent in enumerate(chain.parents, 1):
+        along[child] = along[parent] + np.linalg.norm(chain.places[child - 1])
+
+    def reach(words: Sequence[str]) -> float:
+        found = [
+            along[frame] + np.linalg.norm(pose[:3, 3])
+            for link, (frame, pose) in chain.link_frames.items()
+            if link.lower().endswith(tuple(words))
+        ]
+        return float(min(found, default=0.0))
+
+    legs, trunk = reach(("foot", "ankle")), reach(("head",))
+    return (legs + trunk) / (1.0 - _BEYOND_JOINTS) if legs and trunk else None
+
+
+def _height_doubts(body: Body) -> Iterable[str]:
+    height = person_height(body)
+    if height is not None and not _SMALLEST_PERSON <= height <= _TALLEST_PERSON:
+        yield (
+            f"the person stands {height:.2g} m tall: is the unit of length right? Give length_unit (--length-unit), as "
+            "0.01 for centimetres or 0.0254 for inches"
+        )
 
 
 def _line_doubts(body: Body) -> Iterable[str]:

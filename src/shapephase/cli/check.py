@@ -28,7 +28,7 @@ def check_command(
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Check a body, and a joint motion for it: what was read, what is unlikely of it, and whether it can be used."""
-    from ..body.plausibility import implausible
+    from ..body.plausibility import implausible, person_height
     from ..shape_space.summaries import body_summary, path_summary
     from .motion import body_argument, joint_motion
     from .texts.recording_text import recording_data, recording_lines
@@ -39,6 +39,10 @@ def check_command(
         warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=2)
     summary = body_summary(loaded)
     lines, data = body_lines(summary), {"body": plain(summary)}
+    height = person_height(loaded)
+    if height is not None:
+        lines.insert(1, f"{'height':24}{height:.2f} m, of the person, by the bones")
+        data["body"]["person_height_m"] = height
     if motion is not None:
         path, recorded = joint_motion(motion, loaded, recording)
         moved = path_summary(loaded, path)

@@ -43,7 +43,12 @@ def test_the_flight_is_found_whichever_axis_is_up(rate: float, noise: float):
     lost = 2.0 * np.sqrt(2.0 * 2.0 * np.hypot(noise, 0.002) / G) + 1.0 / rate
     for seed in range(12):
         axis, sign = seed % 3, 1.0 - 2.0 * (seed % 2)
-        found = free_fall(times, centres(times, noise, seed, axis, sign), "a file")
+        motion = centres(times, noise, seed, axis, sign)
+        if sign < 0.0:
+            # That an axis points down has to be said: else this is a push-off, twice as hard.
+            with pytest.raises(TrajectoryError, match=f"--up -{'xyz'[axis]}"):
+                free_fall(times, motion, "a file")
+        found = free_fall(times, motion, "a file", up=f"-{'xyz'[axis]}" if sign < 0.0 else None)
         first, last = times[found.first], times[found.last]
         assert found.up == f"{'+' if sign > 0.0 else '-'}{'xyz'[axis]}"
         assert TAKE_OFF - 1e-9 <= first <= TAKE_OFF + lost, (seed, first)
@@ -68,7 +73,18 @@ def test_a_recording_that_is_nothing_but_flight_is_kept_whole():
     assert found.ends == (0, 79)
 
 
-def recorded(file, up: int):
+@pytest.mark.parametrize("up", [None, "z"])
+def test_a_push_off_is_no_flight_upside_down(up: str | None):
+    """A net g upwards for 0.4 s, then somebody holds the body at once."""
+    times = np.arange(240) / 120.0
+    motion = np.zeros((240, 3))
+    pushed = np.clip(times - 0.8, 0.0, 0.4)
+    motion[:, 2] = 0.5 * G * pushed**2 + 0.05 * G * 0.4 * -np.expm1(-np.clip(times - 1.2, 0.0, None) / 0.05)
+    with pytest.raises(TrajectoryError, match="pushes off or lands" if up is None else "nowhere .* z up"):
+        free_fall(times, motion, "a file", up=up)
+
+
+def recorded(file, up: int, scale: float = 1.0, speed: float = 1.0):
     """A jump of the diver, turning, with the axis y or z up, written by its pelvis."""
     times = 12.0 + np.arange(250) / 100.0
     arms = np.column_stack([1.0 + 0.5 * np.sin(times), 2.0 - np.sin(2.0 * times)])
@@ -84,7 +100,7 @@ def recorded(file, up: int):
     places = centres(times - 12.0, 0.001, 1, up) - turns.apply(centre)
     if file.suffix == ".csv":
         labels = [*(f"base_q{part}" for part in "xyzw"), "base_x", "base_y", "base_z", *DIVER.joint_names]
-        write_delimited(file, labels, times, np.column_stack([turns.as_quat(), places, arms]))
+        write_delimited(file, labels, speed * times, np.column_stack([turns.as_quat(), scale * places, arms]))
         return file
     pelvis = turns * Rotation.from_matrix([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
     angles = pelvis.as_euler("ZXY", degrees=True)
@@ -117,6 +133,38 @@ def test_a_file_keeps_its_flight_only(name: str, up: int, tmp_path):
     assert read_recorded_motion(file, DIVER, flight="all").flight.last_time == pytest.approx(14.49)
 
 
+@pytest.mark.parametrize(
+    ("scale", "speed", "words"),
+    [
+        (1.0 / 2.54, 1.0, "lengths in in were read as cm"),
+        (2.54, 1.0, "lengths in cm were read as in"),
+        (0.3048, 1.0, "lengths in m were read as ft"),
+        (1.0, 4.0, "100 frames a second were read as 25"),
+        (1.0, 0.5, "100 frames a second were read as 200"),
+    ],
+)
+def test_a_fall_by_another_gravity_names_the_slip(scale: float, speed: float, words: str, tmp_path):
+    file = recorded(tmp_path / "take.csv", 2, scale, speed)
+    with pytest.raises(TrajectoryError, match=f"9.81 is expected: .*({words}).*--gravity .*--momentum"):
+        read_recorded_motion(file, DIVER, flight="recorded")
+
+
+def test_gravity_can_be_said_or_left_open(tmp_path):
+    """As on Mars, filmed so: a clock that is slow by the root of 9.81 / 3.7."""
+    slow = float(np.sqrt(G / 3.7))
+    file = recorded(tmp_path / "take.csv", 2, speed=slow)
+    found = [read_recorded_motion(file, DIVER, flight="auto", gravity=said).flight for said in (3.7, "any")]
+    for flight in found:
+        assert flight.fall.gravity == pytest.approx(3.7, abs=4.0 * flight.fall.gravity_bar)
+        assert (flight.last_time - 12.0 * slow) / slow <= LANDING
+    inside = (found[0].first_time, found[0].last_time)
+    with pytest.raises(TrajectoryError, match=r"falls with 3\.\d+ ± 0\.\d+ m/s\^2"):
+        read_recorded_motion(file, DIVER, flight=inside)
+    assert read_recorded_motion(file, DIVER, flight=inside, gravity="any").flight.by == "times"
+    with pytest.raises(ShapeError, match="gravity: a number"):
+        read_recorded_motion(file, DIVER, flight="auto", gravity="moon")
+
+
 def test_what_a_flight_needs(tmp_path):
     file = recorded(tmp_path / "take.csv", 2)
     with pytest.raises(TrajectoryError, match="attitude of the base, and there is none"):
@@ -127,7 +175,7 @@ def test_what_a_flight_needs(tmp_path):
         read_recorded_motion(file, DIVER, flight="auto", base_axes="estimate")
     with pytest.raises(TrajectoryError, match=r"2 samples are in the flight.*from 12 to 14\.49 s"):
         read_recorded_motion(file, DIVER, flight=(12.5, 12.515))
-    with pytest.raises(ShapeError, match="flight: 'auto', 'all' or two times"):
+    with pytest.raises(ShapeError, match="flight: 'auto', 'all', 'recorded' or two times"):
         read_recorded_motion(file, DIVER, flight="never")
     with pytest.raises(ShapeError, match="first before the last"):
         read_recorded_motion(file, DIVER, flight=(13.0, 12.0))

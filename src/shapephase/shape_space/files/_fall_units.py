@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import TrajectoryError
-from ._free_fall import UP_AXES, FreeFall, falls_along, measured_fall
+from ._free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
 
 _LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 """[m] Units that are mixed up."""
@@ -28,6 +28,8 @@ _FITS = 0.04
 """Of gravity: a slip that explains the fall so well is named."""
 _LONG = 0.8
 """[m] g t^2 of a fall that may be one by another acceleration: ten times its bar by wander, 0.29 s on earth."""
+_AS_LONG = 0.8
+"""Of the longest fall: among those that last so long, the one nearest to its parabola counts."""
 _PARABOLA = 0.02
 """[m] rms from a parabola, beyond the noise, of what is no fall at all."""
 
@@ -57,20 +59,26 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
     """
     stride = 1 + len(times) // _MOST_SAMPLES
     seen, rate = times[::stride], 1.0 / float(np.median(np.diff(times)))
-    best: tuple[FreeFall, float] | None = None
+    falls: list[tuple[float, float, FreeFall]] = []
     for trial in _trials(rate):
         centres = positions[::stride] + trial.arms * arms[::stride]
         for axis in UP_AXES[:3] if up is None else (up,):
             found = falls_along(seen, centres, axis, gravity * trial.gravity)
             if found is None:
                 continue
-            lasts = float(seen[found.last] - seen[found.first])
-            long = found.gravity / trial.lengths * lasts**2 > _LONG
-            if long and (best is None or lasts / trial.times > 1.05 * best[1]):
-                best = found, lasts / trial.times
-    if best is None:
+            time = lasts(seen, found.ends) / trial.times
+            if is_long(found, seen, trial.lengths):
+                falls.append((time, found.off / found.gravity, found))
+    if not falls:
         return None
-    return replace(best[0], first=stride * best[0].first, last=stride * best[0].last)
+    longest = max(time for time, _, _ in falls)
+    _, best = min(((off, fall) for time, off, fall in falls if time > _AS_LONG * longest), key=lambda one: one[0])
+    return replace(best, first=stride * best.first, last=stride * best.last)
+
+
+def is_long(fall: FreeFall, times: Array, lengths: float = 1.0) -> bool:
+    """Whether a fall is bent far more than a centre of mass wanders; lengths are so much off."""
+    return fall.gravity / lengths * lasts(times, fall.ends) ** 2 > _LONG
 
 
 class _Trial(NamedTuple):

@@ -16,8 +16,8 @@ from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
 from ._base_columns import ESTIMATE
-from ._fall_units import check_gravity, check_parabola, slipped_fall
-from ._free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, free_fall
+from ._fall_units import check_gravity, check_parabola, is_long, slipped_fall
+from ._free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, free_fall, lasts
 from ._joint_columns import Matched
 from ._recording import Recording
 from ._times import part_of, samples_within, trim_argument
@@ -165,11 +165,16 @@ def _fall(recording: Recording, motion: Matched, body: Body, choices: FlightChoi
             "the flight: flight=(first, last) (--flight FIRST LAST)"
         )
     times, up = recording.times, choices.up or recording.table.up
-    rate, missing = 1.0 / float(np.median(np.diff(times))), None
+    rate, missing, fall = 1.0 / float(np.median(np.diff(times))), None, None
     try:
         fall = free_fall(times, centres, where, up=up, gravity=gravity)
     except TrajectoryError as error:
-        missing, fall = error, slipped_fall(times, base.position, centres - base.position, gravity, up)
+        missing = error
+    if fall is None or not is_long(fall, times):
+        # In wrong units, too, the body may accelerate by g for a moment.
+        slipped = slipped_fall(times, base.position, centres - base.position, gravity, up)
+        if slipped is not None and (fall is None or lasts(times, slipped.ends) > 2.0 * lasts(times, fall.ends)):
+            fall = slipped
     if fall is not None and choices.gravity is not None:
         check_gravity(fall, choices.gravity, rate, where)
     if fall is None and missing is not None and choices.said == AUTO:

@@ -117,7 +117,7 @@ def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None
     else:
         found = {axis: falls_along(times, centres, axis, gravity) for axis in UP_AXES}
         longest, downwards = (_longer([found[axis] for axis in part], times) for part in (UP_AXES[:3], UP_AXES[3:]))
-    if downwards is not None and (longest is None or _lasts(times, downwards.ends) > _lasts(times, longest.ends)):
+    if downwards is not None and (longest is None or lasts(times, downwards.ends) > lasts(times, longest.ends)):
         first, last = times[downwards.first], times[downwards.last]
         raise TrajectoryError(
             f"{where}: from {first:.4g} to {last:.4g} s after its start the body accelerates by g along "
@@ -145,7 +145,7 @@ def falls_along(times: Array, centres: Array, up: str, gravity: float) -> FreeFa
     found = _fall(times, centres, up, gravity)
     if found is not None and abs(found.gravity - gravity) > max(_SAME * gravity, found.gravity_bar):
         as_measured = _fall(times, centres, up, found.gravity) if found.gravity > 0.0 else None
-        if as_measured is not None and _lasts(times, as_measured.ends) > _lasts(times, found.ends):
+        if as_measured is not None and lasts(times, as_measured.ends) > lasts(times, found.ends):
             return as_measured
     return found
 
@@ -156,7 +156,7 @@ def _shortest(noise: float, gravity: float) -> float:
 
 
 def _longer(found: list[FreeFall | None], times: Array) -> FreeFall | None:
-    return max((fall for fall in found if fall is not None), key=lambda fall: _lasts(times, fall.ends), default=None)
+    return max((fall for fall in found if fall is not None), key=lambda fall: lasts(times, fall.ends), default=None)
 
 
 def _fall(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
@@ -217,12 +217,13 @@ def _longest(
         found = _bounded(
             times, straight, int(windows.starts[first]), int(windows.ends[past - 1]), noise, window, gravity
         )
-        if found is not None and (best is None or _lasts(times, found) > _lasts(times, best)):
+        if found is not None and (best is None or lasts(times, found) > lasts(times, best)):
             best = found
     return best
 
 
-def _lasts(times: Array, ends: tuple[int, int]) -> float:
+def lasts(times: Array, ends: tuple[int, int]) -> float:
+    """From the first to the last of two samples [s]."""
     return float(times[ends[1]] - times[ends[0]])
 
 
