@@ -280,7 +280,7 @@ def judged(one: Take, counts: Counter[str], misses: dict[str, list[np.ndarray]],
     bar = 1.959964 * np.sqrt(np.diag(sp.uncertainty(fit.motion, start=fit).start)[3:])
     misses[kind].append(off <= bar)
     ratios[kind].append(float(np.linalg.norm(bar) / np.linalg.norm(off)))
-    return "" if np.all(off <= 1.3 * bar) else f"off {off / bar}"
+    return "" if np.all(off <= 1.3 * bar) else f"{kind}: off {off / bar}"
 
 
 if __name__ == "__main__":

@@ -69,7 +69,8 @@ class Flight:
         if self.recorded is None:
             return ""
         if self.momentum_by == "nothing":
-            return ", zero as nothing of the base is recorded and no --momentum is given"
+            base = "nothing of the base is recorded" if self.recorded.base_attitude is None else "the base never turns"
+            return f", zero as {base} and no --momentum is given"
         record = self.recorded.record
         if self.recorded.flight is None and self.fitted is None:
             return ""

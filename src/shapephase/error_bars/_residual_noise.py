@@ -24,8 +24,8 @@ _OWN = 0.01
 """Of the variance of a mean or a bell is white: no recording is so smooth, and digits are rounded."""
 _BLOCK = 128
 """Samples that are weighed together, four times the longest mean; blocks count as independent."""
-_CHANCE = 0.001
-"""With which residuals that are noise are taken for a momentum that changes."""
+_CHANCE, _SURE = 0.02, 0.001
+"""With which residuals that are noise make bars longer, and are taken for a momentum that changes."""
 _MOST_MODES = 6
 """Legendre polynomials of a momentum in time: more resolve less than a tenth of the flight."""
 
@@ -117,7 +117,7 @@ def _by_correlation(slopes: Array) -> Array:
 
 def _correlations(count: int) -> Array:
     """Of residuals so many samples apart, for each kind and length: (F, count)."""
-    lags = np.arange(count)
+    lags = np.arange(count, dtype=np.float64)
     means = np.maximum(1.0 - lags / _LENGTHS[:, None], 0.0)
     bells = np.exp(-((lags / _LENGTHS[:, None]) ** 2))
     own = (1.0 - _OWN) * np.concatenate([means, bells]) + _OWN * (lags == 0)
@@ -130,20 +130,22 @@ def _priors() -> Array:
     return np.concatenate([np.full(len(_EXPONENTIAL), half), np.full(2 * len(_LENGTHS), quarter)])
 
 
-def drift_modes(residuals: Array, slopes: Array, by_modes: Array) -> int:
-    """How many Legendre polynomials of the momentum in time the residuals ask for; 0 where they are noise.
+def drift_modes(residuals: Array, slopes: Array, by_modes: Array) -> tuple[int, bool]:
+    """How many Legendre polynomials of the momentum in time the residuals ask for, and whether surely.
 
     residuals (N, 3) [rad], slopes (3 N, m), by_modes (3 N, 3 K): change of the attitudes by each polynomial's momentum.
-    One more polynomial counts where chance brings as much in less than one of 1000 cases, also together with the next.
+    One more polynomial counts where chance brings as much in less than one of 50 cases, also together with the next:
+    bars that are too long cost less than a drift that they do not hold. It is sure in less than one of 1000.
     """
-    modes = 0
+    modes, sure = 0, False
     for tried in range(1, by_modes.shape[1] // 3 + 1):
         if tried > modes + 2 or 3 * len(residuals) <= slopes.shape[1] + 3 * (tried + 1):
             break
         noise = residual_noise(residuals, np.hstack([slopes, by_modes[:, : 3 * tried]]))
-        if noise.chance(3 * (tried - modes)) < _CHANCE:
-            modes = tried
-    return modes
+        chance = noise.chance(3 * (tried - modes))
+        if chance < _CHANCE:
+            modes, sure = tried, sure or chance < _SURE
+    return modes, sure
 
 
 def most_modes(count: int) -> int:

@@ -17,7 +17,7 @@ from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import RunProgress
-from ..shape_space.files._flight import ALL
+from ..shape_space.files._flight import ALL, turns
 from ..shape_space.files.read import RecordedMotion
 from ..warning_filters import quiet
 from .recorded_momentum import RecordedMomentum, momentum_from_recording, warn_of_drift
@@ -30,8 +30,8 @@ class RecordedFlight:
     Attributes
     ----------
     motion : of the body along the recorded path
-    momentum_by : "fit" to the recorded attitudes of the base, "given", or "nothing": it is zero, as nothing of the base
-        is recorded and none is given
+    momentum_by : "fit" to the recorded attitudes of the base, "given", or "nothing": it is zero, as the base was not
+        recorded, or has one attitude in every sample, and none is given
     fitted : the fit, where there is one
 
     Examples
@@ -64,7 +64,8 @@ def motion_from_recording(
     """The motion of a recorded body: what every command makes of a recording.
 
     Where the attitude of the base was recorded, the momentum is fitted to it. A momentum that is given wins; the motion
-    then starts at the recorded attitude. Zero is taken only where nothing of the base was recorded.
+    then starts at the recorded attitude. Zero is taken only where nothing of the base was recorded, or one attitude in
+    every sample, as of a base that was held fixed.
 
     Parameters
     ----------
@@ -103,7 +104,7 @@ def motion_from_recording(
     if momentum is not None:
         momentum = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     deformation, attitudes = articulated(body, recorded.path), recorded.base_attitude
-    if momentum is None and attitudes is not None:
+    if momentum is None and attitudes is not None and (recorded.flight is not None or turns(attitudes)):
         if attitude is not None:
             raise ShapeError(
                 "the attitude at the start is fitted to the recorded base, with the momentum; leave it out "

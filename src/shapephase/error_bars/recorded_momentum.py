@@ -69,9 +69,9 @@ class RecordedMomentum:
     noise_correlation : of the noise of neighbouring attitudes, as the fit leaves it: 0 for white noise
     widening : by which this correlation makes the bars of the momentum longer than white noise does, at most
     momenta : (N, 3) the momentum at each time, the recorder's axes [kg m^2/s]: constant where the residuals are noise,
-        else as it changes
+        else as it probably changes, which the bars hold
     conserved : whether the momentum is constant, as far as the residuals show: to a hundredth of itself and of what
-        the joints carry, or within noise
+        the joints carry, or within what chance brings in one of 1000 recordings
     residuals : (N, 3) from reconstructed to recorded attitudes, rotation vectors in base axes [rad]
     motion : the one that was fitted
     times : (N,) of the recorded attitudes [s]
@@ -196,12 +196,12 @@ def _estimated(fit: _Fitted, times: Array, noise: float | None, tolerance: float
     residuals, slopes, motion = fit.residuals, fit.slopes, fit.motion
     white = np.asarray(np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
     seen = float(np.sqrt((residuals**2).sum() / (residuals.size - slopes.shape[1])))
-    modes, by_modes = 0, np.empty((residuals.size, 0))
+    modes, sure, by_modes = 0, False, np.empty((residuals.size, 0))
     # What the tolerance of the reconstruction leaves is rounding.
     if _spread(residuals) > _ROUNDED * tolerance:
         turned = responses(motion, times, most_modes(len(times)))[:, :, UNKNOWNS:]
         by_modes = (so3.transpose(motion.attitude(times)) @ turned).reshape(residuals.size, -1)
-        modes = drift_modes(residuals, slopes, by_modes)
+        modes, sure = drift_modes(residuals, slopes, by_modes)
     left = residual_noise(residuals, np.hstack([slopes, by_modes[:, : 3 * modes]]))
     covariance = left.covariance(slopes)
     widening = float(np.sqrt(np.diag(covariance / (left.weights @ left.variances * white))[3:UNKNOWNS].max()))
@@ -216,7 +216,7 @@ def _estimated(fit: _Fitted, times: Array, noise: float | None, tolerance: float
         momenta = momenta + deviations
         _, carried = motion.deformation.description.sample(times)
         turning = np.linalg.norm(motion.momentum) + np.sqrt((carried**2).sum(axis=1).mean())
-        conserved = bool(np.linalg.norm(deviations, axis=1).max() <= _CONSTANT * turning)
+        conserved = not sure or bool(np.linalg.norm(deviations, axis=1).max() <= _CONSTANT * turning)
     free = fit.slopes.shape[1] > UNKNOWNS
     return RecordedMomentum(
         momentum=motion.momentum,

@@ -69,7 +69,7 @@ def fit_lines(fitted: RecordedMomentum, errors: Uncertainty) -> list[str]:
         f"{'to the recorded base':24}{len(angles)} attitudes with {noise:.3g} deg of noise about each axis"
         f"{_correlated(fitted)}",
     ]
-    if np.ptp(fitted.momenta, axis=0).any():
+    if not fitted.conserved:
         first, last = (", ".join(f"{v:.{digits}f}" for v in fitted.momenta[row]) for row in (0, -1))
         lines.append(f"{'  not constant':24}from {first} to {last}   kg m^2/s; the bars hold it at every time")
     if fitted.axes_covariance.any():

@@ -30,6 +30,8 @@ RECORDED = "recorded"
 """Instead of two times: where the base is recorded, its fall; without places or a fall all of it; else no flight."""
 ANY_GRAVITY = "any"
 """Instead of a gravity: units of length and time are not doubted."""
+# Entries of rotations that differ by less are rounding of one attitude.
+_STILL = 1e-12
 # Of a flight, to which six numbers are fitted.
 _FEWEST = 3
 
@@ -103,6 +105,11 @@ def flight_choices(flight: str | Sequence[float] | None, up: str | None, gravity
     return FlightChoices(trim_argument((first, last), "flight"), up, pull)
 
 
+def turns(attitudes: Array | None) -> bool:
+    """Whether a base was recorded (N, 3, 3) that turns; files of a fixed base have one attitude in every sample."""
+    return attitudes is not None and bool(np.ptp(attitudes, axis=0).max() > _STILL)
+
+
 def in_flight(
     recording: Recording, motion: Matched, body: Body, choices: FlightChoices
 ) -> tuple[Recording, Matched, Flight | None]:
@@ -115,7 +122,7 @@ def in_flight(
         found, or less than three samples are in it; if it falls otherwise than by gravity, as units make it.
     """
     said, where, base = choices.said, recording.table.where, motion.base
-    if said is None or (said == RECORDED and base.attitude is None):
+    if said is None or (said == RECORDED and not turns(base.attitude)):
         return recording, motion, None
     if base.attitude is None:
         raise TrajectoryError(
