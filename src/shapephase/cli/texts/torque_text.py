@@ -27,7 +27,7 @@ def torque_lines(
 ) -> list[str]:
     """Peaks, limits, power and work of each joint for people, of a recording with their bars."""
     head = ("joint", "peak", "", "at [s]", "per kg", "of limit", "peak rate", "", "of limit", "peak [W]", "work [J]")
-    rows = [head]
+    rows: list[tuple[str, ...]] = [head]
     for k, (name, unit) in enumerate(zip(loads.joint_names, loads.joint_units, strict=True)):
         own = (
             (None,) * 4 if bars is None else (bars.peak_torque[k], bars.peak_rate[k], bars.peak_power[k], bars.work[k])

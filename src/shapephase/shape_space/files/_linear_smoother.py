@@ -253,7 +253,7 @@ def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
     nodes, shares = leggauss(order)
     lengths = np.diff(knots, axis=1)
     values = np.stack([_spline_values(knots, piece, 0.5 * (nodes + 1.0)) for piece in range(order)], axis=1)
-    found: list[tuple[Array, Any, Any]] = []
+    found: list[tuple[Any, Any, Any]] = []
     for shift in range(order):
         before = first if periodic else first[: splines - shift]
         after = (before + shift) % max(splines, 1)
@@ -266,7 +266,7 @@ def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
             found.append((sum(shared), after, before))
     entries, rows, columns = (np.concatenate(parts) for parts in zip(*found, strict=True))
     gram = coo_array((entries, (rows, columns)), shape=(splines, splines)).tocsc()
-    scale = diags_array(1.0 / np.sqrt(gram.diagonal()))
+    scale: Any = diags_array(1.0 / np.sqrt(gram.diagonal()))
     return (differences @ scale).tocsc(), (scale @ gram @ scale).tocsc()
 
 

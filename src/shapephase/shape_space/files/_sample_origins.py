@@ -75,9 +75,13 @@ class Prepared:
         smooth = found[0] + self.smoother(found - found[0])
         return np.where(self.smoothed, smooth, found)[self._kept]
 
-    @cached_property
+    @property
     def bias(self) -> Array:
         """As `SampleOrigin`."""
+        return self._bias
+
+    @cached_property
+    def _bias(self) -> Array:
         values = self.joined(self.samples)
         motion = self.pilot(values - values[0])
         return (self.smoother(motion) - motion)[self._kept]
