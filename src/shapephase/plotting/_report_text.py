@@ -14,7 +14,7 @@ from ..deformation.descriptions import RigidDescription
 from ..dynamics.torques import joint_torques
 from ..phases.phases import PhaseSplit
 from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
-from ..phases.turn_counts import turn_counts
+from ..phases.whole_turns import turn_counts
 from ..provenance import provenance
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
