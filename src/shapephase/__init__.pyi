@@ -66,7 +66,7 @@ from .phases.phases import (
 )
 from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
-from .phases.turn_counts import TurnCounts, turn_counts
+from .phases.whole_turns import TurnCounts, turn_counts
 from .plotting import plots
 from .plotting.viewer import motion_page, view
 from .reconstruction.external_torque import ExternalTorque, TorqueState

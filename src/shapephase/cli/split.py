@@ -64,7 +64,7 @@ def split_command(
     from ..exports.tables import ENDINGS, export_motion
     from ..phases.phases import running_phases, split
     from ..phases.split_text import split_lines, wrapped
-    from ..phases.turn_counts import turn_counts
+    from ..phases.whole_turns import turn_counts
     from ..shape_space.body_path import path_gap
     from . import motion as motions
     from .texts.error_bar_text import error_bar_data, error_bar_lines, error_bars, joint_noise

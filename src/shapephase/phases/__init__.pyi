@@ -14,7 +14,7 @@ from .phases import (
 )
 from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
-from .turn_counts import TurnCounts, turn_counts
+from .whole_turns import TurnCounts, turn_counts
 
 __all__ = [
     "ArcErrors",

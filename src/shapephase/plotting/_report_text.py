@@ -19,7 +19,7 @@ from ..dynamics.torques import joint_torques
 from ..errors import WrongObjectError
 from ..phases.phases import PhaseSplit
 from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
-from ..phases.turn_counts import turn_counts
+from ..phases.whole_turns import turn_counts
 from ..provenance import provenance
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_noise import path_errors, stated_noise

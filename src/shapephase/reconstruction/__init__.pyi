@@ -1,5 +1,5 @@
+from ._athlete_axes import AthleteAxes
 from ._solvers import Solution
-from .athlete_axes import AthleteAxes
 from .external_torque import ExternalTorque, TorqueState
 from .forced_motion import ForcedMotion
 from .motion_family import MotionFamily

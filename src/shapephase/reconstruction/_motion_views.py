@@ -15,7 +15,7 @@ from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
 from ..errors import MissingExtraError, ShapeError
 from ..offers import offered
-from .athlete_axes import AthleteAxes, athlete_axes
+from ._athlete_axes import AthleteAxes, athlete_axes
 from .attitude_angles import Chart, EulerAngles, RotationVectors, continued_angles, euler_chart
 from .motion_record import write_table
 

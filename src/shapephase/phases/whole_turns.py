@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..arguments import check_object
 from ..display import short_repr
 from ..errors import ShapePhaseError
-from ..reconstruction.athlete_axes import AthleteAxes
+from ..reconstruction._athlete_axes import AthleteAxes
 from ..reconstruction.reconstruction import Motion
 from .phase_split import PhaseSplit
 
@@ -94,6 +95,8 @@ def turn_counts(motion: Motion, split: PhaseSplit) -> TurnCounts:
     >>> print(f"{sp.turn_counts(motion, sp.split(motion)).about_momentum:.6f}")
     5.000000
     """
+    check_object(motion, "Motion", "motion")
+    check_object(split, "PhaseSplit", "split")
     about = float(split.montgomery_phase) / _TURN if split.has_phase else 0.0
     error = float(split.error_estimates.montgomery_phase) / _TURN
     try:

@@ -33,8 +33,10 @@ _SIDES = re.compile(
     r"(?<![A-Za-z])([Ll]eft|[Rr]ight|LEFT|RIGHT)(?![a-z])|(?<![A-Za-z])([lrLR])(?![A-Za-z])|(Left|Right)|^([lr])(?=[A-Z])"
 )
 """What tells sides in the name of a link: left_arm, LeftArm, l_hip, hip_r, rThigh."""
-_ABOVE, _BELOW = re.compile(r"(?i)head|skull|neck"), re.compile(r"(?i)foot|feet|toe|shank|calf|tibia|ankle")
-"""Links at the upper and the lower end of a body."""
+_ABOVE = re.compile(r"(?i)head|skull|neck")
+"""Links at the upper end of a body."""
+_BELOW = re.compile(r"(?i)foot|feet|toe|shank|calf|tibia|ankle")
+"""Links at its lower end."""
 
 
 _BY_LINKS = "as the links called right and left lie"
@@ -189,11 +191,11 @@ def _from_right_to_left(body: Body, shape: Array) -> Array | None:
     chain = body.chain
     sides: dict[tuple[int, str], dict[str, int]] = {}
     for link, (frame, _) in chain.link_frames.items():
-        told = _SIDES.search(link)
-        if told is None or frame == 0:
+        match = _SIDES.search(link)
+        if match is None or frame == 0:
             continue
-        which = next(group for group in told.groups() if group)[0].lower()
-        rest = link[: told.start()] + "*" + link[told.end() :]
+        which = next(group for group in match.groups() if group)[0].lower()
+        rest = link[: match.start()] + "*" + link[match.end() :]
         sides.setdefault((chain.parents[frame - 1], rest.lower()), {}).setdefault(which, frame - 1)
     turns = link_motions(chain, shape[None], np.zeros_like(shape)[None]).turns[0]
     ways = [
