@@ -220,14 +220,13 @@ class Deformation:
         return Samplers(known.sample, **vars(smoothness), directly=known.channels)
 
     def step_limits(self) -> StepLimits:
-        """How long steps of time may be that pass over nothing that is known of the deformation, nor of what it is
-        seen from."""
+        """The longest steps of an integrator that evaluates the deformation itself, in any gauge."""
         known: Any = self.description
-        found = known.smoothness(self.breaks).step_limits
+        limits = known.smoothness(self.breaks).step_limits
         while hasattr(known, "original"):
             known = known.original
-            found = found.and_those(known.smoothness(self.breaks).step_limits)
-        return found
+            limits = limits.combined(known.smoothness(self.breaks).step_limits)
+        return limits
 
 
 @dataclass(frozen=True, eq=False)

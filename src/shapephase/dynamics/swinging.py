@@ -28,6 +28,8 @@ from ..shape_space.shape_path import ShapePath
 
 Effort = Callable[[float, Array, Array], ArrayLike]
 """Time, coordinates (k,) and rates (k,) of the free hinges -> what springs and dampers do to them (k,) [N m or N]."""
+# Of the tolerance: error of the hinges' integration.
+_INTEGRATED = 0.3
 # Of the tolerance: how far polynomials between knots may be from what was integrated [rad or m].
 _SHARE = 0.03
 # Of the duration: times nearer to each other are one.
@@ -139,7 +141,7 @@ def free_hinges(
     fastest = np.abs(route.curve(np.union1d(looked, 0.5 * (looked[:-1] + looked[1:])))[1]).max(initial=0.0)
     rates = np.full(len(names), 1.0 / route.duration + fastest) + np.abs(starts[1])
     scales = np.concatenate([np.ones(len(names)), rates])
-    found = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _SHARE * goal, limits)
+    found = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _INTEGRATED * goal, limits)
     whole = _path_of(swing, found, breaks, goal)
     motion = reconstruct(articulated(body, whole), mu, attitude, tolerance=goal)
     times = found.error_times

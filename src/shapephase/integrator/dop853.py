@@ -45,7 +45,7 @@ def dop853_rotation(
 def dop853_attitude(
     evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float, limits: StepLimits | None = None
 ) -> DrivenAttitude:
-    """The same with its error estimate, by steps within limits. Raises as `driven_attitude`."""
+    """S(t) of `dop853_rotation` with its measured error, by steps within limits. Raises as `driven_attitude`."""
 
     def rates(times: Array, attitudes: Array, states: Array) -> tuple[Array, Array]:
         inertia, internal = evaluate(times)

@@ -1,4 +1,4 @@
-"""SciPy's DOP853 with steps that pass over nothing: as short as what is known of the functions of time makes them."""
+"""SciPy's DOP853 with steps limited by what is known of the functions of time, so that none steps over a feature."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class StepLimits:
     Attributes
     ----------
     edges : (P + 1,) ends of the stretches, first 0 [s]
-    longest : (P,) no step reaches farther into a stretch than this, nor is longer within it [s]
+    longest : (P,) a step is no longer within a stretch, and reaches no farther into it [s]
     """
 
     edges: Array
@@ -30,22 +30,22 @@ class StepLimits:
     __post_init__ = lock_arrays
 
     @staticmethod
-    def of_parts(edges: Array, steps: float) -> StepLimits:
-        """Limits by which each stretch takes so many steps or more."""
+    def even(edges: Array, steps: float) -> StepLimits:
+        """Limits by which every stretch takes at least this number of steps."""
         return StepLimits(edges, np.diff(edges) / steps)
 
     def repeated(self, loops: int) -> StepLimits:
-        """Limits of a time that consists of this one, so many times."""
+        """Limits for this interval repeated `loops` times."""
         starts = self.edges[-1] * np.arange(loops)
         edges = np.append((starts[:, None] + self.edges[:-1]).ravel(), loops * self.edges[-1])
         return StepLimits(edges, np.tile(self.longest, loops))
 
-    def times(self, factor: float) -> StepLimits:
-        """Limits that are so many times as long."""
+    def scaled(self, factor: float) -> StepLimits:
+        """Limits with all lengths multiplied by a factor."""
         return StepLimits(self.edges, factor * self.longest)
 
-    def and_those(self, other: StepLimits) -> StepLimits:
-        """Limits that keep both."""
+    def combined(self, other: StepLimits) -> StepLimits:
+        """The tighter of two limits at every time."""
         edges = np.union1d(self.edges, other.edges)
         middle = 0.5 * (edges[:-1] + edges[1:])
         return StepLimits(edges, np.minimum(self.at(middle), other.at(middle)))

@@ -57,7 +57,8 @@ class ExternalTorque:
     ----------
     function : `TorqueState` -> (3,) [N m], smooth between the breaks
     axes : "body", those of the base, or "space", inertial ones
-    breaks : interior times where it jumps, as a thruster's pulse begins and ends [s]
+    breaks : interior times where it jumps, as a thruster's pulse begins and ends [s]. The torque is sampled along the
+        motion, at times 1/4,000 of the duration apart: what is narrower than 1/2,000 needs its ends given here
 
     Examples
     --------

@@ -13,9 +13,9 @@ from ..integrator.limited_steps import StepLimits
 from ..integrator.recorded.knot_path import KnotPath
 from ..integrator.resolved import ResolvedPath
 
-# A panel's series has five swings at most that are not rounding: each takes one step or more of twelve evaluations.
+# A resolved panel has at most five swings above rounding (degree 32): each then has ten evaluations or more.
 _STEPS_OF_A_PANEL = 4.0
-# Of the fastest swing.
+# Per period of the fastest swing.
 _STEPS_OF_A_SWING = 4.0
 
 
@@ -53,14 +53,14 @@ class Smoothness:
 
     @property
     def step_limits(self) -> StepLimits:
-        """How long steps of time may be that pass over nothing that is known to happen."""
+        """The longest steps of an integrator that evaluates the function itself: they step over no feature known."""
         if self.resolved is not None:
             rows, loop = self.resolved.leaves, self.resolved.duration
             edges = np.append(self.resolved.left[rows], loop)
-            return StepLimits.of_parts(edges, _STEPS_OF_A_PANEL).repeated(round(self.breaks[-1] / loop))
+            return StepLimits.even(edges, _STEPS_OF_A_PANEL).repeated(round(self.breaks[-1] / loop))
         if self.oscillations is None:
-            return StepLimits.of_parts(self.breaks[[0, -1]], 1.0)
+            return StepLimits.even(self.breaks[[0, -1]], 1.0)
         steps = _STEPS_OF_A_SWING * max(self.oscillations, 0.5)
         if self.smooth_loop:
-            return StepLimits.of_parts(self.breaks[[0, -1]], steps * self.loops)
-        return StepLimits.of_parts(self.breaks, steps)
+            return StepLimits.even(self.breaks[[0, -1]], steps * self.loops)
+        return StepLimits.even(self.breaks, steps)

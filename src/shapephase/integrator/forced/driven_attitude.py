@@ -35,14 +35,14 @@ _SHORTER = 0.75
 _GAIN = 0.4
 # Times at which two runs are compared.
 _MOST_COMPARED = 4000
-# Of the duration: the slope is seen at times no farther apart, those of the scan of a path; what lasts twice as long is
-# not missed.
-_SEEN = 1.0 / 4000.0
-# Of an interval: the largest gap between eight Gauss points.
-_GAP = 0.1835
-# In units of a run's tolerance: the change over a step differs by 2 at most (14 for work) from the integral of the
-# slope along the step in motions that nothing was passed over.
-_PASSED_OVER = 20.0
+# Of the duration: largest distance of times at which a run is checked, as of the scan of a path; what lasts twice as
+# long is found.
+_SAMPLE_GAP = 1.0 / 4000.0
+# Of an interval: largest gap between eight Gauss points.
+_GAUSS_GAP = 0.1835
+# In units of a run's tolerance: by how much the change over a step may differ from the integral of the slope along it;
+# up to 2, for work 14, where nothing was stepped over.
+_DEFECT_LIMIT = 20.0
 # Parts of a step that passed over something.
 _PARTS = 8.0
 # Rounds in which something was passed over: so many narrow stretches can follow from each other.
@@ -141,8 +141,8 @@ def driven_attitude(
         return np.column_stack([*(0.5 * one for one in turning), others / scales])
 
     start = np.concatenate([so3.quat_from_matrix(attitude), states / scales])
-    whole = StepLimits.of_parts(breaks[[0, -1]], 1.0 / _LONGEST)
-    limits = whole if limits is None else limits.and_those(whole)
+    whole = StepLimits.even(breaks[[0, -1]], 1.0 / _LONGEST)
+    limits = whole if limits is None else limits.combined(whole)
     evaluations = 0
 
     def run_of(sharpness: float, limits: StepLimits) -> Run:
@@ -157,10 +157,10 @@ def driven_attitude(
         worst = float(errors[-1].max())
         # One of two that disagree may have passed over what the other one met.
         shorter = [_shorter_steps(slopes, one) for one in ((run,) if worst <= tolerance else (last, run))]
-        found = [one for one in shorter if one is not None]
-        if not found:
+        tighter = [one for one in shorter if one is not None]
+        if not tighter:
             break
-        limits = reduce(StepLimits.and_those, found, limits)
+        limits = reduce(StepLimits.combined, tighter, limits)
     else:
         raise AccuracyNotReached(
             f"what drives the motion changes too often in short times: in {_MOST_ROUNDS} rounds steps passed over "
@@ -182,10 +182,10 @@ def _agreeing_runs(
     sharpness, before = max(_FIRST * tolerance, _LEAST / _SHARPER), np.inf
     last = run_of(sharpness, limits)
     while True:
-        limits = limits.times(_SHORTER)
+        limits = limits.scaled(_SHORTER)
         if sharpness * _SHARPER < 0.9 * _LEAST:
             # No tolerance makes steps shorter now.
-            limits = limits.and_those(StepLimits(last.times, _SHORTER * np.diff(last.times)))
+            limits = limits.combined(StepLimits(last.times, _SHORTER * np.diff(last.times)))
         else:
             sharpness *= _SHARPER
         run = run_of(sharpness, limits)
@@ -203,7 +203,7 @@ def _agreeing_runs(
 
 def _shorter_steps(slopes: Callable[[Array, Array], Array], run: Run) -> StepLimits | None:
     """Limits within the steps of a run that passed over something; None: none did."""
-    passed_over = _defects(slopes, run).max(axis=1) > _PASSED_OVER * run.rtol
+    passed_over = _defects(slopes, run).max(axis=1) > _DEFECT_LIMIT * run.rtol
     if not passed_over.any():
         return None
     return StepLimits(run.times, np.where(passed_over, np.diff(run.times) / _PARTS, np.inf))
@@ -215,15 +215,15 @@ def _defects(slopes: Callable[[Array, Array], Array], run: Run) -> Array:
     Zero for steps that are too short to pass over anything.
     """
     steps, duration = np.diff(run.times), run.times[-1]
-    found = np.zeros((len(steps), len(run(run.times[:1])[0])))
-    long = np.flatnonzero(steps > _SEEN * duration)
+    defects = np.zeros((len(steps), len(run(run.times[:1])[0])))
+    long = np.flatnonzero(steps > _SAMPLE_GAP * duration)
     if len(long):
-        parts = np.ceil(steps[long] * _GAP / (_SEEN * duration)).astype(int)
+        parts = np.ceil(steps[long] * _GAUSS_GAP / (_SAMPLE_GAP * duration)).astype(int)
         first = np.cumsum(parts) - parts
         width = np.repeat(steps[long] / parts, parts)
         left = np.repeat(run.times[long], parts) + width * (np.arange(len(width)) - np.repeat(first, parts))
         nodes, weights = gauss_nodes(left, left + width)
         at_nodes = slopes(nodes.ravel(), run(nodes.ravel())).reshape(*nodes.shape, -1)
         integrals = np.add.reduceat(np.einsum("pm,pmk->pk", weights, at_nodes), first, axis=0)
-        found[long] = np.abs(run(run.times[long + 1]) - run(run.times[long]) - integrals)
-    return found
+        defects[long] = np.abs(run(run.times[long + 1]) - run(run.times[long]) - integrals)
+    return defects
