@@ -366,11 +366,7 @@ class ShapePath:
             breaks,
             self.n_shape,
             names,
-<<<<<<< HEAD
             _most_swings(self, other),
-=======
-            _larger(self._between_breaks, other._between_breaks),
->>>>>>> wB
             scanner=JoinedScan([self, other]) if following is other.curve else None,
         )
 
@@ -445,11 +441,6 @@ class ShapePath:
         order = np.array([self.joint_names.index(name) for name in expected])
         curve = Reordered(self.curve, order)
         return replace(self, curve=curve, joint_names=expected, scanner=DerivedScan(self, "reordered", (order,)))
-
-    @property
-    def _between_breaks(self) -> float | None:
-        """How often it can swing between two breaks, which a smooth loop does not have where it begins again."""
-        return self.oscillations and self.oscillations * (self.loops if self.smooth_loop else 1)
 
     def _joint(self, column: int) -> str:
         return self.joint_names[column] if self.joint_names else f"number {column}"
