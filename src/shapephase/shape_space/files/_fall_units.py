@@ -16,8 +16,10 @@ _LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 """[m] Units that are mixed up."""
 _RATES = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 200, 240, 250, 300, 400, 480, 500, 1000)
 """[1/s] Frame rates that are usual."""
-_MOST_TIMES, _MOST_LENGTHS = 10.0, 40.0
-"""Of the frame rate and of the lengths that are written: slips that show in the fall are by less."""
+_MOST_TIMES = 10.0
+"""Of the frame rate that is written: slips that show in the fall are by less."""
+_MOST_LENGTHS = 40.0
+"""Of the lengths that are written: slips that show in the fall are by less."""
 _MOST_SAMPLES = 3000
 """Time: samples among which a fall by another gravity is looked for."""
 _OFF = 0.1
