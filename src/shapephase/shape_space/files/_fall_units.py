@@ -30,6 +30,8 @@ _FITS = 0.04
 """Of gravity: a slip that explains the fall so well is named."""
 _LONG = 0.8
 """[m] g t^2 of a fall that may be one by another acceleration: ten times its bar by wander, 0.29 s on earth."""
+_SEEN = 6.0
+"""Standard deviations that a fall by another acceleration is from none."""
 _AS_LONG = 0.8
 """Of the longest fall: among those that last so long, the one nearest to its parabola counts."""
 _PARABOLA = 0.02
@@ -69,7 +71,8 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
             if found is None:
                 continue
             time = lasts(seen, found.ends) / trial.times
-            if is_long(found, seen, trial.lengths):
+            # In the lengths of the file, too: whatever moves smoothly bends a little, and looks like a slow fall.
+            if is_long(found, seen, trial.lengths) and found.gravity > _SEEN * found.gravity_bar:
                 falls.append((time, found.off / found.gravity, found))
     if not falls:
         return None
