@@ -28,8 +28,10 @@ _NARROWEST_MASS = 0.01
 _WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)
 # Of moments of inertia, relative to those about the base's origin: what rounding leaves of zero.
 _ON_A_LINE = 1e-12
-# [m] People are taller, and smaller.
-_SMALLEST_PERSON, _TALLEST_PERSON = 0.9, 2.4
+# [m] People are taller.
+_SMALLEST_PERSON = 0.9
+# [m] People are smaller.
+_TALLEST_PERSON = 2.4
 # Of a person's height, that is below the ankle and above the head's joint (Drillis and Contini 1964).
 _BEYOND_JOINTS = 0.039 + 0.130
 # Names in one message.

@@ -24,8 +24,10 @@ _OWN = 0.01
 """Of the variance of a mean or a bell is white: no recording is so smooth, and digits are rounded."""
 _BLOCK = 128
 """Samples that are weighed together, four times the longest mean; blocks count as independent."""
-_CHANCE, _SURE = 0.02, 0.001
-"""With which residuals that are noise make bars longer, and are taken for a momentum that changes."""
+_CHANCE = 0.02
+"""With which residuals that are noise make bars longer."""
+_SURE = 0.001
+"""With which residuals that are noise are taken for a momentum that changes."""
 _MOST_MODES = 6
 """Legendre polynomials of a momentum in time: more resolve less than a tenth of the flight."""
 

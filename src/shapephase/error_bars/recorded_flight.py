@@ -127,7 +127,7 @@ def motion_from_recording(
 def _fit(body: Body, recorded: RecordedMotion, tolerance: float, *, find_axes: bool) -> RecordedMomentum:
     flight, attitudes = recorded.flight, recorded.base_attitude
     assert attitudes is not None
-    assumed = flight is None or not flight.asked
+    assumed = flight is None or not flight.requested
     deformation = articulated(body, recorded.path)
     try:
         with quiet(category=TrajectoryWarning):

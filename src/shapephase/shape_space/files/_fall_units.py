@@ -16,8 +16,10 @@ _LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 """[m] Units that are mixed up."""
 _RATES = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 200, 240, 250, 300, 400, 480, 500, 1000)
 """[1/s] Frame rates that are usual."""
-_MOST_TIMES, _MOST_LENGTHS = 10.0, 40.0
-"""Of the frame rate and of the lengths that are written: slips that show in the fall are by less."""
+_MOST_TIMES = 10.0
+"""Of the frame rate that is written: slips that show in the fall are by less."""
+_MOST_LENGTHS = 40.0
+"""Of the lengths that are written: slips that show in the fall are by less."""
 _MOST_SAMPLES = 3000
 """Time: samples among which a fall by another gravity is looked for."""
 _OFF = 0.1
@@ -28,6 +30,8 @@ _FITS = 0.04
 """Of gravity: a slip that explains the fall so well is named."""
 _LONG = 0.8
 """[m] g t^2 of a fall that may be one by another acceleration: ten times its bar by wander, 0.29 s on earth."""
+_SEEN = 6.0
+"""Standard deviations that a fall by another acceleration is from none."""
 _AS_LONG = 0.8
 """Of the longest fall: among those that last so long, the one nearest to its parabola counts."""
 _PARABOLA = 0.02
@@ -67,7 +71,8 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
             if found is None:
                 continue
             time = lasts(seen, found.ends) / trial.times
-            if is_long(found, seen, trial.lengths):
+            # In the lengths of the file, too: whatever moves smoothly bends a little, and looks like a slow fall.
+            if is_long(found, seen, trial.lengths) and found.gravity > _SEEN * found.gravity_bar:
                 falls.append((time, found.off / found.gravity, found))
     if not falls:
         return None

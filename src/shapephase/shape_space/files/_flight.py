@@ -45,7 +45,7 @@ class Flight:
     first_time, last_time : as the file tells the time
     by : "auto", "all" or "times": how it was found
     fall : how the centre of mass falls there, where the flight was found by it
-    asked : whether it was asked for; else the recorded base has to show that it is one
+    requested : whether a caller asked for it; else the recorded base has to show that it is one
 
     Examples
     --------
@@ -57,7 +57,7 @@ class Flight:
     last_time: float
     by: str
     fall: FreeFall | None = None
-    asked: bool = True
+    requested: bool = True
 
     __repr__ = short_repr
 

@@ -31,6 +31,8 @@ _CUT = 2.0
 """Standard deviations: for so long a contact that accelerates the body by g may last unseen, and that much is cut."""
 _FEWEST = 6
 """Samples of a window."""
+_APART = 1.0 / 60.0
+"""[s] Between samples of which the noise is that of a recording, too, and by which a body moves little."""
 _WANDER = 0.01
 """[m] By which the computed centre of mass may sag in the middle of a flight: segments are not rigid, and not known."""
 _SAME = 0.03
@@ -136,8 +138,13 @@ def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None
 
 
 def centre_noise(times: Array, centres: Array) -> float:
-    """By which a coordinate of the centre of mass is known [m]."""
-    return float(np.hypot(_white_noise(times, centres), _MODEL))
+    """By which a coordinate of the centre of mass is known [m].
+
+    Also of samples that are farther apart: those of a tracker may all be off alike, nearest to each other.
+    """
+    stride = max(round(_APART / float(np.median(np.diff(times)))), 1) if len(times) > 1 else 1
+    apart = max(_white_noise(times[::step], centres[::step]) for step in {1, stride})
+    return float(np.hypot(apart, _MODEL))
 
 
 def falls_along(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
