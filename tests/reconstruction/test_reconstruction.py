@@ -375,8 +375,8 @@ def test_what_another_method_needs_of_the_integrator_is_integrated_once(monkeypa
 
     lifts: list[SteppedRotation] = []
 
-    def counted_lift(rotation: SteppedRotation) -> SteppedRotation:
-        lifts.append(lift_along(rotation))
+    def counted_lift(rotation: SteppedRotation, stored: Any) -> SteppedRotation:
+        lifts.append(lift_along(rotation, stored))
         return lifts[-1]
 
     monkeypatch.setattr(module, "stepped_rotation", counted)
