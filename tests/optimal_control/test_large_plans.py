@@ -70,7 +70,7 @@ def wave(rng, joints, duration=1.0):
 def varied(motion, wave, size):
     def curve(times):
         change, rate = wave(times)
-        return motion.shape(times) + size * change, motion.rate(times) + size * rate
+        return motion.path.shape(times) + size * change, motion.path.rate(times) + size * rate
 
     return sp.ShapePath.function(curve, motion.duration, breaks=np.linspace(0.0, motion.duration, 17)[1:-1])
 

@@ -622,34 +622,37 @@ def test_slides_on_one_line_are_flat(length, load_urdf, rng):
     assert not is_flat(across, shapes)
 
 
-def test_a_frame_without_mass_is_flat(load_urdf):
-    """All that its joints move is one rigid body, which does not turn: slopes and brackets are large and cancel."""
-    gimbal = load_urdf(
-        urdf(
-            '<link name="frame"/>',
-            '<link name="outer"/>',
-            '<link name="inner"/>',
-            link("body", 2.0, [1.0, 1.7, 2.2], (0.1, -0.2, 0.3)),
-            joint("yaw", "revolute", "frame", "outer", Z, (0.1, 0.0, 0.0)),
-            joint("pitch", "revolute", "outer", "inner", Y, (0.0, 0.2, 0.0)),
-            joint("roll", "revolute", "inner", "body", X),
-        )
+def test_a_frame_without_mass_is_flat():
+    """All that its joints move is one rigid body, which does not turn: slopes and brackets are large and cancel.
+
+    Pinocchio reads the files: from a URDF such joints would be the free base.
+    """
+
+    def floating(*parts: str) -> sp.Body:
+        return sp.load_body(pin.buildModelFromXML(urdf(*parts), pin.JointModelFreeFlyer()))
+
+    gimbal = floating(
+        '<link name="frame"/>',
+        '<link name="outer"/>',
+        '<link name="inner"/>',
+        link("body", 2.0, [1.0, 1.7, 2.2], (0.1, -0.2, 0.3)),
+        joint("yaw", "revolute", "frame", "outer", Z, (0.1, 0.0, 0.0)),
+        joint("pitch", "revolute", "outer", "inner", Y, (0.0, 0.2, 0.0)),
+        joint("roll", "revolute", "inner", "body", X),
     )
     columns = sp.mechanical_connection(gimbal, [0.2, 0.3, 0.4]).T
     np.testing.assert_allclose(columns[:2], [Z, [-np.sin(0.2), np.cos(0.2), 0.0]], atol=1e-14, rtol=0)
     assert is_flat(gimbal)
     path = ellipse(gimbal, ("yaw", "pitch"), (1.0, 0.8))
     assert apart(stokes_holonomy(gimbal, path, 1e-12), np.eye(3)) < 1e-12
-    table = load_urdf(
-        urdf(
-            '<link name="frame"/>',
-            '<link name="x"/>',
-            '<link name="y"/>',
-            link("body", 2.0, [1.0, 1.7, 2.2], (0.1, -0.2, 0.3)),
-            joint("along", "prismatic", "frame", "x", (0.6, 0.8, 0.1), rpy=(0.3, 0.2, 0.1)),
-            joint("across", "prismatic", "x", "y", (0.6, 0.0, 0.8)),
-            joint("hinge", "revolute", "y", "body", (0.1, 0.2, 0.3), (0.0, 0.4, 0.0)),
-        )
+    table = floating(
+        '<link name="frame"/>',
+        '<link name="x"/>',
+        '<link name="y"/>',
+        link("body", 2.0, [1.0, 1.7, 2.2], (0.1, -0.2, 0.3)),
+        joint("along", "prismatic", "frame", "x", (0.6, 0.8, 0.1), rpy=(0.3, 0.2, 0.1)),
+        joint("across", "prismatic", "x", "y", (0.6, 0.0, 0.8)),
+        joint("hinge", "revolute", "y", "body", (0.1, 0.2, 0.3), (0.0, 0.4, 0.0)),
     )
     assert is_flat(table)
     far = np.random.default_rng(3).uniform(-1.0, 1.0, (16, 3)) * [800.0, 800.0, 3.0]

@@ -102,7 +102,7 @@ def final_attitudes(
             raise type(error)(f"path {number}: {error}") from error
         ends.append(first @ solution.end[0])
         estimates.append(float(solution.error_estimate[0]))
-        evaluations.append(solution.interpolant.evaluations)
+        evaluations.append(samplers.evaluations)
     for name, array, single in (("momenta", spatial, 1), ("attitudes", start, 2)):
         if array.ndim > single and len(array) != len(ends):
             raise ShapeError(f"{len(array)} {name} were given for {len(ends)} paths")
