@@ -8,10 +8,12 @@ def test_the_routes_of_reconstruct_and_split_stay_short():
 
     `reconstruct` had 10 and 3: since then samples are remembered for other momenta, between the rooms of shapes and
     steps, and bodies may come as a family. Every number of a split has its own error estimate since, and what closes
-    the momentum's curve is found with it; and both say what a wrong object is.
+    the momentum's curve is found with it; and both say what a wrong object is. What `reconstruct` gives is compared
+    with the body at times that no rule has seen: twelve stops and four climbs. `split` asks twice whether the body
+    has wheels of a stated speed, and once whether its curve has: five stops and two climbs.
     """
     found = routes()
-    assert len(found["split"].rooms) <= 35
-    assert found["split"].climbs <= 17
-    assert len(found["reconstruct"].rooms) <= 18
-    assert found["reconstruct"].climbs <= 6
+    assert len(found["split"].rooms) <= 40
+    assert found["split"].climbs <= 19
+    assert len(found["reconstruct"].rooms) <= 30
+    assert found["reconstruct"].climbs <= 10

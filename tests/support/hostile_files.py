@@ -343,7 +343,14 @@ def _inertias() -> Iterator[Case]:
     )
     bare = '<robot name="a">\n<link name="a"/>\n</robot>'
     yield _case("no mass at all", bare, "link 'a': neither it nor any other link has mass", line=2)
-    yield _case("massless root", edit(("<inertial>", "<visual>"), ("</inertial>", "</visual>")))
+    massless = edit(("<inertial>", "<visual>"), ("</inertial>", "</visual>"))
+    yield _case(
+        "massless root",
+        massless,
+        "joint 'hip': the only joint between 'base', which has no mass, and 'arm'.*root=\"free\"",
+        '<joint name="hip"',
+    )
+    yield _case("massless root removed", massless, options=(("root", "free"),))
     point = re.sub(r'(i..)="[\d.]+"', r'\1="0"', GOOD)
     yield _case("point masses", point)
     tiny = re.sub(r'(value|i..)="([\d.]+)"', r'\1="\2e-14"', GOOD)
@@ -413,12 +420,14 @@ def _trees() -> Iterator[Case]:
 def _joints() -> Iterator[Case]:
     limit = '<limit lower="-1.5" upper="1.5" effort="1" velocity="1"/>'
     for kind in ("planar", "floating", "hinge", "Revolute", ""):
+        inside = kind in ("planar", "floating")
         new = f'<joint name="hip" type="{kind}">'
         yield _faulty(
             f"type {kind!r}",
             '<joint name="hip" type="revolute">',
             new,
-            f"joint 'hip': type '{kind}' is not supported.*several in a row",
+            f"joint 'hip': type '{kind}' is not supported.*"
+            + ("inside a body.* one in a row" if inside else "several in a row"),
         )
     yield _faulty("no type", ' type="revolute"', "", "joint 'hip': type ''", '<joint name="hip"')
     yield _faulty("no limit", limit, "", "joint 'hip': a revolute joint needs <limit", '<joint name="hip"')
@@ -625,8 +634,8 @@ def _mjcfs() -> Iterator[Case]:
         "hinge to the world",
         "<freejoint/>",
         hinge,
-        "body 'trunk': a joint between the world and the body that floats, 'j'.*root=\"free\"",
-        '<body name="trunk"',
+        "joint 'j': the only joint between 'the world', which has no mass, and 'trunk'.*root=\"free\"",
+        hinge,
     )
     yield _mjcf("hinge to the world removed", "<freejoint/>", hinge, options=(("root", "free"),))
     yield refused("two free joints", "<freejoint/>", '<freejoint/><joint type="free"/>', "body 'trunk': more", line=11)

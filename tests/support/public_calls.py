@@ -33,7 +33,10 @@ GIVEN: dict[str, Any] = {
     "factor": 0.5,
     "count": 2,
     "owner": "the body",
+    "lateral": "y",
 }
+# Given although they have a default: links of the cat of two halves are not called left and right.
+ASKED = {"lateral"}
 # They make objects or figures, write files or need more than a few numbers, and are called by name below or elsewhere.
 MAKERS = (
     "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias", "sampler",
@@ -77,7 +80,11 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
             if name in ("sample", "sample_rates"):
                 words |= {"shape": np.full((2, on.body.n_shape), 0.3), "rate": np.full((2, on.body.n_shape), 0.2)}
             signature = inspect.signature(getattr(thing, name)).parameters.values()
-            needed = {p.name: words[p.name] for p in signature if p.default is p.empty and p.kind is not p.VAR_KEYWORD}
+            needed = {
+                p.name: words[p.name]
+                for p in signature
+                if p.name in ASKED or (p.default is p.empty and p.kind is not p.VAR_KEYWORD)
+            }
             found[f"{field.name}.{name}"] = lambda thing=thing, name=name, needed=needed: getattr(thing, name)(**needed)
     body, path, deformation, motion = on.body, on.path, on.deformation, on.motion
     shape = given["shape"]
@@ -99,6 +106,10 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "curvature_on_plane": lambda: sp.curvature_on_plane(body, body.joint_names[:2], TIMES, TIMES),
         "is_flat": lambda: sp.is_flat(body),
         "joint_torques": lambda: sp.joint_torques(motion, TIMES),
+        "path_errors": lambda: sp.path_errors(sampled(path), TIMES, 0.01),
+        "torque_errors": lambda: sp.torque_errors(torques_of_samples(body, path), 0.01),
+        "turn_counts": lambda: sp.turn_counts(motion, sp.split(motion)),
+        "motion_from_recording": lambda: recorded_again(motion, body),
         "mujoco_arrays": lambda: sp.exports.mujoco_arrays(motion, TIMES),
         "pinocchio_arrays": lambda: sp.exports.pinocchio_arrays(motion, TIMES),
         "free_hinges": lambda: sp.free_hinges(body, swung(body), {body.joint_names[0]: (0.3, 1.0)}, MOMENTUM),
@@ -162,6 +173,24 @@ def audited(motion: sp.Motion, body: sp.Body, path: sp.ShapePath) -> tuple[bool,
     return found.right, found.runs[0].momentum
 
 
+def sampled(path: sp.ShapePath) -> sp.ShapePath:
+    """The path through samples, whose noise can be asked for."""
+    times = np.linspace(0.0, path.duration, 41)
+    return sp.ShapePath.spline(times, path.shape(times), joint_names=path.joint_names)
+
+
+def torques_of_samples(body: sp.Body, path: sp.ShapePath) -> sp.JointTorques:
+    """What drives the joints along the path through samples."""
+    return sp.joint_torques(sp.reconstruct(sp.articulated(body, sampled(path)), MOMENTUM), TIMES)
+
+
+def recorded_again(motion: sp.Motion, body: sp.Body) -> sp.Motion:
+    """A motion whose momentum was fitted to what it wrote."""
+    with tempfile.TemporaryDirectory() as folder:
+        sp.export_motion(motion, f"{folder}/motion.csv")
+        return sp.motion_from_recording(body, sp.read_recorded_motion(f"{folder}/motion.csv", body)).motion
+
+
 def saved(motion: sp.Motion) -> sp.Motion:
     """A motion that went through a file."""
     with tempfile.TemporaryDirectory() as folder:
@@ -173,7 +202,7 @@ def recorded(path: sp.ShapePath, body: sp.Body) -> Any:
     """A path that went through a table, and its text."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "path.csv"
-        sp.write_shape_path(path, file, np.linspace(0.0, 1.0, 21))
+        sp.write_shape_path(path, file)
         return file.read_text(), sp.read_shape_path(file, body).shape(TIMES)
 
 

@@ -240,8 +240,10 @@ def hollow_warnings(
         If one has more than 1 % of the body's inertia about any axis (unless `on_unphysical` is "warn").
     """
     links = list(links)
-    # Scaled so that the body's is the identity; what it has about its thinnest axis may be nothing but rounding.
     moments, axes = np.linalg.eigh(inertia)
+    if moments[-1] <= 0.0:
+        return []
+    # Scaled so that the body's is the identity; what it has about its thinnest axis may be nothing but rounding.
     scaled = axes / np.sqrt(np.maximum(moments, ROUNDING * moments[-1]))
     found = []
     for link, turn in zip(links, turns, strict=True):

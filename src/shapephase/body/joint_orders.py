@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..arguments import check_object
 from ._link_tree import Joint, LinkTree
 from .virtual_base import joint_coordinates
 
@@ -67,6 +68,7 @@ def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:
 
 def simulator_order(body: Body, word: str, otherwise: tuple[str, ...]) -> tuple[str, ...]:
     """All joints of a body in an order; of one without a file, whose joints have none but their own, what is given."""
+    check_object(body, "Body", "body")
     return next((known.joints for known in body.joint_orders if known.word == word), otherwise)
 
 

@@ -77,6 +77,7 @@ def person_height(body: Body) -> float | None:
 
     From ankle to hip and on to the head's joint along the bones, whatever the pose, and what is beyond them.
     """
+    check_object(body, "Body", "body")
     if body.length_unit is None:
         return None
     chain = body.chain

@@ -232,11 +232,11 @@ def _inside(joint: Joint) -> str:
     why, instead = {
         ANYWHERE: (
             "it has the coordinates of a rigid motion, and only the base floats here",
-            "three slides and a ball",
+            "three prismatic joints and a spherical one",
         ),
-        IN_A_PLANE: ("its two slides turn with it", "two slides and a hinge"),
+        IN_A_PLANE: ("its two slides turn with it", "two prismatic joints and a revolute one"),
     }[joint.kind]
     return (
         f"{joint.where}: joint {joint.name!r}: type {joint.kind!r} is not supported inside a body: {why}; use "
-        f"{instead} joint in a row, or remove it and what it moves"
+        f"{instead} in a row, or remove it and what it moves"
     )

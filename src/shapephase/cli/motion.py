@@ -143,6 +143,11 @@ def _is_named(motion: str) -> bool:
     return motion in MOTIONS and not os.path.isfile(motion)
 
 
+def is_without_momentum(motion: str, options: FlightOptions) -> bool:
+    """Whether the momentum is known to be zero before the motion is read: a recorded base may still show one."""
+    return _is_named(motion) if options.momentum is None else not any(options.momentum)
+
+
 def body_argument(body: str, floating: BodyOptions) -> Body:
     """The body that a command names. Raises what `load_body` raises, and ShapeError for what is rather a motion."""
     is_file = os.path.isfile(body)

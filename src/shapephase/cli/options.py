@@ -152,8 +152,8 @@ class FlightOptions:
         Parameter(
             negative_iterable="",
             show_default=False,
-            help="Of the base at the start, a quaternion x y z w; if not given, as recorded, or that of a library's "
-            "motion (cats begin on their back), else 0 0 0 1. For example `--attitude 1 0 0 0`.",
+            help="Of the base at the start, a quaternion x y z w without unit; if not given, as recorded, or that of a "
+            "library's motion (cats begin on their back), else 0 0 0 1. For example `--attitude 1 0 0 0`.",
         ),
     ] = None
 

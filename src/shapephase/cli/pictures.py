@@ -126,7 +126,7 @@ def plot_command(
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
     check_writable(out, "--out", ".svg", ".pdf", ".png")
-    if FIGURES[kind].with_momentum and flight.momentum is not None and not any(flight.momentum):
+    if FIGURES[kind].with_momentum and motions.is_without_momentum(motion, flight):
         raise _no_momentum(kind)
     with steps(2) as work:
         work.begin("loading and reconstructing")

@@ -117,6 +117,7 @@ def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) 
 
 def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: ArrayLike | None = None) -> Array:
     """Standard deviations of sums over times (N,) of (N, m, n, 3) derivatives by shape, rate and acceleration: (m,)."""
+    check_object(path, "ShapePath", "path")
     samples, levels = _samples(path), _levels(path, joints)
     by_knots = np.einsum("tmja,atk->mkj", derivative, samples.rows_by_knots(times)).reshape(derivative.shape[1], -1)
     variance = (by_knots @ samples.bias) ** 2
@@ -139,6 +140,7 @@ def _samples(path: ShapePath) -> PathSamples:
 
 def stated_noise(path: ShapePath) -> Array | None:
     """The noise that a recording was smoothed for: (n,) [rad or m]; None where none was stated."""
+    check_object(path, "ShapePath", "path")
     said = None if path.record is None else path.record.get("smooth")
     return None if said is None else np.array([said[name] for name in path.joint_names or said])
 

@@ -43,7 +43,8 @@ _DEFECT_SHARE = 0.5
 _LEAST_WIDTH = 1e-13
 # Sixty-four points of a panel, none of them a node: a low-discrepancy sequence.
 _TEST_FRACTIONS = np.sort(np.mod(0.5 + 0.6180339887498949 * np.arange(64, dtype=np.float64), 1.0))
-NONE_JOINED = _NO_DEGREES = np.empty(0, dtype=np.int64)
+NONE_JOINED = np.empty(0, dtype=np.int64)
+_NO_DEGREES = NONE_JOINED
 _NO_VALUES = np.empty((0, 9))
 
 

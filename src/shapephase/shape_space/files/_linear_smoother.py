@@ -15,9 +15,10 @@ ORDER = 3
 """Of the derivative whose square is penalized: quintic splines, whose second derivative is smooth."""
 PILOT_ORDER = 5
 """Of the smoother that knows the motion's third derivative at the ends, where a quintic spline has none."""
-_NARROWEST, _WIDEST = 10.0**-0.5, 10.0**2.5
-"""Widths that are tried, in steps of time: next to nothing is smoothed; 300 samples are, and rounding goes into the
-bias beyond."""
+_NARROWEST = 10.0**-0.5
+"""Width that is tried, in steps of time: next to nothing is smoothed."""
+_WIDEST = 10.0**2.5
+"""Width that is tried, in steps of time: 300 samples are smoothed, and rounding goes into the bias beyond."""
 _WIDTHS_A_DECADE = 6
 """Tried; the best of them and its neighbours have the least of a parabola between them."""
 _ROUNDED = 24
@@ -65,7 +66,7 @@ class LinearSmoother:
         for penalty in np.unique(self.penalties[self.penalties > 0.0]):
             own = self.penalties == penalty
             right = gradients[:, :, own].reshape(self.count, -1)
-            solved = self._system.solved(float(penalty), right).reshape(self.count, -1, int(own.sum()))
+            solved = self._system.solve_linear(float(penalty), right).reshape(self.count, -1, int(own.sum()))
             found[:, :, own] = self.weights[:, None, None] * solved
         return found
 
@@ -79,7 +80,7 @@ class LinearSmoother:
     @property
     def weights(self) -> Array:
         """(count,)."""
-        return self._system.weights
+        return _weights(self.count, self.periodic)
 
     @cached_property
     def _system(self) -> _Roughness:
@@ -129,6 +130,12 @@ def width_of(smoother: LinearSmoother) -> float:
     return scaled ** (0.5 / smoother.order)
 
 
+def _weights(count: int, periodic: bool) -> Array:
+    found = np.ones(count)
+    found[0] = 2.0 if periodic else 1.0
+    return found
+
+
 def _widths(count: int) -> Array:
     most = min(_WIDEST, max(float(count), 1.0))
     number = int(_WIDTHS_A_DECADE * np.log10(most / _NARROWEST)) + 1
@@ -163,9 +170,7 @@ class _Roughness:
         self._unit = float(times[-1]) / (len(times) - 1)
         self._order = order
         self._count = len(times) - periodic
-        self.weights = np.ones(self._count)
-        if periodic:
-            self.weights[0] = 2.0
+        self.weights = _weights(self._count, periodic)
         self._differences, self._gram = _splines(times / self._unit, periodic, order)
         self.modes = self._count - (1 if periodic else order)
         """What is penalized at all: all but constants, or polynomials below the order."""
@@ -174,7 +179,7 @@ class _Roughness:
         """Of a width in steps of time: what swings with it, in radians a step, is halved [s^(2 order - 1)]."""
         return float(width ** (2 * self._order) * self._unit ** (2 * self._order - 1))
 
-    def solved(self, penalty: float, right: Array) -> Array:
+    def solve_linear(self, penalty: float, right: Array) -> Array:
         """(W + penalty K)^-1 right: (count, k) -> (count, k)."""
         if not self._differences.shape[1]:
             return right / self.weights[:, None]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ....arguments import check_object
 from ....arrays import Array, finite_array
 from ....body.body import Body
 from ....errors import ShapeError, TrajectoryError
@@ -44,6 +45,7 @@ def read_arrays(where: Path, data: bytes, body: Body, timestep: float | None, or
     TrajectoryError
         For faults, with the array and the entry.
     """
+    check_object(body, "Body", "body")
     arrays = {"qpos": _loaded(data, where)} if where.suffix.lower() == ".npy" else _members(data, where)
     try:
         if "qpos" in arrays or ("joint_pos" in arrays and "shapes" not in arrays):
