@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
-from ..chebyshev import PiecewiseChebyshev
+from ..chebyshev import PiecewiseChebyshev, widest_margin
 from ..integrator.resolved import ResolvedPath
 from .curves import (
     Curve,
@@ -20,9 +20,8 @@ from .curves import (
     Widened,
 )
 
-# Of the largest coefficient, and in units of the rounding of times: what a series is resolved to by the scan.
+# Of the largest coefficient: what a series is resolved to by the scan.
 _ROUNDING = 32.0 * float(np.finfo(float).eps)
-_TIME_ROUNDING = 8.0
 
 
 def exact_accelerations(curve: Curve, times: Array) -> Array | None:
@@ -73,23 +72,31 @@ def resolved_accelerations(resolved: ResolvedPath, loops: int, times: Array) -> 
     rows = resolved.leaves
     n_shape = resolved.coefficients.shape[2] // 2
     edges = np.append(resolved.left[rows], resolved.right[rows[-1]])
-    rates = PiecewiseChebyshev(edges, _without_noise(resolved.coefficients[rows][:, :, n_shape:], edges))
+    rates = PiecewiseChebyshev(edges, _continuous(resolved.coefficients[rows][:, :, n_shape:], edges))
     loop = np.minimum(np.floor(times / resolved.duration), loops - 1)
     return rates.derivative()(times - loop * resolved.duration)
 
 
-def _without_noise(series: Array, edges: Array) -> Array:
-    """Series (P, k, n) without their last terms as far as these are what times are rounded by.
+def _continuous(series: Array, edges: Array) -> Array:
+    """Series (P, k, n) that meet where panels do, as far as rounding keeps them apart, by a change of their slopes.
 
-    Differentiated, they would be large where panels meet.
+    What accelerations add up to is then what the rates change by, also where these are large for a short time. At a
+    break both sides were sampled at some distance from it, which counts as rounding of times.
     """
     degrees, widths = np.arange(series.shape[1])[:, None], np.diff(edges)[:, None]
+    signs = np.where(degrees % 2, -1.0, 1.0)
+    starts, ends = (signs * series).sum(axis=1), series.sum(axis=1)
     sizes = np.abs(series)
-    largest = sizes.max(axis=1)
-    slopes = 2.0 / widths * (degrees * sizes).max(axis=1)
-    noise = _ROUNDING * largest + _TIME_ROUNDING * np.spacing(edges[-1]) * slopes
-    tails = np.cumsum(sizes[:, ::-1], axis=1)[:, ::-1]
-    return np.where(tails > noise[:, None], series, 0.0)
+    slopes = 2.0 / widths * (degrees**2 * sizes).sum(axis=1)
+    noise = _ROUNDING * sizes.max(axis=1) + widest_margin(float(edges[-1])) * slopes
+    gaps = starts[1:] - ends[:-1]
+    gaps = np.where(np.abs(gaps) <= noise[1:] + noise[:-1], gaps, 0.0)
+    changed = series.copy()
+    none = np.zeros_like(series[:1, 0])
+    at_start, at_end = np.concatenate([none, -0.5 * gaps]), np.concatenate([0.5 * gaps, none])
+    changed[:, 0] += 0.5 * (at_start + at_end)
+    changed[:, 1] += 0.5 * (at_end - at_start)
+    return changed
 
 
 def _fourier(curve: Fourier, times: Array) -> Array:
