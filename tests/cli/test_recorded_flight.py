@@ -168,7 +168,8 @@ def test_every_command_says_the_flight_first(command, flight_file, tmp_path, cap
     kind = [options.pop(0)] if name == "plot" else []
     main([name, *kind, "diver", str(flight_file[0]), *options])
     first = capsys.readouterr().out.splitlines()[0]
-    assert "momentum (4 60 6) kg m^2/s, all from 0 to 0.8 s" in first
+    assert "momentum (4 60 6) kg m^2/s, attitude at the start (" in first
+    assert first.endswith("), all from 0 to 0.8 s")
 
 
 def test_without_a_base_zero_is_said(flight_file, tmp_path, capsys):
@@ -204,4 +205,4 @@ def test_check_says_how_tall_the_person_is(unit: float, doubted: bool, tmp_path,
     main(["check", str(file), "--length-unit", str(unit * bvh_files.UNIT), "--json"])
     found = json.loads(capsys.readouterr().out)
     assert found["body"]["person_height_m"] == pytest.approx(1.74 * unit, rel=0.1)
-    assert any("m tall" in warning for warning in found["warnings"]) == doubted
+    assert any("is the unit of length right" in warning for warning in found["warnings"]) == doubted

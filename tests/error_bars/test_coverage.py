@@ -92,7 +92,6 @@ def test_a_noisy_recording_that_is_closed(name: str, by: str, draws: int):
         covariances[row], biases[row] = bars.holonomy, bars.smoothing_bias
     check(errors, covariances)
     assert (biases > 0.0).all() if by == "smooth" else not biases.any()
-    assert biases.max() < 0.2
     # The mean error beside the bar: what is biased in truth, to what so many draws show.
     off = np.abs(errors.mean(axis=0)) / np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)).mean(axis=0)
     assert off.max() < 0.2 + 3.5 / np.sqrt(draws)

@@ -80,7 +80,7 @@ def test_even_grids_rigid_bodies_and_files_beside_the_study(write, tmp_path):
     read = room.read_study(write(rigid + "[over.momentum_z]\nfrom = 0\nto = 1\ncount = 5\n"))
     assert [case.momentum[2] for case in read.some_cases(np.arange(5))] == [0.0, 0.25, 0.5, 0.75, 1.0]
     (tmp_path / "deep").mkdir()
-    sp.write_shape_path(bend(0.5), tmp_path / "deep" / "bend.csv", np.linspace(0.0, 1.0, 9))
+    sp.write_shape_path(bend(0.5), tmp_path / "deep" / "bend.csv")
     (tmp_path / "deep" / "study.toml").write_text(
         'body = "cat_two_halves"\nmotion = "bend.csv"\n[over.joint_noise]\nunit = "deg"\nvalues = [0.1]\n'
     )

@@ -329,9 +329,9 @@ def test_smoothing_by_the_reader_reports_what_is_left(tmp_path):
     expected = 0.01 * np.sqrt(1.0 - both.smoothing.degrees_of_freedom / 401.0)
     np.testing.assert_allclose(both.residual, expected, rtol=0.05)
     assert motion.smoothing.noise.tolist() == [0.0, 0.01]
-    assert both.record["smoothing"]["penalty_s3"] == both.smoothing.penalty
+    assert both.record["smoothing"]["penalty_s5"] == both.smoothing.penalty.tolist()
     given = read_recorded_motion(tmp_path / "m.csv", DIVER, smooth=0.01, smooth_penalty=1e-4)
-    assert given.smoothing.penalty == 1e-4
+    assert given.smoothing.penalty.tolist() == [1e-4, 1e-4]
     assert np.sqrt(np.mean((both.path.shape(t) - clean) ** 2)) < 0.004
     with pytest.raises(UnknownNameError, match="unknown joint of diver"):
         read_recorded_motion(tmp_path / "m.csv", DIVER, smooth={"elbow": 0.01})
