@@ -109,7 +109,6 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "path_errors": lambda: sp.path_errors(sampled(path), TIMES, 0.01),
         "torque_errors": lambda: sp.torque_errors(torques_of_samples(body, path), 0.01),
         "turn_counts": lambda: sp.turn_counts(motion, sp.split(motion)),
-        "motion_from_recording": lambda: recorded_again(motion, body),
         "mujoco_arrays": lambda: sp.exports.mujoco_arrays(motion, TIMES),
         "pinocchio_arrays": lambda: sp.exports.pinocchio_arrays(motion, TIMES),
         "free_hinges": lambda: sp.free_hinges(body, swung(body), {body.joint_names[0]: (0.3, 1.0)}, MOMENTUM),
@@ -182,13 +181,6 @@ def sampled(path: sp.ShapePath) -> sp.ShapePath:
 def torques_of_samples(body: sp.Body, path: sp.ShapePath) -> sp.JointTorques:
     """What drives the joints along the path through samples."""
     return sp.joint_torques(sp.reconstruct(sp.articulated(body, sampled(path)), MOMENTUM), TIMES)
-
-
-def recorded_again(motion: sp.Motion, body: sp.Body) -> sp.Motion:
-    """A motion whose momentum was fitted to what it wrote."""
-    with tempfile.TemporaryDirectory() as folder:
-        sp.export_motion(motion, f"{folder}/motion.csv")
-        return sp.motion_from_recording(body, sp.read_recorded_motion(f"{folder}/motion.csv", body)).motion
 
 
 def saved(motion: sp.Motion) -> sp.Motion:
