@@ -56,13 +56,14 @@ class TurnCounts:
         if self.about_momentum:
             said = (
                 "The angle of a rotation is said but for whole turns: about its momentum the body turned "
-                f"{self.about_momentum:.4f} times (± {self.error:.0e}; the Montgomery phase)."
+                f"{_count(self.about_momentum)} times (± {self.error:.0e}; the Montgomery phase)."
             )
-        if self.axes is not None:
+        if self.axes is not None and self.somersaults is not None and self.twists is not None:
             tilt = math.degrees(self.largest_tilt or 0.0)
             said += (
-                f" Counted as those of an athlete: {self.somersaults:.4f} somersaults and {self.twists:.4f} twists, "
-                f"tilt at most {tilt:.1f} degrees (± {self.error:.0e} turns); {self.axes}."
+                f" Counted as those of an athlete: {_count(self.somersaults)} somersaults and "
+                f"{_count(self.twists)} twists, tilt at most {tilt:.1f} degrees (± {self.error:.0e} turns); "
+                f"{self.axes}."
             )
         return said.strip()
 
@@ -80,6 +81,11 @@ class TurnCounts:
                 },
             }
         return found
+
+
+def _count(turns: float) -> str:
+    """With four digits after the point; a zero has no sign."""
+    return f"{round(turns, 4) + 0.0:.4f}"
 
 
 def turn_counts(motion: Motion, split: PhaseSplit) -> TurnCounts:
