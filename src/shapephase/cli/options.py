@@ -33,6 +33,15 @@ Momentum = Annotated[
         "base, fitted to its free flight; else zero. For example `--momentum 0 0 0.02`.",
     ),
 ]
+GivenMomentum = Annotated[
+    tuple[float, float, float],
+    Parameter(
+        negative_iterable="",
+        show_default=False,
+        help="Angular momentum about the centre of mass, inertial axes, in kg m^2/s; zero if not given. For example "
+        "`--momentum 0 0 0.02`.",
+    ),
+]
 Gauge = Annotated[
     str,
     Parameter(

@@ -19,7 +19,7 @@ from cyclopts import Parameter
 
 from ...errors import PlanNotFound, ShapeError
 from ..exit_codes import ExitCode
-from ..options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, Momentum, PrintOptions, ReportFile
+from ..options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, GivenMomentum, PrintOptions, ReportFile
 from ..outcome import Outcome, check_writable
 from ..progress import Steps, steps
 from ..terminal import say_written
@@ -55,7 +55,7 @@ def plan_command(
     rotate: float | None = None,
     about: Annotated[str | None, _SIGNED] = None,
     symmetry: Annotated[str | None, _SIGNED] = None,
-    momentum: Momentum = (0.0, 0.0, 0.0),
+    momentum: GivenMomentum = (0.0, 0.0, 0.0),
     duration: float = 1.0,
     somersaults: float | None = None,
     half_twists: float | None = None,
