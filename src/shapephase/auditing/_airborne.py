@@ -26,7 +26,7 @@ _WINDOWS = 12
 _LEAST_WINDOW = 8
 """Samples of a window."""
 _STRAIGHT = 0.5
-"""Of how far the base is off parabolas: the centre of mass of a body that nothing carries is off by less, in most
+"""Share of how far the base is off parabolas: the centre of mass of a body that nothing carries is off by less, in most
 windows; that of a body that stands or walks goes with its base, or farther."""
 _BY_NOISE = 4.0
 """Standard deviations of the noise, by which it may be off anyway."""

@@ -12,9 +12,9 @@ from ._residuals import Residuals
 from .hypothesis import FittedValue, Hypothesis
 
 _AS_ONE = 1e-3
-"""Of the momentum: joints that add less are at rest, and the body turns as one."""
+"""Share of the momentum: joints that add less are at rest, and the body turns as one."""
 _SEEN = 1e-9
-"""Of the largest column: what moves nothing, as the inertia of a ball does not, takes no part."""
+"""Share of the largest column: what moves nothing, as the inertia of a ball does not, takes no part."""
 _AXES = "xyz"
 
 

@@ -27,7 +27,7 @@ _AXES = "xyz"
 _ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 _NARROWER = 0.95
-"""Of the sum of two principal moments, that the third is at most: what is fitted is known to some per cent."""
+"""Largest ratio of a principal moment to the sum of the other two: what is fitted is known to some per cent."""
 _FARTHEST = 3.0
 """Radii of gyration of the whole body: no link's centre is farther from where it was."""
 _MOST_TIMES = 100.0

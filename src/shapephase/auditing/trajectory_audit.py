@@ -43,7 +43,7 @@ _NEAR = 1e-4
 _STEADY = 0.01
 """Of what turns the body: a momentum that changes by more is no flight's, which need not be looked for."""
 _TOLERANCE = 1e-3
-"""Of momentum, rates and fall, where nothing else is asked for."""
+"""Tolerance of momentum, rates and fall, where nothing else is asked for."""
 _WANDER = 0.01
 """[m] Skin moves over bones, and bodies are not what tables make of them: markers and masses wander by so much."""
 _MEASURED = 1e-4
