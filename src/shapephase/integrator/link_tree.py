@@ -1,0 +1,138 @@
+"""A tree of links: inertia and angular momentum at many shapes, and derivatives of the momentum."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..arrays import Array, Integers, Mask
+from .kernels import gradient_kernel, tree_kernel
+from .kernels.tree_kernel import LANES
+from .machine_code import plain
+
+
+class LinkRows(Protocol):
+    """A tree of links as plain numbers: `shapephase.body.link_rows` defines them."""
+
+    @property
+    def parents(self) -> Any:
+        """(k,) unsigned."""
+        ...
+
+    @property
+    def turning(self) -> Array:
+        """(k,)."""
+        ...
+
+    @property
+    def leads(self) -> Array:
+        """(k,)."""
+        ...
+
+    @property
+    def rows(self) -> Array:
+        """(k + 1, 22)."""
+        ...
+
+    @property
+    def mass(self) -> float:
+        """[kg]."""
+        ...
+
+    def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
+        """Of all joints: (N, n), (N, n) -> (N, k), (N, k)."""
+        ...
+
+
+def tree_channels(tree: LinkRows, shapes: Array, rates: Array) -> Array | None:
+    """I^-1 (xx yy zz yz xz xy) and I^-1 L_o of a tree of links: (N, n), (N, n) -> (N, 9).
+
+    None where a tensor is nearly singular or a number is not finite: slower code finds what is wrong.
+    """
+    values, reliable = _sampled(tree, tree.rows[None], np.array([tree.mass]), shapes, rates, inverted=True)
+    return values[0] if reliable[0] else None
+
+
+def tree_inertia_and_momentum(tree: LinkRows, shapes: Array, rates: Array) -> tuple[Array, Array]:
+    """I and L_o about the centre of mass, axes of the base: (N, n), (N, n) -> (N, 3, 3), (N, 3)."""
+    (values,), _ = _sampled(tree, tree.rows[None], np.array([tree.mass]), shapes, rates, inverted=False)
+    return values[:, [0, 5, 4, 5, 1, 3, 4, 3, 2]].reshape(-1, 3, 3), values[:, 6:]
+
+
+def trees_channels(tree: LinkRows, rows: Array, masses: Array, shapes: Array, rates: Array) -> tuple[Array, Mask]:
+    """`tree_channels` of trees that differ from one in their masses, each as if alone, and which can be relied on.
+
+    Parameters
+    ----------
+    rows, masses : (V, k + 1, 22), (V,) as in `LinkRows`
+
+    Returns
+    -------
+    (V, N, 9), (V,)
+    """
+    return _sampled(tree, rows, masses, shapes, rates, inverted=True)
+
+
+def _sampled(
+    tree: LinkRows, rows: Array, masses: Array, shapes: Array, rates: Array, *, inverted: bool
+) -> tuple[Array, Mask]:
+    values, reliable = np.empty((len(rows), len(shapes), 9)), np.empty(len(rows), dtype=np.bool_)
+    coordinates, speeds = tree.coordinates(shapes, rates)
+    tree_kernel.sample_trees(
+        tree.parents, tree.turning, tree.leads, plain(rows).reshape(len(rows), -1), plain(masses), plain(coordinates),
+        plain(speeds), inverted, LANES, values, reliable,
+    )  # fmt: skip
+    return values, reliable
+
+
+def momentum_gradients(
+    tree: LinkRows,
+    shapes: Array,
+    rates: Array,
+    spins: Array,
+    rows: Array,
+    pieces: Integers,
+    powers: Array,
+    slopes: Array,
+    count: int,
+) -> Array:
+    """Sums over the shapes of row . d(I w + L_o), w fixed, by coefficients of polynomials of all joints.
+
+    Parameters
+    ----------
+    shapes, rates : (N, n)
+    spins, rows : (N, S, 3) w, and (N, S, r, 3), axes of the base
+    pieces, powers, slopes : (N,), (N, order), (N, order) which of `count` polynomials each shape is on, and the
+        derivatives of its coordinates and of their rates by the coefficients of this polynomial
+
+    Returns
+    -------
+    (order, count, S r, k), the followers among the k joints included
+    """
+    several, each = rows.shape[1:3]
+    coordinates, speeds = tree.coordinates(shapes, rates)
+    sums = np.empty((powers.shape[1], count, several * each * len(tree.parents)))
+    gradient_kernel.momentum_gradients(
+        tree.parents, tree.turning, tree.leads, plain(tree.rows).ravel(), tree.mass, plain(coordinates), plain(speeds),
+        plain(spins).reshape(len(rows), -1), plain(rows).reshape(len(rows), -1), several, LANES,
+        np.array(pieces, dtype=np.int64), plain(powers), plain(slopes), sums,
+    )  # fmt: skip
+    return sums.reshape(len(sums), count, several * each, -1)
+
+
+def inertial_sums(tree: LinkRows, shapes: Array, rates: Array, spins: Array, rows: Array) -> Array:
+    """Sums over the shapes of row . d(I w + L_o) by the parameters of each frame of the tree; arguments as above.
+
+    Returns
+    -------
+    (S r, k + 1, 10) by mass, first moment and inertia xx yy zz yz xz xy, axes of the frame
+    """
+    several, each = rows.shape[1:3]
+    coordinates, speeds = tree.coordinates(shapes, rates)
+    sums = np.empty((several * each, len(tree.rows), 10))
+    gradient_kernel.inertial_sums(
+        tree.parents, tree.turning, tree.leads, plain(tree.rows).ravel(), tree.mass, plain(coordinates), plain(speeds),
+        plain(spins).reshape(len(rows), -1), plain(rows).reshape(len(rows), -1), several, LANES, sums,
+    )  # fmt: skip
+    return sums
