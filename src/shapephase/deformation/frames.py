@@ -76,8 +76,7 @@ class GivenFrames:
     @property
     def panel_ends(self) -> Array:
         """Times between which U is a short series, found by a look at it: (P + 1,) [s]. Raises and warns as it."""
-        resolved = scanned(self.function, self.breaks).resolved
-        return np.append(resolved.left[resolved.leaves], self.breaks[-1])
+        return scanned(self.function, self.breaks).resolved.edges
 
 
 def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> GivenFrames:
@@ -177,9 +176,9 @@ def _differentiated(u: Callable[[Array], Any], breaks: Array) -> GivenFrames:
     """Rotations with their rates: the slopes of the series that a look at them finds."""
     function = _look_at_turns(u)
     scan = scanned(function, breaks)
-    resolved, rows = scan.resolved, scan.resolved.leaves
-    series = resolved.coefficients[rows, :, :9] / function.judge(breaks, np.zeros((1, 18)))[0][0]
-    half = 0.5 * (resolved.right - resolved.left)[rows]
+    edges = scan.resolved.edges
+    series = scan.resolved.coefficients[:, :, :9] / function.judge(breaks, np.zeros((1, 18)))[0][0]
+    half = 0.5 * np.diff(edges)
     norms = np.linalg.norm(series, axis=-1)
     fastest = max(1.0 / breaks[-1], float(np.max(norms[:, 1] / half)))
     # Coefficients that are rounding would only be magnified: a slope at the end of a series is the sum of its
@@ -191,12 +190,12 @@ def _differentiated(u: Callable[[Array], Any], breaks: Array) -> GivenFrames:
     doubt = degree**2 * last / half
     worst = int(np.argmax(doubt))
     if doubt[worst] > _RATE_DOUBT * fastest:
-        where = resolved.left[rows][worst] + half[worst]
+        where = edges[worst] + half[worst]
         raise GaugeError(
             f"U(t) is too rough near t = {where:.9g} s to be differentiated (its rate is "
             f"uncertain by {doubt[worst]:.3g} rad/s): return its body rates too"
         )
-    slopes = PiecewiseChebyshev(np.append(resolved.left[rows], breaks[-1]), series).derivative()
+    slopes = PiecewiseChebyshev(edges, series).derivative()
     return GivenFrames(_TurnsAlone(u, slopes), np.union1d(breaks, scan.found_breaks))
 
 

@@ -69,10 +69,8 @@ def exact_accelerations(curve: Curve, times: Array) -> Array | None:
 
 def resolved_accelerations(resolved: ResolvedPath, loops: int, times: Array) -> Array:
     """The same by the derivative of the series of the rates, of a path in loops from those of the first: (N, n)."""
-    rows = resolved.leaves
-    n_shape = resolved.coefficients.shape[2] // 2
-    edges = np.append(resolved.left[rows], resolved.right[rows[-1]])
-    rates = PiecewiseChebyshev(edges, _continuous(resolved.coefficients[rows][:, :, n_shape:], edges))
+    n_shape, edges = resolved.coefficients.shape[2] // 2, resolved.edges
+    rates = PiecewiseChebyshev(edges, _continuous(resolved.coefficients[:, :, n_shape:], edges))
     loop = np.minimum(np.floor(times / resolved.duration), loops - 1)
     return rates.derivative()(times - loop * resolved.duration)
 

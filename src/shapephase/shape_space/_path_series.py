@@ -57,8 +57,7 @@ def panel_edges(path: ShapePath, loops: int = 1) -> Array:
     breaks = np.append(own, period)
     scan = path.scan
     if scan is not None:
-        resolved = scan.resolved
-        edges = merged(merged(breaks, scan.found_breaks), resolved.left[resolved.leaves])
+        edges = merged(merged(breaks, scan.found_breaks), scan.resolved.left)
     else:
         edges = evenly_divided(breaks, max(1, ceil(path.oscillations or 0.0)))
     if loops == 1:
@@ -187,7 +186,7 @@ def _blocks(path: ShapePath) -> Iterator[tuple[Array, Array]]:
 
     scan = path.scan
     if scan is not None:
-        yield both(panel_edges(path)), scan.resolved.coefficients[scan.resolved.leaves]
+        yield both(panel_edges(path)), scan.resolved.coefficients
         return
     pieces = polynomial_pieces(path.curve)
     edges = panel_edges(path)

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from ..arrays import Array
 from ..integrator.limited_steps import StepLimits
 from ..integrator.recorded.knot_path import KnotPath
@@ -55,9 +53,8 @@ class Smoothness:
     def step_limits(self) -> StepLimits:
         """The longest steps of an integrator that evaluates the function itself: they step over no feature known."""
         if self.resolved is not None:
-            rows, loop = self.resolved.leaves, self.resolved.duration
-            edges = np.append(self.resolved.left[rows], loop)
-            return StepLimits.even(edges, _STEPS_OF_A_PANEL).repeated(round(self.breaks[-1] / loop))
+            loops = round(self.breaks[-1] / self.resolved.duration)
+            return StepLimits.even(self.resolved.edges, _STEPS_OF_A_PANEL).repeated(loops)
         if self.oscillations is None:
             return StepLimits.even(self.breaks[[0, -1]], 1.0)
         steps = _STEPS_OF_A_SWING * max(self.oscillations, 0.5)

@@ -1,4 +1,4 @@
-"""The panels of a path that is being resolved: their series, and the tree they make."""
+"""The panels of a function that is being resolved, and their series."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Array, Integers, Mask
 from ...chebyshev import inside
-from ...integrator.resolved import DEGREE, ResolvedPath
+from ...integrator.resolved import DEGREE
 
 # Samples of the whole path: with the jitter below no gap is above 1/4,000 of the duration.
 _SAMPLES = 5200
@@ -27,76 +27,58 @@ class Panels:
 
     left: Array
     right: Array
-    piece: Integers
-    node: Integers  # their rows in the tree of the piece
+    piece: Integers  # row of the piece that they are in
     before: Array  # (P, 2 n) misfit of what they are halves of
 
     def of(self, rows: Mask | Integers) -> Panels:
-        return Panels(self.left[rows], self.right[rows], self.piece[rows], self.node[rows], self.before[rows])
+        return Panels(self.left[rows], self.right[rows], self.piece[rows], self.before[rows])
+
+    def halves(self, misfit: Array) -> Panels:
+        """Return both halves of every panel; `misfit` (P, 2 n) is that of the panels."""
+        middle = 0.5 * (self.left + self.right)
+        left, right = np.column_stack([self.left, middle]).ravel(), np.column_stack([middle, self.right]).ravel()
+        return Panels(left, right, np.repeat(self.piece, 2), np.repeat(misfit, 2, axis=0))
 
 
 @dataclass(frozen=True, eq=False)
-class Looked:
-    """Panels at which was looked."""
+class PanelFit:
+    """Series on panels, and their errors."""
 
     coefficients: Array  # (P, DEGREE + 1, 2 n)
-    misfit: Array  # (P, 2 n) how far the path is from the series
+    misfit: Array  # (P, 2 n) how far the function is from the series
     floor: Array  # (P, 2 n) how far rounding and noise may bring it
     noise: Array  # (P,) [rad], where it is noise
 
 
 class Piece:
-    """What is between two breaks: its samples, and the tree of its panels."""
+    """What is between two breaks, and the kinks found in it."""
 
     def __init__(self, left: float, right: float) -> None:
         self.left, self.right = left, right
         first, last = inside(np.array([left]), np.array([right]))
         self.first, self.last = float(first[0]), float(last[0])
-        self.ends: list[tuple[float, float]] = []
-        self.coefficients: list[Array] = []
-        self.misfit: list[tuple[float, float]] = []
-        self.noise: list[float] = []
-        self.children: list[int] = []
-        self.roots: list[int] = []
         self.kinks: list[float] = []
 
-    def added(self, left: float, right: float) -> int:
-        self.ends.append((left, right))
-        self.misfit.append((0.0, 0.0))
-        self.noise.append(0.0)
-        self.children.append(-1)
-        self.coefficients.append(np.zeros(0))
-        return len(self.ends) - 1
 
+@dataclass(frozen=True, eq=False)
+class ResolvedPanels:
+    """Panels that are resolved."""
 
-def panels_of(rows: list[tuple[float, float, int, int]], before: Array) -> Panels:
-    left, right, piece, node = zip(*rows, strict=True) if rows else ((), (), (), ())
-    return Panels(
-        np.array(left), np.array(right), np.array(piece, dtype=np.int64), np.array(node, dtype=np.int64), before
-    )
+    left: Array
+    right: Array
+    piece: Integers  # row of their piece among those that were resolved with it
+    coefficients: Array  # (P, DEGREE + 1, 2 n)
+    noise: Array  # (P,) [rad], where the series follow noise
 
+    def of(self, rows: Mask | Integers) -> ResolvedPanels:
+        return ResolvedPanels(*(array[rows] for array in vars(self).values()))
 
-def resolved_path(pieces: list[Piece], duration: float, defect: float) -> ResolvedPath:
-    """The panels of all pieces, whose outermost ends are the breaks themselves."""
-    shifts = np.cumsum([0, *(len(piece.ends) for piece in pieces)])
-    ends = np.array([end for piece in pieces for end in piece.ends])
-    for piece, shift in zip(pieces, shifts, strict=False):
-        part = ends[shift : shift + len(piece.ends)]
-        part[:, 0][part[:, 0] == piece.first] = piece.left
-        part[:, 1][part[:, 1] == piece.last] = piece.right
-    numbered = list(zip(pieces, shifts, strict=False))
-    children = [row + shift if row >= 0 else -1 for piece, shift in numbered for row in piece.children]
-    return ResolvedPath(
-        left=ends[:, 0],
-        right=ends[:, 1],
-        coefficients=np.stack([series for piece in pieces for series in piece.coefficients]),
-        misfit=np.array([misfit for piece in pieces for misfit in piece.misfit]),
-        noise=np.array([noise for piece in pieces for noise in piece.noise]),
-        children=np.array(children, dtype=np.int64),
-        roots=np.array([row + shift for piece, shift in numbered for row in piece.roots]),
-        duration=duration,
-        defect=defect,
-    )
+    @staticmethod
+    def in_order(parts: list[ResolvedPanels]) -> ResolvedPanels:
+        """Return all of them, in the order of time."""
+        fields = zip(*(vars(part).values() for part in parts), strict=True)
+        panels = ResolvedPanels(*(np.concatenate(arrays) for arrays in fields))
+        return panels.of(np.argsort(panels.left))
 
 
 def sample_times(first: float, last: float, duration: float) -> Array:

@@ -157,7 +157,7 @@ class FunctionScan:
     @property
     def panels(self) -> int:
         """How many panels resolve the function to rounding."""
-        return len(self.resolved.leaves)
+        return len(self.resolved.left)
 
     @property
     def rate_defect(self) -> float:

@@ -13,22 +13,21 @@ from itertools import pairwise
 import numpy as np
 
 from ... import run_progress
-from ...arrays import Array, Mask
+from ...arrays import Array, Integers, Mask
 from ...chebyshev import derivative_matrix, nodes_on, unit_nodes
 from ...errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
-from ...integrator.resolved import DEGREE
+from ...integrator.resolved import DEGREE, ResolvedPath
 from ..curves import CLOSED
 from ._kink_location import located_kink
 from ._scan_panels import (
     CHECKS,
-    Looked,
+    PanelFit,
     Panels,
     Piece,
+    ResolvedPanels,
     check_matrix,
     integral_matrix,
-    panels_of,
     polynomials,
-    resolved_path,
     sample_times,
     transform,
 )
@@ -137,23 +136,29 @@ class _Scan:
         of_rates = np.where(self._function.paired, self._largest[:n] / self._duration, self._largest[n:])
         self._inner_sizes = np.concatenate([self._largest[:n], of_rates])
         done: list[Piece] = []
+        parts: list[ResolvedPanels] = []
         while pieces:
-            self._resolve(pieces, first, values)
+            parts.append(self._resolve(pieces, first, values))
             done += [piece for piece in pieces if not piece.kinks]
             pieces = [part for piece in pieces if piece.kinks for part in self._parts(piece)]
             if pieces:
                 first = self._first_panels(pieces, _FIRST_PANELS[1])
                 values = None
         done.sort(key=lambda piece: piece.left)
-        self._find_corners(done)
-        self._check_jumps(done)
-        resolved = resolved_path(done, self._duration, self._checked_rates(done))
+        panels = ResolvedPanels.in_order(parts)
+        starts = np.searchsorted(panels.left, [piece.first for piece in done])
+        self._find_corners(panels, starts)
+        self._check_jumps(done, panels, starts)
+        defect = self._checked_rates(panels)
+        # The outermost ends of a piece are the breaks themselves.
+        edges = np.append(panels.left, self._duration)
+        edges[starts] = [piece.left for piece in done]
         found = np.array(sorted(self._found))
         kinks = np.array([time for time in found if time not in self._turned])
         if len(kinks):
             self._warn(kinks)
         return FunctionScan(
-            resolved=resolved,
+            resolved=ResolvedPath(edges[:-1], edges[1:], panels.coefficients, panels.noise, self._duration, defect),
             found_breaks=found,
             evaluations=self._evaluations,
             calls=self._calls,
@@ -170,24 +175,22 @@ class _Scan:
         return both
 
     def _first_panels(self, pieces: list[Piece], count: int) -> Panels:
-        rows: list[tuple[float, float, int, int]] = []
-        for number, piece in enumerate(pieces):
-            edges = np.linspace(piece.first, piece.last, count + 1)
-            for a, b in pairwise(edges):
-                piece.roots.append(piece.added(float(a), float(b)))
-                rows.append((float(a), float(b), number, piece.roots[-1]))
-        return panels_of(rows, np.full((len(rows), 1), np.inf))
+        edges = np.array([np.linspace(piece.first, piece.last, count + 1) for piece in pieces])
+        number = np.repeat(np.arange(len(pieces)), count)
+        return Panels(edges[:, :-1].ravel(), edges[:, 1:].ravel(), number, np.full((len(number), 1), np.inf))
 
     # ---- Halving ----
 
-    def _resolve(self, pieces: list[Piece], panels: Panels, values: Array | None) -> None:
-        """Halve panels until all are resolved, or hold kinks that were located."""
+    def _resolve(self, pieces: list[Piece], panels: Panels, values: Array | None) -> ResolvedPanels:
+        """Halve panels until all are resolved, or hold kinks that were located: those of pieces without kinks."""
+        done: list[ResolvedPanels] = []
         level = resolved = 0
         while len(panels.left):
-            looked = self._look(panels, values)
-            values, misfit, floor = None, looked.misfit, looked.floor
+            fit = self._fit(panels, values)
+            values, misfit, floor = None, fit.misfit, fit.floor
             good: Mask = np.all(misfit <= floor, axis=1)
-            self._note(pieces, panels, looked, good)
+            ends = panels.left[good], panels.right[good]
+            done.append(ResolvedPanels(*ends, panels.piece[good], fit.coefficients[good], fit.noise[good]))
             resolved += int(good.sum())
             bad, rounding = panels.of(~good), floor[~good]
             if len(bad.left) + resolved > self._most_panels:
@@ -197,23 +200,13 @@ class _Scan:
             narrow = bad.right - bad.left < _LEAST_WIDTH * self._duration
             if narrow.any():
                 raise self._too_rough(float(bad.left[narrow][0]))
-            panels = self._halves(pieces, bad, left_over)
+            panels = bad.halves(left_over)
             level += 1
+        has_kinks = np.array([bool(piece.kinks) for piece in pieces])
+        found = ResolvedPanels.in_order(done)
+        return found.of(~has_kinks[found.piece])
 
-    def _note(self, pieces: list[Piece], panels: Panels, looked: Looked, good: Mask) -> None:
-        """Enter what was found of panels in the trees of their pieces."""
-        n, half = self._n, 0.5 * (panels.right - panels.left)
-        shapes = looked.misfit[:, :n].max(axis=1, initial=0.0)
-        rates = half * looked.misfit[:, n:].max(axis=1, initial=0.0)
-        for row, (number, node) in enumerate(zip(panels.piece, panels.node, strict=True)):
-            piece = pieces[number]
-            piece.coefficients[node] = looked.coefficients[row]
-            if good[row]:
-                piece.noise[node] = float(looked.noise[row])
-            else:
-                piece.misfit[node] = float(shapes[row]), float(rates[row])
-
-    def _look(self, panels: Panels, values: Array | None) -> Looked:
+    def _fit(self, panels: Panels, values: Array | None) -> PanelFit:
         """Series of panels, and how far the path is from them."""
         left, right = panels.left, panels.right
         count = len(left)
@@ -253,7 +246,7 @@ class _Scan:
         widths = np.where(np.arange(len(inner)) < self._n, 1.0, 0.5 * (right - left)[:, None])
         inner = inner + _INNER_STEPS / widths
         inner = np.where(misfit > _STUBBORN * panels.before, inner, 0.0)
-        return Looked(coefficients, misfit, np.maximum(np.maximum(floor, inner), _NOISE_MARGIN * scatter), noise)
+        return PanelFit(coefficients, misfit, np.maximum(np.maximum(floor, inner), _NOISE_MARGIN * scatter), noise)
 
     def _floor(self, values: Array, width: Array) -> Array:
         """What rounding of numbers and of times leaves of the columns on panels: (P, k, 2 n) -> (P, 2 n)."""
@@ -262,17 +255,6 @@ class _Scan:
         slopes = np.ptp(values, axis=1) / width[:, None]
         slopes[:, :n] = np.where(self._function.paired, largest[:, n:], slopes[:, :n])
         return _ROUNDING * largest + _TIME_ROUNDING * (self._tick * slopes + _EPS * self._inner_sizes)
-
-    @staticmethod
-    def _halves(pieces: list[Piece], panels: Panels, misfit: Array) -> Panels:
-        rows: list[tuple[float, float, int, int]] = []
-        for left, right, number, node in zip(panels.left, panels.right, panels.piece, panels.node, strict=True):
-            middle = 0.5 * (left + right)
-            piece = pieces[number]
-            piece.children[node] = piece.added(left, middle)
-            piece.added(middle, right)
-            rows += [(left, middle, number, piece.children[node]), (middle, right, number, piece.children[node] + 1)]
-        return panels_of(rows, np.repeat(misfit, 2, axis=0))
 
     # ---- Kinks, jumps, noise, roughness ----
 
@@ -295,27 +277,26 @@ class _Scan:
         self._found += piece.kinks
         return [Piece(a, b) for a, b in pairwise([piece.left, *sorted(piece.kinks), piece.right])]
 
-    def _find_corners(self, pieces: list[Piece]) -> None:
+    def _find_corners(self, panels: ResolvedPanels, starts: Integers) -> None:
         """Note kinks of values without rates that are at an end of a panel by chance: the slopes there tell."""
         alone = ~self._function.paired
         if not alone.any():
             return
-        for piece in pieces:
-            rows = sorted((piece.ends[k], k) for k, first in enumerate(piece.children) if first < 0)
-            half = 0.5 * np.array([end[1] - end[0] for end, _ in rows])[:, None]
-            series = np.stack([piece.coefficients[k] for _, k in rows])[:, :, : self._n][:, :, alone]
-            at_end = np.einsum("k,pkn->pn", _END_SLOPES, series) / half
-            signs = np.where(np.arange(DEGREE + 1) % 2, 1.0, -1.0)
-            at_start = np.einsum("k,pkn->pn", signs * _END_SLOPES, series) / half
-            last = np.abs(series[:, -3:]).max(axis=1)
-            rounding = _SLOPE_ROUNDING * self._largest[: self._n][alone]
-            uncertain = _END_SLOPES[-1] * (_SLOPE_MARGIN * last + rounding) / half
-            bends = np.abs(at_start[1:] - at_end[:-1])
-            sizes = np.abs(at_end).max(axis=0, initial=0.0)
-            corner = bends > uncertain[1:] + uncertain[:-1] + _LEAST_CORNER * sizes
-            self._found += [rows[k + 1][0][0] for k in np.flatnonzero(corner.any(axis=1))]
+        half = 0.5 * (panels.right - panels.left)[:, None]
+        series = panels.coefficients[:, :, : self._n][:, :, alone]
+        at_end = np.einsum("k,pkn->pn", _END_SLOPES, series) / half
+        signs = np.where(np.arange(DEGREE + 1) % 2, 1.0, -1.0)
+        at_start = np.einsum("k,pkn->pn", signs * _END_SLOPES, series) / half
+        last = np.abs(series[:, -3:]).max(axis=1)
+        rounding = _SLOPE_ROUNDING * self._largest[: self._n][alone]
+        uncertain = _END_SLOPES[-1] * (_SLOPE_MARGIN * last + rounding) / half
+        sizes = np.repeat(np.maximum.reduceat(np.abs(at_end), starts), np.diff([*starts, len(half)]), axis=0)
+        after = np.setdiff1d(np.arange(len(half)), starts)
+        bends = np.abs(at_start[after] - at_end[after - 1])
+        corner = bends > uncertain[after] + uncertain[after - 1] + _LEAST_CORNER * sizes[after]
+        self._found += panels.left[after][corner.any(axis=1)].tolist()
 
-    def _check_jumps(self, pieces: list[Piece]) -> None:
+    def _check_jumps(self, pieces: list[Piece], panels: ResolvedPanels, starts: Integers) -> None:
         """Raise TrajectoryError where a value jumps at a break; an angle that goes on at another turn does not."""
         if len(pieces) < 2:
             return
@@ -338,18 +319,13 @@ class _Scan:
                 f"{function.subject} jumps: {function.columns[column]} goes from {first[row, column] / weight:.9g} to "
                 f"{second[row, column] / weight:.9g} at {pieces[row].right:.12g} s; {function.words.continuous}"
             )
-        self._note_uncertain_times(pieces, np.abs(second - first)[:, n:].max(axis=1, initial=0.0) * found)
-        rate_jumps = np.abs(second - first)[:, n:] > CLOSED * np.maximum(1.0, self._largest[n:])
+        rate_jumps = np.abs(second - first)[:, n:]
+        # A kink is known to a rounding or two of the times: what a value may be off by there counts as noise.
+        panels.noise[starts[1:] - 1] += _KINK_TICKS * self._tick * rate_jumps.max(axis=1, initial=0.0) * found
+        has_jump = rate_jumps > CLOSED * np.maximum(1.0, self._largest[n:])
         self._turned = {
-            piece.right for row, piece in enumerate(pieces[:-1]) if turns[row].any() and not rate_jumps[row].any()
+            piece.right for row, piece in enumerate(pieces[:-1]) if turns[row].any() and not has_jump[row].any()
         }
-
-    def _note_uncertain_times(self, pieces: list[Piece], rate_jumps: Array) -> None:
-        """A kink is known to a rounding or two of the times: what a value may be off by there counts as noise."""
-        for piece, jump in zip(pieces, rate_jumps, strict=False):
-            for node, (_, right) in enumerate(piece.ends):
-                if right == piece.last:
-                    piece.noise[node] += _KINK_TICKS * self._tick * float(jump)
 
     def _scatter(self, values: Array) -> Array:
         """How far values scatter over times so near to each other that no function changes: (P, k, 2 n) -> (P, 2 n).
@@ -384,14 +360,11 @@ class _Scan:
             "resolve it; declare the times of its jumps as breaks, or smooth the data"
         )
 
-    def _checked_rates(self, pieces: list[Piece]) -> float:
+    def _checked_rates(self, panels: ResolvedPanels) -> float:
         """Compare the integral of each rate on each panel with its value: the sum of the differences above rounding."""
         if not self._function.paired.any():
             return 0.0
-        rows = [(piece, node) for piece in pieces for node, first in enumerate(piece.children) if first < 0]
-        series = np.stack([piece.coefficients[node] for piece, node in rows])
-        left, right = np.array([piece.ends[node] for piece, node in rows]).T
-        n, half = self._n, 0.5 * (right - left)
+        n, series, half = self._n, panels.coefficients, 0.5 * (panels.right - panels.left)
         integrals = half[:, None, None] * (integral_matrix() @ series[:, :, n:])
         apart = np.abs(integrals[:, 1:-1] - series[:, 1:, :n]).max(axis=1, initial=0.0)
         apart *= self._function.paired
@@ -405,7 +378,7 @@ class _Scan:
             rates = basis @ series[panel, :, n + column]
             # The ends of a differentiated series are its least certain part.
             place = 3 + int(np.argmax(np.abs(slopes - rates)[3:-3]))
-            where = nodes_on(left[panel : panel + 1], right[panel : panel + 1], DEGREE)[0, place]
+            where = nodes_on(panels.left[[panel]], panels.right[[panel]], DEGREE)[0, place]
             weight, words = self._weights[column], self._function.words
             raise TrajectoryError(
                 f"{self._function.subject} gives the {words.rate} {rates[place] / weight:.9g} of "
