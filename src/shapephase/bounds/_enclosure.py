@@ -195,9 +195,7 @@ def enclosure(
     Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
     """
     start, end = interval_argument(interval, deformation.duration)
-    sampler = deformation.sampler(pointwise=True)
-    sampler.refine(magnitude or 1.0, tolerance)
-    sampled = sampler.interpolant()
+    sampled = deformation.sampler().samples(magnitude or 1.0, tolerance).interpolant
     error = _sampling_error(deformation, sampled)
     edges, coefficients = _within(sampled, start, end)
     frame, coefficients = _in_best_frame(edges, coefficients)

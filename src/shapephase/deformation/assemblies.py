@@ -19,7 +19,7 @@ from ..letters import what_came
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import CLOSED, ShapePath
-from ..shape_space.smoothness import Smoothness
+from ..integrator.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over
 from ._scanned_functions import least_moment
 from .assembly_parts import Boom, Moments, MovingMass, Part, RigidPart
@@ -49,7 +49,7 @@ class AssemblyDescription(UngaugedDescription):
     parts : each with its moments
     origin : (3,) a point near the common centre of mass; sums are taken about it, which saves digits
     breaks : (M,) that were declared [s]
-    oscillations, loops, smooth_loop, sparse : as `Smoothness` has them
+    oscillations, loops, smooth_loop : as `Smoothness` has them
     """
 
     parts: tuple[Part, ...]
@@ -58,7 +58,6 @@ class AssemblyDescription(UngaugedDescription):
     oscillations: float | None
     loops: int
     smooth_loop: bool
-    sparse: bool
 
     @property
     def mass(self) -> float:
@@ -148,7 +147,6 @@ class AssemblyDescription(UngaugedDescription):
             oscillations=self.oscillations,
             loops=self.loops,
             smooth_loop=self.smooth_loop,
-            sparse=self.sparse,
             resolved=scan.resolved if scan is not None else None,
         )
 
@@ -325,7 +323,6 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
         oscillations=known,
         loops=count,
         smooth_loop=all(path.smooth_loop for path in paths),
-        sparse=not together or any(path.sparse for path in paths),
     )
     description = replace(about_zero, origin=about_zero.centre_of_mass(np.zeros(1))[0])
     check_never_on_a_line(description.moment, breaks)

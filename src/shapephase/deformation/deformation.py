@@ -28,7 +28,7 @@ from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
 from ..integrator.limited_steps import StepLimits
-from ..integrator.sampling import Sampler, Samplers
+from ..integrator.sampling import Sampler
 from ..letters import what_came
 from ..shape_space.body_path import path_gap
 from ..shape_space.family_variants import FamilyVariants
@@ -201,23 +201,13 @@ class Deformation:
         least, when = least_over(lambda t: -triangle_defect(self.description.sample(t)[0]), self.breaks)
         return -least, when
 
-    def sampler(self, *, pointwise: bool = False) -> Sampler:
-        """A fresh sampler for the integrator, of the kind that suits what the description says of itself.
-
-        Along a recorded path panels span several knots, so that attitudes are right, but I^-1 and I^-1 L_o at a single
-        time only to the tolerance over the width of a panel. `pointwise`: no panel spans a knot.
+    def sampler(self) -> Sampler:
+        """A fresh sampler for the integrator.
 
         Raises SingularInertiaError for particles that are on one line at some time.
         """
-        return self.samplers(pointwise=pointwise).fresh()
-
-    def samplers(self, *, pointwise: bool = False) -> Samplers:
-        """Fresh samplers that share what they find out, for many motions of this deformation. As `sampler`."""
         known = self.description
-        smoothness = known.smoothness(self.breaks)
-        if pointwise:
-            smoothness = replace(smoothness, knots=None)
-        return Samplers(known.sample, **vars(smoothness), directly=known.channels)
+        return Sampler(known.sample, known.smoothness(self.breaks), known.channels)
 
     def step_limits(self) -> StepLimits:
         """The longest steps of an integrator that evaluates the deformation itself, in any gauge."""

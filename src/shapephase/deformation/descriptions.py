@@ -19,11 +19,11 @@ from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coeffi
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
-from ..shape_space.body_path import channels_along, recorded_path
+from ..shape_space.body_path import channels_along
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import ShapePath
-from ..shape_space.smoothness import Smoothness
+from ..integrator.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 from ._scanned_functions import inertia_and_momentum, positions_and_velocities
 
@@ -177,11 +177,7 @@ class ArticulatedDescription(UngaugedDescription):
         return self.body.link_pose(shapes, link)[:, :3, :3], self.body.link_angular_velocity(shapes, rates, link)
 
     def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
-        return self._smoothness
-
-    @cached_property
-    def _smoothness(self) -> Smoothness:
-        return replace(self.path.smoothness, knots=recorded_path(self.body, self.path))
+        return self.path.smoothness
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled: what was found out about the path is found out again."""

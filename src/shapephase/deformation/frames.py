@@ -21,7 +21,8 @@ from ..display import short_repr
 from ..errors import GaugeError, ShapeError, unknown_name
 from ..integrator.integrate import stepped_rotation
 from ..integrator.resolved import DEGREE
-from ..integrator.sampling import sampler
+from ..integrator.sampling import Sampler
+from ..integrator.smoothness import Smoothness
 from ..integrator.stepped import SteppedRotation
 from ..letters import what_came
 from ..shape_space.scan.function_scan import ScannedFunction
@@ -212,7 +213,7 @@ def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start:
         raise ShapeError(f"start: one rotation (3, 3) is needed, got {first.shape}")
     scan = scanned(_look_at_rates(rates), breaks)
     edges = np.union1d(breaks, scan.found_breaks)
-    turned = stepped_rotation(sampler(unit_body, edges, resolved=scan.resolved), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    turned = stepped_rotation(Sampler(unit_body, Smoothness(edges, resolved=scan.resolved)), np.zeros((1, 3)), _LIFT_TOLERANCE)
     return GivenFrames(_TurnsOfRates(rates, first, turned), edges)
 
 

@@ -25,7 +25,7 @@ from ..integrator.lift import lift_along
 from ..integrator.resolved import joined
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, side_by_side
 from ..shape_space.scan.scanning import scanned
-from ..shape_space.smoothness import Smoothness
+from ..integrator.smoothness import Smoothness
 from .deformation import Deformation
 from .descriptions import Description
 from .frames import (

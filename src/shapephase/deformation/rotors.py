@@ -17,7 +17,7 @@ from ..errors import ShapeError, TrajectoryError, unknown_name
 from ..shape_space.curves import Widened
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function
 from ..shape_space.shape_path import ShapePath
-from ..shape_space.smoothness import Smoothness
+from ..integrator.smoothness import Smoothness
 from .descriptions import UngaugedDescription
 
 # Of the inertia of a wheel, and of its radius of gyration: a wheel in a file is round to the digits that it has.
@@ -151,7 +151,7 @@ class RotorDescription(UngaugedDescription):
 
     def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
         """As `Description`."""
-        return replace(self.route.smoothness, knots=None)
+        return self.route.smoothness
 
     def _axle(self, rotor: Rotor, shapes: Array, rates: Array) -> tuple[Array, Array]:
         """The axle, and how its carrier turns as seen from the base: (N, 3), (N, 3), base axes."""

@@ -20,7 +20,7 @@ from ..deformation.rotors import widened_path
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.forced.driven_attitude import DrivenAttitude, driven_attitude
+from ..integrator.driven_attitude import DrivenAttitude, driven_attitude
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import PiecewisePolynomial

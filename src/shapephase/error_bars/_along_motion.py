@@ -17,8 +17,6 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ..integrator.fast import engine
-from ..integrator.fast.nodes import rotations_within_steps
 from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
@@ -84,8 +82,8 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
     stepped, start = one_rotation(motion), motion.initial_attitude
     shapes, rates = path.curve(times)
     inverse, drift = stepped.inverse_and_drift(times)
-    attitudes = start @ rotations(stepped, times)
-    lifted = start @ rotations(motion.horizontal_lift, times)
+    attitudes = start @ stepped.rotation(times)[0]
+    lifted = start @ motion.horizontal_lift.rotation(times)[0]
     by_turning = so3.hat(motion.momentum) @ attitudes @ inverse @ so3.transpose(attitudes)
     adjoint, at_start = _adjoint(by_turning.reshape(len(widths), _NODES, 3, 3), widths)
     return AlongMotion(
@@ -130,25 +128,6 @@ def _last_polynomials() -> Array:
     return np.asarray(((2.0 * orders + 1.0) * values).T * shares, dtype=np.float64)
 
 
-def rotations(stepped: SteppedRotation, times: Array) -> Array:
-    """S(t) of one motion at ascending times: (N,) -> (N, 3, 3)."""
-    if not engine.is_ready():
-        return stepped.rotation(times)[0]
-    ends, steps = stepped.times, stepped.steps
-    index = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 2)
-    quaternions = rotations_within_steps(
-        np.diff(stepped.interpolant.edges[: len(steps) + 1]),
-        stepped.interpolant.coefficients,
-        steps,
-        index,
-        (times - ends[index]) / (ends[index + 1] - ends[index]),
-        stepped.quaternions[0],
-        stepped.directions[0],
-        float(np.linalg.norm(stepped.momentum[0])),
-    )
-    return so3.matrix_from_quat(quaternions)
-
-
 def one_rotation(motion: Motion) -> SteppedRotation:
     """The steps of a motion that is no batch."""
     stepped = motion.stepped
@@ -167,7 +146,7 @@ def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
     widths = np.diff(edges)
     at = (edges[:-1, None] + widths[:, None] * nodes).ravel()
     inverse, _ = stepped.inverse_and_drift(at)
-    attitudes = motion.initial_attitude @ rotations(stepped, at)
+    attitudes = motion.initial_attitude @ stepped.rotation(at)[0]
     turning = attitudes @ inverse @ so3.transpose(attitudes)
     scaled = widths[:, None, None, None] * turning.reshape(len(widths), _NODES, 3, 3)
     slopes = scaled @ so3.hat(motion.momentum)

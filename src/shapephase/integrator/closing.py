@@ -2,36 +2,34 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import so3, sphere
 from ..arrays import Array, Integers
-from .fast import closing, engine
-from .fast.closing import ClosedCurves
+
+
+class ClosedCurves(NamedTuple):
+    """Of B curves, each closed by the great circle from its end to its start."""
+
+    area: Array  # (B,) of the polygon of the corners, counted from the region opposite the reference [sr]
+    closing: Array  # (B,) what the closing arc has of it [sr]
+    tilt: Array  # (B, 3, 3) transport along the closing arc, inertial axes
+    gap: Array  # (B,) angle between the ends [rad]
+    turn: Array  # (B,) about the axis, from the tilt to the turn of the attitude, in (-pi, pi] [rad]
 
 
 def closed_curves(corners: Array, references: Array, axes: Array, first: Array, last: Array) -> ClosedCurves:
-    """As `fast.closing.closed_curves`."""
-    find = closing.closed_curves if engine.is_ready() else _closed_curves
-    return find(corners, references, axes, first, last)
+    """Close them.
 
-
-def far_references(curves: Array) -> Array:
-    """`sphere.far_reference` of each of some curves: (B, N, 3) -> (B, 3)."""
-    if engine.is_ready():
-        return sphere.REFERENCES[closing.far_references(curves, _rows_of_references())]
-    return np.array(list(map(sphere.far_reference, curves)))
-
-
-@lru_cache(maxsize=1)
-def _rows_of_references() -> Array:
-    """(3, R)."""
-    return np.ascontiguousarray(sphere.REFERENCES.T)
-
-
-def _closed_curves(corners: Array, references: Array, axes: Array, first: Array, last: Array) -> ClosedCurves:
+    Parameters
+    ----------
+    corners : (B, K + 1, 3) of the curves
+    references : (B, 3)
+    axes : (B, 3) of the momenta, inertial axes
+    first, last : (B, 3, 3) attitudes of the gauge's frame at both ends
+    """
     departing, arriving = corners[:, 0], corners[:, -1]
     arcs = sphere.arc_areas(corners, references)
     tilt = first @ so3.between(arriving, departing) @ so3.transpose(first)
@@ -42,6 +40,11 @@ def _closed_curves(corners: Array, references: Array, axes: Array, first: Array,
         gap=so3.angle_between(departing, arriving),
         turn=so3.angle_about(last @ so3.transpose(first) @ so3.transpose(tilt), axes),
     )
+
+
+def far_references(curves: Array) -> Array:
+    """`sphere.far_reference` of each of some curves: (B, N, 3) -> (B, 3)."""
+    return np.array([sphere.far_reference(curve) for curve in curves]).reshape(-1, 3)
 
 
 def areas_back(references: Array, ends: Array, starts: Array) -> Array:

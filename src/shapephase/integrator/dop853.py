@@ -8,8 +8,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._spectral_error import Evaluate
-from .forced.driven_attitude import DrivenAttitude, driven_attitude
+from .channels import Evaluate
+from .driven_attitude import DrivenAttitude, driven_attitude
 from .limited_steps import StepLimits
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
-from ._spectral_error import spectral_norms
+from .channels import rates_of
 from .interpolant import Interpolant
 
 # Terms of series for each fresh time: 8 % of the evaluations at most.
@@ -42,19 +42,17 @@ def swings(gaps: Array, coefficients: Array, widths: Array, momentum: float) -> 
     """
     is_term = np.abs(coefficients).max(axis=-1) > 0.0
     degrees = is_term.shape[-1] - 1 - np.argmax(is_term[..., ::-1], axis=-1)
-    rates = spectral_norms(gaps.reshape(-1, 1, 9)).reshape(*gaps.shape[:-1], 2) @ np.array([momentum, 1.0])
-    return rates * widths / np.maximum(degrees, 1)
+    return rates_of(gaps, momentum) * widths / np.maximum(degrees, 1)
 
 
-def compare(interpolant: Interpolant, body: Array, joined: Integers, momentum: float, tolerance: float) -> None:
-    """Compare an interpolant with the body at its fresh times, and neighbours with each other at common samples.
+def compare(interpolant: Interpolant, body: Array, momentum: float, tolerance: float) -> None:
+    """Compare an interpolant with the body at its fresh times.
 
     Series within their estimates are off by swings of at most a third of the tolerance.
 
     Parameters
     ----------
     body : (N, 9) its channels at `fresh_times`
-    joined : (J,) panels that have the sample at their right end in common with the next one
     momentum : magnitude of the largest [kg m^2/s]
     tolerance : of the attitude over all loops [rad]
 
@@ -65,14 +63,7 @@ def compare(interpolant: Interpolant, body: Array, joined: Integers, momentum: f
     """
     times, chosen = fresh_times(interpolant)
     gaps = interpolant.channels(times[:, None], chosen)[:, 0] - body
-    if len(joined):
-        series = interpolant.coefficients
-        signs = np.where(np.arange(series.shape[1]) % 2 == 0, 1.0, -1.0)
-        jumps = series.sum(axis=1)[joined] - np.einsum("j,ijk->ik", signs, series)[joined + 1]
-        times, chosen = np.append(times, interpolant.edges[joined + 1]), np.append(chosen, joined)
-        gaps = np.concatenate([gaps, jumps])
-    series, widths = interpolant.coefficients[chosen], interpolant.widths[chosen]
-    angles = interpolant.loops * swings(gaps, series, widths, momentum)
+    angles = interpolant.loops * swings(gaps, interpolant.coefficients[chosen], interpolant.widths[chosen], momentum)
     worst = int(np.argmax(angles))
     if not angles[worst] <= tolerance:
         raise AccuracyNotReached(

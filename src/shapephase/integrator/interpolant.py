@@ -25,9 +25,6 @@ class Interpolant:
         the P panels of the first loop serve every loop
     loops : how often the panels are repeated
     evaluations : how many times the deformation was evaluated
-    band : degree beyond which errors of the samples fade from the series, as those of a Fourier series do; None: they
-        do not
-    sampled : (P / 2, m, 9) the series whose panels are cut in halves here; None: they are as they were sampled
     widths : (P,) of the panels of one loop [s]
 
     Examples
@@ -41,8 +38,6 @@ class Interpolant:
     coefficients: Array
     loops: int
     evaluations: int
-    band: int | None = None
-    sampled: Array | None = None
     widths: Array = field(init=False)
 
     __repr__ = short_repr

@@ -12,11 +12,11 @@ from .. import so3
 from ..arrays import Array, Integers, lock_arrays, read_only
 from ..chebyshev import inside, nodes_on, values_to_coefficients
 from ..display import short_repr
-from ._last_terms import Perturbed
 from .interpolant import Interpolant
+from .integrate import committed_rounding
+from .marches import largest_angle, marched, small_turns
+from .sampling import Perturbed
 from .stepped import SteppedRotation
-from .steps.error_propagator import growth_and_rounding
-from .steps.step_loop import largest_angle, quaternions_alone
 
 # Of the motion's error estimate: what the steps of its lift are to err by at most.
 _SHARE = 0.1
@@ -68,7 +68,7 @@ class Lift:
     def turns(self) -> Array:
         """As of `error_turns`, at the ends of the motion's steps: (2, 1, K + 1, 3)."""
         ends = self.ends
-        other = quaternions_alone(self.interpolant, self.perturbed.coefficients, self.steps)
+        other = _alone(self.interpolant, self.perturbed.coefficients, self.steps)
         better = np.stack([self.finer[:, 2 * ends], other[:, ends]])
         return read_only(small_turns(self.quaternions[:, ends], better))
 
@@ -79,7 +79,6 @@ class Lift:
         if _is_at_rest(motion) and self.is_without_wheels:
             return motion
         stepping, sampling = np.sqrt(np.einsum("sbki,sbki->sbk", self.turns, self.turns).max(axis=-1))
-        growth, rounding = growth_and_rounding(np.empty((1, 0, 3, 3)), quaternions, _tolerance(motion))
         nothing = np.zeros((1, quaternions.shape[1] - 1))
         return SteppedRotation(
             interpolant=self.interpolant,
@@ -91,8 +90,8 @@ class Lift:
             dynamics=nothing,
             sampling_error=self.perturbed.hidden + sampling,
             stepping_error=_SAFETY_FACTOR * stepping,
-            rounding_error=rounding,
-            amplification=growth,
+            rounding_error=committed_rounding(quaternions),
+            amplification=np.ones(1),
             perturbed=self.perturbed,
         )
 
@@ -116,21 +115,26 @@ def lift_along(rotation: SteppedRotation, wheels: Callable[[Array], Array] | Non
     interpolant, perturbed = rotation.interpolant, rotation.perturbed
     if wheels is not None:
         by_wheels = _drift_by(wheels, interpolant)
-        interpolant = replace(interpolant, coefficients=_less(interpolant.coefficients, by_wheels), sampled=None)
-        perturbed = Perturbed.known(_less(perturbed.coefficients, by_wheels), perturbed.hidden)
+        interpolant = replace(interpolant, coefficients=_less(interpolant.coefficients, by_wheels))
+        perturbed = Perturbed(_less(perturbed.coefficients, by_wheels), perturbed.hidden)
     series = interpolant.coefficients
     at_rest, times_finer = _is_at_rest(rotation), 1
     own = at_rest and wheels is None
-    quaternions = rotation.quaternions[:1] if own else quaternions_alone(interpolant, series, rotation.steps)
-    finer = quaternions_alone(interpolant, series, 2 * rotation.steps)
+    quaternions = rotation.quaternions[:1] if own else _alone(interpolant, series, rotation.steps)
+    finer = _alone(interpolant, series, 2 * rotation.steps)
     tolerance = np.inf if own else _tolerance(rotation)
     for _ in range(_MOST_HALVINGS):
         if _SAFETY_FACTOR * float(largest_angle(quaternions, finer[:, ::2])[0]) <= tolerance:
             break
         times_finer *= 2
-        quaternions, finer = finer, quaternions_alone(interpolant, series, 2 * times_finer * rotation.steps)
+        quaternions, finer = finer, _alone(interpolant, series, 2 * times_finer * rotation.steps)
     ends = times_finer * np.arange(rotation.quaternions.shape[1])
     return Lift(rotation, interpolant, perturbed, times_finer * rotation.steps, quaternions, finer, ends)
+
+
+def _alone(interpolant: Interpolant, series: Array, steps: Integers) -> Array:
+    """Attitudes by the shape alone: (1, K + 1, 4)."""
+    return marched(interpolant, series, steps, np.zeros((1, 3)))
 
 
 def _drift_by(wheels: Callable[[Array], Array], interpolant: Interpolant) -> Array:
@@ -169,21 +173,7 @@ def error_turns(rotation: SteppedRotation, lift: Lift) -> Array:
     if _is_at_rest(rotation):
         return np.broadcast_to(lift.turns, (2, len(rotation.momentum), *lift.turns.shape[2:]))
     interpolant, perturbed = rotation.interpolant, rotation.perturbed
-    starts = rotation.directions[:, 0], np.linalg.norm(rotation.momentum, axis=-1)
     better = np.empty((2, *rotation.quaternions.shape))
-    better[0] = quaternions_alone(interpolant, interpolant.coefficients, 2 * rotation.steps, *starts)[:, ::2]
-    better[1] = quaternions_alone(interpolant, perturbed.coefficients, rotation.steps, *starts)
+    better[0] = marched(interpolant, interpolant.coefficients, 2 * rotation.steps, rotation.momentum)[:, ::2]
+    better[1] = marched(interpolant, perturbed.coefficients, rotation.steps, rotation.momentum)
     return small_turns(rotation.quaternions, better)
-
-
-def small_turns(start: Array, end: Array) -> Array:
-    """From quaternions xyzw to others near them: (..., 4), (..., 4) -> (..., 3) [rad]."""
-    x, y, z, w = start[..., 0], start[..., 1], start[..., 2], start[..., 3]
-    back = np.empty((*start.shape, 4))
-    back[..., 0, 0] = back[..., 1, 1] = back[..., 2, 2] = back[..., 3, 3] = w
-    back[..., 0, 1], back[..., 1, 0], back[..., 2, 3], back[..., 3, 2] = z, -z, -z, z
-    back[..., 0, 2], back[..., 2, 0], back[..., 1, 3], back[..., 3, 1] = -y, y, -y, y
-    back[..., 1, 2], back[..., 2, 1], back[..., 0, 3], back[..., 3, 0] = x, -x, -x, x
-    between = np.einsum("...ij,...j", back, end)
-    # A quaternion and its negative are one attitude.
-    return np.copysign(2.0, between[..., 3:]) * between[..., :3]

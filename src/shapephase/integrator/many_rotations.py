@@ -7,28 +7,22 @@ above the tolerance, they go on with refinements of their own, which are rounded
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
-from math import frexp, ldexp
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
-from ._refinement import Refinement, Refinements
-from .fast.rounds import STEPS_OF_FINER, STEPS_OF_OTHERS, marks_between
-from .integrate import Attempt, Integration, norms
+from .integrate import Progress, Refinement, one_round
 from .interpolant import Interpolant
-from .sampling import Sampler, Samplers
+from .marches import magnitudes_and_directions
+from .sampling import Sampler
 from .stepped import SteppedRotation, for_whole_batch, of_rows
 
 # Classes of magnitudes in each factor of two: finer ones are more, coarser ones take more steps than needed.
-_CLASSES = 4
-# From here on a growth of errors is not told from any larger one.
-_MOST_GROWTH = 1e30
+CLASSES = 4
 
 
 class RotationPart(NamedTuple):
@@ -117,17 +111,16 @@ def assembled(parts: list[tuple[Integers, Array]]) -> Array:
 
 
 class _Group(NamedTuple):
-    """Momenta that have come to the same refinements."""
+    """Momenta of one class that need the same refinement."""
 
     rows: Integers
-    best: Array  # (n,) the lowest estimate so far [rad]
     ceiling: float  # of their magnitudes [kg m^2/s]
-    history: tuple[Refinement, ...]  # of all rounds, the one to come included
-    sampler: Sampler | None  # after the rounds before; None: they have to be gone through again
+    refinement: Refinement
+    progress: tuple[Progress, ...]  # of each row
 
 
 def rotations_of_each(
-    samplers: Samplers, momentum: Array, tolerance: float, *, threads: int | None = None
+    sampler: Sampler, momentum: Array, tolerance: float, *, threads: int | None = None
 ) -> SteppedRotation | GroupedRotations:
     """Integrate the attitude equation for each momentum as if it were alone.
 
@@ -142,122 +135,61 @@ def rotations_of_each(
     AccuracyNotReached
         If an estimate stays above the tolerance; in a batch the message has its row.
     """
-    ceilings = rounded_up(norms(momentum), _CLASSES)
+    magnitudes, _ = magnitudes_and_directions(momentum)
+    ceilings = rounded_up(magnitudes, CLASSES)
     parts: list[RotationPart] = []
     for ceiling in sorted(set(ceilings.tolist())) or (0.0,):
         rows = (ceilings == ceiling).nonzero()[0]
-        first = Refinement.at_first(tolerance)
-        waiting = [_Group(rows, np.full(max(len(rows), 1), np.inf), ceiling, (first,), None)]
+        first = Progress()
+        waiting = [_Group(rows, ceiling, first.refinement, (first,) * max(len(rows), 1))]
         while waiting:
-            found, further = _integrated(samplers, waiting.pop(), momentum, tolerance, threads)
+            found, further = _integrated(sampler, waiting.pop(), momentum, tolerance, threads)
             parts += found
             waiting += further
     if len(parts) == 1:
         return parts[0].rotation
-    return GroupedRotations(tuple(parts), samplers.evaluations)
+    return GroupedRotations(tuple(parts), sampler.evaluations)
 
 
 def _integrated(
-    samplers: Samplers, group: _Group, momentum: Array, tolerance: float, threads: int | None
+    sampler: Sampler, group: _Group, momentum: Array, tolerance: float, threads: int | None
 ) -> tuple[list[RotationPart], list[_Group]]:
     """One round for a group: the rows that are within the tolerance now, and those that have to go on."""
     rows, starts = group.rows, momentum[group.rows]
-    sampler = group.sampler or _after(samplers, group)
-    integration = Integration(
-        sampler,
-        starts if group.ceiling else starts[:1],
-        tolerance,
-        ceiling=group.ceiling,
-        threads=threads,
-        refinement=group.history[-1],
-    )
+    # At rest all turn alike.
+    taken = starts if group.ceiling else np.zeros((1, 3))
     try:
-        if len(rows) > 1 and integration.is_long:
-            # Each by the growth of its own errors.
-            return [], [group._replace(rows=rows[k : k + 1], best=group.best[k : k + 1]) for k in range(len(rows))]
-        attempt = integration.attempt()
-        estimates = attempt.rotation.error_estimate
-        done = estimates <= tolerance
-        if done.any():
-            integration.compare_with_body()
+        rotation = one_round(sampler, taken, tolerance, group.ceiling, group.refinement, threads)
     except AccuracyNotReached as error:
         raise _of_row(error, rows[:1], len(momentum)) from error
-    if np.count_nonzero(done) == len(done):
-        return [RotationPart(rows, for_whole_batch(attempt.rotation, starts))], []
-    failed, found = np.flatnonzero(~done), []
-    if len(failed) < len(estimates):
-        passed = np.flatnonzero(done)
-        found.append(RotationPart(rows[passed], of_rows(attempt.rotation, passed, threads)))
-    return found, list(_further(group, integration, sampler, attempt, failed, len(momentum)))
-
-
-def _further(
-    group: _Group, integration: Integration, sampler: Sampler, attempt: Attempt, failed: Integers, count: int
-) -> Iterator[_Group]:
-    """Rows that failed, by the refinements that they need."""
-    at_rest, errors, best = not group.ceiling, attempt.errors.of(failed), group.best[failed]
-    if (lost := integration.first_lost(errors, len(group.history), best)) is not None:
-        place, error = lost
-        raise _of_row(error, group.rows[failed[place : place + 1]], count)
-    together: dict[Refinement, list[int]] = {}
-    refinements = _rounded(integration.refined(errors), group.history[-1], integration.harmless_growth)
-    for place, refinement in enumerate(refinements.each()):
-        if refinement == group.history[-1]:
-            # The next round would be the same.
-            raise _of_row(integration.not_reached(errors, place), group.rows[failed[place : place + 1]], count)
-        together.setdefault(refinement, []).append(place)
-    best = np.minimum(best, errors.estimate)
-    for refinement, members in together.items():
-        rows = group.rows if at_rest else group.rows[failed[members]]
-        estimates = np.full(max(len(rows), 1), best[0]) if at_rest else best[members]
-        history = (*group.history, refinement)
-        # Where all go on together the sampler goes with them.
-        yield _Group(rows, estimates, group.ceiling, history, sampler if len(together) == 1 else None)
-
-
-def _after(samplers: Samplers, group: _Group) -> Sampler:
-    """A sampler after the rounds of a group but the one to come."""
-    sampler = samplers.fresh()
-    for refinement in group.history[:-1]:
-        sampler.refine(group.ceiling, refinement.sampling_target)
-    return sampler
-
-
-def _rounded(refinements: Refinements, last: Refinement, harmless: float) -> Refinements:
-    """What is stricter than in the last round is made stricter by little more, so that many are the same.
-
-    `harmless` : growth of errors up to which samples as they are will do: there one is as good as another
-    """
-    target, finer, amplified = refinements
-    same = target == last.sampling_target
-    grown = rounded_up(np.minimum(amplified, _MOST_GROWTH), STEPS_OF_OTHERS)
-    grown[same & (grown <= harmless)] = 1.0
-    return Refinements(
-        np.where(same, target, 1.0 / rounded_up(1.0 / target, STEPS_OF_OTHERS)),
-        rounded_up(finer, STEPS_OF_FINER),
-        np.where(np.isinf(amplified), np.inf, grown),
-    )
-
-
-def _up(number: float, steps: int) -> float:
-    """As `rounded_up`, of one number."""
-    mantissa, exponent = frexp(number)
-    marks = _listed_marks(steps)
-    return ldexp(marks[bisect_left(marks, mantissa)], exponent)
-
-
-@lru_cache(maxsize=4)
-def _listed_marks(steps: int) -> list[float]:
-    return marks_between(steps).tolist()
+    done = rotation.error_estimate <= tolerance
+    if done.all():
+        return [RotationPart(rows, for_whole_batch(rotation, starts))], []
+    together: dict[Refinement, list[tuple[int, Progress]]] = {}
+    for place in np.flatnonzero(~done).tolist():
+        try:
+            progress = group.progress[place].after(rotation, place, tolerance)
+        except AccuracyNotReached as error:
+            raise _of_row(error, rows[place : place + 1], len(momentum)) from error
+        together.setdefault(progress.refinement, []).append((place, progress))
+    further = [
+        _Group(
+            rows[[place for place, _ in members]] if group.ceiling else rows,
+            group.ceiling,
+            refinement,
+            tuple(progress for _, progress in members),
+        )
+        for refinement, members in together.items()
+    ]
+    passed = np.flatnonzero(done)
+    return [RotationPart(rows[passed], of_rows(rotation, passed))] if len(passed) else [], further
 
 
 def rounded_up(numbers: Array, steps: int) -> Array:
     """To the next of `steps` geometric steps in each factor of two, exactly alike for equal numbers; zero is zero."""
-    if len(numbers) == 1:
-        return np.array([_up(float(numbers[0]), steps) if numbers[0] else 0.0])
     mantissa, exponent = np.frexp(numbers)
-    marks = marks_between(steps)
-    return np.where(numbers == 0.0, 0.0, np.ldexp(marks[np.searchsorted(marks, mantissa) % len(marks)], exponent))
+    marks = 2.0 ** (np.arange(-steps, 1) / steps)
+    return np.where(numbers == 0.0, 0.0, np.ldexp(marks[np.searchsorted(marks, mantissa)], exponent))
 
 
 def _of_row(error: AccuracyNotReached, row: Integers, count: int) -> AccuracyNotReached:

@@ -10,15 +10,14 @@ import numpy as np
 from .. import so3, sphere
 from ..arrays import Array, Integers, lock_arrays, read_only
 from ..display import short_repr
-from ._dense_output import DenseOutput
-from ._last_terms import Perturbed
 from .closing import areas_back, far_references, jumps_between
-from .fast.estimate_constants import DENSE_SHARE
-from .fast.threads import in_threads
 from .interpolant import Interpolant
-from .steps.error_propagator import momentum_slope
-from .steps.stage_channels import stage_channels
+from .kernels.curve_kernel import within_steps
+from .marches import magnitudes_and_directions, momentum_slope, part_channels
+from .sampling import Perturbed
 
+# Times at which attitudes are found at once: the channels there take some fifteen megabytes.
+_AT_ONCE = 4096
 _BATCHED_FIELDS = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error",
     "rounding_error", "amplification",
@@ -94,17 +93,11 @@ class SteppedRotation:
     @property
     def error_estimate(self) -> Array:
         """Estimate of the largest attitude error over the interval, rounding included: (B,) [rad]."""
-        return estimate_from_ends(self._error_at_ends)
-
-    @property
-    def _error_at_ends(self) -> Array:
-        """The same at the ends of the steps: (B,) [rad]."""
         return self.sampling_error + self.stepping_error + self.rounding_error
 
     def rotation(self, t: Array) -> Array:
         """S(t): (N,) -> (B, N, 3, 3)."""
-        found, count = so3.matrix_from_quat(np.moveaxis(self._dense.quaternion(t), 0, -1)), len(self.momentum)
-        return found if len(found) == count else np.repeat(found, count, axis=0)
+        return so3.matrix_from_quat(self._within(t)[1])
 
     @property
     def end(self) -> Array:
@@ -113,9 +106,8 @@ class SteppedRotation:
 
     def dynamic_phase(self, t: Array) -> Array:
         """The integral of omega . Pi/|Pi| from 0 to t: (N,) -> (B, N) [rad]; zero without momentum."""
-        ends = _from_zero(self.dynamics)
-        found = ends[:, self._dense.step_of(t)] + self._dense.dynamic_phase(t)
-        return self._exact_at_ends(t, ends, found) * self._moving
+        index, _, along = self._within(t)
+        return _from_zero(self.dynamics)[:, index] + along
 
     def solid_angle(self, t: Array) -> Array:
         """Of the momentum's curve from 0 to t, closed by the great circle: (N,) -> (B, N) [sr]; without momentum zero.
@@ -126,7 +118,7 @@ class SteppedRotation:
         """
         if not self.directions.shape[1]:
             return np.zeros((len(self.momentum), len(t)))
-        corners, index = self.directions, self._dense.step_of(t)
+        corners, (index, quaternions, along) = self.directions, self._within(t)
         # Counted from a region far from the curve: counted from the start, errors near the point opposite it would
         # stay in the sum. Whole spheres by which the great circle back to the start makes the area jump are taken off.
         start, references = corners[:, :1], far_references(corners)[:, None]
@@ -135,7 +127,7 @@ class SteppedRotation:
         arcs = sphere.triangle_area(references, corners[:, :-1], corners[:, 1:])
         jumps = jumps_between(start, corners[:, :-1], corners[:, 1:], arcs + np.diff(back, axis=1))
         ends = _from_zero(arcs + self.dynamics - self.turns) + back - 4.0 * np.pi * _from_zero(jumps.astype(np.float64))
-        attitude, near = self.rotation(t), corners[:, index]
+        attitude, near = so3.matrix_from_quat(quaternions), corners[:, index]
         there = so3.apply(so3.transpose(attitude), start)
         # The turn about the direction at the step's start, the shortest rotation taken off.
         steps = so3.transpose(so3.matrix_from_quat(self.quaternions[:, index])) @ attitude
@@ -143,46 +135,33 @@ class SteppedRotation:
         grown = sphere.triangle_area(references, near, there)
         grown += areas_back(references, there, start) - back[:, index]
         grown -= 4.0 * np.pi * jumps_between(start, near, there, grown)
-        found = ends[:, index] + grown + self._dense.dynamic_phase(t) - turn
-        return self._exact_at_ends(t, ends, found) * self._moving
-
-    def _exact_at_ends(self, t: Array, ends: Array, found: Array) -> Array:
-        """What is found between the ends of steps, and there the sum over steps, free of the polynomials' errors.
-
-        (N,), (B, K + 1), (B, N) -> (B, N).
-        """
-        place = np.minimum(np.searchsorted(self.times, t), len(self.times) - 1)
-        return np.where(self.times[place] == t, ends[:, place], found)
-
-    @property
-    def _moving(self) -> Array:
-        """One where there is momentum, else zero: (B, 1)."""
-        return np.any(self.momentum != 0.0, axis=1, keepdims=True).astype(np.float64)
+        return (ends[:, index] + grown + along - turn) * np.any(self.momentum != 0.0, axis=1, keepdims=True)
 
     @cached_property
     def momentum_slope(self) -> Array:
         """How the end turns, S exp(hat(slope dPi)), by a change dPi of the body momentum at the start: (B, 3, 3).
 
-        The derivative of steps half as long as those that were taken.
+        The derivative of the steps themselves.
         """
-        # The error of a derivative is larger than that of the steps: twice as many make it smaller.
-        channels = stage_channels(self.interpolant, 2 * self.steps)
-        return momentum_slope(channels, self.momentum, self.interpolant.loops)
+        return momentum_slope(self.interpolant, self.steps, self.momentum)
 
-    @cached_property
-    def _dense(self) -> DenseOutput:
-        """The same rotation between the ends of the steps; without momentum it is one for the whole batch."""
-        rows = slice(None) if self.directions.shape[1] else slice(1)
-        return DenseOutput(
-            interpolant=self.interpolant,
-            steps=self.steps,
-            times=self.times,
-            quaternions=self.quaternions[rows],
-            directions=self.directions[rows],
-            dynamics=self.dynamics[rows],
-            magnitude=np.linalg.norm(self.momentum[rows], axis=-1),
-            goal=DENSE_SHARE * float(self._error_at_ends.min(initial=np.inf)),
-        )
+    def _within(self, t: Array) -> tuple[Integers, Array, Array]:
+        """The step of each time (N,), S there (B, N, 4), and what the dynamic phase grows by from the step's start.
+
+        A part of a step is a step, by the same formula on the same series; a step's end belongs to the next one.
+        """
+        ends, batch = self.times, len(self.momentum)
+        index = np.clip(np.searchsorted(ends, t, side="right") - 1, 0, len(ends) - 2)
+        magnitudes, directions = magnitudes_and_directions(self.momentum)
+        quaternions, along = np.empty((batch, len(t), 4)), np.empty((batch, len(t)))
+        for first in range(0, len(t), _AT_ONCE):
+            part = slice(first, first + _AT_ONCE)
+            starts = self.quaternions[:, index[part]]
+            channels = part_channels(self.interpolant, ends[index[part]], t[part] - ends[index[part]])
+            found, phase = np.empty_like(starts), np.empty(starts.shape[:2])
+            within_steps(channels, magnitudes, directions, starts, found, phase)
+            quaternions[:, part], along[:, part] = found, phase
+        return index, quaternions, along
 
     def with_rotations(self, rotations: Array, error: Array) -> SteppedRotation:
         """The same steps with the rotations at their ends (B, K + 1, 3, 3) found by another method."""
@@ -207,11 +186,6 @@ def _from_zero(of_steps: Array) -> Array:
     return np.concatenate([np.zeros((len(of_steps), 1)), np.cumsum(of_steps, axis=1)], axis=1)
 
 
-def estimate_from_ends(error: Array) -> Array:
-    """The error over the whole interval, from that at the ends of the steps: (B,) -> (B,) [rad]."""
-    return (1.0 + DENSE_SHARE) * error
-
-
 def for_whole_batch(solution: SteppedRotation, momentum: Array) -> SteppedRotation:
     """The solution with one row for each momentum; without momentum all share the only one."""
     count = len(momentum)
@@ -222,15 +196,6 @@ def for_whole_batch(solution: SteppedRotation, momentum: Array) -> SteppedRotati
     return replace(solution, momentum=momentum, **broadcast)
 
 
-def of_rows(solution: SteppedRotation, rows: Integers, threads: int | None = None) -> SteppedRotation:
-    """The solution for some of its momenta; `threads` : that copy, as of `in_threads`."""
-    whole = {name: getattr(solution, name) for name in ("momentum", *_BATCHED_FIELDS)}
-    chosen = {name: np.empty((len(rows), *values.shape[1:])) for name, values in whole.items()}
-
-    def copy(part: slice) -> None:
-        for name, values in whole.items():
-            values.take(rows[part], axis=0, out=chosen[name][part], mode="clip")
-
-    for _ in in_threads(copy, len(rows), 1, threads, chosen.values()):
-        pass
-    return replace(solution, **chosen)
+def of_rows(solution: SteppedRotation, rows: Integers) -> SteppedRotation:
+    """The solution for some of its momenta."""
+    return replace(solution, **{name: getattr(solution, name)[rows] for name in ("momentum", *_BATCHED_FIELDS)})

@@ -14,8 +14,7 @@ from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, TrajectoryError, unknown_name
 from ..integrator.dop853 import dop853_attitude
-from ..integrator.fast import engine
-from ..integrator.forced.driven_attitude import DrivenAttitude
+from ..integrator.driven_attitude import DrivenAttitude
 from ..integrator.many_rotations import rotations_of_each
 from ..rigid_body.euler_top import EulerTop
 
@@ -156,10 +155,9 @@ def dop853_solution(deformation: Deformation, at_start: Array, tolerance: float)
 def _by_interpolant(
     deformation: Deformation, at_start: Array, tolerance: float, threads: int | None
 ) -> tuple[Solution, int]:
-    with engine.Decided():
-        samplers = deformation.samplers()
-        solution = rotations_of_each(samplers, at_start, tolerance, threads=threads)
-    return solution, samplers.evaluations
+    sampler = deformation.sampler()
+    solution = rotations_of_each(sampler, at_start, tolerance, threads=threads)
+    return solution, sampler.evaluations
 
 
 def _by_closed_form(

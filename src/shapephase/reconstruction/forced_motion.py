@@ -18,7 +18,7 @@ from ..deformation.deformation import Deformation
 from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
-from ..integrator.forced.driven_attitude import DrivenAttitude, driven_attitude
+from ..integrator.driven_attitude import DrivenAttitude, driven_attitude
 from .external_torque import ExternalTorque, TorqueState, torque_argument
 from .motion_record import write_table
 

@@ -15,7 +15,7 @@ from ..arrays import Array, Integers, lock_arrays
 from ..deformation.deformation import DeformationFamily
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
-from ..integrator.variants.rotations import VariantRotations, rotations_of_variants
+from ..integrator.families import VariantRotations, rotations_of_variants
 from .reconstruction import Motion
 
 _METHODS = ("auto", "spectral")

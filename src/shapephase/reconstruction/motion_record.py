@@ -19,7 +19,8 @@ from ..errors import InputFileNotFoundError, ResultFileError
 from ..files import npz_arrays, write_whole
 from ..integrator.interpolant import Interpolant
 from ..integrator.many_rotations import GroupedRotations, RotationPart
-from ..integrator.stepped import Perturbed, SteppedRotation
+from ..integrator.sampling import Perturbed
+from ..integrator.stepped import SteppedRotation
 from ..provenance import provenance
 from ._stored_arrays import check_deformation, check_rotation, check_rows, check_start
 
@@ -220,7 +221,7 @@ def _interpolant(arrays: Mapping[str, Any], loops: int, evaluations: int) -> Int
 
 
 def _rotation(arrays: Mapping[str, Any], interpolant: Interpolant) -> SteppedRotation:
-    perturbed = Perturbed.known(arrays["perturbed"], float(arrays["hidden"]))
+    perturbed = Perturbed(arrays["perturbed"], float(arrays["hidden"]))
     return SteppedRotation(interpolant, **{name: arrays[f"step_{name}"] for name in _STEPS}, perturbed=perturbed)
 
 

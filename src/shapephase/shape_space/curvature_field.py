@@ -17,7 +17,7 @@ from ..body.particles.point_masses import ParticleBody
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularInertiaError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
-from ..integrator.sampling import sampler
+from ..integrator.sampling import Sampler
 from ..letters import what_came
 from .body_path import check_closed
 from .connection import connection_slopes
@@ -189,7 +189,7 @@ def stokes_holonomy(
     check_closed(body, route)
     _check_no_turns(body, route)
     cone = _Cone(body, route, _mean_shape(route) if centre is None else _one_shape(body, centre, "centre"), goal)
-    carried = sampler(cone.sample, **vars(route.smoothness))
+    carried = Sampler(cone.sample, route.smoothness)
     round_loop = stepped_rotation(carried, np.zeros((1, 3)), 0.9 * goal)
     _, (out, back) = cone.rays(np.array([0.0, route.duration]))
     estimate = float(round_loop.error_estimate[0]) + 3.0 * cone.worst

@@ -16,7 +16,7 @@ from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError, WrongObjectError
 from ..integrator.many_rotations import rotations_of_each
 from ..letters import what_came
-from .body_path import path_samplers
+from .body_path import path_sampler
 from .knot_crossings import route_along
 from .shape_path import ShapePath
 
@@ -96,13 +96,13 @@ def final_attitudes(
         check_object(path, "ShapePath", f"path {number}")
         mu, first = _of_path(spatial, 1, number), _of_path(start, 2, number)
         try:
-            samplers = path_samplers(body, route_along(body, path))
-            solution = rotations_of_each(samplers, (first.T @ mu)[None], goal)
+            sampler = path_sampler(body, route_along(body, path))
+            solution = rotations_of_each(sampler, (first.T @ mu)[None], goal)
         except ShapePhaseError as error:
             raise type(error)(f"path {number}: {error}") from error
         ends.append(first @ solution.end[0])
         estimates.append(float(solution.error_estimate[0]))
-        evaluations.append(samplers.evaluations)
+        evaluations.append(sampler.evaluations)
     for name, array, single in (("momenta", spatial, 1), ("attitudes", start, 2)):
         if array.ndim > single and len(array) != len(ends):
             raise ShapeError(f"{len(array)} {name} were given for {len(ends)} paths")

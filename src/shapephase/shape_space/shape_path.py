@@ -46,7 +46,7 @@ from .scan._derived_scan import DerivedScan, JoinedScan
 from .scan._rate_check import check_rates
 from .scan.function_scan import FunctionScan, path_function
 from .scan.scanning import scanned
-from .smoothness import Smoothness
+from ..integrator.smoothness import Smoothness
 
 _WHOLE_TURN = 2.0 * np.pi
 
@@ -68,9 +68,6 @@ class ShapePath:
     oscillations : how often the path can swing between two breaks, an upper bound; None: unknown
     loops : the path is its first `duration / loops` seconds, this many times
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
-    sparse : whether harmonics below the highest are missing in a smooth loop
-    swing : how far a joint swings in a smooth loop, an upper bound: the sum of the amplitudes of its harmonics, each
-        times its number [rad or m]; None: unknown
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
     scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
@@ -90,8 +87,6 @@ class ShapePath:
     oscillations: float | None = None
     loops: int = 1
     smooth_loop: bool = False
-    sparse: bool = False
-    swing: float | None = None
     sha256: str | None = None
     record: Mapping[str, Any] | None = None
     scanner: Callable[[], FunctionScan] | None = None
@@ -132,7 +127,6 @@ class ShapePath:
         # Harmonics that are all multiples of one number make a shorter loop, repeated.
         loops = int(np.gcd.reduce(occupied)) if len(occupied) else 1
         highest = int(occupied[-1]) // loops if len(occupied) else 0
-        swings = np.hypot(a, b) @ (np.arange(1, a.shape[1] + 1) / loops)
         return ShapePath(
             Fourier(middle.copy(), a.copy(), b.copy(), period),
             period,
@@ -142,8 +136,6 @@ class ShapePath:
             oscillations=float(highest),
             loops=loops,
             smooth_loop=True,
-            sparse=len(occupied) < highest,
-            swing=float(swings.max(initial=0.0)),
         )
 
     @staticmethod
@@ -272,14 +264,8 @@ class ShapePath:
             oscillations=self.oscillations,
             loops=self.loops,
             smooth_loop=self.smooth_loop,
-            sparse=self.sparse,
-            swing=self.swing,
-            probe=self._shapes_and_rates,
             resolved=scan.resolved if scan is not None else None,
         )
-
-    def _shapes_and_rates(self, times: Array) -> Array:
-        return np.concatenate(self.at_samples(times), axis=1)
 
     @property
     def scan(self) -> FunctionScan | None:

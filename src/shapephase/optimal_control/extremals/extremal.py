@@ -16,7 +16,7 @@ from ...arrays import Array, check_reach
 from ...body.body import Body
 from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
-from ...integrator.casadi_calls import call_casadi
+from ..casadi_calls import call_casadi
 from ...shape_space.shape_path import ShapePath
 from .hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales
 

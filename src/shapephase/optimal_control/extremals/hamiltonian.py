@@ -18,7 +18,7 @@ from ...body.body import Body
 from ...body.couplings.coordinate_map import check_no_balls, check_smooth
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, unknown_name
-from ...integrator.casadi_calls import call_casadi
+from ..casadi_calls import call_casadi
 from ...shape_space.connection import mechanical_connection
 from ..symbolic import solve_linear, symbolic_body
 

@@ -12,7 +12,7 @@ from ...arguments import check_object, tolerance_argument
 from ...arrays import Array
 from ...body.body import Body
 from ...errors import AccuracyNotReached, ShapeError
-from ...integrator.casadi_calls import call_casadi
+from ..casadi_calls import call_casadi
 from ...shape_space.connection import horizontal_lift
 from ...shape_space.knot_crossings import route_along
 from ...shape_space.shape_path import ShapePath

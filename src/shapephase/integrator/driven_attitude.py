@@ -8,12 +8,12 @@ from functools import reduce
 
 import numpy as np
 
-from ... import so3
-from ...arrays import Array, lock_arrays
-from ...display import short_repr
-from ...errors import AccuracyNotReached
-from ...sphere import gauss_nodes
-from ..limited_steps import Run, StepLimits, limited_run
+from .. import so3
+from ..arrays import Array, lock_arrays
+from ..display import short_repr
+from ..errors import AccuracyNotReached
+from ..sphere import gauss_nodes
+from .limited_steps import Run, StepLimits, limited_run
 
 Rates = Callable[[Array, Array, Array], tuple[Array, Array]]
 """Times (N,), attitudes (N, 3, 3), other states (N, k) -> angular velocities, body axes (N, 3), and rates (N, k)."""

@@ -1,1 +1,0 @@
-"""Loops sampled at even times."""

@@ -1,0 +1,171 @@
+"""Attitudes of many deformations along one path, with one momentum each.
+
+Each is sampled and stepped as if there were no others, but for where it begins: on the panels that one of them, the
+model, needs, at which all are evaluated together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from .. import run_progress
+from ..arrays import Array, Integers, Mask
+from ..errors import AccuracyNotReached, ShapeError, SingularInertiaError
+from .channels import inverted
+from .fresh_times import fresh_times
+from .many_rotations import CLASSES, GroupedRotations, rotations_of_each, rounded_up
+from .marches import magnitudes_and_directions
+from .sampling import Panels, Sampler
+from .stepped import SteppedRotation
+from .threads import processors
+
+# Deformations that are evaluated together: enough for what they share to cost little.
+_AT_ONCE = 64
+# Numbers of the series of all, which are kept: eight gigabytes.
+_MOST_KEPT = 1_000_000_000
+
+
+class Variants(Protocol):
+    """Deformations along one path, and the one by which they are planned."""
+
+    def __len__(self) -> int:
+        """How many they are."""
+        ...
+
+    @property
+    def model(self) -> Sampler:
+        """Of the deformation by which they are planned."""
+        ...
+
+    def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
+        """I^-1 and I^-1 L_o of some at times, and which can be relied on: (V,), (S,) -> (V, S, 9), (V,)."""
+        ...
+
+    def alone(self, row: int) -> Sampler:
+        """Of one of them."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class VariantRotations:
+    """S(t) of N deformations, each in a batch of one."""
+
+    rotations: tuple[SteppedRotation, ...]
+
+    def __getitem__(self, row: int) -> SteppedRotation:
+        """Of one deformation."""
+        return self.rotations[row]
+
+    @property
+    def error_estimate(self) -> Array:
+        """(N,) [rad]."""
+        return np.array([one.error_estimate[0] for one in self.rotations])
+
+    @property
+    def end(self) -> Array:
+        """S at the end of the interval: (N, 3, 3)."""
+        return np.array([one.end[0] for one in self.rotations]).reshape(-1, 3, 3)
+
+    @property
+    def evaluations(self) -> Integers:
+        """How many times each deformation was evaluated: (N,)."""
+        return np.array([one.interpolant.evaluations for one in self.rotations], dtype=np.int64)
+
+
+def rotations_of_variants(
+    variants: Variants, momentum: Array, tolerance: float, *, threads: int | None = None
+) -> VariantRotations:
+    """Integrate the attitude equation of each deformation as if there were no others.
+
+    Parameters
+    ----------
+    momentum : (N, 3) body angular momentum at the start of each [kg m^2/s]
+    tolerance : of every attitude over the whole interval [rad]
+    threads : at most; None: one for each processor. Results do not depend on it
+
+    Raises
+    ------
+    AccuracyNotReached, SingularInertiaError
+        As of one deformation, with its number.
+    """
+    count = len(momentum)
+    ceilings = rounded_up(magnitudes_and_directions(momentum)[0], CLASSES)
+    lots = list(_lots(variants, ceilings, tolerance))
+    run_progress.begin(run_progress.STEPPING, max(count, 1))
+    found: list[SteppedRotation | None] = [None] * count
+
+    def integrate(lot: _Lot) -> int:
+        for row, sampler in lot.samplers(variants):
+            try:
+                one = rotations_of_each(sampler, momentum[row : row + 1], tolerance, threads=1)
+            except (AccuracyNotReached, SingularInertiaError) as error:
+                raise type(error)(f"body {row} of {count}: {error}") from error
+            found[row] = one.finest if isinstance(one, GroupedRotations) else one
+        return len(lot.rows)
+
+    workers = max(1, min(processors() if threads is None else threads, len(lots)))
+    with ThreadPoolExecutor(workers) as pool:
+        # In one thread the usual way: errors then show where they are made.
+        for done in pool.map(integrate, lots) if workers > 1 else map(integrate, lots):
+            run_progress.advance(done)
+    return VariantRotations(tuple(one for one in found if one is not None))
+
+
+@dataclass(frozen=True, eq=False)
+class _Lot:
+    """Some that begin on the same panels; None: each on its own."""
+
+    rows: Integers
+    panels: Panels | None
+    times: tuple[Array, ...] = ()
+
+    def samplers(self, variants: Variants) -> Iterator[tuple[int, Sampler]]:
+        """Of each, with what is known of it."""
+        if self.panels is not None:
+            whole = np.concatenate(self.times)
+            channels, reliable = variants.channels(self.rows, whole)
+            stops = np.cumsum([len(times) for times in self.times])[:-1]
+        for place, row in enumerate(self.rows.tolist()):
+            sampler = variants.alone(row)
+            if self.panels is not None and reliable[place]:
+                sampler.begin_with(self.panels, zip(self.times, np.split(channels[place], stops), strict=True))
+            yield row, sampler
+
+
+def _lots(variants: Variants, ceilings: Array, tolerance: float) -> Iterator[_Lot]:
+    """Raise AccuracyNotReached for more than can be kept, before any memory is taken."""
+    kept = 0
+    for ceiling in np.unique(ceilings).tolist():
+        rows = np.flatnonzero(ceilings == ceiling)
+        panels, times = None, ()
+        try:
+            samples = variants.model.samples(ceiling, tolerance)
+        except (AccuracyNotReached, SingularInertiaError):
+            pass
+        else:
+            panels = samples.panels
+            times = panels.times, fresh_times(samples.interpolant)[0]
+            kept += len(rows) * samples.interpolant.coefficients.size
+        if kept > _MOST_KEPT:
+            raise AccuracyNotReached(
+                f"{len(ceilings)} motions on some {kept // (9 * len(ceilings))} samples each would take "
+                f"{8e-9 * kept:.3g} GB; take slices of the family of some {int(len(ceilings) * _MOST_KEPT / kept)} bodies"
+            )
+        for first in range(0, len(rows), _AT_ONCE):
+            yield _Lot(rows[first : first + _AT_ONCE], panels, times)
+
+
+def many_inverted(inertia: Array, momentum: Array, times: Array) -> tuple[Array, Mask]:
+    """I^-1 and I^-1 L_o, and which can be relied on: (V, S, 3, 3), (V, S, 3), (S,) -> (V, S, 9), (V,)."""
+    channels, reliable = np.zeros((*momentum.shape[:2], 9)), np.ones(len(inertia), dtype=np.bool_)
+    for place in range(len(inertia)):
+        try:
+            channels[place] = inverted(inertia[place], momentum[place], times)
+        except (SingularInertiaError, ShapeError):
+            reliable[place] = False
+    return channels, reliable

@@ -1,1 +1,0 @@
-"""Attitudes whose rate depends on more than themselves: a torque from outside, joints that swing freely."""

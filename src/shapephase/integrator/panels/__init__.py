@@ -1,1 +1,0 @@
-"""Deformations sampled on panels between their breaks."""

@@ -1,1 +1,0 @@
-"""Recorded paths: polynomials between many knots, sampled on panels that span several of them."""

@@ -1,0 +1,109 @@
+"""What is known of a function of time before it is sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from ..arrays import Array, Integers
+from .limited_steps import StepLimits
+from .resolved import ResolvedPath
+
+# A resolved panel has at most five swings above rounding (degree 32): each then has ten evaluations or more.
+_STEPS_OF_A_PANEL = 4.0
+# Per period of the fastest swing.
+_STEPS_OF_A_SWING = 4.0
+# Of the duration: times nearer to each other are one.
+_SAME_TIME = 1e-12
+# Pieces between breaks that are many: each is then short beside the motion, and begins with few samples.
+_MANY_PIECES = 64
+# Degrees of a path up to which a body along it begins with 8, 16 and 32: its inertia swings up to half as fast again.
+_TERMS = np.array([5, 10, 21])
+DEGREES = (8, 16, 32)
+"""Of panels, nested; beyond the last a panel is halved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothness:
+    """What is known of a function of time before it is sampled, by which its first panels are chosen.
+
+    Attributes
+    ----------
+    breaks : (M,) times between which it is smooth, first and last the interval's ends [s]
+    oscillations : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
+    loops : the interval is its first part, this many times
+    smooth_loop : whether it also goes smoothly from the end of a loop to its start
+    resolved : the first loop of what it depends on as series; None: unknown
+    checked : whether there is more to know, so that it is compared with its samples between the nodes
+
+    Examples
+    --------
+    >>> known = sp.integrator.Smoothness(np.array([0.0, 1.0]), oscillations=2.0)
+    >>> known.first_panels(1e-9)[0].tolist()
+    [0.0, 0.5, 1.0]
+    """
+
+    breaks: Array
+    oscillations: float | None = None
+    loops: int = 1
+    smooth_loop: bool = False
+    resolved: ResolvedPath | None = None
+    checked: bool = False
+
+    @property
+    def period(self) -> float:
+        """Of one loop [s]."""
+        return float(self.breaks[-1]) / self.loops
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether samples between the nodes are looked at, since nothing else says what is there."""
+        return self.checked or (self.oscillations is None and self.resolved is None)
+
+    def first_panels(self, tolerance: float) -> tuple[Array, Integers]:
+        """Edges (P + 1,) [s] and degrees (P,) of the panels of the first loop to begin with, for a tolerance [rad]."""
+        ends = self._ends
+        if self.resolved is not None:
+            return self._resolved_panels(self.resolved, ends, tolerance)
+        if self.oscillations == 0.0:
+            return ends, np.zeros(len(ends) - 1, dtype=np.int64)
+        parts = max(1, ceil(self.oscillations or 1.0))
+        if self.smooth_loop:
+            ends = ends[[0, -1]]
+        edges = np.append((ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(parts) / parts)).ravel(), ends[-1])
+        first = DEGREES[0] if len(ends) > _MANY_PIECES else DEGREES[1]
+        return edges, np.full(len(edges) - 1, first)
+
+    @property
+    def _ends(self) -> Array:
+        """The breaks of the first loop."""
+        period = self.period
+        ends = self.breaks[self.breaks <= period * (1.0 - _SAME_TIME)]
+        return np.append(ends, period)
+
+    def _resolved_panels(self, resolved: ResolvedPath, ends: Array, tolerance: float) -> tuple[Array, Integers]:
+        inner = resolved.edges[1:-1]
+        near = np.searchsorted(ends, inner).clip(1, len(ends) - 1)
+        apart = np.minimum(np.abs(inner - ends[near - 1]), np.abs(inner - ends[near])) > _SAME_TIME * ends[-1]
+        edges = np.union1d(ends, inner[apart])
+        middle = 0.5 * (edges[:-1] + edges[1:])
+        leaf = np.clip(np.searchsorted(resolved.edges, middle) - 1, 0, len(resolved.left) - 1)
+        terms = resolved.terms(tolerance)[leaf]
+        degrees = np.where(terms == 0, 0, np.array([*DEGREES, DEGREES[-1]])[np.searchsorted(_TERMS, terms)])
+        halved = terms > _TERMS[-1]
+        return np.union1d(edges, middle[halved]), np.repeat(degrees, 1 + halved)
+
+    @property
+    def step_limits(self) -> StepLimits:
+        """The longest steps of an integrator that evaluates the function itself: they step over no feature known."""
+        if self.resolved is not None:
+            limits = StepLimits.even(self.resolved.edges, _STEPS_OF_A_PANEL)
+            return limits.repeated(round(self.breaks[-1] / self.resolved.duration))
+        if self.oscillations is None:
+            return StepLimits.even(self.breaks[[0, -1]], 1.0)
+        steps = _STEPS_OF_A_SWING * max(self.oscillations, 0.5)
+        if self.smooth_loop:
+            return StepLimits.even(self.breaks[[0, -1]], steps * self.loops)
+        return StepLimits.even(self.breaks, steps)

@@ -1,1 +1,0 @@
-"""Many deformations along one path, sampled and stepped side by side: none depends on its companions."""
