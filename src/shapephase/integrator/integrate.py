@@ -162,10 +162,11 @@ def one_round(
 def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: float) -> Integers:
     """The coarsest steps on each panel, a fourth of those that count: (P,). Raises AccuracyNotReached."""
     terms = rates_of(interpolant.coefficients, ceiling) * interpolant.widths[:, None]
-    finer = factor * (_USUAL / tolerance) ** (1.0 / ORDER)
+    finer = (_USUAL / tolerance) ** (1.0 / ORDER)
     counted = np.arange(terms.shape[1]) * (terms > STEPPING_SHARE * tolerance)
     turn = terms.sum(axis=1)
     steps = finer * np.maximum(counted.max(axis=1) / TERMS_OF_STEP, turn / ANGLE_OF_STEP)
+    steps = factor * np.maximum(steps, 1.0)
     total = 4.0 * interpolant.loops * float(steps.sum())
     if total > _MOST_STEPS:
         turns = interpolant.loops * float(turn.sum()) / (2.0 * np.pi)
@@ -174,7 +175,7 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
             f"steps; at most {_MOST_STEPS} are taken, enough for about {turns * _MOST_STEPS / total:.3g} turns: shorten "
             "the motion, or lower the momentum"
         )
-    return np.maximum(np.ceil(steps), 1.0).astype(np.int64)
+    return np.ceil(steps).astype(np.int64)
 
 
 def rotation_of(samples: Samples, found: Attempt, momentum: Array) -> SteppedRotation:

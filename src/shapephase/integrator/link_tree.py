@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..arrays import Array, Integers, Mask
+from ..arrays import Array, Mask
 from .kernels import gradient_kernel, tree_kernel
 from .kernels.tree_kernel import LANES
 from .machine_code import plain
@@ -80,45 +80,32 @@ def _sampled(
     values, reliable = np.empty((len(rows), len(shapes), 9)), np.empty(len(rows), dtype=np.bool_)
     coordinates, speeds = tree.coordinates(shapes, rates)
     tree_kernel.sample_trees(
-        tree.parents, tree.turning, tree.leads, plain(rows).reshape(len(rows), -1), plain(masses), plain(coordinates),
+        tree.parents, tree.turning, tree.leads, plain(rows), plain(masses), plain(coordinates),
         plain(speeds), inverted, LANES, values, reliable,
     )  # fmt: skip
     return values, reliable
 
 
-def momentum_gradients(
-    tree: LinkRows,
-    shapes: Array,
-    rates: Array,
-    spins: Array,
-    rows: Array,
-    pieces: Integers,
-    powers: Array,
-    slopes: Array,
-    count: int,
-) -> Array:
-    """Sums over the shapes of row . d(I w + L_o), w fixed, by coefficients of polynomials of all joints.
+def momentum_gradients(tree: LinkRows, shapes: Array, rates: Array, spins: Array, rows: Array) -> tuple[Array, Array]:
+    """Products row . d(I w + L_o), w fixed, by the coordinates of all joints, followers included, and by their rates.
 
     Parameters
     ----------
     shapes, rates : (N, n)
     spins, rows : (N, S, 3) w, and (N, S, r, 3), axes of the base
-    pieces, powers, slopes : (N,), (N, order), (N, order) which of `count` polynomials each shape is on, and the
-        derivatives of its coordinates and of their rates by the coefficients of this polynomial
 
     Returns
     -------
-    (order, count, S r, k), the followers among the k joints included
+    (N, S r, k) each
     """
-    several, each = rows.shape[1:3]
     coordinates, speeds = tree.coordinates(shapes, rates)
-    sums = np.empty((powers.shape[1], count, several * each * len(tree.parents)))
+    by_shape, by_rate = np.empty((2, *rows.shape[:3], len(tree.parents)))
     gradient_kernel.momentum_gradients(
-        tree.parents, tree.turning, tree.leads, plain(tree.rows).ravel(), tree.mass, plain(coordinates), plain(speeds),
-        plain(spins).reshape(len(rows), -1), plain(rows).reshape(len(rows), -1), several, LANES,
-        np.array(pieces, dtype=np.int64), plain(powers), plain(slopes), sums,
+        tree.parents, tree.turning, tree.leads, plain(tree.rows), tree.mass, plain(coordinates), plain(speeds),
+        plain(spins), plain(rows), LANES, by_shape, by_rate,
     )  # fmt: skip
-    return sums.reshape(len(sums), count, several * each, -1)
+    products = rows.shape[1] * rows.shape[2]
+    return by_shape.reshape(len(rows), products, -1), by_rate.reshape(len(rows), products, -1)
 
 
 def inertial_sums(tree: LinkRows, shapes: Array, rates: Array, spins: Array, rows: Array) -> Array:
@@ -128,11 +115,11 @@ def inertial_sums(tree: LinkRows, shapes: Array, rates: Array, spins: Array, row
     -------
     (S r, k + 1, 10) by mass, first moment and inertia xx yy zz yz xz xy, axes of the frame
     """
-    several, each = rows.shape[1:3]
     coordinates, speeds = tree.coordinates(shapes, rates)
-    sums = np.empty((several * each, len(tree.rows), 10))
+    spins = np.repeat(spins, rows.shape[2], axis=1)
+    sums = np.empty((spins.shape[1], len(tree.rows), 10))
     gradient_kernel.inertial_sums(
-        tree.parents, tree.turning, tree.leads, plain(tree.rows).ravel(), tree.mass, plain(coordinates), plain(speeds),
-        plain(spins).reshape(len(rows), -1), plain(rows).reshape(len(rows), -1), several, LANES, sums,
+        tree.parents, tree.turning, tree.leads, plain(tree.rows), tree.mass, plain(coordinates), plain(speeds),
+        plain(spins), plain(rows).reshape(spins.shape), LANES, sums,
     )  # fmt: skip
     return sums

@@ -26,9 +26,11 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _F = TypeVar("_F", bound=Callable[..., Any])
 
-_MODULES = ("tree_kernel", "gradient_kernel")
+_MODULES = ("step_kernel", "curve_kernel", "tree_kernel", "gradient_kernel")
 """Of `kernels/`, those with a function `warm`, which calls each kernel of its module once."""
-_OPTIONS: dict[str, Any] = {"error_model": "numpy"}
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
+"""Of parts and kernels alike: what is called from both would else be compiled twice. Parts that are not put where they
+are called make loops over lanes half as long again; the compiler takes as long with as without."""
 _NUMBA_DOES_NOT_WORK = (ImportError, AttributeError, SystemError)
 """What the import of a Numba raises that does not go with this NumPy or this Python."""
 _MANY_STEPS = 5000  # of the formula, of 110 us interpreted each; a motion takes some 400 in its three marches
@@ -42,7 +44,7 @@ _is_large = False
 
 
 def inline(function: _F) -> _F:
-    """Mark a part of kernels, which they and other parts may call; it stays a plain function of Python."""
+    """Mark a part of kernels, compiled into each place where it is called; it stays a plain function of Python."""
     with _lock:
         _parts.append(function)
     return function
@@ -69,12 +71,14 @@ class Kernel(Generic[_P, _R]):
     def _dispatcher(self) -> Callable[_P, _R]:
         """Numba's function, which loads or compiles the code for the types of its first arguments."""
         from numba import njit
-        from numba.extending import register_jitable
+        from numba.core.types import Dispatcher
+        from numba.core.typing.templates import infer_global
 
         with _lock:
             while _parts:
-                register_jitable(**_OPTIONS)(_parts.pop())
-            compiled: Any = self._compiled or njit(nogil=True, **_OPTIONS)(self.interpreted)
+                part = _parts.pop()
+                infer_global(part, Dispatcher(njit(**_OPTIONS)(part)))
+            compiled: Any = self._compiled or njit(**_OPTIONS)(self.interpreted)
             if self._compiled is None:
                 name = f"{self.interpreted.__module__.rpartition('.')[2]}.{self.interpreted.__qualname__}"
                 compiled._cache = KeptFunction(name, kernel_folder())
@@ -88,13 +92,14 @@ def kernel(function: Callable[_P, _R]) -> Kernel[_P, _R]:
 
 
 def plain(array: Array) -> Array:
-    """Return the array, or a copy, in double precision, contiguous and writable, as kernels are compiled for.
+    """Return the array, or a copy, in double precision, contiguous and writable, which kernels are compiled for.
 
     For any other kind Numba would compile a kernel once more. Kernels do not write to what they are given to read.
     """
     flags = array.flags
-    if not (flags.c_contiguous and flags.aligned and array.dtype == np.float64):
-        return np.array(array, dtype=np.float64, order="C")
+    kind: Any = np.complex128 if np.iscomplexobj(array) else np.float64
+    if not (flags.c_contiguous and flags.aligned and array.dtype == kind):
+        return np.array(array, dtype=kind, order="C")
     if flags.writeable:
         return array
     view = array.view()

@@ -214,7 +214,7 @@ class _Panels:
     ----------
     left, right : (P,) [s]
     values : (P, degree/2 + 1, 9) at every second node; None: nothing is known yet
-    before : (P,) the last terms of the panel that each is a half of [rad/s]
+    before : (P,) the last terms, at the highest degree, of the panel that each is a half of [rad/s]
     """
 
     degree: int
@@ -305,8 +305,9 @@ class _Sampling:
         late, decay = tail_and_decay(rates)
         rounded = ROUNDED_SAMPLES * EPS * rates.max(axis=1)
         rounded += 4.0 * np.spacing(right) / width * (rates @ np.arange(degree + 1.0))
-        stays = (late >= _NOISE_STAYS * panels.before) & (late <= _NOISE * rates.max(axis=1))
-        noisy = (late <= rounded) | stays
+        noisy = late <= rounded
+        if degree == DEGREES[-1]:
+            noisy |= (late >= _NOISE_STAYS * panels.before) & (late <= _NOISE * rates.max(axis=1))
         # What is beyond the degree swings that often over the panel, but for how far the body turns in it.
         swings = np.maximum(degree - width * rates.sum(axis=1), 1.0)
         missing = late * decay / (1.0 - decay)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..machine_code import inline, kernel
-from .tree_kernel import FRAME, LANES, NUMBERS, TOTAL, add_link, add_point, centres, place_frames
+from .tree_kernel import FRAME, LANES, NUMBERS, TOTAL, add_link, add_point, place_frames
 
 _PARAMETERS = 10
 """Of a frame: mass, first moment (3), inertia xx yy zz yz xz xy."""
@@ -40,19 +40,36 @@ def _from_centre(frame, centre, lanes):
 
 
 @inline
-def _carry(mass, frame, total, lanes):
-    """The first six sums of a frame, which `add_link` takes from the base, from the centre of mass."""
-    for j in range(6):
-        for i in range(lanes):
-            total[j * LANES + i] = mass * frame[(18 + j) * LANES + i]
+def _sum_links(parents, body, mass, frames, sums, centre, lanes):
+    """Sums over what hangs on each joint, and the frames, from the centre of mass of all."""
+    for j in range(6 * LANES):
+        centre[j] = 0.0
+    for frame in range(len(frames)):
+        for j in range(TOTAL * LANES):
+            sums[frame, j] = 0.0
+        add_link(body[frame], frames[frame], sums[frame], lanes)
+        for j in range(6 * LANES):
+            centre[j] += sums[frame, j] / mass
+    for frame in range(len(frames)):
+        point, f, s = body[frame, 12], frames[frame], sums[frame]
+        add_point(point, f, centre, s, lanes)
+        _from_centre(f, centre, lanes)
+        # Those of place and velocity, which `add_link` takes from the base.
+        for j in range(6 * LANES):
+            s[j] = point * f[18 * LANES + j]
+    for joint in range(len(parents) - 1, -1, -1):
+        for j in range(TOTAL * LANES):
+            sums[parents[joint], j] += sums[joint + 1, j]
 
 
 @inline
-def _load(numbers, first, count, lanes, out):
-    """Numbers (N, m) of eight shapes as rows of lanes; what is beyond the last is zero."""
-    for j in range(numbers.shape[1]):
-        for i in range(lanes):
-            out[j * LANES + i] = numbers[first + i, j] if first + i < count else 0.0
+def _load(spins, first, out):
+    """Vectors (N, S, 3) at eight shapes as rows of lanes, the last repeated: (S, 3 LANES)."""
+    last = len(spins) - 1
+    for which in range(len(out)):
+        for i in range(LANES):
+            spin = spins[first + i if first + i < last else last, which]
+            out[which, i], out[which, LANES + i], out[which, 2 * LANES + i] = spin[0], spin[1], spin[2]
 
 
 @inline
@@ -106,99 +123,50 @@ def _by_shape(s, f, turning, lead, rate, w, out, lanes):
 
 
 @inline
-def _products(rows, at, each, column, out, lanes):
-    """Of `each` rows from `at` on with a column."""
-    for k in range(each):
-        r = (at + k) * 3 * LANES
-        for i in range(lanes):
-            out[k * LANES + i] = (
-                rows[r + i] * column[i]
-                + rows[r + LANES + i] * column[LANES + i]
-                + rows[r + 2 * LANES + i] * column[2 * LANES + i]
-            )
-
-
-@inline
-def _add_times(factor, numbers, out):
-    for j in range(len(numbers)):
-        out[j] += factor * numbers[j]
+def _write(rows, column, first, which, joint, out):
+    """Products of the rows (N, S, r, 3) of eight shapes with a column."""
+    for i in range(LANES):
+        if first + i < len(rows):
+            own, products = rows[first + i, which], out[first + i, which]
+            for k in range(len(own)):
+                row = own[k]
+                products[k, joint] = row[0] * column[i] + row[1] * column[LANES + i] + row[2] * column[2 * LANES + i]
 
 
 @kernel
-def momentum_gradients(
-    parents, turning, leads, body, mass, shapes, rates, spins, rows, several, lanes, pieces, powers, slopes, found
-):
-    """Sums over shapes of products of rows with how the angular momentum answers to polynomials of all joints.
+def momentum_gradients(parents, turning, leads, body, mass, shapes, rates, spins, rows, lanes, by_shape, by_rate):
+    """Products of rows with how the angular momentum answers to the coordinates and to the rates of all joints.
 
-    parents, turning, leads, body, mass: as `LinkRows` has them, the body's rows one after another
+    parents, turning, leads, body, mass: as `LinkRows` has them
     shapes, rates: (N, joints)
-    spins: (N, S * 3)
-    rows: (N, S * r * 3)
-    several: S
+    spins, rows: (N, S, 3), (N, S, r, 3)
     lanes: LANES
-    pieces, powers, slopes: (N,), (N, order), (N, order) the piece of the path that each shape is in, and by what its
-        coordinates and their rates grow with the coefficients of the piece
-    found: (order, pieces, S * r * joints) to be filled
+    by_shape, by_rate: (N, S, r, joints) to be filled
     """
-    joints, count = len(parents), len(shapes)
-    each = rows.shape[1] // (3 * several)
-    frames, sums = np.zeros((joints + 1, FRAME * LANES)), np.empty((joints + 1, TOTAL * LANES))
-    total, centre = np.empty(TOTAL * LANES), np.empty(6 * LANES)
-    rate, cosine, sine, column = np.empty((joints, LANES)), np.empty(LANES), np.empty(LANES), np.empty(3 * LANES)
-    w, a, out = np.empty(several * 3 * LANES), np.empty(several * each * 3 * LANES), np.empty(each * LANES)
-    shape, by_shapes, by_rates = np.empty(LANES), np.empty((LANES, found.shape[2])), np.empty((LANES, found.shape[2]))
-    for i in range(LANES):
-        frames[0, i] = frames[0, 4 * LANES + i] = frames[0, 8 * LANES + i] = 1.0
-    found[:] = 0.0
-    for first in range(0, count, LANES):
-        for j in range(9, FRAME):
-            for i in range(LANES):
-                frames[0, j * LANES + i] = 0.0
+    joints, several = len(parents), spins.shape[1]
+    frames, sums = np.empty((joints + 1, FRAME * LANES)), np.empty((joints + 1, TOTAL * LANES))
+    rate, cosine, sine, shape = np.empty((joints, LANES)), np.empty(LANES), np.empty(LANES), np.empty(LANES)
+    centre, w, column = np.empty(6 * LANES), np.empty((several, 3 * LANES)), np.empty(3 * LANES)
+    for first in range(0, len(shapes), LANES):
         place_frames(parents, turning, leads, body, shapes, rates, first, frames, shape, rate, cosine, sine, lanes)
-        total[:] = 0.0
-        for frame in range(joints + 1):
-            sums[frame] = 0.0
-            add_link(body[frame * NUMBERS : (frame + 1) * NUMBERS], frames[frame], sums[frame], lanes)
-            for j in range(6 * LANES):
-                total[j] += sums[frame, j]
-        centres(total, mass, centre, lanes)
-        for frame in range(joints + 1):
-            add_point(body[frame * NUMBERS + 12], frames[frame], centre, sums[frame], lanes)
-            _from_centre(frames[frame], centre, lanes)
-            _carry(body[frame * NUMBERS + 12], frames[frame], sums[frame], lanes)
-        for joint in range(joints - 1, -1, -1):
-            for j in range(TOTAL * LANES):
-                sums[parents[joint], j] += sums[joint + 1, j]
-        _load(spins, first, count, lanes, w)
-        _load(rows, first, count, lanes, a)
+        _sum_links(parents, body, mass, frames, sums, centre, lanes)
+        _load(spins, first, w)
         for joint in range(joints):
-            s, f = sums[joint + 1], frames[joint + 1]
+            s, f, turn, lead = sums[joint + 1], frames[joint + 1], turning[joint], leads[joint]
             for which in range(several):
-                _by_shape(s, f, turning[joint], leads[joint], rate[joint], w[which * 3 * LANES :], column, lanes)
-                _products(a, which * each, each, column, out, lanes)
-                for k in range(each):
-                    for i in range(lanes):
-                        by_shapes[i, (which * each + k) * joints + joint] = out[k * LANES + i]
-            _by_rate(s, f, turning[joint], leads[joint], column, lanes)
+                _by_shape(s, f, turn, lead, rate[joint], w[which], column, lanes)
+                _write(rows, column, first, which, joint, by_shape)
+            _by_rate(s, f, turn, lead, column, lanes)
             for which in range(several):
-                _products(a, which * each, each, column, out, lanes)
-                for k in range(each):
-                    for i in range(lanes):
-                        by_rates[i, (which * each + k) * joints + joint] = out[k * LANES + i]
-        for i in range(min(LANES, count - first)):
-            at = first + i
-            for power in range(len(found)):
-                _add_times(powers[at, power], by_shapes[i], found[power, pieces[at]])
-                if power:
-                    _add_times(slopes[at, power], by_rates[i], found[power, pieces[at]])
+                _write(rows, column, first, which, joint, by_rate)
 
 
 @inline
-def _add_by_parameters(f, w, rows, at, out, lanes):
+def _by_parameters(f, w, a, out, lanes):
     """What a row adds to the sums by the ten parameters of a frame, the body turning at w: (10 LANES)."""
     for i in range(lanes):
         w0, w1, w2 = w[i], w[LANES + i], w[2 * LANES + i]
-        a0, a1, a2 = rows[at + i], rows[at + LANES + i], rows[at + 2 * LANES + i]
+        a0, a1, a2 = a[i], a[LANES + i], a[2 * LANES + i]
         x0, x1, x2 = f[18 * LANES + i], f[19 * LANES + i], f[20 * LANES + i]
         d0, d1, d2 = _cross(w0, w1, w2, x0, x1, x2)
         v0, v1, v2 = f[21 * LANES + i] + d0, f[22 * LANES + i] + d1, f[23 * LANES + i] + d2
@@ -223,46 +191,36 @@ def _add_by_parameters(f, w, rows, at, out, lanes):
 
 
 @kernel
-def inertial_sums(parents, turning, leads, body, mass, shapes, rates, spins, rows, several, lanes, found):
+def inertial_sums(parents, turning, leads, body, mass, shapes, rates, spins, rows, lanes, found):
     """Sums over shapes of products of rows with how the angular momentum answers to the parameters of frames.
 
-    found: (S * r, joints + 1, 10) to be filled; the other arguments as for `momentum_gradients`
+    spins, rows: (N, m, 3) one of each for each product
+    found: (m, joints + 1, 10) to be filled; the other arguments as for `momentum_gradients`
     """
-    joints, count = len(parents), len(shapes)
-    each = len(found) // several
-    frames, total, centre = np.zeros((joints + 1, FRAME * LANES)), np.empty(TOTAL * LANES), np.empty(6 * LANES)
+    joints, products = len(parents), len(found)
+    frames, sums = np.empty((joints + 1, FRAME * LANES)), np.empty((joints + 1, TOTAL * LANES))
     rate, cosine, sine, shape = np.empty((joints, LANES)), np.empty(LANES), np.empty(LANES), np.empty(LANES)
-    w, a, out = np.empty(several * 3 * LANES), np.empty(several * each * 3 * LANES), np.empty(_PARAMETERS * LANES)
-    for i in range(LANES):
-        frames[0, i] = frames[0, 4 * LANES + i] = frames[0, 8 * LANES + i] = 1.0
+    centre, w, a = np.empty(6 * LANES), np.empty((products, 3 * LANES)), np.empty((products, 3 * LANES))
+    out = np.empty(_PARAMETERS * LANES)
     found[:] = 0.0
-    for first in range(0, count, LANES):
-        for j in range(9, FRAME):
-            for i in range(LANES):
-                frames[0, j * LANES + i] = 0.0
+    for first in range(0, len(shapes), LANES):
         place_frames(parents, turning, leads, body, shapes, rates, first, frames, shape, rate, cosine, sine, lanes)
-        total[:] = 0.0
+        _sum_links(parents, body, mass, frames, sums, centre, lanes)
+        _load(spins, first, w)
+        _load(rows, first, a)
         for frame in range(joints + 1):
-            add_link(body[frame * NUMBERS : (frame + 1) * NUMBERS], frames[frame], total, lanes)
-        centres(total, mass, centre, lanes)
-        _load(spins, first, count, lanes, w)
-        _load(rows, first, count, lanes, a)
-        for frame in range(joints + 1):
-            f = frames[frame]
-            _from_centre(f, centre, lanes)
-            for row in range(several * each):
-                _add_by_parameters(f, w[row // each * 3 * LANES :], a, row * 3 * LANES, out, lanes)
+            for row in range(products):
+                _by_parameters(frames[frame], w[row], a[row], out, lanes)
                 for j in range(_PARAMETERS):
-                    add = 0.0
                     for i in range(LANES):
-                        add += out[j * LANES + i]
-                    found[row, frame, j] += add
+                        if first + i < len(shapes):
+                            found[row, frame, j] += out[j * LANES + i]
 
 
 def warm() -> None:
     """Call each kernel with the least that it takes: one frame, one shape."""
-    none, shapes, vectors = np.zeros(0), np.zeros((1, 0)), np.zeros((1, 3))
-    parents, body, factors = np.zeros(0, dtype=np.uint32), np.ones(NUMBERS), np.ones((1, 1))
-    given = (parents, none, none, body, 1.0, shapes, shapes, vectors, vectors, 1, LANES)
-    momentum_gradients(*given, np.zeros(1, dtype=np.int64), factors, factors, np.empty((1, 1, 0)))
-    inertial_sums(*given, np.empty((1, 1, _PARAMETERS)))
+    none, shapes, spins = np.zeros(0), np.zeros((1, 0)), np.zeros((1, 1, 3))
+    given = np.zeros(0, dtype=np.uint32), none, none, np.ones((1, NUMBERS)), 1.0, shapes, shapes, spins
+    products = np.empty((1, 1, 1, 0))
+    momentum_gradients(*given, np.zeros((1, 1, 1, 3)), LANES, products, products.copy())
+    inertial_sums(*given, spins, LANES, np.empty((1, 1, _PARAMETERS)))

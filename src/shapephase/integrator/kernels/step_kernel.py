@@ -21,7 +21,7 @@ WEIGHTS = np.ascontiguousarray(DOP853.B[:STAGES])
 _TABLEAU = np.vstack([DOP853.A[:STAGES, :STAGES], WEIGHTS])
 # The entries that are not zero, row after row; row STAGES is the end of the step.
 _VALUES = _TABLEAU[_TABLEAU != 0.0]
-_COLUMNS = np.nonzero(_TABLEAU)[1]
+_COLUMNS = np.ascontiguousarray(np.nonzero(_TABLEAU)[1])
 _STARTS = np.concatenate([[0], np.cumsum(np.count_nonzero(_TABLEAU, axis=1))])
 
 

@@ -121,20 +121,6 @@ def add_point(mass, frame, centre, total, lanes):
 
 
 @inline
-def centres(total, mass, centre, lanes):
-    """Place and velocity of the centre of mass of all."""
-    for i in range(lanes):
-        for j in range(6):
-            centre[j * LANES + i] = total[j * LANES + i] / mass
-
-
-@inline
-def _cosines_and_sines(angle, cosine, sine, lanes):
-    for i in range(lanes):
-        cosine[i], sine[i] = cos_sin(angle[i])
-
-
-@inline
 def _inverse(xx, yy, zz, yz, xz, xy):
     """I^-1 by square-root-free Cholesky, backward stable; a condition number, NaN or negative where there is none."""
     a, b = xy / xx, xz / xx
@@ -164,27 +150,32 @@ def _write(total, lane, inverted, out):
 
 @inline
 def place_frames(parents, turning, leads, body, shapes, rates, first, frames, shape, rate, cosine, sine, lanes):
-    """All frames at eight shapes from `first` on, the last repeated; the base's is there.
+    """All frames at eight shapes from `first` on, the last repeated, with the base's at rest.
 
-    body: the rows of the tree one after another
+    body: (k + 1, NUMBERS) the rows of the tree
     shape, rate, cosine, sine: room for LANES numbers, of the rates for each joint
     """
-    count = len(shapes)
-    for joint in range(len(parents)):
-        far = 0.0
+    last = len(shapes) - 1
+    for j in range(FRAME):
         for i in range(LANES):
-            row = min(first + i, count - 1)
+            frames[0, j * LANES + i] = 1.0 if j == 0 or j == 4 or j == 8 else 0.0
+    for joint in range(len(parents)):
+        near = True
+        for i in range(LANES):
+            row = first + i if first + i < last else last
             shape[i], rate[joint, i], cosine[i], sine[i] = shapes[row, joint], rates[row, joint], 1.0, 0.0
-            far = max(far, abs(shape[i]))
+            near = near and abs(shape[i]) < MOST_ANGLE
         if turning[joint] != 0.0:
-            _cosines_and_sines(shape, cosine, sine, lanes)
-            if not far < MOST_ANGLE:
+            for i in range(lanes):
+                cosine[i], sine[i] = cos_sin(shape[i])
+            if not near:
                 for i in range(LANES):
-                    if not abs(shape[i]) < MOST_ANGLE:
+                    if MOST_ANGLE <= abs(shape[i]) < math.inf:
                         cosine[i], sine[i] = math.cos(shape[i]), math.sin(shape[i])
-        start = (joint + 1) * NUMBERS
-        own, after, before = body[start : start + NUMBERS], frames[joint + 1], frames[parents[joint]]
-        _move_frame(own, before, after, turning[joint], leads[joint], cosine, sine, shape, rate[joint], lanes)
+        before, after = frames[parents[joint]], frames[joint + 1]
+        _move_frame(
+            body[joint + 1], before, after, turning[joint], leads[joint], cosine, sine, shape, rate[joint], lanes
+        )
 
 
 @kernel
@@ -192,7 +183,7 @@ def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted,
     """Of trees that differ in their masses, I^-1 and I^-1 L_o, or I and L_o, about the centre of mass, base axes.
 
     parents, turning, leads: as `LinkRows` has them
-    rows: (V, (k + 1) 22) of each tree, their geometry the same
+    rows: (V, k + 1, NUMBERS) of each tree, their geometry the same
     masses: (V,) of each tree
     shapes, rates: (N, joints) of all joints
     inverted: whether I^-1 and I^-1 L_o are wanted, not I and L_o
@@ -201,31 +192,30 @@ def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted,
     reliable: (V,) to be filled: whether all can be relied on
     """
     joints, count = len(parents), len(shapes)
-    frames = np.zeros((joints + 1, FRAME * LANES))
-    total, centre = np.empty(TOTAL * LANES), np.empty(6 * LANES)
-    shape, rate, cosine, sine = np.empty(LANES), np.empty((joints, LANES)), np.empty(LANES), np.empty(LANES)
-    geometry = rows[0]
-    for i in range(LANES):
-        frames[0, i] = frames[0, 4 * LANES + i] = frames[0, 8 * LANES + i] = 1.0
+    frames, total, centre = np.empty((joints + 1, FRAME * LANES)), np.empty(TOTAL * LANES), np.empty(6 * LANES)
+    rate, cosine, sine, shape = np.empty((joints, LANES)), np.empty(LANES), np.empty(LANES), np.empty(LANES)
     for tree in range(len(rows)):
         reliable[tree] = True
     for first in range(0, count, LANES):
-        place_frames(parents, turning, leads, geometry, shapes, rates, first, frames, shape, rate, cosine, sine, lanes)
+        place_frames(parents, turning, leads, rows[0], shapes, rates, first, frames, shape, rate, cosine, sine, lanes)
         for tree in range(len(rows)):
-            total[:] = 0.0
+            for j in range(TOTAL * LANES):
+                total[j] = 0.0
             for frame in range(joints + 1):
-                add_link(rows[tree, frame * NUMBERS : (frame + 1) * NUMBERS], frames[frame], total, lanes)
-            centres(total, masses[tree], centre, lanes)
+                add_link(rows[tree, frame], frames[frame], total, lanes)
+            for j in range(6 * LANES):
+                centre[j] = total[j] / masses[tree]
             for frame in range(joints + 1):
-                add_point(rows[tree, frame * NUMBERS + 12], frames[frame], centre, total, lanes)
-            for i in range(min(LANES, count - first)):
-                fine = _write(total, i, inverted, values[tree, first + i])
-                reliable[tree] = reliable[tree] and fine
+                add_point(rows[tree, frame, 12], frames[frame], centre, total, lanes)
+            for i in range(LANES):
+                if first + i < count:
+                    fine = _write(total, i, inverted, values[tree, first + i])
+                    reliable[tree] = reliable[tree] and fine
 
 
 def warm() -> None:
     """Call each kernel with the least that it takes: one frame, one shape."""
     none, shapes = np.zeros(0), np.zeros((1, 0))
     values, reliable = np.empty((1, 1, 9)), np.empty(1, dtype=np.bool_)
-    parents, rows, masses = np.zeros(0, dtype=np.uint32), np.ones((1, NUMBERS)), np.ones(1)
+    parents, rows, masses = np.zeros(0, dtype=np.uint32), np.ones((1, 1, NUMBERS)), np.ones(1)
     sample_trees(parents, none, none, rows, masses, shapes, shapes, True, LANES, values, reliable)
