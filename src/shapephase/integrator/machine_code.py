@@ -38,7 +38,7 @@ _MANY_MOMENTA = 20  # about 0.8 s interpreted
 _MANY_ROWS = 200  # of a recording, about 1.5 s interpreted
 
 _lock = threading.RLock()
-_parts: list[Callable[..., Any]] = []
+_parts: dict[Callable[..., Any], Any] = {}  # with Numba's functions, once it is there
 _is_command = False
 _is_large = False
 
@@ -46,7 +46,7 @@ _is_large = False
 def inline(function: _F) -> _F:
     """Mark a part of kernels, compiled into each place where it is called; it stays a plain function of Python."""
     with _lock:
-        _parts.append(function)
+        _parts[function] = None
     return function
 
 
@@ -75,9 +75,10 @@ class Kernel(Generic[_P, _R]):
         from numba.core.typing.templates import infer_global
 
         with _lock:
-            while _parts:
-                part = _parts.pop()
-                infer_global(part, Dispatcher(njit(**_OPTIONS)(part)))
+            for part, dispatcher in _parts.items():
+                if dispatcher is None:
+                    _parts[part] = njit(**_OPTIONS)(part)
+                    infer_global(part, Dispatcher(_parts[part]))
             compiled: Any = self._compiled or njit(**_OPTIONS)(self.interpreted)
             if self._compiled is None:
                 name = f"{self.interpreted.__module__.rpartition('.')[2]}.{self.interpreted.__qualname__}"

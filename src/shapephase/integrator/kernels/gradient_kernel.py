@@ -63,13 +63,12 @@ def _sum_links(parents, body, mass, frames, sums, centre, lanes):
 
 
 @inline
-def _load(spins, first, out):
-    """Vectors (N, S, 3) at eight shapes as rows of lanes, the last repeated: (S, 3 LANES)."""
-    last = len(spins) - 1
+def _load(vectors, first, out):
+    """Vectors (N, S, 3) of eight shapes as rows of lanes, zero beyond the last: (S, 3 LANES)."""
     for which in range(len(out)):
-        for i in range(LANES):
-            spin = spins[first + i if first + i < last else last, which]
-            out[which, i], out[which, LANES + i], out[which, 2 * LANES + i] = spin[0], spin[1], spin[2]
+        for j in range(3):
+            for i in range(LANES):
+                out[which, j * LANES + i] = vectors[first + i, which, j] if first + i < len(vectors) else 0.0
 
 
 @inline
@@ -212,9 +211,10 @@ def inertial_sums(parents, turning, leads, body, mass, shapes, rates, spins, row
             for row in range(products):
                 _by_parameters(frames[frame], w[row], a[row], out, lanes)
                 for j in range(_PARAMETERS):
+                    add = 0.0
                     for i in range(LANES):
-                        if first + i < len(shapes):
-                            found[row, frame, j] += out[j * LANES + i]
+                        add += out[j * LANES + i]
+                    found[row, frame, j] += add
 
 
 def warm() -> None:
