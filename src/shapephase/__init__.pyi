@@ -50,7 +50,7 @@ from .errors import (
     UnphysicalInertiaWarning,
 )
 from .exports.tables import export_motion
-from .integrator.fast.engine import compile_steps
+from .integrator.machine_code import compile_steps
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
 from .phases.forced_split import ForcedSplit

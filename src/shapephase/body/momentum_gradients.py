@@ -55,7 +55,7 @@ def by_shape_and_rate(
         found += cross(at.slides - arms, drift) + cross(sums.moment, cross(whole, at.slides) - point)
         np.matmul(rows[:, which], np.moveaxis(found, 0, 1), out=by_shape[:, which])
     by_rates = rows.reshape(count, -1, 3) @ np.moveaxis(by_rate, 0, 1)
-    return _by_independent(chain, by_shape.reshape(count, several * each, -1), by_rates, shapes, rates)
+    return by_independent(chain, by_shape.reshape(count, several * each, -1), by_rates, shapes, rates)
 
 
 def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Array, Array]:
@@ -85,11 +85,11 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     speeds = at.speeds + cross(spin, at.origins)
     by_shape = cross(whole, at.axes) * about - cross(at.axes, speeds) * drift + cross(whole, at.slides) * drift
     by_rate = at.axes * about + at.slides * drift
-    found = _by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
+    found = by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
     return found[0][:, 0], found[1][:, 0]
 
 
-def _by_independent(
+def by_independent(
     chain: JointChain, by_shape: Array, by_rate: Array, shapes: Array, rates: Array
 ) -> tuple[Array, Array]:
     """From derivatives by coordinates and rates of all joints to those by the shape and its rate: (N, m, k), (N, m, k)

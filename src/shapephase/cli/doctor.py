@@ -8,7 +8,7 @@ from .options import AS_TEXT, PrintOptions
 from .outcome import Outcome
 
 _PACKAGES = (
-    ("shapephase", "numpy", "scipy", "pin", "casadi", "cyclopts", "rich"),
+    ("shapephase", "numpy", "scipy", "pin", "casadi", "numba", "cyclopts", "rich"),
     (
         "matplotlib",
         "trimesh",
@@ -20,7 +20,6 @@ _PACKAGES = (
         "mujoco",
         "rosbags",
         "pyyaml",
-        "numba",
     ),
 )
 """What is needed, and what may be there."""
@@ -96,17 +95,21 @@ def _compiler() -> str | None:
 
 
 def _machine_code() -> str:
-    """Whether the innermost loops are machine code in Python."""
-    from ..integrator.fast.switch import VARIABLE, is_allowed, is_installed
+    """Whether the innermost loops can be machine code."""
+    import warnings
 
-    if not is_installed():
-        return "no, Numba is not installed"
-    return "yes, by Numba" if is_allowed() else f"no, {VARIABLE} is 0"
+    from ..errors import CompiledCodeWarning
+    from ..integrator.machine_code import fault
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CompiledCodeWarning)
+        why = fault()
+    return f"no, {why}: much work takes much longer" if why else "yes, by Numba"
 
 
 def _cache() -> str | None:
     """The folder of compiled functions, and how many it holds."""
-    from ..integrator.fast.cache_folder import code_folder
+    from ..integrator.kept_code import code_folder
 
     try:
         folder = code_folder()

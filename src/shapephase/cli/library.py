@@ -30,12 +30,12 @@ def robots_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG
 
 
 def compile_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
-    """Compile the innermost loops with Numba (pip install 'shapephase[fast]'): the same results, sooner.
+    """Compile the innermost loops with Numba now, not when they are first needed.
 
     Once is enough for all later sessions: what is compiled is kept in $XDG_CACHE_HOME/shapephase, or
-    ~/.cache/shapephase. In Python the first reconstruction does it by itself.
+    ~/.cache/shapephase.
     """
-    from ..integrator.fast.engine import compile_steps
+    from ..integrator.machine_code import compile_steps
 
     with steps(1) as work:
         work.begin("compiling")

@@ -17,7 +17,7 @@ from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import OutputFileError, ShapePhaseError
-from ..integrator.fast.switch import begin_command
+from ..integrator.machine_code import begin_command
 from ..provenance import command_line, provenance
 from .audit import audit_command
 from .check import check_command

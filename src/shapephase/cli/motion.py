@@ -19,7 +19,7 @@ from ..deformation.deformation import articulated
 from ..deformation.frames import gauge_link
 from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
-from ..integrator.fast.switch import expect_work
+from ..integrator.machine_code import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import RunProgress
 from ..shape_space.files._base_columns import ESTIMATE
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 _STANDARD_INPUT = "-"
 """Instead of the name of a file."""
-_SAMPLES_A_BREAK = 5
-"""Of the body between two knots of a recording, or more."""
 DEFAULT_TOLERANCE = 1e-9
 """Of the attitude where a command has no option for it [rad]: that of `reconstruct`."""
 
@@ -112,7 +110,7 @@ def flight(
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
     path, recorded = joint_motion(motion, loaded, recording, given=momentum is not None)
-    expect_work(samples=_SAMPLES_A_BREAK * len(path.breaks))
+    expect_work(rows=len(path.breaks))
     if recorded is None:
         zero = np.zeros(3) if momentum is None else momentum
         moved = reconstruct(articulated(loaded, path), zero, start, tolerance=goal, progress=progress)

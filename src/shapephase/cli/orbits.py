@@ -58,7 +58,7 @@ def orbits_command(
     from ..deformation.deformation import articulated
     from ..deformation.frames import gauge_link
     from ..deformation.gauge import named_gauge
-    from ..integrator.fast.switch import expect_work
+    from ..integrator.machine_code import expect_work
     from ..phases.phases import split
     from ..phases.return_map import fixed_points
     from ..phases.split_text import rotation_line

@@ -69,10 +69,13 @@ def sweep_command(
     study
         The file, as of `shapephase.study.read_study`; for example `study.toml`.
     """
+    from ..integrator.machine_code import expect_much
     from ..study.connection import connected
     from ..study.store import open_study
     from ..study.study_file import read_study
 
+    # Cases have the same bits whether they are computed here, in other processes, or by a program.
+    expect_much()
     if workers is not None and (scheduler is not None or workers < 1):
         raise ShapeError(f"--workers: a whole number above 0, and no --scheduler beside it, is needed, got {workers}")
     read = read_study(study)

@@ -11,14 +11,14 @@ from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..body.inertial_regressor import LinkMotions, by_link_parameters, link_motions
-from ..body.momentum_gradients import by_shape_and_rate
-from ..integrator.fast import engine, gradients
+from ..body.momentum_gradients import by_independent, by_shape_and_rate
+from ..integrator import link_tree, machine_code
 from ..shape_space.path_samples import PathSamples
 
 
 @dataclass(frozen=True, eq=False)
 class BodyAlong:
-    """A body at N shapes and rates of a path; in machine code where that is used.
+    """A body at N shapes and rates of a path.
 
     Attributes
     ----------
@@ -46,15 +46,12 @@ class BodyAlong:
         """
         chain, closing = self.body.chain, samples.is_closing(self.times)
         check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
-        if engine.is_ready() and chain.follows.is_linear:
-            basis = samples.basis(self.times)
-            sums = gradients.momentum_gradients(
-                chain.rows, self.shapes, self.rates, spins, rows, basis.pieces, basis.powers, basis.slopes, basis.total
-            )
-            found = samples.by_knots_of(sums if chain.follows.is_identity else sums @ chain.matrix)
+        if self._in_machine_code:
+            of_all = link_tree.momentum_gradients(chain.rows, self.shapes, self.rates, spins, rows)
+            parts = by_independent(chain, *of_all, self.shapes, self.rates)
         else:
             parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
-            found = samples.by_knots(self.times, *parts)
+        found = samples.by_knots(self.times, *parts)
         if closing.any():
             by_duration = -np.einsum("nsrc,nsc->sr", rows[closing], momenta[closing]).ravel()
             found += by_duration[:, None] * samples.seconds_by_knots()
@@ -63,11 +60,16 @@ class BodyAlong:
     def by_inertias(self, spins: Array, rows: Array) -> Array:
         """The same by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
         chain = self.body.chain
-        if not engine.is_ready() or not chain.has_rows:
+        if not self._in_machine_code:
             each = [by_link_parameters(self._links, rows[:, k], spins[:, k]) for k in range(rows.shape[1])]
             return np.concatenate(each)
-        found = gradients.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
+        found = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
         return chain.rows.in_chain_axes(found).reshape(len(found), -1)
+
+    @property
+    def _in_machine_code(self) -> bool:
+        """Bodies with ball joints have no rows; arrays are quicker than interpreted kernels."""
+        return self.body.chain.has_rows and machine_code.is_used()
 
     @cached_property
     def _links(self) -> LinkMotions:

@@ -114,7 +114,7 @@ def plain(array: Array) -> Array:
 def is_used() -> bool:
     """Whether kernels are machine code now; imports Numba.
 
-    Always in a program that imports the library; in a command once `expect_work` was given much. Never with
+    Always in a program that imports the library; in a command once much work is expected. Never with
     NUMBA_DISABLE_JIT=1, nor where Numba cannot be imported.
     """
     return (_is_large or not _is_command) and not fault()
@@ -127,15 +127,21 @@ def fault() -> str:
 
 
 def begin_command() -> None:
-    """Interpret from now on, until `expect_work` is given much: Numba takes longer to import than a command to run."""
+    """Interpret until much work is expected: Numba takes as long to import as a short command to run."""
     global _is_command, _is_large
     _is_command, _is_large = True, False
 
 
 def expect_work(*, momenta: int = 1, rows: int = 0, steps: int = 0) -> None:
-    """Use machine code in this command if momenta on one motion, rows of a recording or steps to come are many."""
+    """`expect_much` if momenta on one motion, rows of a recording or steps to come are many."""
+    if momenta >= _MANY_MOMENTA or rows >= _MANY_ROWS or steps >= _MANY_STEPS:
+        expect_much()
+
+
+def expect_much() -> None:
+    """Use machine code in this command from now on."""
     global _is_large
-    _is_large = _is_large or momenta >= _MANY_MOMENTA or rows >= _MANY_ROWS or steps >= _MANY_STEPS
+    _is_large = True
 
 
 def compile_steps() -> list[Path]:
@@ -159,7 +165,7 @@ def compile_steps() -> list[Path]:
     >>> len(kept) > 0
     True
     """
-    expect_work(momenta=_MANY_MOMENTA)
+    expect_much()
     with warnings.catch_warnings():
         warnings.simplefilter("error", CompiledCodeWarning)
         try:

@@ -21,7 +21,7 @@ from ..body.catalog import load_body
 from ..body.family import BodyFamily
 from ..deformation.deformation import Deformation, DeformationFamily, articulated, rigid
 from ..errors import StudyError
-from ..integrator.fast import engine
+from ..integrator import machine_code
 from ..letters import printable
 from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
@@ -180,7 +180,7 @@ class Evaluator:
     ) -> None:
         """With inertias of their own: together where they share the path."""
         # Without machine code the sums of a family are those of one large product, whose order is not that of a small.
-        if cases[0].joint_noise is None and engine.is_ready():
+        if cases[0].joint_noise is None and machine_code.is_used():
             lots: Iterable[slice] = (slice(0, len(cases)),)
         else:
             lots = (slice(row, row + 1) for row in range(len(cases)))

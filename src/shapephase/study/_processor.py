@@ -7,7 +7,7 @@ import platform
 from functools import lru_cache
 from pathlib import Path
 
-from ..integrator.fast.switch import is_allowed
+from ..integrator.machine_code import is_used
 
 
 @lru_cache(maxsize=1)
@@ -19,5 +19,5 @@ def processor_text() -> str:
             if line.lower().startswith("model name"):
                 name = line.partition(":")[2].strip()
                 break
-    code = "machine code" if is_allowed() else "interpreted"
+    code = "machine code" if is_used() else "interpreted"
     return ", ".join(part for part in (platform.machine(), name, code) if part)

@@ -18,7 +18,6 @@ import numpy as np
 from ..arguments import check_file_name, check_flag, check_object
 from ..arrays import Integers
 from ..errors import MissingExtraError, RunStopped, StudyError, StudyStoreError
-from ..integrator.fast.switch import is_allowed
 from ..letters import what_came
 from ..warning_filters import quiet
 from ._evaluate import DONE, Evaluator, Results
@@ -95,7 +94,7 @@ def _target(study: Study, store: str | os.PathLike[str], resume: bool) -> StudyS
             raise StudyStoreError(f"{store}: there is a store already; go on with it by resume, or name another place")
         return new_store(store, study)
     target = open_study(store)
-    check_same(target, study, is_allowed())
+    check_same(target, study)
     return target
 
 
