@@ -1,6 +1,6 @@
 """Inertia and momentum of random bodies, rounded: `python -m benchmarks.body_leaf [BODIES [SEED]]`; needs a C compiler.
 
-Pinocchio's and the kernel's of `shapephase[fast]`, each against extended precision, in units of eps times the sum of
+Pinocchio's and the kernel's, each against extended precision, in units of eps times the sum of
 the magnitudes of the terms: what no computation in doubles can avoid is a few of these for every joint.
 """
 
@@ -20,7 +20,7 @@ import shapephase as sp
 from shapephase.body import Coupling
 from shapephase.body.body import Body
 from shapephase.body.joint_chain import JointChain
-from shapephase.integrator.fast.tree import tree_channels, tree_inertia_and_momentum
+from shapephase.integrator.link_tree import tree_channels, tree_inertia_and_momentum
 
 from .extended import Truth
 

@@ -367,7 +367,7 @@ class CompilerError(ShapePhaseError, RuntimeError):
     """The steps could not be compiled.
 
     Causes: a Numba that does not go with this NumPy, no folder that only this user may write to. Remedy: another
-    version of Numba, another folder in $XDG_CACHE_HOME; or none: everything works without compiled steps.
+    version of Numba, another folder in $XDG_CACHE_HOME; or none: everything works without compiled steps, slowly.
 
     Examples
     --------
@@ -466,7 +466,7 @@ class VisualWarning(UserWarning):
 
 
 class CompiledCodeWarning(UserWarning):
-    """Compiled steps cannot be kept, or not be used; the interpreted ones give the same results.
+    """Compiled steps cannot be kept, or not be used; the interpreted ones give the same results, slowly.
 
     Examples
     --------
