@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import pickle
 import shutil
@@ -11,15 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shapephase.integrator import kept_code
 from support.keeping_process import KeepingProcess
 
-pytestmark = pytest.mark.usefixtures("fast")
 FEW_OR_MANY = pytest.mark.parametrize("trials", [4, pytest.param(200, marks=pytest.mark.full)])
 
 
 @pytest.fixture(scope="module")
 def process():
-    pytest.importorskip("numba")
     one = KeepingProcess()
     yield one
     one.stop()
@@ -48,7 +48,7 @@ def ask(process, home, **request):
 
 def files(home) -> list[Path]:
     """All that is kept, whatever it is."""
-    return list(home.glob("shapephase/kernels-*/*/*"))
+    return list(home.glob("shapephase/kernels-*/*"))
 
 
 def kept(home) -> Path:
@@ -65,7 +65,7 @@ def is_made_anew(process, home):
 
 def test_what_is_whole_is_loaded(process, home):
     assert ask(process, home) == (14.0, True, [])
-    assert stat.S_IMODE(kept(home).parents[1].stat().st_mode) == 0o700
+    assert stat.S_IMODE(kept(home).parent.stat().st_mode) == 0o700
 
 
 @FEW_OR_MANY
@@ -116,6 +116,28 @@ def test_the_code_of_another_function_is_not_taken_for_it(process, home, tmp_pat
     is_made_anew(process, home)
 
 
+def test_a_helper_that_changed_in_another_file_is_not_computed_with_its_old_code(process, tmp_path):
+    """Numba keeps the code of what a function calls with it, and looks at the function's own file alone."""
+    file = tmp_path / "changing_helper.py"
+    for factor, found in ((2.0, False), (2.0, True), (3.0, False), (2.0, True)):
+        file.write_text(f"def part(x):\n    return {factor} * x\n")
+        assert ask(process, tmp_path, source=str(file)) == (7.0 * factor, found, [])
+    assert len(files(tmp_path)) == 2
+
+
+def test_all_that_kernels_import_from_here_names_their_folder():
+    """What they take their numbers and parts from: a change of it is a change of their code."""
+    root = Path(kept_code.__file__).parents[1]
+    known = {file for source in kept_code.SOURCES for file in (source.glob("*.py") if source.is_dir() else [source])}
+    kernels = list((root / "integrator" / "kernels").glob("*.py"))
+    assert set(kernels) < known
+    for file in kernels:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                folder = file.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+                assert folder.with_suffix(".py") in known, f"{file.name}: {node.module}"
+
+
 @pytest.mark.parametrize("bits", [0o602, 0o620, 0o666])
 def test_a_file_that_others_may_write_to_is_made_anew(process, home, bits):
     kept(home).chmod(bits)
@@ -156,8 +178,8 @@ def test_a_full_disk_is_told_and_leaves_nothing(process, tmp_path):
 def test_processes_that_compile_at_once_do_not_disturb_each_other(process, tmp_path, rounds):
     for k in range(rounds):
         home = tmp_path / str(k)
-        answers = process.ask(home=home, count=4)["all"]
-        assert [answer.get("value") for answer in answers] == [14.0] * 4
+        answers = process.ask(home=home, count=8)["all"]
+        assert [answer.get("value") for answer in answers] == [14.0] * 8
         kept(home)
         assert ask(process, home) == (14.0, True, [])
 

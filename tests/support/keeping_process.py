@@ -5,6 +5,7 @@ Run as a script this is the process: it reads requests as lines of JSON and answ
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import random
@@ -35,15 +36,31 @@ def thrice(x: float) -> float:
     return 3.0 * x
 
 
-def called(home: str, function: str = "twice", limit: int | None = None, moment: int | None = None) -> dict[str, Any]:
+def called(
+    home: str,
+    function: str = "twice",
+    limit: int | None = None,
+    moment: int | None = None,
+    source: str | None = None,
+) -> dict[str, Any]:
     """Compile or load the function, and call it; whether it was found, and what was warned of.
 
     Of all the moments in which files are written, so many are counted; at the one asked for the process kills itself.
+    `source` is a file with a function `part`, called instead, as if the file were one of those of the kernels.
     """
     from shapephase import files
-    from shapephase.integrator.fast.kernels.jit import kernel
+    from shapephase.integrator import kept_code
+    from shapephase.integrator.machine_code import inline, kernel
 
     os.environ["XDG_CACHE_HOME"] = home
+    known = {"twice": twice, "thrice": thrice}
+    if source is not None:
+        kept_code.SOURCES = (Path(source),)
+        # A file that changes twice in a second is not compiled anew by Python.
+        sys.dont_write_bytecode = True
+        sys.path.insert(0, str(Path(source).parent))
+        part = inline(importlib.import_module(Path(source).stem).part)
+        known["twice"] = lambda x: part(x)
     if limit is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     moments = 0
@@ -57,11 +74,12 @@ def called(home: str, function: str = "twice", limit: int | None = None, moment:
 
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
-        made = kernel({"twice": twice, "thrice": thrice}[function])
+        made = kernel(known[function])
         sys.setprofile(watch)
         value = made(7.0)
         sys.setprofile(None)
-    found = bool(sum(made.stats.cache_hits.values()))
+    compiled: Any = made._compiled
+    found = bool(sum(compiled._cache_hits.values()))
     return {"value": value, "found": found, "said": [str(one.message) for one in said], "moments": moments}
 
 
@@ -103,7 +121,7 @@ def killed(home: str, trials: int, seed: int) -> dict[str, Any]:
     longest = 1.3 * (time.monotonic() - start)
     moments = [round(k * (whole["moments"] - 1) / (trials - 1)) for k in range(trials)]
     found = {"trials": 0, "wrong": 0, "kept": 0, "littered": 0}
-    folder = next(Path(home).glob("shapephase/kernels-*/*"))
+    folder = next(Path(home).glob("shapephase/kernels-*"))
     for moment in [None] * trials + moments:
         for file in folder.iterdir():
             file.unlink()

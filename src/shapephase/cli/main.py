@@ -17,7 +17,7 @@ from cyclopts import App, CycloptsError
 
 from .. import __version__
 from ..errors import OutputFileError, ShapePhaseError
-from ..integrator.machine_code import begin_command
+from ..integrator.machine_code import as_command
 from ..provenance import command_line, provenance
 from .audit import audit_command
 from .check import check_command
@@ -86,8 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Warnings are lines on stderr too, and a list in what `--json` prints.
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
-    begin_command()
-    with spoken(tokens), command_line(tokens):
+    with spoken(tokens), command_line(tokens), as_command():
         try:
             code = _ran(tokens, as_json="--json" in tokens)
         except BrokenPipeError:

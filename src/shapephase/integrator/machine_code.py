@@ -9,8 +9,9 @@ from __future__ import annotations
 import os
 import threading
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import lru_cache, update_wrapper
 from importlib import import_module
 from pathlib import Path
@@ -126,10 +127,16 @@ def fault() -> str:
     return _import_fault() if _numba_compiles() else "NUMBA_DISABLE_JIT is set"
 
 
-def begin_command() -> None:
-    """Interpret until much work is expected: Numba takes as long to import as a short command to run."""
+@contextmanager
+def as_command() -> Iterator[None]:
+    """Interpret within, until much work is expected: Numba takes as long to import as a short command to run."""
     global _is_command, _is_large
+    before = _is_command, _is_large
     _is_command, _is_large = True, False
+    try:
+        yield
+    finally:
+        _is_command, _is_large = before
 
 
 def expect_work(*, momenta: int = 1, rows: int = 0, steps: int = 0) -> None:
