@@ -10,8 +10,6 @@ from functools import lru_cache
 
 # The workers share the cores: threads of their own would get in each other's way.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# Machine code is tested where the fixture `fast` switches it on.
-os.environ["SHAPEPHASE_FAST"] = "0"
 
 import hypothesis
 import numpy as np
@@ -46,9 +44,10 @@ def pytest_collection():
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config, log):
-    from support.distribution import WholeFiles
+    """A file's tests go to one worker, which computes what they share once."""
+    from xdist.scheduler import LoadFileScheduling
 
-    return WholeFiles(config, log) if config.getvalue("dist") == "load" else None
+    return LoadFileScheduling(config, log) if config.getvalue("dist") == "load" else None
 
 
 @lru_cache(maxsize=len(BODIES))
@@ -64,19 +63,6 @@ def body(request):
 @pytest.fixture
 def rng():
     return np.random.default_rng(20060518)
-
-
-@pytest.fixture
-def fast(monkeypatch):
-    """Machine code for the test that asks for it; skipped where Numba is not installed."""
-    pytest.importorskip("numba")
-    monkeypatch.setenv("SHAPEPHASE_FAST", "1")
-
-
-@pytest.fixture
-def compiled(monkeypatch):
-    """Machine code where there is Numba, else none: for tests of what stands on the integrator."""
-    monkeypatch.setenv("SHAPEPHASE_FAST", "1")
 
 
 @pytest.fixture

@@ -19,7 +19,6 @@ from shapephase.plotting import plots
 from support.independent import BODIES, body_of, random_loop, random_vector
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 COUNT = 30
 NAMES = ("cat_two_halves", "satellite", "cat")

@@ -148,8 +148,7 @@ def test_each_setting_alone_changes_nothing(expected, setting, request):
 
 
 @pytest.mark.full
-@pytest.mark.usefixtures("fast")
-def test_with_machine_code_threads_and_forks_get_the_same_too():
+def test_threads_and_forks_get_the_same_too():
     """Forked after the compiled steps were loaded; eight threads that find them not loaded yet."""
     threads = """
 import json
@@ -160,11 +159,9 @@ with ThreadPoolExecutor(8) as pool:
     several = list(pool.map(lambda _: digests(on), range(8)))
 found = several[0]
 assert several == [found] * 8, "a thread gets something else"
-from shapephase.integrator.fast import engine
-assert engine.is_ready()
 """
-    one = alone(BEGIN + FORK + END, SHAPEPHASE_FAST="1")
-    assert alone(threads + FORK + END, SHAPEPHASE_FAST="1") == one
+    one = alone(BEGIN + FORK + END)
+    assert alone(threads + FORK + END) == one
 
 
 # ---- Other processes ------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ import shapephase as sp
 from shapephase.errors import IgnoredElementWarning
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = [pytest.mark.usefixtures("kept_locale"), pytest.mark.usefixtures("compiled")]
+pytestmark = pytest.mark.usefixtures("kept_locale")
 FLIGHTS = Path(__file__).parents[1] / "data" / "trampoline"
 MODEL = FLIGHTS / "Model_JeCh_15DoFs.bioMod"
 BASE = ("TransX", "TransY", "TransZ", "RotX", "RotY", "RotZ")

@@ -13,7 +13,6 @@ from shapephase.cli.main import main
 from shapephase.shape_space.files.read import read_recorded_motion
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 TIMES = np.arange(61) / 60.0
 WAVE = np.sin(np.pi * TIMES) ** 2

@@ -18,7 +18,6 @@ from support.motion_writers import write_delimited
 from support.recorded_flights import ATTITUDE_NOISE, FLIGHT, TAKE_OFF, Y_UP, momentum, simulated, write_take
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 DIVER = sp.load_body("diver")
 

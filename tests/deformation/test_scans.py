@@ -22,7 +22,6 @@ from support.independent import hat
 from support.long_runs import full_but
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 T = 3.0
 TOLERANCE = 1e-9

@@ -11,7 +11,6 @@ from shapephase.errors import ShapeError, UnknownNameError
 from support.long_runs import full_but
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 _DRAWS = 100
 

@@ -16,7 +16,6 @@ from shapephase.shape_space.files.smoothing import Recorded
 from support.long_runs import full_but
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 _NOISE = np.radians(0.3)
 _RATE = 60.0

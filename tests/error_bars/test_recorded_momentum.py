@@ -13,7 +13,6 @@ from shapephase.error_bars._along_motion import responses
 from shapephase.errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 _MOMENTUM = np.array([4.0, -6.0, 40.0])
 _START = so3.exp(np.array([0.3, 0.2, 0.1]))

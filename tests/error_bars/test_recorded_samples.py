@@ -11,7 +11,6 @@ from shapephase import so3
 from shapephase.shape_space.path_samples import path_samples
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 _SIGMA = np.radians(0.3)
 BODY = sp.load_body("diver")

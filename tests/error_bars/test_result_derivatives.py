@@ -17,7 +17,6 @@ from shapephase.shape_space.path_samples import path_samples
 from support.coupled_bodies import LEG, TURN, couplings
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 # Of central differences with motions at 1e-12: their error is some 1e-12 over the step, and the step squared.
 _NEAR = 1e-6

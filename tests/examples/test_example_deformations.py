@@ -44,7 +44,6 @@ from shapephase.rigid_body.euler_top import EulerTop
 from support.long_runs import full_but
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 TURN = so3.exp(np.array([0.3, -0.7, 0.4]))
 TILTED = TURN @ np.diag([1.0, 1.4, 2.1]) @ TURN.T

@@ -24,7 +24,6 @@ from shapephase.examples.scenarios import (
 from support.long_runs import full_but
 
 # What is computed is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 
 FILES = {
     "cat_righting": 400,

@@ -62,7 +62,7 @@ class LimitedProcess(AskedProcess):
         """Start it; `long`: for so many inputs that it is worth while to import everything beforehand."""
         self._folder = folder
         (folder / _BODY).write_text(BODY)
-        fixed = {"OMP_NUM_THREADS": "1", "SHAPEPHASE_FAST": "0", "COLUMNS": "200", "MPLBACKEND": "agg"}
+        fixed = {"OMP_NUM_THREADS": "1", "COLUMNS": "200", "MPLBACKEND": "agg"}
         super().__init__("-m", "fuzz.limited_process", *(["long"] if long else []), folder=folder, **fixed)
         self.answer()
 

@@ -14,7 +14,6 @@ from shapephase.optimal_control import Goal, Search, plan_reorientation
 from support.independent import FreeFloating, apart, pinocchio_motion, turn, urdf_file
 
 # What is planned is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 COARSE = Search(pieces=8)
 FAR = turn([1.0, 0.1, 0.0], 2.6)
 DIRECTION = np.array([0.3, -1.0, 2.5]) / np.linalg.norm([0.3, -1.0, 2.5])

@@ -17,7 +17,6 @@ from support.ball_bodies import BALLS
 from support.bodies import joint, link, urdf
 from support.independent import MujocoBody
 
-pytestmark = pytest.mark.usefixtures("compiled")
 TIMES = 4001
 TURN = so3.exp(np.array([1.2, 0.0, 0.0]))
 # Of two discs on one axle, and what the joint feels of both.

@@ -42,7 +42,6 @@ from support.independent import apart, pinocchio_motion
 from support.long_runs import full_but
 
 # What is planned is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 HALF_TURN = so3.exp(np.array([np.pi, 0.0, 0.0]))
 AXIS = [[0.0, 0.0, 2.0], [0.0, 0.0, -1.0]]
 # As the theory of optimal loops has it.

@@ -17,7 +17,6 @@ from shapephase.optimal_control.task import reorientation
 from support.independent import apart, pinocchio_motion, turn
 
 # What is planned is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 GOAL = turn([2.0, 0.3, 0.1], 2.0)
 BESIDE = Waypoint([0.5, 0.2, 0.1])
 

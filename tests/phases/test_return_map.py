@@ -34,7 +34,6 @@ from support.independent import (
 from support.long_runs import full_but
 
 # The map is the same with and without machine code, which is quicker.
-pytestmark = pytest.mark.usefixtures("compiled")
 Array = NDArray[np.float64]
 # Less for the diver, who at his usual momentum turns so fast that the map mixes the sphere.
 SIZES = {**BODIES, "diver": 2.0}

@@ -50,16 +50,13 @@ def paths():
 PATHS = paths()
 
 
-@pytest.mark.parametrize("fast_or_not", full_but(["slow", "fast"], "fast"))
 @pytest.mark.parametrize("turn", full_but(TURNING, "spline", "line"))
 @pytest.mark.parametrize("kind", PATHS)
-def test_motions_are_those_of_joints_driven_by_hand(kind, turn, fast_or_not, load_urdf, request):
+def test_motions_are_those_of_joints_driven_by_hand(kind, turn, load_urdf):
     """Breaks of the driven motion are where a knee that is looked at at many times goes through knots.
 
     Whatever the knots are, either motion keeps its estimate.
     """
-    if fast_or_not == "fast":
-        request.getfixturevalue("fast")
     coupling, function = TURNING[turn]
     free, path = load_urdf(LEG), PATHS[kind]
     body = free.with_couplings(couplings(coupling))

@@ -109,9 +109,8 @@ deviation = 0.1
 
 
 @pytest.mark.full
-@pytest.mark.usefixtures("fast")
 def test_a_hundred_thousand_cases_survive_the_death_of_worker_scheduler_and_driver(tmp_path):
-    """By the command, in machine code: none is lost or stored twice, and all are those of a plain loop."""
+    """By the command: none is lost or stored twice, and all are those of a plain loop."""
     (tmp_path / "study.toml").write_text(STUDY)
     begun, stored = tmp_path / "begun", tmp_path / "stored"
     environment = {

@@ -109,9 +109,8 @@ def test_cases_do_not_depend_on_those_beside_them_nor_on_their_order(name):
 
 
 @pytest.mark.full
-@pytest.mark.usefixtures("fast")
 @pytest.mark.parametrize("name", list(STUDIES)[:-1])
-def test_machine_code_gives_cases_their_bits_too(name):
+def test_cases_have_the_bits_of_a_plain_loop(name):
     body, motion, over, more = STUDIES[name]
     draws = 60 // (2 if name in ("paths", "centres") else 1)
     study = room.Study(body, motion, over, ENDS, draws=draws, momentum=[0.0, 0.0, 0.01], **more)

@@ -67,7 +67,7 @@ class WritingProcess(AskedProcess):
 
     def __init__(self, *writers: str) -> None:
         # Two writes of the same are the same bytes.
-        fixed = {"SOURCE_DATE_EPOCH": "0", "PYTHONHASHSEED": "0", "SHAPEPHASE_FAST": "0"}
+        fixed = {"SOURCE_DATE_EPOCH": "0", "PYTHONHASHSEED": "0"}
         super().__init__(__file__, *writers, **fixed)
 
 
