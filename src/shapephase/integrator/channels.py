@@ -19,7 +19,10 @@ Directly = Callable[[Array], Array | None]
 
 # Times in one call of the body: some seconds of work at most, and its arrays stay within some hundred MB.
 _AT_ONCE = 16_384
-_VOIGT = np.array([0, 4, 8, 5, 2, 1])
+VOIGT = np.array([0, 4, 8, 5, 2, 1])
+"""Entries xx yy zz yz xz xy of a matrix row by row."""
+MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
+"""And back."""
 # Off-diagonal channels stand for two entries of I^-1.
 _WEIGHTS = np.sqrt(np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]))
 
@@ -71,7 +74,7 @@ def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
     """
     inverse = inverse_inertia(inertia, times)
     channels = np.empty((len(times), 9))
-    channels[:, :6] = inverse.reshape(-1, 9)[:, _VOIGT]
+    channels[:, :6] = inverse.reshape(-1, 9)[:, VOIGT]
     channels[:, 6:] = (inverse @ momentum[:, :, None])[:, :, 0]
     if not isfinite(channels[:, 6:].sum()):
         row = int(np.argwhere(~np.isfinite(channels[:, 6:]))[0, 0])

@@ -20,16 +20,18 @@ from .constants import (
     EPS,
     MEASURED_ROUNDING,
     ORDER,
+    ROUNDED_INERTIA,
     ROUNDING_OF_START,
     ROUNDING_OF_STEP,
+    ROUNDING_SHARE,
     STEPPING,
     STEPPING_SHARE,
     TERMS_OF_STEP,
 )
 from .fresh_times import compare, fresh_times
 from .interpolant import Interpolant
-from .marches import Attempt, attempted, magnitudes_and_directions
-from .sampling import Sampler, Samples
+from .marches import Attempt, attempted, largest_angle, magnitudes_and_directions, marched
+from .sampling import Sampler, Samples, largest_condition, rounded_series
 from .stepped import SteppedRotation
 
 # Steps of one motion: some ten seconds, and a gigabyte of results.
@@ -42,10 +44,12 @@ _GAINS = 0.9
 _USUAL = 1e-9
 # Refinements are made stricter by less than this factor, so that momenta of a batch share them.
 _QUARTERS = 4
+# Of the tolerance: samples are not made denser than for this.
+_LEAST_WANTED = 1e-9
+# How many times their rounding samples are changed by, to see what it does.
+_EXAGGERATED = 1024.0
 # [rad] Marches farther apart than this tell nothing of how errors fall.
 _LOST = 0.1
-# Times of a motion at which its rate and inertia are looked at.
-_PLACES = 17
 
 
 class Refinement(NamedTuple):
@@ -90,11 +94,11 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
     ceiling = float(magnitudes.max(initial=0.0))
     progress = Progress()
     while True:
-        rotation = one_round(sampler, momentum, tolerance, ceiling, progress.refinement)
+        rotation, level = one_round(sampler, momentum, tolerance, ceiling, progress.refinement)
         if (rotation.error_estimate <= tolerance).all():
             return rotation
         worst = int(np.argmax(rotation.error_estimate))
-        progress = progress.after(rotation, worst, tolerance)
+        progress = progress.after(rotation, worst, tolerance, level)
 
 
 class Progress(NamedTuple):
@@ -105,11 +109,11 @@ class Progress(NamedTuple):
     rounds: int = 0
     in_vain: int = 0
 
-    def after(self, rotation: SteppedRotation, row: int, tolerance: float) -> Progress:
-        """What the next round does for a row. Raises AccuracyNotReached where none will help."""
+    def after(self, rotation: SteppedRotation, row: int, tolerance: float, level: float) -> Progress:
+        """What the next round does for a row; `level` as of `Samples`. Raises AccuracyNotReached where none will help."""
         estimate = float(rotation.error_estimate[row])
         in_vain = self.in_vain + (estimate > _GAINS * self.best)
-        refinement = refined(self.refinement, rotation, row, tolerance)
+        refinement = refined(self.refinement, rotation, row, tolerance, level)
         if in_vain >= 2 or self.rounds >= _MOST_ROUNDS or refinement == self.refinement:
             raise AccuracyNotReached(
                 f"the tolerance {tolerance:.3g} rad was not reached: the estimate is {estimate:.3g} rad, of which "
@@ -120,16 +124,21 @@ class Progress(NamedTuple):
         return Progress(refinement, min(estimate, self.best), self.rounds + 1, in_vain)
 
 
-def refined(last: Refinement, rotation: SteppedRotation, row: int, tolerance: float) -> Refinement:
+def refined(last: Refinement, rotation: SteppedRotation, row: int, tolerance: float, level: float) -> Refinement:
     """What the parts of an error ask for: more samples, more steps, or both."""
     sampling, stepping = float(rotation.sampling_error[row]), float(rotation.stepping_error[row])
     samples, steps = last
     spare = max(tolerance - float(rotation.rounding_error[row]), 0.5 * tolerance)
-    if sampling > STEPPING_SHARE * spare:
-        samples += ceil(_QUARTERS * log2(max(min(4.0 * sampling / spare, 1e6), 2.0)))
+    if sampling > STEPPING_SHARE * spare and level:
+        # Below the level at which there would be more of them, by as much as they turn the body too far.
+        wanted = min(level, last.sampling_tolerance(tolerance)) * min(0.25 * spare / sampling, 0.5)
+        samples = max(samples + 1, ceil(_QUARTERS * log2(tolerance / max(wanted, _LEAST_WANTED * tolerance))))
     if stepping > STEPPING_SHARE * spare:
         wanted = stepping / (0.5 * STEPPING_SHARE * spare)
         steps += ceil(_QUARTERS * min(max(log2(min(wanted, 1e300)) / ORDER, 1.0 / _QUARTERS), 2.0))
+    elif rotation.rounding_error[row] > STEPPING_SHARE * tolerance:
+        # Marches with finer steps differ by nothing but their rounding, which then is measured.
+        steps += _QUARTERS // 2
     return Refinement(samples, steps)
 
 
@@ -140,8 +149,10 @@ def one_round(
     ceiling: float,
     refinement: Refinement,
     threads: int | None = None,
-) -> SteppedRotation:
+) -> tuple[SteppedRotation, float]:
     """Sample and step momenta (B, 3) up to a ceiling [kg m^2/s], with error estimates, within the tolerance or not.
+
+    With it comes the level of the samples.
 
     What is within it has been compared with the body at fresh times.
     """
@@ -149,14 +160,14 @@ def one_round(
     samples = sampler.samples(ceiling, wanted, strict=not refinement.samples)
     steps = planned(samples.interpolant, ceiling, tolerance, refinement.factor)
     found = attempted(samples.interpolant, samples.perturbed.coefficients, steps, momentum, threads)
-    rotation = rotation_of(samples, found, momentum)
+    rotation = rotation_of(samples, found, momentum, tolerance)
     done = rotation.error_estimate <= tolerance
     if done.any():
         times, _ = fresh_times(samples.interpolant)
         compare(samples.interpolant, sampler.channels(times), ceiling, tolerance)
     elif samples.too_rough is not None:
         raise samples.too_rough
-    return rotation
+    return rotation, samples.level
 
 
 def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: float) -> Integers:
@@ -178,14 +189,21 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
     return np.ceil(steps).astype(np.int64)
 
 
-def rotation_of(samples: Samples, found: Attempt, momentum: Array) -> SteppedRotation:
+def rotation_of(samples: Samples, found: Attempt, momentum: Array, tolerance: float) -> SteppedRotation:
     """Steps with their error estimates."""
     interpolant, growth = samples.interpolant, found.growth
     fell = np.clip(found.fine / np.maximum(found.coarse, 1e-300), 2.0**-ORDER, 1.0)
-    stepping = np.where(found.fine < _LOST, STEPPING * fell * found.fine, np.pi)
     committed = _committed(found.dynamics.shape[1], found.turned)
-    rounding = np.minimum(growth * committed, committed + MEASURED_ROUNDING * found.fine)
-    rounding += rounding_of_body(interpolant, found, momentum)
+    rounding = growth * committed * largest_condition(interpolant.coefficients)
+    # What rounding alone may set two marches apart says nothing of their steps.
+    apart = np.maximum(found.fine - rounding, 0.0)
+    stepping = np.where(found.fine < _LOST, STEPPING * fell * apart, np.pi)
+    large = np.flatnonzero((rounding > ROUNDING_SHARE * tolerance) & (found.fine < _LOST))
+    if len(large):
+        measured = committed[large] + MEASURED_ROUNDING * found.fine[large]
+        measured += rounding_of_samples(interpolant, found.steps // 4, momentum[large])
+        rounding[large] = np.minimum(rounding[large], measured)
+    rounding += rounding_of_times(interpolant, momentum)
     sampling = np.maximum(found.sampling, samples.between) + growth * samples.hidden
     return SteppedRotation(
         interpolant=interpolant,
@@ -215,26 +233,20 @@ def committed_rounding(quaternions: Array) -> Array:
     return _committed(quaternions.shape[1] - 1, turned)
 
 
-def rounding_of_body(interpolant: Interpolant, found: Attempt, momentum: Array) -> Array:
-    """Attitude error because inertia and times are rounded before anything is sampled: (B,) [rad].
+def rounding_of_samples(interpolant: Interpolant, steps: Integers, momentum: Array) -> Array:
+    """Attitude error because inertias are rounded, grown as it grows along the motion: (B,) [rad].
 
-    Inertia is off by eps |I| in any direction, which turns a body that spins at omega off by eps |I| |I^-1 omega| a
-    second: of a slender body about its long axis that is as many units a radian as its moments differ by. Times are off
-    by eps times the duration. No march shows either, since all have them in common.
+    Of far more units than there are, so that it stands out of the rounding of the marches themselves.
     """
+    series = interpolant.coefficients
+    plain = marched(interpolant, series, steps, momentum)
+    rounded = marched(interpolant, rounded_series(series, _EXAGGERATED * ROUNDED_INERTIA), steps, momentum)
+    return largest_angle(plain, rounded) / _EXAGGERATED
+
+
+def rounding_of_times(interpolant: Interpolant, momentum: Array) -> Array:
+    """Attitude error because times are rounded, by eps times the duration: (B,) [rad]. No march shows it."""
     magnitudes, _ = magnitudes_and_directions(momentum)
-    ends = np.cumsum(found.steps)
-    chosen = np.unique(np.linspace(0, interpolant.loops * int(ends[-1]), _PLACES).astype(np.int64))
-    of_loop = chosen % ends[-1]
-    panel = np.searchsorted(ends, of_loop, side="right")
-    share = (of_loop - ends[panel] + found.steps[panel]) / found.steps[panel]
-    inverse, drift = interpolant.inverse_and_drift(interpolant.edges[panel] + share * interpolant.widths[panel])
-    rates = np.broadcast_to(-drift, (len(magnitudes), *drift.shape))
-    if found.directions.shape[1]:
-        turning = (found.directions[:, chosen][:, :, None] * inverse).sum(axis=-1)
-        rates = rates + magnitudes[:, None, None] * turning
-    sizes = 1.0 / np.linalg.eigvalsh(inverse)[:, 0]
-    off = sizes * np.sqrt((((rates[:, :, None] * inverse).sum(axis=-1)) ** 2).sum(axis=-1))
-    fastest = magnitudes * rates_of(interpolant.coefficients * np.repeat([1.0, 0.0], [6, 3]), 1.0).sum(axis=1).max()
-    fastest = fastest + rates_of(interpolant.coefficients, 0.0).sum(axis=1).max()
-    return EPS * float(interpolant.edges[-1]) * (off.mean(axis=1) + fastest)
+    inverse = rates_of(interpolant.coefficients * np.repeat([1.0, 0.0], [6, 3]), 1.0).sum(axis=1).max()
+    drift = rates_of(interpolant.coefficients, 0.0).sum(axis=1).max()
+    return EPS * float(interpolant.edges[-1]) * (magnitudes * inverse + drift)

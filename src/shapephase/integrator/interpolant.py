@@ -10,8 +10,8 @@ import numpy as np
 from ..arrays import Array, Integers, lock_arrays
 from ..chebyshev import PiecewiseChebyshev
 from ..display import short_repr
+from .channels import MATRIX
 
-_MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,4 +64,4 @@ class Interpolant:
     def inverse_and_drift(self, times: Array) -> tuple[Array, Array]:
         """I^-1 and I^-1 L_o: (N,) -> (N, 3, 3) [1/(kg m^2)], (N, 3) [rad/s]."""
         values = self.series(times)
-        return values[:, _MATRIX].reshape(-1, 3, 3), values[:, 6:]
+        return values[:, MATRIX].reshape(-1, 3, 3), values[:, 6:]

@@ -159,7 +159,7 @@ def _integrated(
     # At rest all turn alike.
     taken = starts if group.ceiling else np.zeros((1, 3))
     try:
-        rotation = one_round(sampler, taken, tolerance, group.ceiling, group.refinement, threads)
+        rotation, level = one_round(sampler, taken, tolerance, group.ceiling, group.refinement, threads)
     except AccuracyNotReached as error:
         raise _of_row(error, rows[:1], len(momentum)) from error
     done = rotation.error_estimate <= tolerance
@@ -168,7 +168,7 @@ def _integrated(
     together: dict[Refinement, list[tuple[int, Progress]]] = {}
     for place in np.flatnonzero(~done).tolist():
         try:
-            progress = group.progress[place].after(rotation, place, tolerance)
+            progress = group.progress[place].after(rotation, place, tolerance, level)
         except AccuracyNotReached as error:
             raise _of_row(error, rows[place : place + 1], len(momentum)) from error
         together.setdefault(progress.refinement, []).append((place, progress))

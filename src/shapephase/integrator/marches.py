@@ -23,7 +23,7 @@ _KEPT = 64
 # [rad] of the starts that show how errors grow: what is neglected is as small as rounding, relative to it.
 _TURN = 1e-7
 # Times between which the growth of errors is known, the start included.
-_MARKS = 9
+_MARKS = 17
 _NO_MARKS = np.zeros(0, dtype=np.int64)
 # Of a direction, for derivatives: its products with whatever grows stay far from the smallest and the largest numbers.
 _IMAGINARY = 1e-60

@@ -17,7 +17,7 @@ from ..arrays import Array, Integers, Mask, lock_arrays, read_only
 from ..chebyshev import chebyshev, end_margin, nodes_on, values_to_coefficients
 from ..display import short_repr
 from ..errors import AccuracyNotReached
-from .channels import Channels, Directly, Evaluate, rates_of
+from .channels import MATRIX, VOIGT, Channels, Directly, Evaluate, rates_of
 from .constants import (
     BEYOND_LAST_TERMS,
     CHANGED_LAST_TERMS,
@@ -100,6 +100,7 @@ class Samples:
     noisy : (P,) whether these terms are noise, which all others have as well
     between : attitude error within a panel that its ends do not show [rad]
     hidden : what no series shows, without amplification [rad]
+    level : tolerance below which there would be more samples [rad]; 0: all that is missing is noise
     too_rough : why the samples are not as dense as they were to be; None: they are
     """
 
@@ -109,6 +110,7 @@ class Samples:
     noisy: Mask
     between: float
     hidden: float
+    level: float
     too_rough: AccuracyNotReached | None = None
 
     __repr__ = short_repr
@@ -122,8 +124,8 @@ class Samples:
 def changed_series(coefficients: Array, change: Array, noisy: Mask) -> Array:
     """Series (P, n, 9) with their last two terms changed by shares (P,) of themselves.
 
-    Where these terms are noise, twice the last of them is added to the first, with signs by chance: all terms have as
-    much of it, and the first turns the body most.
+    Where these terms are noise, the last of them is added to the first, with signs by chance: all terms have as much of
+    it, and the first turns the body most.
     """
     found = coefficients.copy()
     last = last_terms(coefficients)
@@ -131,9 +133,40 @@ def changed_series(coefficients: Array, change: Array, noisy: Mask) -> Array:
     for back in (0, 1):
         place = np.maximum(last - back, 0)
         found[rows, place] *= np.where(last >= 2, 1.0 - change, 1.0)[:, None]
-    signs = np.where(np.random.default_rng(0).random(len(found)) < 0.5, -2.0, 2.0)
-    found[:, 0] += np.where(noisy & (last >= 2), signs, 0.0)[:, None] * coefficients[rows, last]
+    found[:, 0] += (_signs(len(found)) * (noisy & (last >= 2)))[:, None] * coefficients[rows, last]
     return read_only(found)
+
+
+def rounded_series(coefficients: Array, units: float) -> Array:
+    """Series (P, n, 9) of inertias and momenta that are rounded otherwise, by so many units of their largest entries.
+
+    With L the largest moment, a rounding eps L E of the inertia, E of size one in any direction, changes I^-1 by
+    -I^-1 eps L E I^-1: of a body that hardly resists turning about one axis, by more than units of its own.
+    """
+    panels, terms, _ = coefficients.shape
+    rng, inverse = np.random.default_rng(0), coefficients[:, 0][:, MATRIX].reshape(-1, 1, 3, 3)
+    least = np.linalg.eigvalsh(inverse[:, 0])[:, 0]
+    unit = (units * EPS / np.where(least > 0.0, least, np.inf))[:, None, None]
+    tensors, vectors = rng.standard_normal((panels, terms, 3, 3)), rng.standard_normal((panels, terms, 3))
+    turned = inverse @ (tensors + np.swapaxes(tensors, -1, -2))
+    drift = np.abs(coefficients[:, :, 6:]).max(axis=(1, 2))[:, None, None] * vectors
+    found = coefficients.copy()
+    there = np.arange(terms) <= last_terms(coefficients)[:, None]
+    unit = unit * there[:, :, None]
+    found[:, :, :6] += unit * (turned @ inverse).reshape(panels, terms, 9)[:, :, VOIGT]
+    of_tensors = (turned @ coefficients[:, None, 0, 6:, None])[..., 0]
+    found[:, :, 6:] += unit * (of_tensors + (inverse @ drift[..., None])[..., 0])
+    return found
+
+
+def _signs(count: int) -> Array:
+    return np.where(np.random.default_rng(0).random(count) < 0.5, -1.0, 1.0)
+
+
+def largest_condition(coefficients: Array) -> float:
+    """Of the inertia, on all panels."""
+    values = np.linalg.eigvalsh(coefficients[:, 0][:, MATRIX].reshape(-1, 3, 3))
+    return float((values[:, 2] / np.maximum(values[:, 0], _TINY)).max())
 
 
 def last_terms(coefficients: Array) -> Integers:
@@ -256,19 +289,20 @@ class _Sampling:
         self._done: list[tuple[Array, ...]] = []
         self._count = 0
         self._gap = 0.0
+        self._worst = 0.0
 
     def samples(self) -> Samples:
         known, before = self._known, self._sampler.evaluations
         defect = known.loops * (0.0 if known.resolved is None else known.resolved.defect)
+        too_rough = None
         if defect > 0.5 * self._tolerance:
-            raise AccuracyNotReached(
+            too_rough = AccuracyNotReached(
                 f"rates and values of the function of time disagree by {defect:.3g} rad, which is too much for samples "
                 f"good to {self._tolerance:.3g} rad; give the exact derivatives, or loosen the tolerance"
             )
         first = self._sampler.first_panels(HIDDEN_SHARE * self._tolerance)
         most = _MOST_PANELS + 40 * len(known.breaks) + len(first.degrees)
         waiting = first.by_degree()
-        too_rough = None
         while waiting:
             values = self._sampled(waiting)
             further: list[_Panels] = []
@@ -313,7 +347,8 @@ class _Sampling:
         missing = late * decay / (1.0 - decay)
         good = noisy | (missing <= self._rate * swings)
         if self._known.is_checked:
-            good &= self._fits_between(panels, series, good, rates)
+            good &= self._fits_between(panels, series, good, self._rate * swings + rounded)
+        self._worst = max(self._worst, float((missing / swings)[good & ~noisy].max(initial=0.0)))
         change = np.minimum(CHANGED_LAST_TERMS * (1.0 + BEYOND_LAST_TERMS / degree) * decay / (1.0 - decay), degree)
         beyond = np.maximum(missing, noisy * late) * width / swings
         table = np.stack([np.where(noisy, 1.0, change), noisy, beyond, np.full(len(left), degree)])
@@ -327,18 +362,18 @@ class _Sampling:
         ends = np.concatenate([left[rough], middle]), np.concatenate([middle, right[rough]])
         return [_Panels(DEGREES[1], *ends, None, np.tile(late[rough], 2))]
 
-    def _fits_between(self, panels: _Panels, series: Array, good: Mask, rates: Array) -> Mask:
-        """Whether series are right between their nodes, of those that are good there."""
-        rows, degree = np.flatnonzero(good), panels.degree
+    def _fits_between(self, panels: _Panels, series: Array, good: Mask, allowed: Array) -> Mask:
+        """Whether series are right between their nodes, to what is allowed (P,) [rad/s]: of those good at the nodes."""
+        rows = np.flatnonzero(good)
         width = (panels.right - panels.left)[rows]
         times = panels.left[rows, None] + width[:, None] * _BETWEEN
         body = self._sampler.channels(times.ravel()).reshape(*times.shape, 9)
-        here = chebyshev(2.0 * _BETWEEN - 1.0, degree + 1) @ series[rows]
+        here = chebyshev(2.0 * _BETWEEN - 1.0, panels.degree + 1) @ series[rows]
         gap = rates_of(here - body, self._momentum).max(axis=1)
-        allowed = self._rate * np.maximum(degree - width * rates[rows].sum(axis=1), 1.0)
         fits = np.zeros(len(good), dtype=bool)
-        fits[rows] = gap <= np.maximum(allowed, ROUNDED_SAMPLES * EPS * rates[rows].max(axis=1))
-        self._gap = max(self._gap, float(gap[fits[rows]].max(initial=0.0)))
+        fits[rows] = gap <= allowed[rows]
+        # What is seen there swings to both sides.
+        self._gap += 0.5 * float((gap * width)[fits[rows]].sum())
         return fits
 
     def _keep(self, left: Array, right: Array, series: Array, table: Array) -> None:
@@ -378,8 +413,10 @@ class _Sampling:
             edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._end * loops)
         interpolant = Interpolant(edges, series[order], loops, evaluations)
         panels = Panels(edges[: len(order) + 1], table[3].astype(np.int64))
-        hidden = defect + loops * self._end * self._gap / DEGREES[0] + loops * self._noise_of_path(interpolant)
-        return Samples(interpolant, panels, table[0], table[1] > 0.0, float(table[2].max(initial=0.0)), hidden, too_rough)
+        hidden = defect + loops * (self._gap + self._noise_of_path(interpolant))
+        level = self._worst * loops * self._end / SAMPLING_SHARE
+        between = float(table[2].max(initial=0.0))
+        return Samples(interpolant, panels, table[0], table[1] > 0.0, between, hidden, level, too_rough)
 
     def _noise_of_path(self, interpolant: Interpolant) -> float:
         """What noise of a resolved path turns the body by in one loop: that of panels is independent of each other."""
