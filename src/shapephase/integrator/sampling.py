@@ -269,10 +269,18 @@ class _Panels:
         nodes[:, 0], nodes[:, -1] = self.left + margin, self.right - margin
         return nodes if self.values is None else nodes[:, 1::2]
 
-    def with_fresh(self, fresh: Array) -> Array:
-        """All values: (P, k, 9) -> (P, degree + 1, 9)."""
+    def with_fresh(self, fresh: Array, end: float) -> Array:
+        """All values, at the ends of panels themselves: (P, k, 9) -> (P, degree + 1, 9)."""
         if self.values is None:
-            return fresh
+            if not self.degree:
+                return fresh
+            # From this side of a break to the break, along the slope of the series.
+            width, order = self.right - self.left, np.arange(self.degree + 1.0)
+            slopes = np.stack([(-1.0) ** order, np.ones_like(order)]) * order**2
+            moved = (slopes @ values_to_coefficients(self.degree)) @ fresh
+            values = fresh.copy()
+            values[:, [0, -1]] += moved * (2.0 * end_margin(width, end) / width)[:, None, None]
+            return values
         values = np.empty((len(self.left), self.degree + 1, 9))
         values[:, ::2], values[:, 1::2] = self.values, fresh
         return values
@@ -323,7 +331,7 @@ class _Sampling:
         found = self._sampler.channels(np.concatenate([one.ravel() for one in times]))
         stops = np.cumsum([one.size for one in times])[:-1]
         return [
-            panels.with_fresh(part.reshape(*one.shape, 9))
+            panels.with_fresh(part.reshape(*one.shape, 9), self._end)
             for panels, one, part in zip(waiting, times, np.split(found, stops), strict=True)
         ]
 
