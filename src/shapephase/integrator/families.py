@@ -20,7 +20,8 @@ from .channels import inverted
 from .fresh_times import fresh_times
 from .many_rotations import CLASSES, GroupedRotations, rotations_of_each, rounded_up
 from .marches import magnitudes_and_directions
-from .sampling import Panels, Sampler
+from .samples import Panels
+from .sampling import Sampler, nodes_of_panels
 from .stepped import SteppedRotation
 from .threads import processors
 
@@ -149,7 +150,7 @@ def _lots(variants: Variants, ceilings: Array, tolerance: float) -> Iterator[_Lo
             pass
         else:
             panels = samples.panels
-            times = panels.times, fresh_times(samples.interpolant)[0]
+            times = nodes_of_panels(panels), fresh_times(samples.interpolant)[0]
             kept += len(rows) * samples.interpolant.coefficients.size
         if kept > _MOST_KEPT:
             raise AccuracyNotReached(

@@ -14,7 +14,6 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
-from .channels import rates_of
 from .constants import (
     ANGLE_OF_STEP,
     EPS,
@@ -30,8 +29,11 @@ from .constants import (
 )
 from .fresh_times import compare, fresh_times
 from .interpolant import Interpolant
+from .kernels import spectra_kernel
+from .machine_code import plain
 from .marches import Attempt, attempted, largest_angle, magnitudes_and_directions, marched
-from .sampling import Sampler, Samples, largest_condition, rounded_series
+from .samples import Samples, rounded_series
+from .sampling import Sampler
 from .stepped import SteppedRotation
 
 # Steps of one motion: some ten seconds, and a gigabyte of results.
@@ -172,11 +174,11 @@ def one_round(
 
 def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: float) -> Integers:
     """The coarsest steps on each panel, a fourth of those that count: (P,). Raises AccuracyNotReached."""
-    terms = rates_of(interpolant.coefficients, ceiling) * interpolant.widths[:, None]
+    turn, terms = np.empty((2, len(interpolant.widths)))
+    least = STEPPING_SHARE * tolerance
+    spectra_kernel.plan(plain(interpolant.coefficients), interpolant.widths, ceiling, least, turn, terms)
     finer = (_USUAL / tolerance) ** (1.0 / ORDER)
-    counted = np.arange(terms.shape[1]) * (terms > STEPPING_SHARE * tolerance)
-    turn = terms.sum(axis=1)
-    steps = finer * np.maximum(counted.max(axis=1) / TERMS_OF_STEP, turn / ANGLE_OF_STEP)
+    steps = finer * np.maximum(terms / TERMS_OF_STEP, turn / ANGLE_OF_STEP)
     steps = factor * np.maximum(steps, 1.0)
     total = 4.0 * interpolant.loops * float(steps.sum())
     if total > _MOST_STEPS:
@@ -194,16 +196,16 @@ def rotation_of(samples: Samples, found: Attempt, momentum: Array, tolerance: fl
     interpolant, growth = samples.interpolant, found.growth
     fell = np.clip(found.fine / np.maximum(found.coarse, 1e-300), 2.0**-ORDER, 1.0)
     committed = _committed(found.dynamics.shape[1], found.turned)
-    rounding = growth * committed * largest_condition(interpolant.coefficients)
+    rounding = growth * committed * samples.condition
     # What rounding alone may set two marches apart says nothing of their steps.
     apart = np.maximum(found.fine - rounding, 0.0)
     stepping = np.where(found.fine < _LOST, STEPPING * fell * apart, np.pi)
     large = np.flatnonzero((rounding > ROUNDING_SHARE * tolerance) & (found.fine < _LOST))
     if len(large):
         measured = committed[large] + MEASURED_ROUNDING * found.fine[large]
-        measured += rounding_of_samples(interpolant, found.steps // 4, momentum[large])
+        measured += rounding_of_samples(samples, found.steps // 4, momentum[large])
         rounding[large] = np.minimum(rounding[large], measured)
-    rounding += rounding_of_times(interpolant, momentum)
+    rounding += rounding_of_times(samples, momentum)
     sampling = np.maximum(found.sampling, samples.between) + growth * samples.hidden
     return SteppedRotation(
         interpolant=interpolant,
@@ -233,20 +235,19 @@ def committed_rounding(quaternions: Array) -> Array:
     return _committed(quaternions.shape[1] - 1, turned)
 
 
-def rounding_of_samples(interpolant: Interpolant, steps: Integers, momentum: Array) -> Array:
+def rounding_of_samples(samples: Samples, steps: Integers, momentum: Array) -> Array:
     """Attitude error because inertias are rounded, grown as it grows along the motion: (B,) [rad].
 
     Of far more units than there are, so that it stands out of the rounding of the marches themselves.
     """
-    series = interpolant.coefficients
-    plain = marched(interpolant, series, steps, momentum)
-    rounded = marched(interpolant, rounded_series(series, _EXAGGERATED * ROUNDED_INERTIA), steps, momentum)
-    return largest_angle(plain, rounded) / _EXAGGERATED
+    interpolant, series = samples.interpolant, samples.interpolant.coefficients
+    same = marched(interpolant, series, steps, momentum)
+    rounded = marched(interpolant, rounded_series(samples, _EXAGGERATED * ROUNDED_INERTIA), steps, momentum)
+    return largest_angle(same, rounded) / _EXAGGERATED
 
 
-def rounding_of_times(interpolant: Interpolant, momentum: Array) -> Array:
+def rounding_of_times(samples: Samples, momentum: Array) -> Array:
     """Attitude error because times are rounded, by eps times the duration: (B,) [rad]. No march shows it."""
     magnitudes, _ = magnitudes_and_directions(momentum)
-    inverse = rates_of(interpolant.coefficients * np.repeat([1.0, 0.0], [6, 3]), 1.0).sum(axis=1).max()
-    drift = rates_of(interpolant.coefficients, 0.0).sum(axis=1).max()
-    return EPS * float(interpolant.edges[-1]) * (magnitudes * inverse + drift)
+    inverse, drift = samples.rates
+    return EPS * float(samples.interpolant.edges[-1]) * (magnitudes * inverse + drift)

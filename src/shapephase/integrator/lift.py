@@ -15,7 +15,7 @@ from ..display import short_repr
 from .interpolant import Interpolant
 from .integrate import committed_rounding
 from .marches import largest_angle, marched, small_turns
-from .sampling import Perturbed
+from .samples import Perturbed
 from .stepped import SteppedRotation
 
 # Of the motion's error estimate: what the steps of its lift are to err by at most.

@@ -27,7 +27,7 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _F = TypeVar("_F", bound=Callable[..., Any])
 
-_MODULES = ("step_kernel", "curve_kernel", "tree_kernel", "gradient_kernel")
+_MODULES = ("step_kernel", "spectra_kernel", "curve_kernel", "tree_kernel", "gradient_kernel")
 """Of `kernels/`, those with a function `warm`, which calls each kernel of its module once."""
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
 """Of parts and kernels alike: what is called from both would else be compiled twice. Parts that are not put where they

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,13 +13,11 @@ from .. import run_progress
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from .interpolant import Interpolant
-from .kernels import step_kernel
+from .kernels import spectra_kernel, step_kernel
 from .threads import in_threads
 
 # Steps of which the channels are there at once: four times as many take some 16 megabytes.
 _AT_ONCE = 4000
-# Steps of a panel for which the matrix that gives their channels is kept.
-_KEPT = 64
 # [rad] of the starts that show how errors grow: what is neglected is as small as rounding, relative to it.
 _TURN = 1e-7
 # Times between which the growth of errors is known, the start included.
@@ -29,32 +27,59 @@ _NO_MARKS = np.zeros(0, dtype=np.int64)
 _IMAGINARY = 1e-60
 
 
-def stage_channels(series: Array, widths: Array, steps: Integers, first: int = 0, stop: int | None = None) -> Array:
-    """The channels at the stages of steps `first` to `stop` of one loop, times their lengths: (K, STAGES, 9).
+class Block(NamedTuple):
+    """Steps whose channels are there at once: of panels `low` to `high`, or some of one panel's."""
+
+    low: int
+    high: int
+    begin: int  # of the steps of the first panel
+    end: int
+    loops: int
+
+
+def _blocks(steps: Integers, loops: int) -> Iterator[Block]:
+    """All steps of all loops."""
+    ends = np.cumsum(steps)
+    if ends[-1] <= _AT_ONCE:
+        yield Block(0, len(steps), 0, int(steps[0]), loops)
+        return
+    for _ in range(loops):
+        low = 0
+        while low < len(steps):
+            before = ends[low] - steps[low]
+            high = max(low + 1, int(np.searchsorted(ends, before + _AT_ONCE, side="right")))
+            for begin in range(0, int(steps[low]), _AT_ONCE) if high == low + 1 else (0,):
+                yield Block(low, high, begin, min(begin + _AT_ONCE, int(steps[low])), 1)
+            low = high
+
+
+def stage_channels(
+    series: Array, widths: Array, steps: Integers, block: Block, factors: tuple[int, ...] = (1,)
+) -> tuple[Array, Integers]:
+    """The channels at the stages of steps, times their lengths, and the steps of each panel: (K, STAGES, 9), (P,).
+
+    Of each panel first its steps, then for each further factor so many times as many.
 
     Parameters
     ----------
-    series, widths, steps : (P, n, 9), (P,) [s], (P,) of each panel
+    series, widths, steps : (P,  n, 9), (P,) [s], (P,) of each panel of one loop
     """
-    ends = np.cumsum(steps)
-    stop = int(ends[-1]) if stop is None else stop
-    found = np.empty((stop - first, step_kernel.STAGES, 9))
-    low, high = (int(np.searchsorted(ends, place, side="right")) for place in (first, stop - 1))
-    scaled, counts = series[low : high + 1] * widths[low : high + 1, None, None], steps[low : high + 1]
-    starts = ends[low : high + 1] - counts
-    for count in np.unique(counts).tolist():
+    part = slice(block.low, block.high)
+    scaled, counts = series[part] * widths[part, None, None], steps[part]
+    terms = series.shape[1]
+    if block.end - block.begin < counts[0]:
+        matrix = np.concatenate([_matrix(terms, int(f * counts[0]), f * block.begin, f * block.end) for f in factors])
+        return (matrix @ scaled[0]).reshape(-1, step_kernel.STAGES, 9), np.array([block.end - block.begin])
+    distinct = sorted(set(counts.tolist()))
+    if len(distinct) == 1:
+        return (_matrix_of_panel(terms, distinct[0], factors) @ scaled).reshape(-1, step_kernel.STAGES, 9), counts
+    each = sum(factors)
+    found, starts = np.empty((each * int(counts.sum()), step_kernel.STAGES, 9)), each * (np.cumsum(counts) - counts)
+    for count in distinct:
         rows = np.flatnonzero(counts == count)
-        if count <= _KEPT and starts[rows[0]] >= first and starts[rows[-1]] + count <= stop:
-            values = (_matrix_of_panel(series.shape[1], count) @ scaled[rows]).reshape(len(rows), count, -1, 9)
-            if len(rows) == len(counts):
-                return values.reshape(found.shape)
-            found[(starts[rows] - first)[:, None] + np.arange(count)] = values
-            continue
-        for row in rows:
-            begin, end = max(int(starts[row]), first), min(int(starts[row]) + count, stop)
-            matrix = _matrix(series.shape[1], count, begin - int(starts[row]), end - int(starts[row]))
-            found[begin - first : end - first] = (matrix @ scaled[row]).reshape(end - begin, -1, 9)
-    return found
+        values = (_matrix_of_panel(terms, count, factors) @ scaled[rows]).reshape(len(rows), each * count, -1, 9)
+        found[starts[rows, None] + np.arange(each * count)] = values
+    return found, counts
 
 
 def _matrix(terms: int, count: int, begin: int, end: int) -> Array:
@@ -64,19 +89,8 @@ def _matrix(terms: int, count: int, begin: int, end: int) -> Array:
 
 
 @lru_cache(maxsize=256)
-def _matrix_of_panel(terms: int, count: int) -> Array:
-    return _matrix(terms, count, 0, count)
-
-
-def _blocks(steps: Integers, loops: int) -> Iterator[tuple[int, int, int]]:
-    """First and last step of one loop, and how many loops go over them, one block after another."""
-    total = int(steps.sum())
-    if total <= _AT_ONCE:
-        yield 0, total, loops
-        return
-    for _ in range(loops):
-        for first in range(0, total, _AT_ONCE):
-            yield first, min(first + _AT_ONCE, total), 1
+def _matrix_of_panel(terms: int, count: int, factors: tuple[int, ...]) -> Array:
+    return np.concatenate([_matrix(terms, f * count, 0, f * count) for f in factors])
 
 
 def marched(
@@ -102,15 +116,15 @@ def _marched(
     quaternions = np.zeros((len(magnitudes), count + 1, 4), dtype=directions.dtype)
     quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0] if start is None else start
     at = 0
-    for first, stop, loops in _blocks(steps, interpolant.loops):
-        channels = stage_channels(series, interpolant.widths, steps, first, stop)
+    for block in _blocks(steps, interpolant.loops):
+        channels, _ = stage_channels(series, interpolant.widths, steps, block)
 
-        def march(rows: slice, channels: Array = channels, loops: int = loops, at: int = at) -> None:
+        def march(rows: slice, channels: Array = channels, loops: int = block.loops, at: int = at) -> None:
             step_kernel.march(channels, loops, magnitudes[rows], directions[rows], at, quaternions[rows])
 
         for _ in in_threads(march, len(magnitudes)):
             pass
-        at += loops * (stop - first)
+        at += block.loops * len(channels)
     return quaternions
 
 
@@ -170,48 +184,28 @@ def attempted(interpolant: Interpolant, changed: Array, steps: Integers, momentu
     at = 0
     blocks = list(_blocks(steps, loops))
     run_progress.begin(run_progress.STEPPING, len(blocks))
-    for first, stop, times in blocks:
-        channels, finer, finest, other = (
-            stage_channels(which, widths, factor * steps, factor * first, factor * stop)
-            for which, factor in ((series, 1), (series, 2), (series, 4), (changed, 1))
-        )
-        block = channels, finer, finest, other, times
+    for block in blocks:
+        channels, counts = stage_channels(series, widths, steps, block, (1, 2, 4))
+        other, _ = stage_channels(changed, widths, steps, block)
+        of_block = channels, other, counts, block.loops
 
-        def attempt(rows: slice, block: tuple[Any, ...] = block, at: int = at) -> None:
+        def attempt(rows: slice, of_block: tuple[Any, ...] = of_block, at: int = at) -> None:
             step_kernel.attempt(
-                *block, magnitudes[rows], directions[rows], marks, at, states[rows],
+                *of_block, magnitudes[rows], directions[rows], marks, at, states[rows],
                 quaternions[rows], seen[rows], turns[rows], dynamics[rows], measured[rows], marked[rows],
             )  # fmt: skip
 
         for _ in in_threads(attempt, batch, threads):
             pass
-        at += times * (stop - first)
+        at += block.loops * len(other)
         run_progress.advance(1)
     coarse, fine, sampling, turned = measured.T
-    growth = largest_growth(marked) if moving else np.ones(batch)
+    growth = np.ones(batch)
+    if moving:
+        spectra_kernel.growths(marked, _TURN, growth)
     return Attempt(
         4 * steps, quaternions, seen if moving else seen[:, :0], turns, dynamics, coarse, fine, sampling, turned, growth
     )
-
-
-def largest_growth(marked: Array) -> Array:
-    """The largest growth of a small turn from one mark to a later one, from attitudes and turned ones: (B, M, 4, 4) -> (B,).
-
-    The turns by which an error is known are propagators P; from one mark to a later one an error grows by P_j P_i^-1,
-    whose determinant is one, and whose singular values are s, 1 and 1/s: s follows from the sum of the squares of its
-    entries.
-    """
-    base, others = marked[:, :, :1], marked[:, :, 1:]
-    matrices = np.swapaxes(small_turns(np.broadcast_to(base, others.shape), others), -1, -2) / _TURN
-    a, b, c = (matrices[..., k, :] for k in range(3))
-    inverses = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=-1)
-    largest = np.ones(len(marked))
-    for later in range(1, marked.shape[1]):
-        products = matrices[:, later, None] @ inverses[:, :later]
-        squares = 0.5 * ((products * products).sum(axis=(-1, -2)) - 1.0)
-        largest = np.maximum(largest, squares.max(axis=1))
-    largest = np.where(np.isfinite(largest), largest, np.inf)
-    return np.sqrt(largest + np.sqrt(largest * largest - 1.0))
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -8,27 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from math import inf
 
 import numpy as np
 
-from ..arrays import Array, Integers, Mask, lock_arrays, read_only
+from ..arrays import Array
 from ..chebyshev import chebyshev, end_margin, nodes_on, values_to_coefficients
-from ..display import short_repr
 from ..errors import AccuracyNotReached
-from .channels import MATRIX, VOIGT, Channels, Directly, Evaluate, rates_of
-from .constants import (
-    BEYOND_LAST_TERMS,
-    CHANGED_LAST_TERMS,
-    EPS,
-    HIDDEN_SHARE,
-    RANDOM_SUM,
-    ROUNDED_SAMPLES,
-    SAMPLING_SHARE,
-    SLOWEST_DECAY,
-)
+from .channels import Channels, Directly, Evaluate, rates_of
+from .constants import HIDDEN_SHARE, RANDOM_SUM, SAMPLING_SHARE
 from .interpolant import Interpolant
+from .kernels import spectra_kernel as spectra
+from .samples import Panels, Samples
 from .smoothness import DEGREES, Smoothness
 
 # Panels before halving ends, besides 40 for every break: a motion that needs more is rough, not merely long.
@@ -37,142 +28,6 @@ _MOST_PANELS = 4000
 _LEAST_WIDTH = 1e-13
 # Where the samples of a panel are compared with its series: none is near a node of a degree in use.
 _BETWEEN = np.array([0.0411, 0.2677, 0.5573, 0.8219])
-# Of what a panel's parent had beyond its degree: noise is as large in the halves, anything else is smaller.
-_NOISE_STAYS = 0.5
-# Of the largest term: what counts as noise is far below.
-_NOISE = 1e-6
-_TINY = 1e-300
-
-
-@dataclass(frozen=True, eq=False)
-class Perturbed:
-    """An interpolant's series with errors like those that they probably have.
-
-    Attributes
-    ----------
-    coefficients : (P, n, 9) the last terms of each series changed by as much as is missing beyond them
-    hidden : attitude error of what they do not show, without amplification [rad]
-    """
-
-    coefficients: Array
-    hidden: float
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
-
-
-@dataclass(frozen=True, eq=False)
-class Panels:
-    """Panels of one loop, which are sampled at Chebyshev points.
-
-    Attributes
-    ----------
-    edges : (P + 1,) [s]
-    degrees : (P,)
-    """
-
-    edges: Array
-    degrees: Integers
-
-    @property
-    def times(self) -> Array:
-        """All nodes, panels of one degree after those of another: (S,) [s]."""
-        end = float(self.edges[-1])
-        return np.concatenate([panels.times(end).ravel() for panels in self.by_degree()])
-
-    def by_degree(self) -> list[_Panels]:
-        """Of one degree together."""
-        left, right = self.edges[:-1], self.edges[1:]
-        each = [(degree, self.degrees == degree) for degree in np.unique(self.degrees).tolist()]
-        return [_Panels.new(degree, left[rows], right[rows]) for degree, rows in each]
-
-
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """A deformation as it was sampled for momenta up to a magnitude.
-
-    Attributes
-    ----------
-    interpolant : the series through the samples
-    panels : on which they are
-    change : (P,) by how much of themselves the last two terms of each series may be wrong
-    noisy : (P,) whether these terms are noise, which all others have as well
-    between : attitude error within a panel that its ends do not show [rad]
-    hidden : what no series shows, without amplification [rad]
-    level : tolerance below which there would be more samples [rad]; 0: all that is missing is noise
-    too_rough : why the samples are not as dense as they were to be; None: they are
-    """
-
-    interpolant: Interpolant
-    panels: Panels
-    change: Array
-    noisy: Mask
-    between: float
-    hidden: float
-    level: float
-    too_rough: AccuracyNotReached | None = None
-
-    __repr__ = short_repr
-
-    @cached_property
-    def perturbed(self) -> Perturbed:
-        """The series changed by what is probably missing."""
-        return Perturbed(changed_series(self.interpolant.coefficients, self.change, self.noisy), self.hidden)
-
-
-def changed_series(coefficients: Array, change: Array, noisy: Mask) -> Array:
-    """Series (P, n, 9) with their last two terms changed by shares (P,) of themselves.
-
-    Where these terms are noise, the last of them is added to the first, with signs by chance: all terms have as much of
-    it, and the first turns the body most.
-    """
-    found = coefficients.copy()
-    last = last_terms(coefficients)
-    rows = np.arange(len(found))
-    for back in (0, 1):
-        place = np.maximum(last - back, 0)
-        found[rows, place] *= np.where(last >= 2, 1.0 - change, 1.0)[:, None]
-    found[:, 0] += (_signs(len(found)) * (noisy & (last >= 2)))[:, None] * coefficients[rows, last]
-    return read_only(found)
-
-
-def rounded_series(coefficients: Array, units: float) -> Array:
-    """Series (P, n, 9) of inertias and momenta that are rounded otherwise, by so many units of their largest entries.
-
-    With L the largest moment, a rounding eps L E of the inertia, E of size one in any direction, changes I^-1 by
-    -I^-1 eps L E I^-1: of a body that hardly resists turning about one axis, by more than units of its own.
-    """
-    panels, terms, _ = coefficients.shape
-    rng, inverse = np.random.default_rng(0), coefficients[:, 0][:, MATRIX].reshape(-1, 1, 3, 3)
-    least = np.linalg.eigvalsh(inverse[:, 0])[:, 0]
-    unit = (units * EPS / np.where(least > 0.0, least, np.inf))[:, None, None]
-    tensors, vectors = rng.standard_normal((panels, terms, 3, 3)), rng.standard_normal((panels, terms, 3))
-    turned = inverse @ (tensors + np.swapaxes(tensors, -1, -2))
-    drift = np.abs(coefficients[:, :, 6:]).max(axis=(1, 2))[:, None, None] * vectors
-    found = coefficients.copy()
-    there = np.arange(terms) <= last_terms(coefficients)[:, None]
-    unit = unit * there[:, :, None]
-    found[:, :, :6] += unit * (turned @ inverse).reshape(panels, terms, 9)[:, :, VOIGT]
-    of_tensors = (turned @ coefficients[:, None, 0, 6:, None])[..., 0]
-    found[:, :, 6:] += unit * (of_tensors + (inverse @ drift[..., None])[..., 0])
-    return found
-
-
-def _signs(count: int) -> Array:
-    return np.where(np.random.default_rng(0).random(count) < 0.5, -1.0, 1.0)
-
-
-def largest_condition(coefficients: Array) -> float:
-    """Of the inertia, on all panels."""
-    values = np.linalg.eigvalsh(coefficients[:, 0][:, MATRIX].reshape(-1, 3, 3))
-    return float((values[:, 2] / np.maximum(values[:, 0], _TINY)).max())
-
-
-def last_terms(coefficients: Array) -> Integers:
-    """The degree of each series, padded with zeros to one degree: (P, n, 9) -> (P,)."""
-    there = coefficients.any(axis=2)
-    return np.where(there.any(axis=1), there.shape[1] - 1 - np.argmax(there[:, ::-1], axis=1), 0)
 
 
 class Sampler:
@@ -239,6 +94,19 @@ class Sampler:
         return found
 
 
+def nodes_of_panels(panels: Panels) -> Array:
+    """All nodes of panels, those of one degree after those of another: (S,) [s]."""
+    end = float(panels.edges[-1])
+    return np.concatenate([part.times(end).ravel() for part in _by_degree(panels)])
+
+
+def _by_degree(panels: Panels) -> list[_Panels]:
+    """Of one degree together."""
+    left, right = panels.edges[:-1], panels.edges[1:]
+    each = [(degree, panels.degrees == degree) for degree in sorted(set(panels.degrees.tolist()))]
+    return [_Panels.new(degree, left[rows], right[rows]) for degree, rows in each]
+
+
 @dataclass(frozen=True, eq=False)
 class _Panels:
     """Panels of one degree that are being sampled.
@@ -247,14 +115,19 @@ class _Panels:
     ----------
     left, right : (P,) [s]
     values : (P, degree/2 + 1, 9) at every second node; None: nothing is known yet
-    before : (P,) the last terms, at the highest degree, of the panel that each is a half of [rad/s]
+    parents : (P,) the last terms of the panels, at the highest degree, that each is a half of [rad/s]
     """
 
     degree: int
     left: Array
     right: Array
     values: Array | None
-    before: Array
+    parents: Array
+
+    @property
+    def before(self) -> Array:
+        """The parents where they are of this degree, else infinite: (P,) [rad/s]."""
+        return self.parents if self.degree == DEGREES[-1] else np.full(len(self.left), inf)
 
     @classmethod
     def new(cls, degree: int, left: Array, right: Array) -> _Panels:
@@ -297,7 +170,6 @@ class _Sampling:
         self._done: list[tuple[Array, ...]] = []
         self._count = 0
         self._gap = 0.0
-        self._worst = 0.0
 
     def samples(self) -> Samples:
         known, before = self._known, self._sampler.evaluations
@@ -310,7 +182,7 @@ class _Sampling:
             )
         first = self._sampler.first_panels(HIDDEN_SHARE * self._tolerance)
         most = _MOST_PANELS + 40 * len(known.breaks) + len(first.degrees)
-        waiting = first.by_degree()
+        waiting = _by_degree(first)
         while waiting:
             values = self._sampled(waiting)
             further: list[_Panels] = []
@@ -338,51 +210,36 @@ class _Sampling:
     def _judged(self, panels: _Panels, values: Array) -> list[_Panels]:
         """Keep the panels that are dense enough; the others as they are sampled next."""
         degree, left, right = panels.degree, panels.left, panels.right
-        series = values_to_coefficients(degree) @ values
-        if not degree:
-            self._keep(left, right, series, np.zeros((4, len(left))))
+        series, table = values_to_coefficients(degree) @ values, np.empty((len(left), spectra.COLUMNS))
+        spectra.judge(series, right - left, np.spacing(right), panels.before, self._momentum, self._rate, table)
+        if self._known.is_checked and degree:
+            self._check_between(panels, series, table)
+        good = table[:, spectra.GOOD] > 0.0
+        if good.all():
+            self._keep(left, right, series, table)
             return []
-        width = right - left
-        rates = rates_of(series, self._momentum)
-        late, decay = tail_and_decay(rates)
-        rounded = ROUNDED_SAMPLES * EPS * rates.max(axis=1)
-        rounded += 4.0 * np.spacing(right) / width * (rates @ np.arange(degree + 1.0))
-        noisy = late <= rounded
-        if degree == DEGREES[-1]:
-            noisy |= (late >= _NOISE_STAYS * panels.before) & (late <= _NOISE * rates.max(axis=1))
-        # What is beyond the degree swings that often over the panel, but for how far the body turns in it.
-        swings = np.maximum(degree - width * rates.sum(axis=1), 1.0)
-        missing = late * decay / (1.0 - decay)
-        good = noisy | (missing <= self._rate * swings)
-        if self._known.is_checked:
-            good &= self._fits_between(panels, series, good, self._rate * swings + rounded)
-        self._worst = max(self._worst, float((missing / swings)[good & ~noisy].max(initial=0.0)))
-        change = np.minimum(CHANGED_LAST_TERMS * (1.0 + BEYOND_LAST_TERMS / degree) * decay / (1.0 - decay), degree)
-        beyond = np.maximum(missing, noisy * late) * width / swings
-        table = np.stack([np.where(noisy, 1.0, change), noisy, beyond, np.full(len(left), degree)])
-        self._keep(left[good], right[good], series[good], table[:, good])
+        self._keep(left[good], right[good], series[good], table[good])
         rough = ~good
-        if not rough.any():
-            return []
+        left, right, late = left[rough], right[rough], table[rough, spectra.LATE]
         if degree < DEGREES[-1]:
-            return [_Panels(2 * degree, left[rough], right[rough], values[rough], panels.before[rough])]
-        middle = 0.5 * (left[rough] + right[rough])
-        ends = np.concatenate([left[rough], middle]), np.concatenate([middle, right[rough]])
-        return [_Panels(DEGREES[1], *ends, None, np.tile(late[rough], 2))]
+            # Of no noise is known before the highest degree.
+            return [_Panels(2 * degree, left, right, values[rough], panels.parents[rough])]
+        middle = 0.5 * (left + right)
+        ends = np.concatenate([left, middle]), np.concatenate([middle, right])
+        return [_Panels(DEGREES[1], *ends, None, np.tile(late, 2))]
 
-    def _fits_between(self, panels: _Panels, series: Array, good: Mask, allowed: Array) -> Mask:
-        """Whether series are right between their nodes, to what is allowed (P,) [rad/s]: of those good at the nodes."""
-        rows = np.flatnonzero(good)
+    def _check_between(self, panels: _Panels, series: Array, table: Array) -> None:
+        """Look between the nodes of the panels that are good there, and take those for bad that are wrong."""
+        rows = np.flatnonzero(table[:, spectra.GOOD])
         width = (panels.right - panels.left)[rows]
         times = panels.left[rows, None] + width[:, None] * _BETWEEN
         body = self._sampler.channels(times.ravel()).reshape(*times.shape, 9)
         here = chebyshev(2.0 * _BETWEEN - 1.0, panels.degree + 1) @ series[rows]
         gap = rates_of(here - body, self._momentum).max(axis=1)
-        fits = np.zeros(len(good), dtype=bool)
-        fits[rows] = gap <= allowed[rows]
+        fits = gap <= table[rows, spectra.ALLOWED]
+        table[rows[~fits], spectra.GOOD] = 0.0
         # What is seen there swings to both sides.
-        self._gap += 0.5 * float((gap * width)[fits[rows]].sum())
-        return fits
+        self._gap += 0.5 * float((gap * width)[fits].sum())
 
     def _keep(self, left: Array, right: Array, series: Array, table: Array) -> None:
         self._done.append((left, right, series, table))
@@ -390,12 +247,12 @@ class _Sampling:
 
     def _keep_as_it_is(self, panels: _Panels) -> None:
         """Panels that cannot be finer, by samples of the least degree: their estimates say how far they are off."""
-        coarse = _Panels.new(panels.degree, panels.left, panels.right)
-        (values,) = self._sampled([coarse])
-        series = values_to_coefficients(panels.degree) @ values
-        late, _ = tail_and_decay(rates_of(series, self._momentum))
-        one = np.ones(len(late))
-        self._keep(panels.left, panels.right, series, np.stack([panels.degree * one, 0.0 * one, late, panels.degree * one]))
+        (values,) = self._sampled([_Panels.new(panels.degree, panels.left, panels.right)])
+        series, table = values_to_coefficients(panels.degree) @ values, np.empty((len(values), spectra.COLUMNS))
+        ends = panels.right - panels.left, np.spacing(panels.right), panels.before
+        spectra.judge(series, *ends, self._momentum, self._rate, table)
+        table[:, [spectra.CHANGE, spectra.BETWEEN]] = float(panels.degree), table[:, spectra.LATE, None]
+        self._keep(panels.left, panels.right, series, table)
 
     def _rough(self, further: list[_Panels]) -> AccuracyNotReached:
         narrowest = min(further, key=lambda panels: float((panels.right - panels.left).min()))
@@ -406,25 +263,36 @@ class _Sampling:
         )
 
     def _whole(self, evaluations: int, defect: float, too_rough: AccuracyNotReached | None) -> Samples:
-        left, right = (np.concatenate([part[k] for part in self._done]) for k in (0, 1))
-        order = np.argsort(left)
-        table = np.concatenate([part[3] for part in self._done], axis=1)[:, order]
-        series = np.zeros((len(left), max(part[2].shape[1] for part in self._done), 9))
-        row = 0
-        for part in self._done:
-            series[row : row + len(part[0]), : part[2].shape[1]] = part[2]
-            row += len(part[0])
+        left, right, table = (np.concatenate([part[k] for part in self._done]) for k in (0, 1, 3))
+        degrees = np.concatenate([np.full(len(part[0]), part[2].shape[1] - 1) for part in self._done])
+        if len(self._done) == 1:
+            series = self._done[0][2]
+        else:
+            series, row = np.zeros((len(left), degrees.max() + 1, 9)), 0
+            for part in self._done:
+                series[row : row + len(part[0]), : part[2].shape[1]] = part[2]
+                row += len(part[0])
+            order = np.argsort(left)
+            left, right, table, degrees, series = (each[order] for each in (left, right, table, degrees, series))
         loops = self._known.loops
-        edges = np.append(left[order], right[order[-1]])
+        edges = first = np.append(left, right[-1])
         if loops > 1:
             starts = self._end * np.arange(loops)
             edges = np.append((starts[:, None] + edges[:-1]).ravel(), self._end * loops)
-        interpolant = Interpolant(edges, series[order], loops, evaluations)
-        panels = Panels(edges[: len(order) + 1], table[3].astype(np.int64))
-        hidden = defect + loops * (self._gap + self._noise_of_path(interpolant))
-        level = self._worst * loops * self._end / SAMPLING_SHARE
-        between = float(table[2].max(initial=0.0))
-        return Samples(interpolant, panels, table[0], table[1] > 0.0, between, hidden, level, too_rough)
+        interpolant = Interpolant(edges, series, loops, evaluations)
+        worst = table.max(axis=0)
+        return Samples(
+            interpolant=interpolant,
+            panels=Panels(first, degrees),
+            change=table[:, spectra.CHANGE],
+            noisy=table[:, spectra.NOISY],
+            between=float(worst[spectra.BETWEEN]),
+            hidden=defect + loops * (self._gap + self._noise_of_path(interpolant)),
+            level=float(worst[spectra.MISSING]) * loops * self._end / SAMPLING_SHARE,
+            condition=float(worst[spectra.CONDITION]),
+            rates=(float(worst[spectra.INVERSE]), float(worst[spectra.DRIFT])),
+            too_rough=too_rough,
+        )
 
     def _noise_of_path(self, interpolant: Interpolant) -> float:
         """What noise of a resolved path turns the body by in one loop: that of panels is independent of each other."""
@@ -434,15 +302,3 @@ class _Sampling:
         turn = interpolant.widths.sum() * rates_of(interpolant.coefficients[:, 0], self._momentum).max()
         noise = resolved.noise * (1.0 + turn / len(resolved.noise))
         return float(min(noise.sum(), RANDOM_SUM * np.sqrt((noise * noise).sum())))
-
-
-def tail_and_decay(rates: Array) -> tuple[Array, Array]:
-    """The larger of the last two terms, and by which factor terms fall from one degree to the next: (P, n) -> (P,) each.
-
-    Single terms are small by chance, or by a motion's symmetry.
-    """
-    degree = rates.shape[1] - 1
-    late = rates[:, -2:].max(axis=1)
-    middle = np.maximum(rates[:, degree // 2 : degree - 1].max(axis=1), late)
-    decay = (np.maximum(late, _TINY) / np.maximum(middle, _TINY)) ** (2.0 / degree)
-    return late, np.minimum(decay, SLOWEST_DECAY)

@@ -128,10 +128,18 @@ def march(channels, loops, magnitudes, directions, first, quaternions):
 
 @inline
 def _advance(channels, magnitude, direction, slopes, state):
-    """Take some steps (m, STAGES, 9) from a state (4,), in its place."""
-    for k in range(len(channels)):
-        x, y, z, w, _ = step(channels[k], magnitude, direction, slopes, state[0], state[1], state[2], state[3])
-        state[0], state[1], state[2], state[3] = x, y, z, w
+    """Take a step (STAGES, 9) from a state (4,), in its place."""
+    x, y, z, w, _ = step(channels, magnitude, direction, slopes, state[0], state[1], state[2], state[3])
+    state[0], state[1], state[2], state[3] = x, y, z, w
+
+
+@inline
+def _mark(state, marked):
+    """Keep the attitude by steps, and those from turned starts: (4, 4)."""
+    for i in range(4):
+        marked[0, i] = state[0, i]
+        for turned in range(4, 7):
+            marked[turned - 3, i] = state[turned, i]
 
 
 @inline
@@ -156,13 +164,15 @@ def _turn_of_step(q, r, p, s):
 
 @kernel
 def attempt(
-    channels, finer, finest, changed, loops, magnitudes, directions, marks, first,
+    channels, changed, counts, loops, magnitudes, directions, marks, first,
     states, quaternions, seen, turns, dynamics, measured, marked,
 ):  # fmt: skip
     """Steps, twice and four times as many, all side by side, of some momenta; the last line of arguments is filled.
 
-    channels, finer, finest: (K, STAGES, 9), (2 K, ...), (4 K, ...) at the stages of the steps of one loop
-    changed: (K, STAGES, 9) the same of series with errors like those they probably have; none: not wanted
+    channels: (7 K, STAGES, 9) at the stages of the steps of one loop, of each panel first its own, then twice and four
+        times as many, times their lengths
+    changed: (K, STAGES, 9) the same of series with errors like those they probably have, of its own alone
+    counts: (P,) steps of each panel
     magnitudes, directions: (B,), (B, 3) of the momenta
     marks: (M,) numbers of steps after which turned starts are compared, ascending
     first: which step of all loops the next one is
@@ -177,20 +187,25 @@ def attempt(
         slopes = np.empty((STAGES, 4))
         magnitude, direction, state = magnitudes[row], directions[row], states[row]
         there, found, sight = quaternions[row], measured[row], seen[row]
-        done = first
-        mark = 0
-        while mark < len(marks) and marks[mark] < done:
+        done, mark = first, 0
+        while mark < len(marks) and marks[mark] <= done:
+            if marks[mark] == done:
+                _mark(state, marked[row, mark])
             mark += 1
         for _ in range(loops):
-            for k in range(-1 if done == 0 else 0, len(channels)):
-                if k >= 0:
-                    _advance(channels[k : k + 1], magnitude, direction, slopes, state[0])
+            start = 0
+            for panel in range(len(counts)):
+                count = counts[panel]
+                for k in range(count):
+                    one, two, four = 7 * start + k, 7 * start + count + 2 * k, 7 * start + 3 * count + 4 * k
+                    _advance(channels[one], magnitude, direction, slopes, state[0])
                     for half in range(2):
-                        _advance(finer[2 * k + half : 2 * k + half + 1], magnitude, direction, slopes, state[1])
-                        for quarter in range(2):
-                            at, of = 4 * done + 2 * half + quarter, 4 * k + 2 * half + quarter
-                            s = state[2]
-                            x, y, z, w, along = step(finest[of], magnitude, direction, slopes, s[0], s[1], s[2], s[3])
+                        _advance(channels[two + half], magnitude, direction, slopes, state[1])
+                        for quarter in range(2 * half, 2 * half + 2):
+                            at, s = 4 * done + quarter, state[2]
+                            x, y, z, w, along = step(
+                                channels[four + quarter], magnitude, direction, slopes, s[0], s[1], s[2], s[3]
+                            )
                             s[0], s[1], s[2], s[3] = x, y, z, w
                             there[at + 1, 0], there[at + 1, 1], there[at + 1, 2], there[at + 1, 3] = x, y, z, w
                             found[3] += angle_between(there[at], s)
@@ -201,19 +216,16 @@ def attempt(
                                 turns[row, at] = _turn_of_step(there[at], s, sight[at], sight[at + 1])
                         found[1] = max(found[1], angle_between(state[1], state[2]))
                     found[0] = max(found[0], angle_between(state[0], state[1]))
-                    if len(changed):
-                        _advance(changed[k : k + 1], magnitude, direction, slopes, state[3])
-                        found[2] = max(found[2], angle_between(state[0], state[3]))
-                    if len(marks):
+                    _advance(changed[start + k], magnitude, direction, slopes, state[3])
+                    found[2] = max(found[2], angle_between(state[0], state[3]))
+                    if len(marks) > 0:
                         for turned in range(4, 7):
-                            _advance(channels[k : k + 1], magnitude, direction, slopes, state[turned])
+                            _advance(channels[one], magnitude, direction, slopes, state[turned])
                     done += 1
-                while mark < len(marks) and marks[mark] == done:
-                    for i in range(4):
-                        marked[row, mark, 0, i] = state[0, i]
-                        for turned in range(4, 7):
-                            marked[row, mark, turned - 3, i] = state[turned, i]
-                    mark += 1
+                    if mark < len(marks) and marks[mark] == done:
+                        _mark(state, marked[row, mark])
+                        mark += 1
+                start += count
 
 
 def warm() -> None:
@@ -223,6 +235,6 @@ def warm() -> None:
     march(none, 1, one, north, 0, still)
     march(none, 1, one, north + 0j, 0, still + 0j)
     attempt(
-        none[:1], none[:2], none, none[:1], 1, one, north, np.zeros(1, dtype=np.int64), 0, still[:, [0] * 7].copy(),
+        np.zeros((7, STAGES, 9)), none[:1], np.ones(1, dtype=np.int64), 1, one, north, np.zeros(1, dtype=np.int64), 0, still[:, [0] * 7].copy(),
         still, np.zeros((1, 5, 3)), np.zeros((1, 4)), np.zeros((1, 4)), np.zeros((1, 4)), np.zeros((1, 1, 4, 4)),
     )  # fmt: skip

@@ -1,0 +1,124 @@
+"""A deformation as it was sampled, and what its series may be off by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from ..arrays import Array, Integers, lock_arrays, read_only
+from ..display import short_repr
+from ..errors import AccuracyNotReached
+from .channels import MATRIX, VOIGT
+from .constants import EPS
+from .interpolant import Interpolant
+from .kernels import spectra_kernel as spectra
+from .machine_code import plain
+
+
+@dataclass(frozen=True, eq=False)
+class Perturbed:
+    """An interpolant's series with errors like those that they probably have.
+
+    Attributes
+    ----------
+    coefficients : (P, n, 9) the last terms of each series changed by as much as is missing beyond them
+    hidden : attitude error of what they do not show, without amplification [rad]
+    """
+
+    coefficients: Array
+    hidden: float
+
+    __repr__ = short_repr
+
+    __post_init__ = lock_arrays
+
+
+@dataclass(frozen=True, eq=False)
+class Panels:
+    """Panels of one loop, which are sampled at Chebyshev points.
+
+    Attributes
+    ----------
+    edges : (P + 1,) [s]
+    degrees : (P,)
+    """
+
+    edges: Array
+    degrees: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A deformation as it was sampled for momenta up to a magnitude.
+
+    Attributes
+    ----------
+    interpolant : the series through the samples
+    panels : on which they are
+    change : (P,) by how much of themselves the last two terms of each series may be wrong
+    noisy : (P,) one where these terms are noise, which all others have as well, else zero
+    between : attitude error within a panel that its ends do not show [rad]
+    hidden : what no series shows, without amplification [rad]
+    level : tolerance below which there would be more samples [rad]; 0: all that is missing is noise
+    condition : a bound of that of the inertia
+    rates : the largest of I^-1 [1/(kg m^2)] and of I^-1 L_o [rad/s], as sums over the terms of a panel
+    too_rough : why the samples are not as dense as they were to be; None: they are
+    """
+
+    interpolant: Interpolant
+    panels: Panels
+    change: Array
+    noisy: Array
+    between: float
+    hidden: float
+    level: float
+    condition: float
+    rates: tuple[float, float]
+    too_rough: AccuracyNotReached | None = None
+
+    __repr__ = short_repr
+
+    @cached_property
+    def perturbed(self) -> Perturbed:
+        """The series changed by what is probably missing."""
+        return Perturbed(changed_series(self), self.hidden)
+
+
+def changed_series(samples: Samples) -> Array:
+    """The series with errors like those they probably have: (P, n, 9)."""
+    series = samples.interpolant.coefficients
+    changed = np.empty_like(series)
+    degrees, signs = samples.panels.degrees, _signs(len(series))
+    spectra.change(plain(series), degrees, plain(samples.change), plain(samples.noisy), signs, changed)
+    return read_only(changed)
+
+
+def rounded_series(samples: Samples, units: float) -> Array:
+    """Series (P, n, 9) of inertias and momenta that are rounded otherwise, by so many units of their largest entries.
+
+    With L the largest moment, a rounding eps L E of the inertia, E of size one in any direction, changes I^-1 by
+    -I^-1 eps L E I^-1: of a body that hardly resists turning about one axis, by more than units of its own.
+    """
+    coefficients, degrees = samples.interpolant.coefficients, samples.panels.degrees
+    panels, terms, _ = coefficients.shape
+    rng, inverse = np.random.default_rng(0), coefficients[:, 0][:, MATRIX].reshape(-1, 1, 3, 3)
+    least = np.linalg.eigvalsh(inverse[:, 0])[:, 0]
+    unit = (units * EPS / np.where(least > 0.0, least, np.inf))[:, None, None]
+    tensors, vectors = rng.standard_normal((panels, terms, 3, 3)), rng.standard_normal((panels, terms, 3))
+    turned = inverse @ (tensors + np.swapaxes(tensors, -1, -2))
+    drift = np.abs(coefficients[:, :, 6:]).max(axis=(1, 2))[:, None, None] * vectors
+    found = coefficients.copy()
+    there = np.arange(terms) <= degrees[:, None]
+    unit = unit * there[:, :, None]
+    found[:, :, :6] += unit * (turned @ inverse).reshape(panels, terms, 9)[:, :, VOIGT]
+    of_tensors = (turned @ coefficients[:, None, 0, 6:, None])[..., 0]
+    found[:, :, 6:] += unit * (of_tensors + (inverse @ drift[..., None])[..., 0])
+    return found
+
+
+@lru_cache(maxsize=64)
+def _signs(count: int) -> Array:
+    """By chance: (count,)."""
+    return np.where(np.random.default_rng(0).random(count) < 0.5, -1.0, 1.0)
