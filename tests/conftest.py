@@ -66,6 +66,12 @@ def rng():
 
 
 @pytest.fixture
+def interpreted(monkeypatch):
+    """No machine code, as in a short command, whose bits a program is to have: the body's samples are Pinocchio's."""
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+
+
+@pytest.fixture
 def few_guesses(monkeypatch):
     """Plans from the best of two guesses, not of eight: for tests of what is true of any plan."""
     monkeypatch.setattr("shapephase.optimal_control.planning._RANKED", 2)

@@ -42,6 +42,7 @@ def test_the_cat_s_righting_as_a_table(capsys):
     assert "error estimate" in text
 
 
+@pytest.mark.usefixtures("interpreted")
 def test_json_holds_the_split(capsys):
     data = json.loads(run(capsys, *CAT, "--momentum", 0.01, -2e-2, 0, "--attitude", 0, 0, 1, 0, "--json"))
     start = np.diag([-1.0, -1.0, 1.0])

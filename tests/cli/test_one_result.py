@@ -61,6 +61,7 @@ def words_of_figure(page: str, caption: str) -> list[str]:
 
 
 @pytest.mark.filterwarnings("ignore:.*outside its limits:shapephase.TrajectoryWarning")
+@pytest.mark.usefixtures("interpreted")
 @pytest.mark.parametrize("number", full_but(range(COUNT), 0))
 def test_everything_that_shows_a_split_shows_the_same_numbers(number, capfd, tmp_path, monkeypatch, request):
     if "full" not in request.keywords:

@@ -118,7 +118,7 @@ def test_the_code_of_another_function_is_not_taken_for_it(process, home, tmp_pat
 
 def test_a_helper_that_changed_in_another_file_is_not_computed_with_its_old_code(process, tmp_path):
     """Numba keeps the code of what a function calls with it, and looks at the function's own file alone."""
-    file = tmp_path / "changing_helper.py"
+    file = (tmp_path / "changing_helper").with_suffix(".py")
     for factor, found in ((2.0, False), (2.0, True), (3.0, False), (2.0, True)):
         file.write_text(f"def part(x):\n    return {factor} * x\n")
         assert ask(process, tmp_path, source=str(file)) == (7.0 * factor, found, [])

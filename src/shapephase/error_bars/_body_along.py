@@ -46,7 +46,7 @@ class BodyAlong:
         """
         chain, closing = self.body.chain, samples.is_closing(self.times)
         check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
-        if self._in_machine_code:
+        if self._has_kernels:
             of_all = link_tree.momentum_gradients(chain.rows, self.shapes, self.rates, spins, rows)
             parts = by_independent(chain, *of_all, self.shapes, self.rates)
         else:
@@ -60,14 +60,14 @@ class BodyAlong:
     def by_inertias(self, spins: Array, rows: Array) -> Array:
         """The same by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
         chain = self.body.chain
-        if not self._in_machine_code:
+        if not self._has_kernels:
             each = [by_link_parameters(self._links, rows[:, k], spins[:, k]) for k in range(rows.shape[1])]
             return np.concatenate(each)
         found = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
         return chain.rows.in_chain_axes(found).reshape(len(found), -1)
 
     @property
-    def _in_machine_code(self) -> bool:
+    def _has_kernels(self) -> bool:
         """Bodies with ball joints have no rows; arrays are quicker than interpreted kernels."""
         return self.body.chain.has_rows and machine_code.is_used()
 

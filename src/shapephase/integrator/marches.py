@@ -186,7 +186,7 @@ def attempted(interpolant: Interpolant, changed: Array, steps: Integers, momentu
     run_progress.begin(run_progress.STEPPING, len(blocks))
     for block in blocks:
         channels, counts = stage_channels(series, widths, steps, block, (1, 2, 4))
-        other, _ = stage_channels(changed, widths, steps, block)
+        other, _ = stage_channels(changed, widths, steps, block, (2,))
         of_block = channels, other, counts, block.loops
 
         def attempt(rows: slice, of_block: tuple[Any, ...] = of_block, at: int = at) -> None:
@@ -197,7 +197,7 @@ def attempted(interpolant: Interpolant, changed: Array, steps: Integers, momentu
 
         for _ in in_threads(attempt, batch, threads):
             pass
-        at += block.loops * len(other)
+        at += block.loops * int(counts.sum())
         run_progress.advance(1)
     coarse, fine, sampling, turned = measured.T
     growth = np.ones(batch)

@@ -19,7 +19,7 @@ from ..errors import InputFileNotFoundError, ResultFileError
 from ..files import npz_arrays, write_whole
 from ..integrator.interpolant import Interpolant
 from ..integrator.many_rotations import GroupedRotations, RotationPart
-from ..integrator.sampling import Perturbed
+from ..integrator.samples import Perturbed
 from ..integrator.stepped import SteppedRotation
 from ..provenance import provenance
 from ._stored_arrays import check_deformation, check_rotation, check_rows, check_start

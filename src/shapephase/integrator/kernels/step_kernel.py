@@ -171,7 +171,7 @@ def attempt(
 
     channels: (7 K, STAGES, 9) at the stages of the steps of one loop, of each panel first its own, then twice and four
         times as many, times their lengths
-    changed: (K, STAGES, 9) the same of series with errors like those they probably have, of its own alone
+    changed: (2 K, STAGES, 9) of twice as many steps, on series with errors like those they probably have
     counts: (P,) steps of each panel
     magnitudes, directions: (B,), (B, 3) of the momenta
     marks: (M,) numbers of steps after which turned starts are compared, ascending
@@ -179,7 +179,7 @@ def attempt(
     states: (B, 7, 4) attitudes so far by steps, twice, four times as many, on changed series, and from turned starts;
         at `marks` the last three say how errors grow
     quaternions, seen, turns, dynamics: (B, 4 N + 1, 4), (B, 4 N + 1, 3), (B, 4 N), (B, 4 N) of all four times as many
-    measured: (B, 4) largest angles between steps and twice as many, these and four times as many, steps and those on
+    measured: (B, 4) largest angles between steps and twice as many, these and four times as many, these and those on
         changed series; and the sum of all angles turned
     marked: (B, M, 4, 4) attitudes at marks, then those from turned starts
     """
@@ -201,6 +201,8 @@ def attempt(
                     _advance(channels[one], magnitude, direction, slopes, state[0])
                     for half in range(2):
                         _advance(channels[two + half], magnitude, direction, slopes, state[1])
+                        _advance(changed[2 * (start + k) + half], magnitude, direction, slopes, state[3])
+                        found[2] = max(found[2], angle_between(state[1], state[3]))
                         for quarter in range(2 * half, 2 * half + 2):
                             at, s = 4 * done + quarter, state[2]
                             x, y, z, w, along = step(
@@ -216,8 +218,6 @@ def attempt(
                                 turns[row, at] = _turn_of_step(there[at], s, sight[at], sight[at + 1])
                         found[1] = max(found[1], angle_between(state[1], state[2]))
                     found[0] = max(found[0], angle_between(state[0], state[1]))
-                    _advance(changed[start + k], magnitude, direction, slopes, state[3])
-                    found[2] = max(found[2], angle_between(state[0], state[3]))
                     if len(marks) > 0:
                         for turned in range(4, 7):
                             _advance(channels[one], magnitude, direction, slopes, state[turned])
@@ -235,6 +235,6 @@ def warm() -> None:
     march(none, 1, one, north, 0, still)
     march(none, 1, one, north + 0j, 0, still + 0j)
     attempt(
-        np.zeros((7, STAGES, 9)), none[:1], np.ones(1, dtype=np.int64), 1, one, north, np.zeros(1, dtype=np.int64), 0, still[:, [0] * 7].copy(),
+        np.zeros((7, STAGES, 9)), none[:2], np.ones(1, dtype=np.int64), 1, one, north, np.zeros(1, dtype=np.int64), 0, still[:, [0] * 7].copy(),
         still, np.zeros((1, 5, 3)), np.zeros((1, 4)), np.zeros((1, 4)), np.zeros((1, 4)), np.zeros((1, 1, 4, 4)),
     )  # fmt: skip
