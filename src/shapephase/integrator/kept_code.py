@@ -24,7 +24,7 @@ from ..errors import CompiledCodeWarning, InputFileNotFoundError, OutputFileErro
 from ..files import write_whole
 
 _HERE = Path(__file__).parent
-SOURCES = (_HERE / "kernels", _HERE / "machine_code.py", _HERE / "kept_code.py", _HERE.parent / "so3.py")
+SOURCES = tuple(_HERE / name for name in ("kernels", "constants.py", "machine_code.py", "kept_code.py"))
 """Whatever the kernels' code and constants depend on: files, and folders of files."""
 _PRIVATE = 0o700
 _OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
