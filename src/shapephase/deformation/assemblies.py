@@ -15,11 +15,11 @@ from ..arguments import check_object, on_unphysical_argument, positive_argument,
 from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError, WrongObjectError
 from ..inertia_tensor import second_moment
+from ..integrator.smoothness import Smoothness
 from ..letters import what_came
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import CLOSED, ShapePath
-from ..integrator.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_triangle, least_over
 from ._scanned_functions import least_moment
 from .assembly_parts import Boom, Moments, MovingMass, Part, RigidPart

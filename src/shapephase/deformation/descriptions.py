@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -19,11 +19,11 @@ from ..chebyshev import PiecewiseChebyshev, inside, unit_nodes, values_to_coeffi
 from ..errors import GaugeError, ShapeError
 from ..inertia_tensor import inverse_inertia, second_moment
 from ..integrator.interpolant import Interpolant
+from ..integrator.smoothness import Smoothness
 from ..shape_space.body_path import channels_along
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import ShapePath
-from ..integrator.smoothness import Smoothness
 from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 from ._scanned_functions import inertia_and_momentum, positions_and_velocities
 

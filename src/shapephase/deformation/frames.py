@@ -213,7 +213,9 @@ def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start:
         raise ShapeError(f"start: one rotation (3, 3) is needed, got {first.shape}")
     scan = scanned(_look_at_rates(rates), breaks)
     edges = np.union1d(breaks, scan.found_breaks)
-    turned = stepped_rotation(Sampler(unit_body, Smoothness(edges, resolved=scan.resolved)), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    turned = stepped_rotation(
+        Sampler(unit_body, Smoothness(edges, resolved=scan.resolved)), np.zeros((1, 3)), _LIFT_TOLERANCE
+    )
     return GivenFrames(_TurnsOfRates(rates, first, turned), edges)
 
 

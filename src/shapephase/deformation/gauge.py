@@ -23,9 +23,9 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import SteppedRotation, stepped_rotation
 from ..integrator.lift import lift_along
 from ..integrator.resolved import joined
+from ..integrator.smoothness import Smoothness
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, side_by_side
 from ..shape_space.scan.scanning import scanned
-from ..integrator.smoothness import Smoothness
 from .deformation import Deformation
 from .descriptions import Description
 from .frames import (

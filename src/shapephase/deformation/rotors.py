@@ -14,10 +14,10 @@ from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError, unknown_name
+from ..integrator.smoothness import Smoothness
 from ..shape_space.curves import Widened
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function
 from ..shape_space.shape_path import ShapePath
-from ..integrator.smoothness import Smoothness
 from .descriptions import UngaugedDescription
 
 # Of the inertia of a wheel, and of its radius of gyration: a wheel in a file is round to the digits that it has.

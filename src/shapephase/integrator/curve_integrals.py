@@ -1,8 +1,8 @@
 """Dynamic phase and area of the momentum's curve, piece by piece.
 
-Each piece is stepped anew from its start, and once more in two halves, which shows the error. The attitude enters only by
-the directions of the momentum, not by the turns that the motion's steps were composed of, so that what is found here is
-a check of these.
+Each piece is stepped anew from its start, and once more in two halves, which shows the error. The attitude enters only
+by the directions of the momentum, not by the turns that the motion's steps were composed of, so that what is found here
+is a check of these.
 """
 
 from __future__ import annotations

@@ -127,14 +127,16 @@ class _Lot:
 
     def samplers(self, variants: Variants) -> Iterator[tuple[int, Sampler]]:
         """Of each, with what is known of it."""
-        if self.panels is not None:
-            whole = np.concatenate(self.times)
-            channels, reliable = variants.channels(self.rows, whole)
-            stops = np.cumsum([len(times) for times in self.times])[:-1]
-        for place, row in enumerate(self.rows.tolist()):
+        rows = self.rows.tolist()
+        if self.panels is None:
+            yield from ((row, variants.alone(row)) for row in rows)
+            return
+        channels, reliable = variants.channels(self.rows, np.concatenate(self.times))
+        stops = np.cumsum([len(times) for times in self.times])[:-1]
+        for row, values, known in zip(rows, channels, reliable, strict=True):
             sampler = variants.alone(row)
-            if self.panels is not None and reliable[place]:
-                sampler.begin_with(self.panels, zip(self.times, np.split(channels[place], stops), strict=True))
+            if known:
+                sampler.begin_with(self.panels, zip(self.times, np.split(values, stops), strict=True))
             yield row, sampler
 
 
@@ -155,7 +157,8 @@ def _lots(variants: Variants, ceilings: Array, tolerance: float) -> Iterator[_Lo
         if kept > _MOST_KEPT:
             raise AccuracyNotReached(
                 f"{len(ceilings)} motions on some {kept // (9 * len(ceilings))} samples each would take "
-                f"{8e-9 * kept:.3g} GB; take slices of the family of some {int(len(ceilings) * _MOST_KEPT / kept)} bodies"
+                f"{8e-9 * kept:.3g} GB; take slices of the family of some "
+                f"{int(len(ceilings) * _MOST_KEPT / kept)} bodies"
             )
         for first in range(0, len(rows), _AT_ONCE):
             yield _Lot(rows[first : first + _AT_ONCE], panels, times)

@@ -112,15 +112,16 @@ class Progress(NamedTuple):
     in_vain: int = 0
 
     def after(self, rotation: SteppedRotation, row: int, tolerance: float, level: float) -> Progress:
-        """What the next round does for a row; `level` as of `Samples`. Raises AccuracyNotReached where none will help."""
+        """What the next round does for a row; `level` as of `Samples`. Raises AccuracyNotReached if none will help."""
         estimate = float(rotation.error_estimate[row])
         in_vain = self.in_vain + (estimate > _GAINS * self.best)
         refinement = refined(self.refinement, rotation, row, tolerance, level)
         if in_vain >= 2 or self.rounds >= _MOST_ROUNDS or refinement == self.refinement:
             raise AccuracyNotReached(
                 f"the tolerance {tolerance:.3g} rad was not reached: the estimate is {estimate:.3g} rad, of which "
-                f"sampling {rotation.sampling_error[row]:.3g}, stepping {rotation.stepping_error[row]:.3g} and rounding "
-                f"{rotation.rounding_error[row]:.3g}, with errors amplified {rotation.amplification[row]:.3g} times; "
+                f"sampling {rotation.sampling_error[row]:.3g}, stepping {rotation.stepping_error[row]:.3g} and "
+                f"rounding {rotation.rounding_error[row]:.3g}, with errors amplified "
+                f"{rotation.amplification[row]:.3g} times; "
                 "loosen the tolerance or shorten the motion"
             )
         return Progress(refinement, min(estimate, self.best), self.rounds + 1, in_vain)
@@ -185,8 +186,8 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
         turns = interpolant.loops * float(turn.sum()) / (2.0 * np.pi)
         raise AccuracyNotReached(
             f"the body turns up to {turns:.3g} times in {interpolant.edges[-1]:.6g} s, which takes some {total:.3g} "
-            f"steps; at most {_MOST_STEPS} are taken, enough for about {turns * _MOST_STEPS / total:.3g} turns: shorten "
-            "the motion, or lower the momentum"
+            f"steps; at most {_MOST_STEPS} are taken, enough for about {turns * _MOST_STEPS / total:.3g} turns: "
+            "shorten the motion, or lower the momentum"
         )
     return np.ceil(steps).astype(np.int64)
 

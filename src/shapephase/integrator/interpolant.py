@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-
 from ..arrays import Array, Integers, lock_arrays
 from ..chebyshev import PiecewiseChebyshev
 from ..display import short_repr
 from .channels import MATRIX
-
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,8 +12,8 @@ from .. import so3
 from ..arrays import Array, Integers, lock_arrays, read_only
 from ..chebyshev import inside, nodes_on, values_to_coefficients
 from ..display import short_repr
-from .interpolant import Interpolant
 from .integrate import committed_rounding
+from .interpolant import Interpolant
 from .marches import largest_angle, marched, small_turns
 from .samples import Perturbed
 from .stepped import SteppedRotation

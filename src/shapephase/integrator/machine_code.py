@@ -29,9 +29,8 @@ _F = TypeVar("_F", bound=Callable[..., Any])
 
 _MODULES = ("step_kernel", "spectra_kernel", "curve_kernel", "tree_kernel", "gradient_kernel")
 """Of `kernels/`, those with a function `warm`, which calls each kernel of its module once."""
-_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True}
-"""Of parts and kernels alike: what is called from both would else be compiled twice. Parts that are not put where they
-are called make loops over lanes half as long again; the compiler takes as long with as without."""
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True, "no_cfunc_wrapper": True}
+"""Without `forceinline` loops over lanes take half as long again; the compiler takes as long with as without."""
 _NUMBA_DOES_NOT_WORK = (ImportError, AttributeError, SystemError)
 """What the import of a Numba raises that does not go with this NumPy or this Python."""
 _MANY_STEPS = 5000  # of the formula, of 110 us interpreted each; a motion takes some 400 in its three marches
@@ -71,21 +70,23 @@ class Kernel(Generic[_P, _R]):
 
     def _dispatcher(self) -> Callable[_P, _R]:
         """Numba's function, which loads or compiles the code for the types of its first arguments."""
-        from numba import njit
+        import numba
         from numba.core.types import Dispatcher
         from numba.core.typing.templates import infer_global
 
+        jit: Any = numba.njit
         with _lock:
             for part, dispatcher in _parts.items():
                 if dispatcher is None:
-                    _parts[part] = njit(**_OPTIONS)(part)
+                    # Numba then knows the plain function by this one, compiled once for the types of its arguments.
+                    _parts[part] = jit(no_cpython_wrapper=True, **_OPTIONS)(part)
                     infer_global(part, Dispatcher(_parts[part]))
-            compiled: Any = self._compiled or njit(**_OPTIONS)(self.interpreted)
             if self._compiled is None:
+                compiled = jit(**_OPTIONS)(self.interpreted)
                 name = f"{self.interpreted.__module__.rpartition('.')[2]}.{self.interpreted.__qualname__}"
                 compiled._cache = KeptFunction(name, kernel_folder())
                 self._compiled = compiled
-            return compiled
+            return self._compiled
 
 
 def kernel(function: Callable[_P, _R]) -> Kernel[_P, _R]:

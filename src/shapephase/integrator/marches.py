@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,8 @@ from .threads import in_threads
 
 # Steps of which the channels are there at once: four times as many take some 16 megabytes.
 _AT_ONCE = 4000
+# Steps of a panel up to which the matrix that gives their channels is kept: half a megabyte at most.
+_FEW = 24
 # [rad] of the starts that show how errors grow: what is neglected is as small as rounding, relative to it.
 _TURN = 1e-7
 # Times between which the growth of errors is known, the start included.
@@ -88,8 +90,12 @@ def _matrix(terms: int, count: int, begin: int, end: int) -> Array:
     return chebyshev(np.clip(2.0 * places / count - 1.0, -1.0, 1.0), terms) / count
 
 
-@lru_cache(maxsize=256)
 def _matrix_of_panel(terms: int, count: int, factors: tuple[int, ...]) -> Array:
+    return (_kept_matrix if count <= _FEW else _kept_matrix.__wrapped__)(terms, count, factors)
+
+
+@lru_cache(maxsize=128)
+def _kept_matrix(terms: int, count: int, factors: tuple[int, ...]) -> Array:
     return np.concatenate([_matrix(terms, f * count, 0, f * count) for f in factors])
 
 
@@ -109,8 +115,8 @@ def marched(
 
 
 def _marched(
-    interpolant: Interpolant, series: Array, steps: Integers, magnitudes: Array, directions: Array, start: Array | None
-) -> Array:
+    interpolant: Interpolant, series: Array, steps: Integers, magnitudes: Array, directions: Any, start: Array | None
+) -> Any:
     """As `marched`; directions may be complex, for a derivative."""
     count = interpolant.loops * int(steps.sum())
     quaternions = np.zeros((len(magnitudes), count + 1, 4), dtype=directions.dtype)
@@ -167,7 +173,9 @@ class Attempt:
     growth: Array
 
 
-def attempted(interpolant: Interpolant, changed: Array, steps: Integers, momentum: Array, threads: int | None) -> Attempt:
+def attempted(
+    interpolant: Interpolant, changed: Array, steps: Integers, momentum: Array, threads: int | None
+) -> Attempt:
     """Take so many steps (P,) on each panel, twice and four times as many, for momenta (B, 3)."""
     magnitudes, directions = magnitudes_and_directions(momentum)
     series, widths, loops = interpolant.coefficients, interpolant.widths, interpolant.loops
@@ -187,13 +195,11 @@ def attempted(interpolant: Interpolant, changed: Array, steps: Integers, momentu
     for block in blocks:
         channels, counts = stage_channels(series, widths, steps, block, (1, 2, 4))
         other, _ = stage_channels(changed, widths, steps, block, (2,))
-        of_block = channels, other, counts, block.loops
+        begun: Callable[..., None] = partial(step_kernel.attempt, channels, other, counts, block.loops)
+        of_rows = states, quaternions, seen, turns, dynamics, measured, marked
 
-        def attempt(rows: slice, of_block: tuple[Any, ...] = of_block, at: int = at) -> None:
-            step_kernel.attempt(
-                *of_block, magnitudes[rows], directions[rows], marks, at, states[rows],
-                quaternions[rows], seen[rows], turns[rows], dynamics[rows], measured[rows], marked[rows],
-            )  # fmt: skip
+        def attempt(rows: slice, begun: Callable[..., None] = begun, at: int = at) -> None:
+            begun(magnitudes[rows], directions[rows], marks, at, *(part[rows] for part in of_rows))
 
         for _ in in_threads(attempt, batch, threads):
             pass

@@ -1,7 +1,7 @@
 """How a deformation is sampled: on panels, at nested Chebyshev points, as densely as an attitude needs, and no more.
 
-The bandwidth of the shape motion, not the speed of the rotation, sets how often the body must be evaluated. A panel gets
-8, 16 or 32 degrees, beyond which it is halved, until what is missing from its series turns the body by little.
+The bandwidth of the shape motion, not the speed of the rotation, sets how often the body must be evaluated. A panel
+gets 8, 16 or 32 degrees, beyond which it is halved, until what is missing from its series turns the body by little.
 """
 
 from __future__ import annotations
@@ -273,7 +273,8 @@ class _Sampling:
                 series[row : row + len(part[0]), : part[2].shape[1]] = part[2]
                 row += len(part[0])
             order = np.argsort(left)
-            left, right, table, degrees, series = (each[order] for each in (left, right, table, degrees, series))
+            left, right, table, series = (each[order] for each in (left, right, table, series))
+            degrees = degrees[order]
         loops = self._known.loops
         edges = first = np.append(left, right[-1])
         if loops > 1:

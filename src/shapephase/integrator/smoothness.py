@@ -19,7 +19,7 @@ _STEPS_OF_A_SWING = 4.0
 _SAME_TIME = 1e-12
 # Pieces between breaks that are many: each is then short beside the motion, and begins with few samples.
 _MANY_PIECES = 64
-# Tolerance [rad] below which the highest degree is tried first, where pieces are few: its samples hold those of the others.
+# Tolerance [rad] below which the highest degree is tried first, where pieces are few: its samples hold all others.
 _SHARP = 1e-8
 # Degrees of a path up to which a body along it begins with 8, 16 and 32: its inertia swings up to half as fast again.
 _TERMS = np.array([5, 10, 21])

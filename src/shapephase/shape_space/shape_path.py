@@ -21,6 +21,7 @@ from ..arguments import (
 from ..arrays import Array, check_reach, finite_array, lock_arrays, read_only
 from ..display import card_html, card_text
 from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
+from ..integrator.smoothness import Smoothness
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
 from ._card import shape_path_card
@@ -46,7 +47,6 @@ from .scan._derived_scan import DerivedScan, JoinedScan
 from .scan._rate_check import check_rates
 from .scan.function_scan import FunctionScan, path_function
 from .scan.scanning import scanned
-from ..integrator.smoothness import Smoothness
 
 _WHOLE_TURN = 2.0 * np.pi
 

@@ -52,7 +52,7 @@ def curve_pieces(channels, halves, lifted, magnitudes, directions, found, differ
     channels, halves: (M, STAGES, 9), (2 M, STAGES, 9) at the stages of a step over each piece, and of two halves
     lifted: whether the gauge is the horizontal one, not the base
     magnitudes, directions: (B,), (B, M, 3) of the momenta, body axes at the start of each piece
-    found, differences: (B, M, 2) to be filled: of the gauge's omega . Pi/|Pi|, and the signed area between arc and chord
+    found, differences: (B, M, 2) to be filled: of the gauge's omega . Pi/|Pi|, and signed area between arc and chord
     """
     for row in range(len(magnitudes)):
         slopes, lift_slopes = np.empty((STAGES, 4)), np.empty((STAGES, 4))

@@ -39,9 +39,9 @@ def _condition(c):
 def judge(series, widths, spacing, before, momentum, rate, table):
     """Judge series (P, degree + 1, 9) of one degree, for momenta up to a magnitude; `table` (P, COLUMNS) is filled.
 
-    The two last terms tell what is missing beyond them, by the factor by which terms fall from the middle to the end: single
-    terms are small by chance, or by a motion's symmetry. What is missing swings as often over the panel as its degree
-    says, but for how far the body turns in it.
+    The two last terms tell what is missing beyond them, by the factor by which terms fall from the middle to the end:
+    single terms are small by chance, or by a motion's symmetry. What is missing swings as often over the panel as its
+    degree says, but for how far the body turns in it.
 
     widths, spacing: (P,) [s] of panels, and of floating-point numbers at their ends
     before: (P,) the last terms, at this degree, of the panel that each is a half of [rad/s]
@@ -72,7 +72,9 @@ def judge(series, widths, spacing, before, momentum, rate, table):
         beyond = decay / (1.0 - decay)
         missing = late * beyond
         found[GOOD] = 1.0 if noisy or missing <= rate * swings else 0.0
-        found[CHANGE] = 1.0 if noisy else min(CHANGED_LAST_TERMS * (1.0 + BEYOND_LAST_TERMS / degree) * beyond, 1.0 * degree)
+        found[CHANGE] = (
+            1.0 if noisy else min(CHANGED_LAST_TERMS * (1.0 + BEYOND_LAST_TERMS / degree) * beyond, 1.0 * degree)
+        )
         found[NOISY] = 1.0 if noisy else 0.0
         found[BETWEEN] = (max(missing, late) if noisy else missing) * width / swings
         found[MISSING] = 0.0 if noisy else missing / swings
@@ -83,8 +85,8 @@ def judge(series, widths, spacing, before, momentum, rate, table):
 def change(series, degrees, shares, noisy, signs, changed):
     """Fill `changed` (P, n, 9) with series whose last two terms are changed by shares (P,) of themselves.
 
-    Where these terms are noise, the last of them is added to the first, with signs (P,) by chance: all terms have as much of
-    it, and the first turns the body most.
+    Where these terms are noise, the last of them is added to the first, with signs (P,) by chance: all terms have as
+    much of it, and the first turns the body most.
     """
     for panel in range(len(series)):
         last = degrees[panel]
@@ -133,9 +135,9 @@ def _adjugate(m, out):
 def growths(marked, turn, found):
     """Fill the largest growths (B,) of a small turn from one mark to a later one.
 
-    The turns by which an error is known, rows of (3, 3), are propagators P; from one mark to a later one an error grows by
-    P_i^-1 P_j, whose determinant is one, and whose singular values are s, 1 and 1/s: s follows from the sum of the squares
-    of its entries.
+    The turns by which an error is known, rows of (3, 3), are propagators P; from one mark to a later one an error grows
+    by P_i^-1 P_j, whose determinant is one, and whose singular values are s, 1 and 1/s: s follows from the sum of the
+    squares of its entries.
 
     marked: (B, M, 4, 4) attitudes at marks, then those of starts turned by `turn` about each axis
     """

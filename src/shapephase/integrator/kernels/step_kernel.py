@@ -1,8 +1,8 @@
 """The attitude equation by the eighth-order formula of Dormand and Prince: the one place that has it.
 
-A quaternion turns at q' = q w / 2, with w = |Pi| I^-1 p - I^-1 L_o in body axes and p = S^T Pi_0/|Pi_0|: the momentum rests
-in space, so that its direction follows from the attitude. Coefficients are those of SciPy's DOP853 (Hairer, Norsett
-and Wanner, Solving Ordinary Differential Equations I, section II.5).
+A quaternion turns at q' = q w / 2, with w = |Pi| I^-1 p - I^-1 L_o in body axes and p = S^T Pi_0/|Pi_0|: the momentum
+rests in space, so that its direction follows from the attitude. Coefficients are those of SciPy's DOP853 (Hairer,
+Norsett and Wanner, Solving Ordinary Differential Equations I, section II.5).
 """
 
 from __future__ import annotations
@@ -234,7 +234,8 @@ def warm() -> None:
     still = np.array([[[0.0, 0.0, 0.0, 1.0]] * 5])
     march(none, 1, one, north, 0, still)
     march(none, 1, one, north + 0j, 0, still + 0j)
+    counts, marks = np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
     attempt(
-        np.zeros((7, STAGES, 9)), none[:2], np.ones(1, dtype=np.int64), 1, one, north, np.zeros(1, dtype=np.int64), 0, still[:, [0] * 7].copy(),
+        np.zeros((7, STAGES, 9)), none[:2], counts, 1, one, north, marks, 0, still[:, [0] * 7].copy(),
         still, np.zeros((1, 5, 3)), np.zeros((1, 4)), np.zeros((1, 4)), np.zeros((1, 4)), np.zeros((1, 1, 4, 4)),
     )  # fmt: skip

@@ -16,8 +16,8 @@ from ...arrays import Array, check_reach
 from ...body.body import Body
 from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
-from ..casadi_calls import call_casadi
 from ...shape_space.shape_path import ShapePath
+from ..casadi_calls import call_casadi
 from .hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales
 
 # Of the series of rates on a step of order 8, whose error is that of the step.

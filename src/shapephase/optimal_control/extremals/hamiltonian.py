@@ -18,8 +18,8 @@ from ...body.body import Body
 from ...body.couplings.coordinate_map import check_no_balls, check_smooth
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, unknown_name
-from ..casadi_calls import call_casadi
 from ...shape_space.connection import mechanical_connection
+from ..casadi_calls import call_casadi
 from ..symbolic import solve_linear, symbolic_body
 
 # Costs that are the integral of a metric, which is what the equations need.

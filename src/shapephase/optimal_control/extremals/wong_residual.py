@@ -14,10 +14,10 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
-from ..casadi_calls import call_casadi
 from ...shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
 from ...shape_space.knot_crossings import route_along
 from ...shape_space.shape_path import ShapePath
+from ..casadi_calls import call_casadi
 from ..task import joint_coupling
 from .hamiltonian import Hamiltonian, checked_metric, hamiltonian
 
