@@ -24,7 +24,7 @@ RANDOM_SUM = 4.0
 # ---- Steps -----------------------------------------------------------------------------------------------------------
 ORDER = 8
 """Of the formula: half as long steps have 2^-8 of the error."""
-STEPPING = 12.0
+STEPPING = 8.0
 """Times the distance between two step sizes, times by how much it fell from the pair before, is the error of the finer
 steps; the formula's own order alone would make it 1. Measured: with 4 one motion of harmonics in 70 exceeds it."""
 ANGLE_OF_STEP = 2.5

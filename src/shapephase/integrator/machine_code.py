@@ -81,12 +81,12 @@ class Kernel(Generic[_P, _R]):
                     # Numba then knows the plain function by this one, compiled once for the types of its arguments.
                     _parts[part] = jit(no_cpython_wrapper=True, **_OPTIONS)(part)
                     infer_global(part, Dispatcher(_parts[part]))
+            compiled: Any = self._compiled or jit(**_OPTIONS)(self.interpreted)
             if self._compiled is None:
-                compiled = jit(**_OPTIONS)(self.interpreted)
                 name = f"{self.interpreted.__module__.rpartition('.')[2]}.{self.interpreted.__qualname__}"
                 compiled._cache = KeptFunction(name, kernel_folder())
                 self._compiled = compiled
-            return self._compiled
+            return compiled
 
 
 def kernel(function: Callable[_P, _R]) -> Kernel[_P, _R]:

@@ -189,6 +189,7 @@ def attempted(
     quaternions[:, 0, 3], seen[:, 0] = 1.0, directions
     turns, dynamics = np.zeros((2, batch, 4 * count))
     measured, marked = np.zeros((batch, 4)), np.empty((batch, len(marks), 4, 4))
+    of_rows = states, quaternions, seen, turns, dynamics, measured, marked
     at = 0
     blocks = list(_blocks(steps, loops))
     run_progress.begin(run_progress.STEPPING, len(blocks))
@@ -196,10 +197,9 @@ def attempted(
         channels, counts = stage_channels(series, widths, steps, block, (1, 2, 4))
         other, _ = stage_channels(changed, widths, steps, block, (2,))
         begun: Callable[..., None] = partial(step_kernel.attempt, channels, other, counts, block.loops)
-        of_rows = states, quaternions, seen, turns, dynamics, measured, marked
 
         def attempt(rows: slice, begun: Callable[..., None] = begun, at: int = at) -> None:
-            begun(magnitudes[rows], directions[rows], marks, at, *(part[rows] for part in of_rows))
+            begun(magnitudes[rows], directions[rows], marks, at, *[part[rows] for part in of_rows])
 
         for _ in in_threads(attempt, batch, threads):
             pass

@@ -92,7 +92,8 @@ class Smoothness:
         edges = np.union1d(ends, inner[apart])
         middle = 0.5 * (edges[:-1] + edges[1:])
         leaf = np.clip(np.searchsorted(resolved.edges, middle) - 1, 0, len(resolved.left) - 1)
-        terms = resolved.terms(tolerance)[leaf]
+        # What all panels leave unseen adds up.
+        terms = resolved.terms(tolerance / len(resolved.left))[leaf]
         degrees = np.where(terms == 0, 0, np.array([*DEGREES, DEGREES[-1]])[np.searchsorted(_TERMS, terms)])
         halved = terms > _TERMS[-1]
         return np.union1d(edges, middle[halved]), np.repeat(degrees, 1 + halved)
