@@ -10,10 +10,10 @@ from benchmarks.extended import Truth, angles_between
 
 import shapephase as sp
 from shapephase.integrator.integrate import stepped_rotation
-from shapephase.integrator.sampling import FinishedSampler
 from support.compiler import needs_compiler
 from support.independent import BODIES, apart, body_of, random_loop, random_vector
 from support.long_runs import full_but
+from support.series_motion import sampler_of_series
 
 TOLERANCES = (1e-5, 1e-8, 1e-11)
 
@@ -48,7 +48,7 @@ def test_where_the_motion_s_steps_end_steps_of_the_lift_end(tolerance: float):
     motion = motion_of("cat", spline("cat"), tolerance)
     lift = motion.horizontal_lift
     assert np.isin(motion.solution.times, lift.times).all()
-    fine = stepped_rotation(FinishedSampler(motion.interpolant), np.zeros((1, 3)), 1e-13)
+    fine = stepped_rotation(sampler_of_series(motion.interpolant), np.zeros((1, 3)), 1e-12)
     gap = apart(lift.rotation(fine.times)[0], fine.rotation(fine.times)[0])
     assert gap <= lift.stepping_error[0] + lift.rounding_error[0] + fine.error_estimate[0]
 
@@ -69,7 +69,6 @@ def test_a_motion_read_or_unpickled_has_the_same_lift(kind: str, tmp_path):
 
 
 def test_what_may_be_missing_of_the_samples_is_kept_when_others_are_taken():
-    """Samples may stand in work arrays, which the next motion of the body fills."""
     path = random_loop(3, body_of("cat").n_shape).path
     deformation = sp.articulated(body_of("cat"), path)
     motion = sp.reconstruct(deformation, random_vector(2, 0.3), tolerance=1e-7)

@@ -179,7 +179,8 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
     least = STEPPING_SHARE * tolerance
     spectra_kernel.plan(plain(interpolant.coefficients), interpolant.widths, ceiling, least, turn, terms)
     finer = (_USUAL / tolerance) ** (1.0 / ORDER)
-    steps = finer * np.maximum(terms / TERMS_OF_STEP, turn / ANGLE_OF_STEP)
+    # However loose the tolerance, steps that do not follow the terms do not show by what they err.
+    steps = np.maximum(max(finer, 1.0) * terms / TERMS_OF_STEP, finer * turn / ANGLE_OF_STEP)
     steps = factor * np.maximum(steps, 1.0)
     total = 4.0 * interpolant.loops * float(steps.sum())
     if total > _MOST_STEPS:
