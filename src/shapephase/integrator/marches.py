@@ -14,6 +14,7 @@ from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from .interpolant import Interpolant
 from .kernels import spectra_kernel, step_kernel
+from .machine_code import expect_work
 from .threads import in_threads
 
 # Steps of which the channels are there at once: four times as many take some 16 megabytes.
@@ -24,6 +25,8 @@ _FEW = 24
 _TURN = 1e-7
 # Times between which the growth of errors is known, the start included.
 _MARKS = 17
+# Steps that are taken side by side, for each that is asked for.
+_JOBS = 12
 _NO_MARKS = np.zeros(0, dtype=np.int64)
 # Of a direction, for derivatives: its products with whatever grows stay far from the smallest and the largest numbers.
 _IMAGINARY = 1e-60
@@ -122,6 +125,7 @@ def _marched(
     quaternions = np.zeros((len(magnitudes), count + 1, 4), dtype=directions.dtype)
     quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0] if start is None else start
     at = 0
+    expect_work(steps=count * len(magnitudes))
     for block in _blocks(steps, interpolant.loops):
         channels, _ = stage_channels(series, interpolant.widths, steps, block)
 
@@ -191,6 +195,7 @@ def attempted(
     measured, marked = np.zeros((batch, 4)), np.empty((batch, len(marks), 4, 4))
     of_rows = states, quaternions, seen, turns, dynamics, measured, marked
     at = 0
+    expect_work(steps=_JOBS * count * batch)
     blocks = list(_blocks(steps, loops))
     run_progress.begin(run_progress.STEPPING, len(blocks))
     for block in blocks:

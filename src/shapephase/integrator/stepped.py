@@ -151,7 +151,7 @@ class SteppedRotation:
         A part of a step is a step, by the same formula on the same series; a step's end belongs to the next one.
         """
         ends, batch = self.times, len(self.momentum)
-        index = np.clip(np.searchsorted(ends, t, side="right") - 1, 0, len(ends) - 2)
+        index = np.searchsorted(ends, t, side="right") - 1
         magnitudes, directions = magnitudes_and_directions(self.momentum)
         quaternions, along = np.empty((batch, len(t), 4)), np.empty((batch, len(t)))
         for first in range(0, len(t), _AT_ONCE):
@@ -160,7 +160,10 @@ class SteppedRotation:
             channels = part_channels(self.interpolant, ends[index[part]], t[part] - ends[index[part]])
             found, phase = np.empty_like(starts), np.empty(starts.shape[:2])
             within_steps(channels, magnitudes, directions, starts, found, phase)
-            quaternions[:, part], along[:, part] = found, phase
+            at_start = t[part] == ends[index[part]]
+            # There nothing is to be stepped, and nothing rounded.
+            quaternions[:, part] = np.where(at_start[:, None], starts, found)
+            along[:, part] = np.where(at_start, 0.0, phase)
         return index, quaternions, along
 
     def with_rotations(self, rotations: Array, error: Array) -> SteppedRotation:

@@ -25,6 +25,13 @@ _COLUMNS = np.ascontiguousarray(np.nonzero(_TABLEAU)[1])
 _STARTS = np.concatenate([[0], np.cumsum(np.count_nonzero(_TABLEAU, axis=1))])
 
 
+# The states of `attempt`: by steps, twice and four times as many, on changed series, and from turned starts.
+_OF_FINER, _OF_FINEST, _OF_CHANGED, _OF_TURNED = 1, 2, 3, 4
+# Which of them go on one after another in one step, and by which of their own steps in it.
+_STATES = np.array([0, 1, 3, 2, 2, 1, 3, 2, 2, 4, 5, 6])
+_NUMBERS = np.array([0, 0, 0, 0, 1, 1, 1, 2, 3, 0, 0, 0])
+
+
 @inline
 def combined(slopes, row, x, y, z, w):
     """A quaternion plus the slopes (STAGES, 4) before it by a row of the tableau."""
@@ -82,19 +89,20 @@ def step(channels, magnitude, direction, slopes, x, y, z, w):
     channels: (STAGES, 9) at the stages, times the length of the step
     """
     along = 0.0 * x
-    for stage in range(STAGES):
+    a, b, c, d = x, y, z, w
+    for stage in range(STAGES + 1):
         a, b, c, d = combined(slopes, stage, x, y, z, w)
-        here = channels[stage]
-        u, v, t = -here[6], -here[7], -here[8]
-        if magnitude != 0.0:
-            p0, p1, p2 = seen_from(a, b, c, d, direction[0], direction[1], direction[2])
-            s0, s1, s2 = spin(here, magnitude, p0, p1, p2)
-            u, v, t = u + s0, v + s1, t + s2
-            along += WEIGHTS[stage] * (u * p0 + v * p1 + t * p2)
-        turned_at(slopes, stage, a, b, c, d, u, v, t)
-    x, y, z, w = combined(slopes, STAGES, x, y, z, w)
-    x, y, z, w = normalised(x, y, z, w)
-    return x, y, z, w, along
+        if stage < STAGES:
+            here = channels[stage]
+            u, v, t = -here[6], -here[7], -here[8]
+            if magnitude != 0.0:
+                p0, p1, p2 = seen_from(a, b, c, d, direction[0], direction[1], direction[2])
+                s0, s1, s2 = spin(here, magnitude, p0, p1, p2)
+                u, v, t = u + s0, v + s1, t + s2
+                along += WEIGHTS[stage] * (u * p0 + v * p1 + t * p2)
+            turned_at(slopes, stage, a, b, c, d, u, v, t)
+    a, b, c, d = normalised(a, b, c, d)
+    return a, b, c, d, along
 
 
 @inline
@@ -127,19 +135,12 @@ def march(channels, loops, magnitudes, directions, first, quaternions):
 
 
 @inline
-def _advance(channels, magnitude, direction, slopes, state):
-    """Take a step (STAGES, 9) from a state (4,), in its place."""
-    x, y, z, w, _ = step(channels, magnitude, direction, slopes, state[0], state[1], state[2], state[3])
-    state[0], state[1], state[2], state[3] = x, y, z, w
-
-
-@inline
 def _mark(state, marked):
     """Keep the attitude by steps, and those from turned starts: (4, 4)."""
     for i in range(4):
         marked[0, i] = state[0, i]
-        for turned in range(4, 7):
-            marked[turned - 3, i] = state[turned, i]
+        for axis in range(3):
+            marked[axis + 1, i] = state[_OF_TURNED + axis, i]
 
 
 @inline
@@ -187,7 +188,7 @@ def attempt(
         slopes = np.empty((STAGES, 4))
         magnitude, direction, state = magnitudes[row], directions[row], states[row]
         there, found, sight = quaternions[row], measured[row], seen[row]
-        done, mark = first, 0
+        done, mark, jobs = first, 0, len(_STATES) if len(marks) > 0 else len(_STATES) - 3
         while mark < len(marks) and marks[mark] <= done:
             if marks[mark] == done:
                 _mark(state, marked[row, mark])
@@ -197,18 +198,23 @@ def attempt(
             for panel in range(len(counts)):
                 count = counts[panel]
                 for k in range(count):
-                    one, two, four = 7 * start + k, 7 * start + count + 2 * k, 7 * start + 3 * count + 4 * k
-                    _advance(channels[one], magnitude, direction, slopes, state[0])
-                    for half in range(2):
-                        _advance(channels[two + half], magnitude, direction, slopes, state[1])
-                        _advance(changed[2 * (start + k) + half], magnitude, direction, slopes, state[3])
-                        found[2] = max(found[2], angle_between(state[1], state[3]))
-                        for quarter in range(2 * half, 2 * half + 2):
-                            at, s = 4 * done + quarter, state[2]
-                            x, y, z, w, along = step(
-                                channels[four + quarter], magnitude, direction, slopes, s[0], s[1], s[2], s[3]
-                            )
-                            s[0], s[1], s[2], s[3] = x, y, z, w
+                    for job in range(jobs):
+                        which, number = _STATES[job], _NUMBERS[job]
+                        s = state[which]
+                        if which == _OF_CHANGED:
+                            here = changed[2 * (start + k) + number]
+                        elif which == _OF_FINEST:
+                            here = channels[7 * start + 3 * count + 4 * k + number]
+                        elif which == _OF_FINER:
+                            here = channels[7 * start + count + 2 * k + number]
+                        else:
+                            here = channels[7 * start + k]
+                        x, y, z, w, along = step(here, magnitude, direction, slopes, s[0], s[1], s[2], s[3])
+                        s[0], s[1], s[2], s[3] = x, y, z, w
+                        if which == _OF_CHANGED:
+                            found[2] = max(found[2], angle_between(state[_OF_FINER], s))
+                        if which == _OF_FINEST:
+                            at = 4 * done + number
                             there[at + 1, 0], there[at + 1, 1], there[at + 1, 2], there[at + 1, 3] = x, y, z, w
                             found[3] += angle_between(there[at], s)
                             dynamics[row, at] = along
@@ -216,11 +222,9 @@ def attempt(
                                 p0, p1, p2 = seen_from(x, y, z, w, direction[0], direction[1], direction[2])
                                 sight[at + 1, 0], sight[at + 1, 1], sight[at + 1, 2] = p0, p1, p2
                                 turns[row, at] = _turn_of_step(there[at], s, sight[at], sight[at + 1])
-                        found[1] = max(found[1], angle_between(state[1], state[2]))
-                    found[0] = max(found[0], angle_between(state[0], state[1]))
-                    if len(marks) > 0:
-                        for turned in range(4, 7):
-                            _advance(channels[one], magnitude, direction, slopes, state[turned])
+                            if number % 2 == 1:
+                                found[1] = max(found[1], angle_between(state[_OF_FINER], s))
+                    found[0] = max(found[0], angle_between(state[0], state[_OF_FINER]))
                     done += 1
                     if mark < len(marks) and marks[mark] == done:
                         _mark(state, marked[row, mark])
