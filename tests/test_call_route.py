@@ -10,10 +10,12 @@ def test_the_routes_of_reconstruct_and_split_stay_short():
     steps, and bodies may come as a family. Every number of a split has its own error estimate since, and what closes
     the momentum's curve is found with it; and both say what a wrong object is. What `reconstruct` gives is compared
     with the body at times that no rule has seen: twelve stops and four climbs. `split` asks twice whether the body
-    has wheels of a stated speed, and once whether its curve has: five stops and two climbs.
+    has wheels of a stated speed, and once whether its curve has: five stops and two climbs. Loops are sampled in rounds
+    like all else, each of which asks the body: nineteen stops and four climbs; and a split steps its own lift, and
+    pieces of its curve, by functions of the integrator: six stops and three climbs.
     """
     found = routes()
-    assert len(found["split"].rooms) <= 40
-    assert found["split"].climbs <= 19
-    assert len(found["reconstruct"].rooms) <= 30
-    assert found["reconstruct"].climbs <= 10
+    assert len(found["split"].rooms) <= 46
+    assert found["split"].climbs <= 22
+    assert len(found["reconstruct"].rooms) <= 49
+    assert found["reconstruct"].climbs <= 14

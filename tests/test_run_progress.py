@@ -67,19 +67,20 @@ def test_a_look_is_reported_and_is_not_repeated():
     assert "looking at the path" not in {now.phase for now in reports(deformation, MOMENTUM)[1]}
 
 
-def test_steps_are_reported_while_they_are_taken():
-    """Two hundred loops are more than one block of steps: the share moves within the phase."""
+def test_steps_are_reported_while_they_are_taken(monkeypatch):
+    """The steps of two hundred loops come in blocks: the share moves within the phase."""
+    monkeypatch.setattr("shapephase.integrator.marches._AT_ONCE", 10)
     heard = reports(*CASES["one momentum, many loops"])[1]
     assert sum(now.phase == "stepping" for now in heard) > 10
 
 
 def test_many_samples_are_taken_in_parts_and_reported(monkeypatch):
     """The parts do not change the samples."""
-    from shapephase.integrator import _spectral_error
+    from shapephase.integrator import channels
 
     deformation = cat(False)
     whole = sp.reconstruct(deformation, MOMENTUM)
-    monkeypatch.setattr(_spectral_error, "_AT_ONCE", 7)
+    monkeypatch.setattr(channels, "_AT_ONCE", 7)
     motion, heard = reports(deformation, MOMENTUM)
     assert sum(now.phase == "sampling the body" for now in heard) >= 5
     np.testing.assert_allclose(motion.final_attitude, whole.final_attitude, atol=1e-14)

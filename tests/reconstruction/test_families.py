@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from benchmarks.cases import as_function, numbered_case
 from benchmarks.extended import Truth, angles_between
-from shapephase.integrator.variants import rotations
 
 import shapephase as sp
 from shapephase.arrays import Array
 from shapephase.body.family import BodyFamily
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError, WrongObjectError
+from shapephase.integrator import families
 from support.bodies import joint, link, urdf
 from support.compiler import needs_compiler
 from support.long_runs import full_but
@@ -85,15 +85,6 @@ def test_companions_order_and_threads_change_nothing(number: int, box: bool):
         assert np.array_equal(ours.attitude(0.3), theirs.attitude(0.3))
 
 
-def test_without_machine_code_companions_change_rounding_only():
-    """Sums over links are one product of matrices for all bodies, whose order of adding is the processor's."""
-    deformations = family(CAT, box=False, count=12)
-    momenta = momenta_of(CAT, 12)
-    together = sp.reconstruct(deformations, momenta)
-    alone = sp.reconstruct(picked(deformations, np.array([5])), momenta[5])
-    assert np.abs(alone.final_attitude[0] - together.final_attitude[5]).max() <= 1e-3 * together.tolerance
-
-
 @needs_compiler
 @pytest.mark.parametrize("first", full_but([0, 10], 0))
 @pytest.mark.parametrize("number", [CAT, DIVER])
@@ -132,18 +123,16 @@ def test_each_is_as_the_one_body_s_own_motion(number: int, box: bool):
 
 
 def test_bodies_that_are_far_from_the_one_they_were_made_from_are_right_too():
-    """Masses and inertias over two decades: some turn so much faster that they go alone."""
+    """Masses and inertias over two decades: some turn much faster, and need more than all begin with."""
     deformations = family(CAT, box=False, spread=1.2)
     motions = sp.reconstruct(deformations, momentum_of(CAT, 10.0))
     assert motions.error_estimate.max() <= motions.tolerance
-    assert 0 < len(motions.solution.alone) < len(motions)
     for row in range(0, len(deformations), 8):
         alone = sp.reconstruct(deformations[row], momentum_of(CAT, 10.0), tolerance=1e-11)
         assert np.abs(alone.final_attitude - motions.final_attitude[row]).max() <= 1e-11 + motions.error_estimate[row]
 
 
 def test_a_recorded_path_is_followed_between_all_of_its_rows():
-    """Alone its panels span several rows."""
     body = sp.load_body("cat")
     path = sp.read_shape_path(sp.body.robots_folder() / "cat_righting.csv", body)
     motions = sp.reconstruct(sp.articulated(family_of(body, 3), path), np.zeros(3), tolerance=1e-8)
@@ -184,7 +173,7 @@ def rod_family(load_urdf) -> sp.DeformationFamily:
 
 
 def test_what_fails_is_named(load_urdf):
-    with pytest.raises(SingularInertiaError, match=r"^body 1 of 3: locked inertia at t = 0 s"):
+    with pytest.raises(SingularInertiaError, match=r"^body 1 of 3: locked inertia at t = \S+ s is not positive definite"):
         sp.reconstruct(rod_family(load_urdf), [0.1, 0.0, 0.0])
     momenta = np.stack([momentum_of(CAT), 1e9 * momentum_of(CAT)])
     with pytest.raises(AccuracyNotReached, match=r"^body 1 of 2: "):
@@ -192,8 +181,8 @@ def test_what_fails_is_named(load_urdf):
 
 
 def test_more_than_can_be_kept_is_refused(monkeypatch):
-    monkeypatch.setattr(rotations, "_MOST_KEPT", 10_000)
-    with pytest.raises(AccuracyNotReached, match=r"40 motions on \d+ samples .* GB; take slices of"):
+    monkeypatch.setattr(families, "_MOST_KEPT", 10_000)
+    with pytest.raises(AccuracyNotReached, match=r"40 motions on some \d+ samples .* GB; take slices of"):
         sp.reconstruct(family(CAT, box=False), momentum_of(CAT))
 
 
