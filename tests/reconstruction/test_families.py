@@ -173,7 +173,7 @@ def rod_family(load_urdf) -> sp.DeformationFamily:
 
 
 def test_what_fails_is_named(load_urdf):
-    with pytest.raises(SingularInertiaError, match=r"^body 1 of 3: locked inertia at t = \S+ s is not positive definite"):
+    with pytest.raises(SingularInertiaError, match=r"^body 1 of 3: locked inertia at t = \S+ s is not positive"):
         sp.reconstruct(rod_family(load_urdf), [0.1, 0.0, 0.0])
     momenta = np.stack([momentum_of(CAT), 1e9 * momentum_of(CAT)])
     with pytest.raises(AccuracyNotReached, match=r"^body 1 of 2: "):
