@@ -242,8 +242,9 @@ class _Sampling:
         self._gap += 0.5 * float((gap * width)[fits].sum())
 
     def _keep(self, left: Array, right: Array, series: Array, table: Array) -> None:
-        self._done.append((left, right, series, table))
-        self._count += len(left)
+        if len(left):
+            self._done.append((left, right, series, table))
+            self._count += len(left)
 
     def _keep_as_it_is(self, panels: _Panels) -> None:
         """Panels that cannot be finer, by samples of the least degree: their estimates say how far they are off."""
