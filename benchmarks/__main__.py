@@ -3,12 +3,12 @@
 Seventeen motions, each as its known kind (Fourier loop, spline, moves) and as a black box (`ShapePath.function` of the
 same path, looked at before), beside peer.cpp: Pinocchio in Boost.odeint's Runge-Kutta-Fehlberg 7(8), which takes the
 motion as a function of time in C++, at the loosest relative tolerance (half decades) that keeps its own largest error
-at its steps within 1e-9. Ours runs at the tolerance asked for, 1e-9, and at the loosest that keeps the true error
-within 1e-9 at the same times ("same error"). Truth is in extended precision (`benchmarks.extended`). All take turns, in
-processes of one thread; times are processor time, ratios medians of the turns' ratios.
+at its steps within 1e-9. Ours is `reconstruct(articulated(body, path))` at the tolerance asked for, 1e-9, and at the
+loosest that keeps the true error within 1e-9 at the same times ("same error"). Truth is in extended precision
+(`benchmarks.extended`). All take turns, in processes of one thread; times are processor time, ratios medians of the
+turns' ratios. What is compiled is compiled first.
 
-Ours runs without Numba ("plain") and, where it is installed, with it ("fast"). `--against SRC` names the `src` folder
-of another checkout, which runs in the same turns, interpreted and compiled. SHAPEPHASE_FAST=0 leaves out what is fast.
+`--against SRC` names the `src` folder of another checkout, which runs in the same turns.
 Then what follows a reconstruction, many momenta and bodies at once, threads, and recorded motions.
 `--keep` writes what is printed to benchmarks/results.txt, too, which `python -m benchmarks.page` puts on its page.
 """
@@ -26,7 +26,6 @@ import io
 import sys
 import tempfile
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TextIO
 
@@ -119,18 +118,12 @@ def _arguments() -> argparse.Namespace:
 
 def started(against: Path | None, folder: str) -> list[Contestant]:
     """The processes; what is compiled, is compiled first."""
-    settings = [Setting("plain", cache=f"{folder}/plain")]
-    compiled = []
-    if os.environ.get("SHAPEPHASE_FAST", "") != "0" and find_spec("numba") is not None:
-        compiled.append(Setting("fast", fast=True))
+    settings = [Setting("ours")]
     if against is not None:
-        settings.append(Setting("before", against.resolve(), cache=f"{folder}/interpreted"))
-        compiled.append(Setting("before, compiled", against.resolve(), cache=f"{folder}/compiled"))
+        settings.append(Setting("before", against.resolve(), cache=f"{folder}/before"))
     contestants = [Contestant(setting) for setting in settings]
-    for setting in compiled:
-        contestant = Contestant(setting)
-        print(f"{setting.name}: {contestant('compiled')}", flush=True)
-        contestants.append(contestant)
+    for contestant in contestants:
+        print(f"{contestant.name}: {contestant('compiled')}", flush=True)
     return contestants
 
 
@@ -151,12 +144,11 @@ def print_cases(contestants: list[Contestant], numbers: list[int], turns: int) -
             print(_row(all_cases[number], way, done[number], contestants), flush=True)
     if (_PEER, "", "") in done[numbers[0]]:
         print_medians({number: all_cases[number].name for number in numbers}, done, ways)
-    for ours, theirs in (("plain", "before"), ("fast", "before, compiled")):
-        names = {c.name for c in contestants}
-        if {ours, theirs} <= names:
-            print(f"\n{ours} / {theirs}, at the tolerance asked for")
-            for way in ("known", "box"):
-                print(f"  {way:7}{_ratios(done, numbers, (ours, way, 'asked'), (theirs, way, 'asked'))}")
+    for before in contestants[1:]:
+        print(f"\n{contestants[0].name} / {before.name}, at the tolerance asked for")
+        for way in ("known", "box"):
+            ours, theirs = ((c.name, way, "asked") for c in (contestants[0], before))
+            print(f"  {way:7}{_ratios(done, numbers, ours, theirs)}")
 
 
 def print_medians(names: dict[int, str], done: dict[int, Entries], ways: list[tuple[str, str, str]]) -> None:

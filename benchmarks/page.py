@@ -1,6 +1,7 @@
 """The results on the page of benchmarks: `python -m benchmarks.page` writes them into docs/benchmarks.md.
 
-They are those of `benchmarks/results.txt`, which `make bench` writes; at its top are date, machine and versions.
+They are those of `benchmarks/results.txt`, which `make bench` writes; at its top are date, machine and versions, and
+where they are of another state of the library a `note: ...` that says so.
 """
 
 from __future__ import annotations
@@ -21,16 +22,11 @@ PAGE = ROOT / "docs" / "benchmarks.md"
 _PACKAGES = ("numpy", "scipy", "pin", "numba")
 _BEGIN, _END = "<!-- results -->\n", "<!-- end of results -->\n"
 _MEDIAN = re.compile(
-    r"^  (plain|fast) +(known|box) +(asked|same error) +median +([\d.]+) +from +[\d.]+ to +[\d.]+((?: +[\d.]+)+)$",
+    r"^  ours +(known|box) +(asked|same error) +median +([\d.]+) +from +[\d.]+ to +[\d.]+((?: +[\d.]+)+)$",
     re.MULTILINE,
 )
 _KINDS = ("loop", "move", "samples")
-_ROWS = {
-    ("fast", "known"): "with `[fast]`",
-    ("fast", "box"): "with `[fast]`, the same as a function of time",
-    ("plain", "known"): "without",
-    ("plain", "box"): "without, as a function of time",
-}
+_ROWS = {"known": "the path as it is", "box": "the same as a function of time"}
 
 
 def circumstances() -> list[str]:
@@ -68,11 +64,11 @@ def _compiler() -> list[str]:
 
 def section(results: str) -> str:
     """The results as the page has them: circumstances, the medians as a table, then all numbers."""
-    said = dict(re.findall(r"^(date|machine|versions): (.*)$", results, re.MULTILINE))
-    by_way: dict[tuple[str, str], dict[str, list[float]]] = {}
-    for name, way, asked, of_all, kinds in _MEDIAN.findall(results):
+    said = dict(re.findall(r"^(date|machine|versions|note): (.*)$", results, re.MULTILINE))
+    by_way: dict[str, dict[str, list[float]]] = {}
+    for way, asked, of_all, kinds in _MEDIAN.findall(results):
         numbers = [*map(float, kinds.split()[: len(_KINDS)]), float(of_all)]
-        by_way.setdefault((name, way), {})[asked] = numbers
+        by_way.setdefault(way, {})[asked] = numbers
     rows = [
         f"| {title} | "
         + " | ".join(f"{_short(a)} and {_short(b)}" for a, b in zip(*by_way[key].values(), strict=True))
@@ -85,12 +81,13 @@ def section(results: str) -> str:
     return "\n".join(
         [
             f"Measured on {said['date']} on {said['machine']}, with {said['versions']}.",
+            *([f"\n{said['note']}"] if "note" in said else []),
             "",
             "| times C++ | Fourier loops | moves | splines of 12 samples | all |",
             "|---|---|---|---|---|",
             *rows,
             "",
-            "What follows a reconstruction, many at once, and recordings; `plain` is without `[fast]`:",
+            "What follows a reconstruction, many at once, and recordings:",
             "",
             "```text",
             workloads.strip("\n"),

@@ -1,8 +1,9 @@
 """The compiled C++ peer: peer.cpp, built where a C++ compiler, Eigen's and Pinocchio's headers are found.
 
-Pinocchio's headers, Boost's and the library come with pin's wheel; Eigen's with `pip install cmeel-eigen`, or with the
-system. Flags: -O3 -DNDEBUG, no -march, as Pinocchio's own wheels and as the packages of a distribution are built. The
-library is kept in the folder $SHAPEPHASE_PEER, or in one that goes with the process.
+Pinocchio's headers, Boost's and the library come with pin's wheel; Eigen's with CasADi's wheel, with
+`pip install cmeel-eigen`, or with the system. Flags: -O3 -DNDEBUG, no -march, as Pinocchio's own wheels and as the
+packages of a distribution are built. The library is kept in the folder $SHAPEPHASE_PEER, or in one that goes with the
+process.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+import casadi
 import numpy as np
 import pinocchio as pin
 
@@ -179,7 +181,8 @@ def peer_library() -> ctypes.CDLL:
     if shutil.which(compiler[0]) is None:
         raise NoPeer(f"there is no C++ compiler {compiler[0]} (set CXX)")
     prefix = _prefix()
-    eigen = next((path for path in (prefix / "include/eigen3", _SYSTEM_EIGEN) if (path / "Eigen").is_dir()), None)
+    places = prefix / "include/eigen3", Path(casadi.__file__).parent / "include/eigen3", _SYSTEM_EIGEN
+    eigen = next((path for path in places if (path / "Eigen").is_dir()), None)
     if eigen is None:
         raise NoPeer("Eigen's headers are missing: pip install cmeel-eigen")
     command = [

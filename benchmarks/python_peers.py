@@ -7,7 +7,7 @@ the final attitude is within the same error; it takes the same steps whoever com
 turn with ours, in one process with one thread, three times at a turn, as a program calls them again and again; medians
 of processor time.
 Ours runs twice: at the tolerance asked for, which the error stays far below; and, as DOP853 does, at the loosest at
-which the true error is within it ("tuned"). Errors are against DOP853 at 3e-14. SHAPEPHASE_FAST=0 leaves Numba out.
+which the true error is within it ("tuned"). Errors are against DOP853 at 3e-14.
 """
 
 from __future__ import annotations

@@ -150,7 +150,7 @@ def test_the_page_has_the_results_that_were_kept():
     page = PAGE.read_text(encoding="utf-8")
     assert with_results(page, results) == page
     assert re.search(r"^Measured on 20\d\d-\d\d-\d\d on .+, with shapephase [\d.]+, Python 3\.", page, re.MULTILINE)
-    # The table, from the rows of the cases: the first ratio of fast, its medians by the kind of path.
+    # The table, from the rows of the cases: the first ratio of ours, its medians by the kind of path.
     ratios: dict[str, list[float]] = {"loop": [], "move": [], "samples": [], "": []}
     for line in results.splitlines():
         if found := re.match(r"(.{38})known .*?(\d+\.\d\d) +\d+\.\d\d +\d+$", line):
@@ -158,7 +158,7 @@ def test_the_page_has_the_results_that_were_kept():
                 ratios[kind] += [float(found[2])] * (kind in found[1])
     assert len(ratios[""]) == 17
     medians = [f"{np.median(values):.1f}" for values in ratios.values()]
-    (row,) = re.findall(r"^\| with `\[fast\]` \|(.*)\|$", page, re.MULTILINE)
+    (row,) = re.findall(r"^\| the path as it is \|(.*)\|$", page, re.MULTILINE)
     assert [cell.split()[0] for cell in row.split("|")] == medians
 
 
