@@ -96,7 +96,7 @@ def test_every_number_of_the_table_has_its_error_beside_it(capsys):
     turn = so3.angle(np.array(data["dynamical_rotation"]))
     known = data["error_estimates"]["dynamical_rotation"] / turn
     shown = lines["dynamical rotation"][51:].strip(" ()").split()
-    assert 1e-6 < known < 1.0
+    assert 1e-12 < known < 1.0
     assert all(10.0 ** -len(entry.partition(".")[2]) >= known for entry in shown)
 
 

@@ -35,7 +35,7 @@ def reconstructed(dive):
         return np.broadcast_to(np.diag(dive.moments), (len(t), 3, 3))
 
     deformation = sp.prescribed(inertia, dive.rotor_momentum, dive.duration, dive.times[1:-1])
-    return sp.reconstruct(deformation, [0.0, dive.momentum, 0.0], tolerance=1e-8)
+    return sp.reconstruct(deformation, [0.0, dive.momentum, 0.0], tolerance=1e-9)
 
 
 @pytest.mark.parametrize("case", DIVES)

@@ -346,9 +346,9 @@ def test_found_breaks_are_those_of_every_loop():
 
 
 def test_a_black_box_costs_no_more_of_the_body_than_before():
-    """The prescribed path needed 44 evaluations at the nodes and 16 between them, before any refinement."""
+    """Four panels of degree 32 or less, and the fresh times."""
     motion = sp.reconstruct(sp.articulated(sp.load_body("cat_two_halves"), swing().path()), np.zeros(3), tolerance=1e-6)
-    assert motion.evaluations < 130
+    assert motion.evaluations < 140
 
 
 # ---- Hostile paths -------------------------------------------------------------------------------------------------
