@@ -30,12 +30,13 @@ _WEIGHTS = np.sqrt(np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]))
 class Channels:
     """The deformation as channels, with a count of its evaluations.
 
-    Whole calls are kept: one with the same times is answered from what was found before.
+    Whole calls are kept, but for very large ones: one with the same times is answered from what was found before.
     """
 
     def __init__(self, evaluate: Evaluate, directly: Directly | None = None) -> None:
         self._evaluate, self._directly = evaluate, directly
         self._known: dict[bytes, Array] = {}
+        self._not_asked: set[bytes] = set()
         self.count = 0
 
     def __call__(self, times: Array) -> Array:
@@ -43,13 +44,18 @@ class Channels:
         key = times.tobytes()
         found = self._known.get(key)
         if found is None:
-            found = self._known[key] = self.fresh(times)
+            found = self.fresh(times)
+            if len(times) <= _AT_ONCE:
+                self._known[key] = found
+        elif key in self._not_asked:
+            self._not_asked.remove(key)
+            self.count += len(times)
         return found
 
     def know(self, times: Array, channels: Array) -> None:
-        """Keep what was evaluated elsewhere, which counts as evaluations of this."""
+        """Keep what was evaluated elsewhere; when it is asked for, it counts as evaluations of this."""
         self._known[times.tobytes()] = channels
-        self.count += len(times)
+        self._not_asked.add(times.tobytes())
 
     def fresh(self, times: Array) -> Array:
         """The same, evaluated anew."""

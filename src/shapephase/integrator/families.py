@@ -7,7 +7,6 @@ model, needs, at which all are evaluated together.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,7 +22,6 @@ from .marches import magnitudes_and_directions
 from .samples import Panels
 from .sampling import Sampler, nodes_of_panels
 from .stepped import SteppedRotation
-from .threads import processors
 
 # Deformations that are evaluated together: enough for what they share to cost little.
 _AT_ONCE = 64
@@ -78,16 +76,13 @@ class VariantRotations:
         return np.array([one.interpolant.evaluations for one in self.rotations], dtype=np.int64)
 
 
-def rotations_of_variants(
-    variants: Variants, momentum: Array, tolerance: float, *, threads: int | None = None
-) -> VariantRotations:
+def rotations_of_variants(variants: Variants, momentum: Array, tolerance: float) -> VariantRotations:
     """Integrate the attitude equation of each deformation as if there were no others.
 
     Parameters
     ----------
     momentum : (N, 3) body angular momentum at the start of each [kg m^2/s]
     tolerance : of every attitude over the whole interval [rad]
-    threads : at most; None: one for each processor. Results do not depend on it
 
     Raises
     ------
@@ -96,25 +91,17 @@ def rotations_of_variants(
     """
     count = len(momentum)
     ceilings = rounded_up(magnitudes_and_directions(momentum)[0], CLASSES)
-    lots = list(_lots(variants, ceilings, tolerance))
     run_progress.begin(run_progress.STEPPING, max(count, 1))
-    found: list[SteppedRotation | None] = [None] * count
-
-    def integrate(lot: _Lot) -> int:
+    found: dict[int, SteppedRotation] = {}
+    for lot in list(_lots(variants, ceilings, tolerance)):
         for row, sampler in lot.samplers(variants):
             try:
-                one = rotations_of_each(sampler, momentum[row : row + 1], tolerance, threads=1)
+                one = rotations_of_each(sampler, momentum[row : row + 1], tolerance)
             except (AccuracyNotReached, SingularInertiaError) as error:
                 raise type(error)(f"body {row} of {count}: {error}") from error
             found[row] = one.finest if isinstance(one, GroupedRotations) else one
-        return len(lot.rows)
-
-    workers = max(1, min(processors() if threads is None else threads, len(lots)))
-    with ThreadPoolExecutor(workers) as pool:
-        # In one thread the usual way: errors then show where they are made.
-        for done in pool.map(integrate, lots) if workers > 1 else map(integrate, lots):
-            run_progress.advance(done)
-    return VariantRotations(tuple(one for one in found if one is not None))
+        run_progress.advance(len(lot.rows))
+    return VariantRotations(tuple(found[row] for row in range(count)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,10 @@ from .kernels import spectra_kernel as spectra
 from .machine_code import plain
 
 
+# Panels at once: some megabytes.
+_AT_ONCE = 2048
+
+
 @dataclass(frozen=True, eq=False)
 class Perturbed:
     """An interpolant's series with errors like those that they probably have.
@@ -101,20 +105,20 @@ def rounded_series(samples: Samples, units: float) -> Array:
     With L the largest moment, a rounding eps L E of the inertia, E of size one in any direction, changes I^-1 by
     -I^-1 eps L E I^-1: of a body that hardly resists turning about one axis, by more than units of its own.
     """
-    coefficients, degrees = samples.interpolant.coefficients, samples.panels.degrees
-    panels, terms, _ = coefficients.shape
-    rng, inverse = np.random.default_rng(0), coefficients[:, 0][:, MATRIX].reshape(-1, 1, 3, 3)
-    least = np.linalg.eigvalsh(inverse[:, 0])[:, 0]
-    unit = (units * EPS / np.where(least > 0.0, least, np.inf))[:, None, None]
-    tensors, vectors = rng.standard_normal((panels, terms, 3, 3)), rng.standard_normal((panels, terms, 3))
-    turned = inverse @ (tensors + np.swapaxes(tensors, -1, -2))
-    drift = np.abs(coefficients[:, :, 6:]).max(axis=(1, 2))[:, None, None] * vectors
-    found = coefficients.copy()
-    there = np.arange(terms) <= degrees[:, None]
-    unit = unit * there[:, :, None]
-    found[:, :, :6] += unit * (turned @ inverse).reshape(panels, terms, 9)[:, :, VOIGT]
-    of_tensors = (turned @ coefficients[:, None, 0, 6:, None])[..., 0]
-    found[:, :, 6:] += unit * (of_tensors + (inverse @ drift[..., None])[..., 0])
+    series, degrees, rng = samples.interpolant.coefficients, samples.panels.degrees, np.random.default_rng(0)
+    found, terms = series.copy(), series.shape[1]
+    for first in range(0, len(series), _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        inverse, drift = series[part, 0][:, MATRIX].reshape(-1, 1, 3, 3), series[part, :, 6:]
+        count, least = len(inverse), np.linalg.eigvalsh(inverse[:, 0])[:, 0]
+        unit = (units * EPS / np.where(least > 0.0, least, np.inf))[:, None, None]
+        unit = unit * (np.arange(terms) <= degrees[part, None])[:, :, None]
+        tensors, vectors = rng.standard_normal((count, terms, 3, 3)), rng.standard_normal((count, terms, 3))
+        turned = inverse @ (tensors + np.swapaxes(tensors, -1, -2))
+        vectors *= np.abs(drift).max(axis=(1, 2))[:, None, None]
+        found[part, :, :6] += unit * (turned @ inverse).reshape(count, terms, 9)[:, :, VOIGT]
+        of_drift = (turned @ drift[:, None, 0, :, None])[..., 0] + (inverse @ vectors[..., None])[..., 0]
+        found[part, :, 6:] += unit * of_drift
     return found
 
 

@@ -6,7 +6,7 @@ gets 8, 16 or 32 degrees, beyond which it is halved, until what is missing from 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import inf
 
@@ -24,6 +24,8 @@ from .smoothness import DEGREES, Smoothness
 
 # Panels before halving ends, besides 40 for every break: a motion that needs more is rough, not merely long.
 _MOST_PANELS = 4000
+# Panels that are sampled together: their samples take some ten megabytes.
+_AT_ONCE = 4096
 # Of a panel, relative to the interval: narrower ones would consist of rounding.
 _LEAST_WIDTH = 1e-13
 # Where the samples of a panel are compared with its series: none is near a node of a degree in use.
@@ -107,6 +109,16 @@ def _by_degree(panels: Panels) -> list[_Panels]:
     return [_Panels.new(degree, left[rows], right[rows]) for degree, rows in each]
 
 
+def _parts(waiting: list[_Panels]) -> Iterator[list[_Panels]]:
+    """Panels that are sampled together: all, where they are few, else some thousand at a time."""
+    if sum(len(panels.left) for panels in waiting) <= _AT_ONCE:
+        yield waiting
+        return
+    for panels in waiting:
+        for first in range(0, len(panels.left), _AT_ONCE):
+            yield [panels.of(slice(first, first + _AT_ONCE))]
+
+
 @dataclass(frozen=True, eq=False)
 class _Panels:
     """Panels of one degree that are being sampled.
@@ -133,6 +145,11 @@ class _Panels:
     def new(cls, degree: int, left: Array, right: Array) -> _Panels:
         """Of which nothing is known."""
         return cls(degree, left, right, None, np.full(len(left), inf))
+
+    def of(self, rows: slice) -> _Panels:
+        """Some of them."""
+        values = None if self.values is None else self.values[rows]
+        return _Panels(self.degree, self.left[rows], self.right[rows], values, self.parents[rows])
 
     def times(self, end: float) -> Array:
         """The nodes that are not sampled yet, the outermost on this side of breaks: (P, k) [s]."""
@@ -184,10 +201,10 @@ class _Sampling:
         most = _MOST_PANELS + 40 * len(known.breaks) + len(first.degrees)
         waiting = _by_degree(first)
         while waiting:
-            values = self._sampled(waiting)
             further: list[_Panels] = []
-            for panels, there in zip(waiting, values, strict=True):
-                further += self._judged(panels, there)
+            for part in _parts(waiting):
+                for panels, there in zip(part, self._sampled(part), strict=True):
+                    further += self._judged(panels, there)
             finer = sum(len(panels.left) for panels in further)
             narrow = min((float((p.right - p.left).min()) for p in further), default=inf)
             if narrow < _LEAST_WIDTH * self._end or self._count + finer > most:

@@ -112,9 +112,8 @@ def reconstruct_family(
     attitude: ArrayLike | None,
     tolerance: float,
     method: str,
-    threads: int | None,
 ) -> MotionFamily:
-    """As `reconstruct`, with tolerance and threads already checked."""
+    """As `reconstruct`, with the tolerance already checked."""
     if not isinstance(method, str) or method not in _METHODS:
         raise unknown_name("method for a family of bodies", method, _METHODS)
     count = len(deformations)
@@ -126,7 +125,7 @@ def reconstruct_family(
         )
     spatial, start = np.broadcast_to(spatial, (count, 3)), np.broadcast_to(start, (count, 3, 3))
     at_start = so3.apply(so3.transpose(start), spatial)
-    solution = rotations_of_variants(deformations.variants(), at_start, tolerance, threads=threads)
+    solution = rotations_of_variants(deformations.variants(), at_start, tolerance)
     return MotionFamily(
         deformations=deformations,
         momentum=spatial,

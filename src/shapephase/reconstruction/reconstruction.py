@@ -391,7 +391,7 @@ def reconstruct(
     method : "auto" or "spectral" (the deformation sampled at Chebyshev points, the attitude stepped on the interpolant
         by a Runge-Kutta method of order 8), "closed_form" (of a rigid body, by elliptic functions:
         `rigid_body.EulerTop`), or "dop853" (SciPy's integrator on the deformation itself, an independent check)
-    threads : at most, for many momenta or bodies; None: one for each processor. Results do not depend on it
+    threads : at most, for many momenta; None: one for each processor. Results do not depend on it
     progress : called with a `RunProgress` some two hundred times in a long run: the share that is done, which never
         falls, and what is being done; if it returns something true, the run stops
     torque : from outside, an `ExternalTorque` or a function of a `TorqueState` in base axes [N m]; None: none. With
@@ -441,7 +441,7 @@ def reconstruct(
         from .motion_family import reconstruct_family
 
         with watched(progress):
-            return reconstruct_family(deformation, momentum, attitude, goal, method, workers)
+            return reconstruct_family(deformation, momentum, attitude, goal, method)
     if not isinstance(method, str) or method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
     spatial, start = initial_state_arguments(momentum, attitude)
