@@ -16,7 +16,6 @@ from .interpolant import Interpolant
 from .kernels import spectra_kernel as spectra
 from .machine_code import plain
 
-
 # Panels at once: some megabytes.
 _AT_ONCE = 2048
 
