@@ -1,4 +1,4 @@
-"""Constants of error estimates, each with what it follows from or was measured by; docs/numerics.md has the table."""
+"""Constants of error estimates, each with what it follows from or was measured by; numerics.md section 1 has the table."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def driven_attitude(
 
     Examples
     --------
-    >>> from shapephase.integrator.forced.driven_attitude import driven_attitude
+    >>> from shapephase.integrator.driven_attitude import driven_attitude
     >>> def rates(t, attitude, states):
     ...     return np.column_stack([0.0 * t, 0.0 * t, states[:, 0]]), np.ones((len(t), 1))  # a turn that speeds up
     >>> found = driven_attitude(rates, np.array([0.0, 1.0]), np.eye(3), np.zeros(1), np.ones(1), 1e-9)

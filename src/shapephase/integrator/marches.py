@@ -126,7 +126,9 @@ def _marched(
     quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0] if start is None else start
     at = 0
     expect_work(steps=count * len(magnitudes))
-    for block in _blocks(steps, interpolant.loops):
+    blocks = list(_blocks(steps, interpolant.loops))
+    run_progress.begin(run_progress.STEPPING, len(blocks))
+    for block in blocks:
         channels, _ = stage_channels(series, interpolant.widths, steps, block)
 
         def march(rows: slice, channels: Array = channels, loops: int = block.loops, at: int = at) -> None:
@@ -135,6 +137,7 @@ def _marched(
         for _ in in_threads(march, len(magnitudes)):
             pass
         at += block.loops * len(channels)
+        run_progress.advance(1)
     return quaternions
 
 
@@ -190,7 +193,8 @@ def attempted(
     states[:, :, 3] = 1.0
     states[:, [4, 5, 6], [0, 1, 2]] = 0.5 * _TURN
     quaternions, seen = np.zeros((batch, 4 * count + 1, 4)), np.empty((batch, 4 * count + 1 if moving else 1, 3))
-    quaternions[:, 0, 3], seen[:, 0] = 1.0, directions
+    # Without momentum the direction stays as it is.
+    quaternions[:, 0, 3], seen[:] = 1.0, directions[:, None]
     turns, dynamics = np.zeros((2, batch, 4 * count))
     measured, marked = np.zeros((batch, 4)), np.empty((batch, len(marks), 4, 4))
     of_rows = states, quaternions, seen, turns, dynamics, measured, marked

@@ -269,7 +269,7 @@ class _Sampling:
         series, table = values_to_coefficients(panels.degree) @ values, np.empty((len(values), spectra.COLUMNS))
         ends = panels.right - panels.left, np.spacing(panels.right), panels.before
         spectra.judge(series, *ends, self._momentum, self._rate, table)
-        table[:, [spectra.CHANGE, spectra.BETWEEN]] = float(panels.degree), table[:, spectra.LATE, None]
+        table[:, spectra.CHANGE], table[:, spectra.BETWEEN] = panels.degree, table[:, spectra.LATE]
         self._keep(panels.left, panels.right, series, table)
 
     def _rough(self, further: list[_Panels]) -> AccuracyNotReached:
@@ -283,13 +283,14 @@ class _Sampling:
     def _whole(self, evaluations: int, defect: float, too_rough: AccuracyNotReached | None) -> Samples:
         left, right, table = (np.concatenate([part[k] for part in self._done]) for k in (0, 1, 3))
         degrees = np.concatenate([np.full(len(part[0]), part[2].shape[1] - 1) for part in self._done])
-        if len(self._done) == 1:
-            series = self._done[0][2]
-        else:
-            series, row = np.zeros((len(left), degrees.max() + 1, 9)), 0
+        series, row = self._done[0][2], 0
+        if len(self._done) > 1:
+            series = np.zeros((len(left), degrees.max() + 1, 9))
             for part in self._done:
                 series[row : row + len(part[0]), : part[2].shape[1]] = part[2]
                 row += len(part[0])
+        # Halves of panels come after all first halves.
+        if not np.all(left[:-1] < left[1:]):
             order = np.argsort(left)
             left, right, table, series = (each[order] for each in (left, right, table, series))
             degrees = degrees[order]

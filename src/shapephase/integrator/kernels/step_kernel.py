@@ -110,8 +110,8 @@ def angle_between(p, q):
     """The angle of small turns between two quaternions (4,) of either sign."""
     near, far = 0.0, 0.0
     for i in range(4):
-        near += (p[i] - q[i]) ** 2
-        far += (p[i] + q[i]) ** 2
+        less, more = p[i] - q[i], p[i] + q[i]
+        near, far = near + less * less, far + more * more
     return 2.0 * math.sqrt(min(near, far))
 
 
