@@ -23,6 +23,7 @@ from .constants import (
     ROUNDING_OF_START,
     ROUNDING_OF_STEP,
     ROUNDING_SHARE,
+    SMALL_TERM,
     STEPPING,
     STEPPING_SHARE,
     TERMS_OF_STEP,
@@ -176,7 +177,7 @@ def one_round(
 def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: float) -> Integers:
     """The coarsest steps on each panel, a fourth of those that count: (P,). Raises AccuracyNotReached."""
     turn, terms = np.empty((2, len(interpolant.widths)))
-    least = STEPPING_SHARE * tolerance
+    least = SMALL_TERM * tolerance
     spectra_kernel.plan(plain(interpolant.coefficients), interpolant.widths, ceiling, least, turn, terms)
     finer = (_USUAL / tolerance) ** (1.0 / ORDER)
     # However loose the tolerance, steps that do not follow the terms do not show by what they err.

@@ -136,8 +136,8 @@ def growths(marked, turn, found):
     """Fill the largest growths (B,) of a small turn from one mark to a later one.
 
     The turns by which an error is known, rows of (3, 3), are propagators P; from one mark to a later one an error grows
-    by P_i^-1 P_j, whose determinant is one. With singular values near s, 1 and 1/s, s follows from the sum of the squares
-    of its entries; where the middle one is another, it is at most 4 % too low or 41 % too high.
+    by P_i^-1 P_j, whose determinant is one. With singular values near s, 1 and 1/s, s follows from the sum of the
+    squares of its entries; where the middle one is another, it is at most 4 % too low or 41 % too high.
 
     marked: (B, M, 4, 4) attitudes at marks, then those of starts turned by `turn` about each axis
     """
