@@ -69,7 +69,7 @@ def test_a_look_is_reported_and_is_not_repeated():
 
 def test_steps_are_reported_while_they_are_taken(monkeypatch):
     """The steps of two hundred loops come in blocks: the share moves within the phase."""
-    monkeypatch.setattr("shapephase.integrator.marches._AT_ONCE", 10)
+    monkeypatch.setattr("shapephase.integrator.stepping._AT_ONCE", 10)
     heard = reports(*CASES["one momentum, many loops"])[1]
     assert sum(now.phase == "stepping" for now in heard) > 10
 

@@ -14,8 +14,8 @@ from shapephase.integrator.curve_integrals import curve_integrals
 from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.kernels import step_kernel
 from shapephase.integrator.lift import lift_along
-from shapephase.integrator.marches import attempted, marched, momentum_slope, small_turns
 from shapephase.integrator.stepped import SteppedRotation
+from shapephase.integrator.stepping import attempted, momentum_slope, small_turns, stepped_quaternions
 from support.independent import apart, axisymmetric_attitude, hat
 from support.series_motion import constant_interpolant, random_interpolant, sampler_of_series, series_motion
 
@@ -63,7 +63,7 @@ def test_steps_of_a_symmetric_top_converge_with_order_eight():
     top = constant_interpolant([TOP[0], TOP[0], TOP[1]], 2.0)
     truth = axisymmetric_attitude(*TOP, momentum[0], np.eye(3), np.array([2.0]))[0]
     for steps in (4, 8, 16):
-        end = marched(top, top.coefficients, np.array([steps]), momentum)[0, -1]
+        end = stepped_quaternions(top, top.coefficients, np.array([steps]), momentum)[0, -1]
         errors.append(apart(so3.matrix_from_quat(end), truth))
     assert errors[-1] > 1e-12
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -79,7 +79,7 @@ def test_without_momentum_a_drift_about_one_axis_turns_by_its_integral():
     drift = constant_interpolant([1.0, 1.0, 1.0], 2.0)
     errors = []
     for steps in (3, 6, 12):
-        quaternions = marched(drift, series, np.array([steps]), np.zeros((1, 3)))[0]
+        quaternions = stepped_quaternions(drift, series, np.array([steps]), np.zeros((1, 3)))[0]
         ends = 2.0 * np.arange(steps + 1) / steps
         errors.append(np.abs(2.0 * np.arcsin(quaternions[:, 2]) - 2.0 * np.sin(3.0 * ends) / 3.0).max())
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([8.0, 8.0], abs=0.7)
@@ -91,8 +91,8 @@ def test_all_marches_of_an_attempt_are_marches(loops: int, rng: np.random.Genera
     body, given = random_interpolant(rng, loops=loops), momenta(rng, 4)
     changed = body.coefficients * (1.0 + 1e-4 * rng.normal(size=body.coefficients.shape))
     found = attempted(body, changed, STEPS, given, None)
-    coarse, fine, finest = (marched(body, body.coefficients, k * STEPS, given) for k in (1, 2, 4))
-    other = marched(body, changed, STEPS, given)
+    coarse, fine, finest = (stepped_quaternions(body, body.coefficients, k * STEPS, given) for k in (1, 2, 4))
+    other = stepped_quaternions(body, changed, STEPS, given)
     assert np.array_equal(found.quaternions, finest)
     assert np.array_equal(found.steps, 4 * STEPS)
     # Chords of quaternions here, of vectors there.
@@ -165,8 +165,8 @@ def test_the_slope_by_the_momentum_is_that_of_central_differences(loops: int, rn
 
     def difference(width: float) -> np.ndarray:
         moved = given[:, None, None] + width * np.array([1.0, -1.0])[:, None] * np.eye(3)[:, None]
-        ends = marched(body, body.coefficients, STEPS, moved.reshape(-1, 3))[:, -1].reshape(4, 3, 2, 4)
-        here = marched(body, body.coefficients, STEPS, given)[:, None, -1]
+        ends = stepped_quaternions(body, body.coefficients, STEPS, moved.reshape(-1, 3))[:, -1].reshape(4, 3, 2, 4)
+        here = stepped_quaternions(body, body.coefficients, STEPS, given)[:, None, -1]
         turns = [so3.rotation_vector_from_quat(_less(here, ends[:, :, side])) for side in (0, 1)]
         return np.swapaxes(turns[0] - turns[1], -1, -2) / (2.0 * width)
 
@@ -220,14 +220,14 @@ def test_growth_is_that_of_motions_that_start_turned(seed: int):
 
     def turned(by: np.ndarray) -> np.ndarray:
         start = np.append(0.5 * by, 1.0)[None]
-        ends = marched(body, body.coefficients, steps, given, start / np.linalg.norm(start))[0, ::12]
+        ends = stepped_quaternions(body, body.coefficients, steps, given, start / np.linalg.norm(start))[0, ::12]
         assert len(ends) == 17
-        return small_turns(marched(body, body.coefficients, steps, given)[0, ::12], ends)
+        return small_turns(stepped_quaternions(body, body.coefficients, steps, given)[0, ::12], ends)
 
     columns = [(turned(1e-5 * axis) - turned(-1e-5 * axis)) / 2e-5 for axis in np.eye(3)]
     largest = largest_of(np.stack(columns, axis=-1))
     # Found as if the middle singular value were one; the product of all three is.
-    assert 0.96 * largest < found.growth[0] < 1.5 * largest
+    assert 0.96 * largest < found.amplification[0] < 1.5 * largest
 
 
 # ---- Machine code ---------------------------------------------------------------------------------------------------

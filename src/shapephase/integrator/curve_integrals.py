@@ -16,8 +16,8 @@ from ..arrays import Array
 from .constants import ORDER, STEPPING
 from .kernels.curve_kernel import curve_pieces
 from .lift import Lift
-from .marches import magnitudes_and_directions, part_channels
 from .stepped import SteppedRotation
+from .stepping import magnitudes_and_directions, part_channels
 
 # Pieces at once: their channels take some twenty megabytes.
 _AT_ONCE = 8_000

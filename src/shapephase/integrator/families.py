@@ -18,10 +18,10 @@ from ..errors import AccuracyNotReached, ShapeError, SingularInertiaError
 from .channels import inverted
 from .fresh_times import fresh_times
 from .many_rotations import CLASSES, GroupedRotations, rotations_of_each, rounded_up
-from .marches import magnitudes_and_directions
 from .samples import Panels
 from .sampling import Sampler, nodes_of_panels
 from .stepped import SteppedRotation
+from .stepping import magnitudes_and_directions
 
 # Deformations that are evaluated together: enough for what they share to cost little.
 _AT_ONCE = 64

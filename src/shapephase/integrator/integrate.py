@@ -32,10 +32,10 @@ from .fresh_times import compare, fresh_times
 from .interpolant import Interpolant
 from .kernels import spectra_kernel
 from .machine_code import plain
-from .marches import Attempt, attempted, largest_angle, magnitudes_and_directions, marched
 from .samples import Samples, rounded_series
 from .sampling import Sampler
 from .stepped import SteppedRotation
+from .stepping import Attempt, attempted, largest_angle, magnitudes_and_directions, stepped_quaternions
 
 # Steps of one motion: some ten seconds, and a gigabyte of results.
 _MOST_STEPS = 4_000_000
@@ -135,11 +135,11 @@ def refined(last: Refinement, rotation: SteppedRotation, row: int, tolerance: fl
     spare = max(tolerance - float(rotation.rounding_error[row]), 0.5 * tolerance)
     if sampling > STEPPING_SHARE * spare and level:
         # Below the level at which there would be more of them, by as much as they turn the body too far.
-        wanted = min(level, last.sampling_tolerance(tolerance)) * min(0.25 * spare / sampling, 0.5)
-        samples = max(samples + 1, ceil(_QUARTERS * log2(tolerance / max(wanted, _LEAST_WANTED * tolerance))))
+        needed = min(level, last.sampling_tolerance(tolerance)) * min(0.25 * spare / sampling, 0.5)
+        samples = max(samples + 1, ceil(_QUARTERS * log2(tolerance / max(needed, _LEAST_WANTED * tolerance))))
     if stepping > STEPPING_SHARE * spare:
-        wanted = stepping / (0.5 * STEPPING_SHARE * spare)
-        steps += ceil(_QUARTERS * min(max(log2(min(wanted, 1e300)) / ORDER, 1.0 / _QUARTERS), 2.0))
+        needed = stepping / (0.5 * STEPPING_SHARE * spare)
+        steps += ceil(_QUARTERS * min(max(log2(min(needed, 1e300)) / ORDER, 1.0 / _QUARTERS), 2.0))
     elif rotation.rounding_error[row] > STEPPING_SHARE * tolerance:
         # Marches with finer steps differ by nothing but their rounding, which then is measured.
         steps += _QUARTERS // 2
@@ -160,8 +160,8 @@ def one_round(
 
     What is within it has been compared with the body at fresh times.
     """
-    wanted = refinement.sampling_tolerance(tolerance)
-    samples = sampler.samples(ceiling, wanted, strict=not refinement.samples)
+    needed = refinement.sampling_tolerance(tolerance)
+    samples = sampler.samples(ceiling, needed, strict=not refinement.samples)
     steps = planned(samples.interpolant, ceiling, tolerance, refinement.factor)
     found = attempted(samples.interpolant, samples.perturbed.coefficients, steps, momentum, threads)
     rotation = rotation_of(samples, found, momentum, tolerance)
@@ -196,7 +196,7 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
 
 def rotation_of(samples: Samples, found: Attempt, momentum: Array, tolerance: float) -> SteppedRotation:
     """Steps with their error estimates."""
-    interpolant, growth = samples.interpolant, found.growth
+    interpolant, growth = samples.interpolant, found.amplification
     fell = np.clip(found.fine / np.maximum(found.coarse, 1e-300), 2.0**-ORDER, 1.0)
     committed = _committed(found.dynamics.shape[1], found.turned)
     rounding = growth * committed * samples.condition
@@ -244,8 +244,8 @@ def rounding_of_samples(samples: Samples, steps: Integers, momentum: Array) -> A
     Of far more units than there are, so that it stands out of the rounding of the marches themselves.
     """
     interpolant, series = samples.interpolant, samples.interpolant.coefficients
-    same = marched(interpolant, series, steps, momentum)
-    rounded = marched(interpolant, rounded_series(samples, _EXAGGERATED * ROUNDED_INERTIA), steps, momentum)
+    same = stepped_quaternions(interpolant, series, steps, momentum)
+    rounded = stepped_quaternions(interpolant, rounded_series(samples, _EXAGGERATED * ROUNDED_INERTIA), steps, momentum)
     return largest_angle(same, rounded) / _EXAGGERATED
 
 

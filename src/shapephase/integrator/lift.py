@@ -14,9 +14,9 @@ from ..chebyshev import inside, nodes_on, values_to_coefficients
 from ..display import short_repr
 from .integrate import committed_rounding
 from .interpolant import Interpolant
-from .marches import largest_angle, marched, small_turns
 from .samples import Perturbed
 from .stepped import SteppedRotation
+from .stepping import largest_angle, small_turns, stepped_quaternions
 
 # Of the motion's error estimate: what the steps of its lift are to err by at most.
 _SHARE = 0.1
@@ -134,7 +134,7 @@ def lift_along(rotation: SteppedRotation, wheels: Callable[[Array], Array] | Non
 
 def _alone(interpolant: Interpolant, series: Array, steps: Integers) -> Array:
     """Attitudes by the shape alone: (1, K + 1, 4)."""
-    return marched(interpolant, series, steps, np.zeros((1, 3)))
+    return stepped_quaternions(interpolant, series, steps, np.zeros((1, 3)))
 
 
 def _drift_by(wheels: Callable[[Array], Array], interpolant: Interpolant) -> Array:
@@ -174,6 +174,8 @@ def error_turns(rotation: SteppedRotation, lift: Lift) -> Array:
         return np.broadcast_to(lift.turns, (2, len(rotation.momentum), *lift.turns.shape[2:]))
     interpolant, perturbed = rotation.interpolant, rotation.perturbed
     better = np.empty((2, *rotation.quaternions.shape))
-    better[0] = marched(interpolant, interpolant.coefficients, 2 * rotation.steps, rotation.momentum)[:, ::2]
-    better[1] = marched(interpolant, perturbed.coefficients, rotation.steps, rotation.momentum)
+    better[0] = stepped_quaternions(interpolant, interpolant.coefficients, 2 * rotation.steps, rotation.momentum)[
+        :, ::2
+    ]
+    better[1] = stepped_quaternions(interpolant, perturbed.coefficients, rotation.steps, rotation.momentum)
     return small_turns(rotation.quaternions, better)

@@ -17,9 +17,9 @@ from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
 from .integrate import Progress, Refinement, one_round
 from .interpolant import Interpolant
-from .marches import magnitudes_and_directions
 from .sampling import Sampler
 from .stepped import SteppedRotation, for_whole_batch, of_rows
+from .stepping import magnitudes_and_directions
 
 # Classes of magnitudes in each factor of two: finer ones are more, coarser ones take more steps than needed.
 CLASSES = 4

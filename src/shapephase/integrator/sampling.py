@@ -204,7 +204,7 @@ class _Sampling:
             further: list[_Panels] = []
             for part in _parts(waiting):
                 for panels, there in zip(part, self._sampled(part), strict=True):
-                    further += self._judged(panels, there)
+                    further += self._sampled_next(panels, there)
             finer = sum(len(panels.left) for panels in further)
             narrow = min((float((p.right - p.left).min()) for p in further), default=inf)
             if narrow < _LEAST_WIDTH * self._end or self._count + finer > most:
@@ -224,7 +224,7 @@ class _Sampling:
             for panels, one, part in zip(waiting, times, np.split(found, stops), strict=True)
         ]
 
-    def _judged(self, panels: _Panels, values: Array) -> list[_Panels]:
+    def _sampled_next(self, panels: _Panels, values: Array) -> list[_Panels]:
         """Keep the panels that are dense enough; the others as they are sampled next."""
         degree, left, right = panels.degree, panels.left, panels.right
         series, table = values_to_coefficients(degree) @ values, np.empty((len(left), spectra.COLUMNS))

@@ -8,6 +8,7 @@ from math import ceil
 import numpy as np
 
 from ..arrays import Array, Integers
+from ..display import short_repr
 from .limited_steps import StepLimits
 from .resolved import ResolvedPath
 
@@ -53,6 +54,8 @@ class Smoothness:
     smooth_loop: bool = False
     resolved: ResolvedPath | None = None
     checked: bool = False
+
+    __repr__ = short_repr
 
     @property
     def period(self) -> float:

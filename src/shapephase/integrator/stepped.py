@@ -13,8 +13,8 @@ from ..display import short_repr
 from .closing import areas_back, far_references, jumps_between
 from .interpolant import Interpolant
 from .kernels.curve_kernel import within_steps
-from .marches import magnitudes_and_directions, momentum_slope, part_channels
 from .samples import Perturbed
+from .stepping import magnitudes_and_directions, momentum_slope, part_channels
 
 # Times at which attitudes are found at once: the channels there take some fifteen megabytes.
 _AT_ONCE = 4096

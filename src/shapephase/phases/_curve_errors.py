@@ -30,8 +30,9 @@ _OF_LARGEST = 0.03
 _LEAST = np.array([0.05, 0.01])
 # Of what happens at unknown times, for each radian of the curve: most of it cancels as the curve goes round.
 _AT_ANY_TIME = 0.1
-# Of the attitude's error estimate: what is added at times between the ends of steps.
-_BETWEEN_STEPS = 0.02
+# Of the attitude's error estimate: what is added at times between the ends of steps, where errors are taken for linear
+# and grow as the ninth power of the part: at most 0.65 of what one of a dozen steps errs by.
+_BETWEEN_STEPS = 0.05
 # Units of rounding: of any sum of angles; and of each radian that is summed up.
 _ROUNDING = 32.0
 _ROUNDING_OF_RADIANS = 8.0

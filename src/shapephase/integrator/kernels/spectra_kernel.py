@@ -9,8 +9,18 @@ import numpy as np
 from ..constants import BEYOND_LAST_TERMS, CHANGED_LAST_TERMS, EPS, ROUNDED_SAMPLES, SLOWEST_DECAY
 from ..machine_code import inline, kernel
 
-GOOD, CHANGE, NOISY, BETWEEN, MISSING, ALLOWED, LATE, CONDITION, INVERSE, DRIFT, COLUMNS = range(11)
-"""Columns of what `judge` finds."""
+# Columns of what `judge` finds.
+GOOD = 0
+CHANGE = 1
+NOISY = 2
+BETWEEN = 3
+MISSING = 4
+ALLOWED = 5
+LATE = 6
+CONDITION = 7
+INVERSE = 8
+DRIFT = 9
+COLUMNS = 10
 # Of what a panel's parent had beyond its degree: noise is as large in the halves, anything else is smaller.
 _NOISE_STAYS = 0.5
 # Of the largest term: what counts as noise is far below.

@@ -26,7 +26,10 @@ _STARTS = np.concatenate([[0], np.cumsum(np.count_nonzero(_TABLEAU, axis=1))])
 
 
 # The states of `attempt`: by steps, twice and four times as many, on changed series, and from turned starts.
-_OF_FINER, _OF_FINEST, _OF_CHANGED, _OF_TURNED = 1, 2, 3, 4
+_OF_FINER = 1
+_OF_FINEST = 2
+_OF_CHANGED = 3
+_OF_TURNED = 4
 # Which of them go on one after another in one step, and by which of their own steps in it.
 _STATES = np.array([0, 1, 3, 2, 2, 1, 3, 2, 2, 4, 5, 6])
 _NUMBERS = np.array([0, 0, 0, 0, 1, 1, 1, 2, 3, 0, 0, 0])
@@ -116,7 +119,7 @@ def angle_between(p, q):
 
 
 @kernel
-def march(channels, loops, magnitudes, directions, first, quaternions):
+def integrate_steps(channels, loops, magnitudes, directions, first, quaternions):
     """Fill the attitudes (B, K + 1, 4) after the place `first`, where the last steps ended; real or complex.
 
     channels: (K, STAGES, 9) at the stages of the steps of one loop, times their lengths
@@ -236,8 +239,8 @@ def warm() -> None:
     """Call the kernels with the least that they take."""
     none, one, north = np.zeros((4, STAGES, 9)), np.ones(1), np.array([[0.0, 0.0, 1.0]])
     still = np.array([[[0.0, 0.0, 0.0, 1.0]] * 5])
-    march(none, 1, one, north, 0, still)
-    march(none, 1, one, north + 0j, 0, still + 0j)
+    integrate_steps(none, 1, one, north, 0, still)
+    integrate_steps(none, 1, one, north + 0j, 0, still + 0j)
     counts, marks = np.ones(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
     attempt(
         np.zeros((7, STAGES, 9)), none[:2], counts, 1, one, north, marks, 0, still[:, [0] * 7].copy(),

@@ -102,7 +102,7 @@ def _kept_matrix(terms: int, count: int, factors: tuple[int, ...]) -> Array:
     return np.concatenate([_matrix(terms, f * count, 0, f * count) for f in factors])
 
 
-def marched(
+def stepped_quaternions(
     interpolant: Interpolant, series: Array, steps: Integers, momentum: Array, start: Array | None = None
 ) -> Array:
     """Attitudes at the ends of steps of all loops, quaternions xyzw: (B, K + 1, 4).
@@ -114,13 +114,13 @@ def marched(
     momentum : (B, 3) body angular momentum at the start [kg m^2/s]
     start : (B, 4) attitudes; None: the identity
     """
-    return _marched(interpolant, series, steps, *magnitudes_and_directions(momentum), start)
+    return _stepped_quaternions(interpolant, series, steps, *magnitudes_and_directions(momentum), start)
 
 
-def _marched(
+def _stepped_quaternions(
     interpolant: Interpolant, series: Array, steps: Integers, magnitudes: Array, directions: Any, start: Array | None
 ) -> Any:
-    """As `marched`; directions may be complex, for a derivative."""
+    """As `stepped_quaternions`; directions may be complex, for a derivative."""
     count = interpolant.loops * int(steps.sum())
     quaternions = np.zeros((len(magnitudes), count + 1, 4), dtype=directions.dtype)
     quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0] if start is None else start
@@ -131,10 +131,10 @@ def _marched(
     for block in blocks:
         channels, _ = stage_channels(series, interpolant.widths, steps, block)
 
-        def march(rows: slice, channels: Array = channels, loops: int = block.loops, at: int = at) -> None:
-            step_kernel.march(channels, loops, magnitudes[rows], directions[rows], at, quaternions[rows])
+        def integrate(rows: slice, channels: Array = channels, loops: int = block.loops, at: int = at) -> None:
+            step_kernel.integrate_steps(channels, loops, magnitudes[rows], directions[rows], at, quaternions[rows])
 
-        for _ in in_threads(march, len(magnitudes)):
+        for _ in in_threads(integrate, len(magnitudes)):
             pass
         at += block.loops * len(channels)
         run_progress.advance(1)
@@ -165,7 +165,7 @@ class Attempt:
     coarse, fine : (B,) largest angle between a fourth and half as many steps, and between these and all [rad]
     sampling : (B,) between steps on the series and on those changed by what is probably missing [rad]
     turned : (B,) the sum of all turns [rad]
-    growth : (B,) of an error, from one time to a later one
+    amplification : (B,) of an error, from one time to a later one
     """
 
     steps: Integers
@@ -177,7 +177,7 @@ class Attempt:
     fine: Array
     sampling: Array
     turned: Array
-    growth: Array
+    amplification: Array
 
 
 def attempted(
@@ -215,11 +215,20 @@ def attempted(
         at += block.loops * int(counts.sum())
         run_progress.advance(1)
     coarse, fine, sampling, turned = measured.T
-    growth = np.ones(batch)
+    amplification = np.ones(batch)
     if moving:
-        spectra_kernel.growths(marked, _TURN, growth)
+        spectra_kernel.growths(marked, _TURN, amplification)
     return Attempt(
-        4 * steps, quaternions, seen if moving else seen[:, :0], turns, dynamics, coarse, fine, sampling, turned, growth
+        4 * steps,
+        quaternions,
+        seen if moving else seen[:, :0],
+        turns,
+        dynamics,
+        coarse,
+        fine,
+        sampling,
+        turned,
+        amplification,
     )
 
 
@@ -255,7 +264,9 @@ def momentum_slope(interpolant: Interpolant, steps: Integers, momentum: Array) -
     still = magnitudes == 0.0
     scale = np.where(still, 1.0, magnitudes)
     directions = np.where(still[:, None], 0.0, directions)[:, None] + (1j * _IMAGINARY) * np.eye(3)
-    ends = _marched(interpolant, interpolant.coefficients, steps, np.repeat(scale, 3), directions.reshape(-1, 3), None)
+    ends = _stepped_quaternions(
+        interpolant, interpolant.coefficients, steps, np.repeat(scale, 3), directions.reshape(-1, 3), None
+    )
     end = ends[:, -1].reshape(-1, 3, 4)
     turns = _twice_turned(end.real, end.imag / (_IMAGINARY * scale[:, None, None]))
     return np.swapaxes(turns, -1, -2)
