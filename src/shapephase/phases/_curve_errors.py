@@ -30,9 +30,9 @@ _OF_LARGEST = 0.03
 _LEAST = np.array([0.05, 0.01])
 # Of what happens at unknown times, for each radian of the curve: most of it cancels as the curve goes round.
 _AT_ANY_TIME = 0.1
-# Of the attitude's error estimate: what is added at times between the ends of steps, where errors are taken for linear
-# and grow as the ninth power of the part: at most 0.65 of what one of a dozen steps errs by.
-_BETWEEN_STEPS = 0.05
+# Of what an error grows by in one step: in it the error grows as the ninth power of the part that is taken, and is taken
+# to be linear; x - x^9 is 0.68 at most.
+_NOT_LINEAR = 0.68
 # Units of rounding: of any sum of angles; and of each radian that is summed up.
 _ROUNDING = 32.0
 _ROUNDING_OF_RADIANS = 8.0
@@ -220,9 +220,11 @@ class CurveErrors:
     @cached_property
     def _unseen_of_gauge(self) -> Array:
         found = self._unseen if self.curve.lift is None else self._unseen + self._unseen_of_lift
-        if len(self.curve.edges) == self._stepped.quaternions.shape[1]:
+        if self.curve.frames is None and len(self.curve.edges) == self._stepped.quaternions.shape[1]:
             return found
-        return found + _BETWEEN_STEPS * self.motion.solution.error_estimate
+        # What is between the ends of steps counts, too.
+        grown = _norms(np.diff(self._of_attitude, axis=2)).max(axis=2, initial=0.0)
+        return found + _NOT_LINEAR * np.tensordot(_FACTORS, grown, axes=1)
 
     @cached_property
     def _of_gauge(self) -> Array:
