@@ -30,7 +30,7 @@ _OF_LARGEST = 0.03
 _LEAST = np.array([0.05, 0.01])
 # Of what happens at unknown times, for each radian of the curve: most of it cancels as the curve goes round.
 _AT_ANY_TIME = 0.1
-# Of what an error grows by in one step: in it the error grows as the ninth power of the part that is taken, and is taken
+# Of what an error grows by in one step: in it the error grows as the ninth power of the part that is taken, and is held
 # to be linear; x - x^9 is 0.68 at most.
 _NOT_LINEAR = 0.68
 # Units of rounding: of any sum of angles; and of each radian that is summed up.
