@@ -48,7 +48,7 @@ _USUAL = 1e-9
 # Refinements are made stricter by less than this factor, so that momenta of a batch share them.
 _QUARTERS = 4
 # Of the tolerance: samples are not made denser than for this.
-_LEAST_WANTED = 1e-9
+_LEAST_TOLERANCE = 1e-9
 # How many times their rounding samples are changed by, to see what it does.
 _EXAGGERATED = 1024.0
 # [rad] Marches farther apart than this tell nothing of how errors fall.
@@ -136,7 +136,7 @@ def refined(last: Refinement, rotation: SteppedRotation, row: int, tolerance: fl
     if sampling > STEPPING_SHARE * spare and level:
         # Below the level at which there would be more of them, by as much as they turn the body too far.
         needed = min(level, last.sampling_tolerance(tolerance)) * min(0.25 * spare / sampling, 0.5)
-        samples = max(samples + 1, ceil(_QUARTERS * log2(tolerance / max(needed, _LEAST_WANTED * tolerance))))
+        samples = max(samples + 1, ceil(_QUARTERS * log2(tolerance / max(needed, _LEAST_TOLERANCE * tolerance))))
     if stepping > STEPPING_SHARE * spare:
         needed = stepping / (0.5 * STEPPING_SHARE * spare)
         steps += ceil(_QUARTERS * min(max(log2(min(needed, 1e300)) / ORDER, 1.0 / _QUARTERS), 2.0))
@@ -156,9 +156,7 @@ def one_round(
 ) -> tuple[SteppedRotation, float]:
     """Sample and step momenta (B, 3) up to a ceiling [kg m^2/s], with error estimates, within the tolerance or not.
 
-    With it comes the level of the samples.
-
-    What is within it has been compared with the body at fresh times.
+    With it comes the level of the samples. What is within the tolerance has been compared with the body at fresh times.
     """
     needed = refinement.sampling_tolerance(tolerance)
     samples = sampler.samples(ceiling, needed, strict=not refinement.samples)

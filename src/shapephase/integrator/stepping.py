@@ -67,7 +67,7 @@ def stage_channels(
 
     Parameters
     ----------
-    series, widths, steps : (P,  n, 9), (P,) [s], (P,) of each panel of one loop
+    series, widths, steps : (P, n, 9), (P,) [s], (P,) of each panel of one loop
     """
     part = slice(block.low, block.high)
     scaled, counts = series[part] * widths[part, None, None], steps[part]
@@ -219,16 +219,16 @@ def attempted(
     if moving:
         spectra_kernel.growths(marked, _TURN, amplification)
     return Attempt(
-        4 * steps,
-        quaternions,
-        seen if moving else seen[:, :0],
-        turns,
-        dynamics,
-        coarse,
-        fine,
-        sampling,
-        turned,
-        amplification,
+        steps=4 * steps,
+        quaternions=quaternions,
+        directions=seen if moving else seen[:, :0],
+        turns=turns,
+        dynamics=dynamics,
+        coarse=coarse,
+        fine=fine,
+        sampling=sampling,
+        turned=turned,
+        amplification=amplification,
     )
 
 
