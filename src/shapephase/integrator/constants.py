@@ -44,7 +44,7 @@ ROUNDING_OF_STEP = 2.0
 """Units of rounding of a step, which add up as the root of their number."""
 MEASURED_ROUNDING = 4.0
 """Times the distance between two marches, which round differently: their rounding is not larger."""
-ROUNDED_INERTIA = 2.0
-"""Units of rounding of an inertia, relative to its largest moment."""
+ROUNDED_INERTIA = 3.0
+"""Units of rounding of an inertia, relative to its largest moment: of its sums, of its inverse, and one for chance."""
 ROUNDING_SHARE = 0.05
 """Of the tolerance: a bound of rounding above it is measured."""

@@ -51,6 +51,8 @@ _QUARTERS = 4
 _LEAST_TOLERANCE = 1e-9
 # How many times their rounding samples are changed by, to see what it does.
 _EXAGGERATED = 1024.0
+# Keeps quotients defined where marches agree to the last bit.
+_TINY = 1e-300
 # [rad] Marches farther apart than this tell nothing of how errors fall.
 _LOST = 0.1
 
@@ -195,7 +197,9 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
 def rotation_of(samples: Samples, found: Attempt, momentum: Array, tolerance: float) -> SteppedRotation:
     """Steps with their error estimates."""
     interpolant, growth = samples.interpolant, found.amplification
-    fell = np.clip(found.fine / np.maximum(found.coarse, 1e-300), 2.0**-ORDER, 1.0)
+    # Twice as fast a fall as by the order or more is no order yet: as much as it is faster it may be slower next time.
+    ratio = 2.0**ORDER * found.fine / np.maximum(found.coarse, _TINY)
+    fell = 2.0**-ORDER * np.clip(np.maximum(ratio, 0.5 / np.maximum(ratio, _TINY)), 1.0, 2.0**ORDER)
     committed = _committed(found.dynamics.shape[1], found.turned)
     rounding = growth * committed * samples.condition
     # What rounding alone may set two marches apart says nothing of their steps.
