@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import ceil
 
 import numpy as np
 
@@ -15,9 +14,6 @@ from .display import short_repr
 _CHUNK = 2_000_000
 MARGIN_OF_WIDTH = 1e-3
 """Of an interval's width: times are not moved farther inside than this."""
-
-# Of the terms of a series, those that its halves have: T_n swings at most n / sqrt(2) times as fast there.
-_SHARE_OF_TERMS = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,13 +112,6 @@ def nodes_on(left: Array, right: Array, degree: int) -> Array:
     return 0.5 * (left + right)[:, None] + 0.5 * (right - left)[:, None] * unit_nodes(degree)
 
 
-def nodes_of(left: Array, right: Array, degree: Integers) -> Array:
-    """The same of panels of different degrees, one after another: (P,), (P,), (P,) -> (the sum of degree + 1,)."""
-    local = np.concatenate([unit_nodes(one) for one in degree.tolist()])
-    each = degree + 1
-    return np.repeat(0.5 * (left + right), each) + np.repeat(0.5 * (right - left), each) * local
-
-
 @lru_cache(maxsize=64)
 def values_to_coefficients(degree: int) -> Array:
     """Values at the ascending Chebyshev points of [-1, 1] -> Chebyshev coefficients: (degree + 1, degree + 1)."""
@@ -158,23 +147,3 @@ def restriction_matrix(count: int, left: float, right: float) -> Array:
     """Coefficients of a series on [-1, 1] -> those of the same function on a part of it, as many: (count, count)."""
     nodes = 0.5 * (left + right) + 0.5 * (right - left) * unit_nodes(count - 1)
     return values_to_coefficients(count - 1) @ chebyshev(np.clip(nodes, -1.0, 1.0), count)
-
-
-@lru_cache(maxsize=64)
-def on_halves(terms: int) -> Array:
-    """Coefficients but the first of a series -> those of its first and its second half: (2, m, terms - 1).
-
-    By 2 x T_k = T_(k-1) + T_(k+1), x being (y - 1)/2 or (y + 1)/2; in extended precision.
-    """
-    halves = np.zeros((2, terms, terms), dtype=np.longdouble)
-    halves[:, 0, 0] = 1.0
-    for half, middle in enumerate((-0.5, 0.5)):
-        for k in range(1, terms):
-            last = halves[half, k - 1]
-            times_x = middle * last
-            times_x[1:] += 0.25 * last[:-1]
-            times_x[:-1] += 0.25 * last[1:]
-            times_x[1:2] += 0.25 * last[:1]
-            halves[half, k] = times_x if k == 1 else 2.0 * times_x - halves[half, k - 2]
-    kept = min(terms, ceil(_SHARE_OF_TERMS * terms) + 1)
-    return np.ascontiguousarray(halves[:, 1:, :kept].transpose(0, 2, 1), dtype=np.float64)

@@ -194,7 +194,9 @@ def test_small_turns_of_the_attitude_change_phases_as_predicted(name: str):
     fine = stepped_rotation(sampler_of_series(loose.interpolant), solution_of(loose).momentum, 1e-13)
     tight = replace(loose, solution=fine)
     for gauge in GAUGES:
-        curve = momentum_curve(loose, gauge, times=loose.solution.times)
+        # Sums over edges are linear between them: steps are long, and cut in halves.
+        ends = loose.solution.times
+        curve = momentum_curve(loose, gauge, times=np.union1d(ends, 0.5 * (ends[:-1] + ends[1:])))
         times = curve.edges
         turns = so3.log(so3.transpose(loose.attitude(times)) @ tight.attitude(times))[None]
         area, phase, _ = curve.displaced(turns)
@@ -209,7 +211,7 @@ def test_small_turns_of_the_attitude_change_phases_as_predicted(name: str):
         np.testing.assert_allclose(closing[0], closing[1], atol=1e-12)
         change = theirs[0] - mine[0]
         scale, both = np.abs(turns).max(), curve.error[0] + other.error[0]
-        assert np.abs(change - (area + phase)).max() < 0.15 * np.abs(area + phase).max() + 0.03 * scale + both
+        assert np.abs(change - (area + phase)).max() < 0.15 * np.abs(area + phase).max() + 0.02 * scale + both
 
 
 @pytest.mark.parametrize("gauge", GAUGES)

@@ -443,7 +443,7 @@ def test_phases_at_the_end_of_a_step_are_free_of_the_errors_between_steps():
     deformation = sp.articulated(body_of("cat"), sp.examples.cat_righting())
     motion = sp.reconstruct(deformation, [0.05, 0.0, 0.1], tolerance=1e-6)
     split, end = sp.split(motion, "base"), motion.duration
-    near = 2e-2 * float(motion.error_estimate)
+    near = 1e-2 * float(motion.error_estimate)
     assert abs(motion.dynamic_phase(end) - split.dynamic_phase) < near
     assert abs(modulo_sphere(motion.solid_angle(end) - split.solid_angle)) < near
     assert motion.solid_angle(0.0) == 0.0

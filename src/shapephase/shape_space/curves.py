@@ -25,8 +25,6 @@ CLOSED = 1e-9
 _WHOLE_TURN = 2.0 * np.pi
 # Of the last break: times nearer to each other than this are one, however a path was stretched or reversed.
 _SAME_TIME = 1e-12
-# Breaks of a loop from which on it is taken for a recording.
-_MANY_BREAKS = 64
 # Knots of a loop repeated that are still written out.
 _MOST_REPEATED = 100_000
 # Sets of times of which a curve's values are kept, and numbers of all of them: sixteen megabytes.
@@ -183,23 +181,6 @@ def polynomial_pieces(curve: Curve) -> PiecewisePolynomial | None:
     if isinstance(curve, Repeated) and curve.count * len(inner.knots) <= _MOST_REPEATED:
         return _joined_pieces([inner] * curve.count, [loop * curve.turns for loop in range(curve.count)])
     return None
-
-
-def many_pieces(curve: Curve, breaks: Array) -> PiecewisePolynomial | None:
-    """Those polynomials between breaks (M,), knots and others, that are many and end with the first loop; else None."""
-    found = polynomial_pieces(curve) if len(breaks) > _MANY_BREAKS else None
-    if found is None:
-        return None
-    # Breaks and knots that rounding has moved apart are the same.
-    near = _SAME_TIME * breaks[-1]
-    piece = np.searchsorted(found.knots, 0.5 * (breaks[:-1] + breaks[1:])) - 1
-    inner = found.knots[(found.knots > near) & (found.knots < breaks[-1] - near)]
-    place = np.clip(np.searchsorted(breaks, inner), 1, len(breaks) - 1)
-    apart = np.minimum(np.abs(breaks[place] - inner), np.abs(breaks[place - 1] - inner))
-    if apart.max(initial=0.0) > near or piece[-1] >= found.coefficients.shape[1]:
-        return None
-    since = breaks[:-1] - found.knots[piece]
-    return PiecewisePolynomial(breaks, _moved(found.coefficients[:, piece], np.where(since > near, since, 0.0)))
 
 
 def _moved(coefficients: Array, by: Array) -> Array:

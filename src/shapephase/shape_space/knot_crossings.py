@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from ..arguments import check_object
-from ..arrays import Array, Mask
+from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.ball_joints import BallJoint
 from ..body.couplings.coordinate_map import CoordinateMap
@@ -24,8 +24,6 @@ from .shape_path import ShapePath
 
 _ROUNDING = 64.0 * np.finfo(float).eps
 """Of a coordinate's size: what rounding may leave of it where it goes through a knot."""
-_AT_KNOT = 1e-9
-"""[rad or m, or of the largest knot] by which a joint may be off a knot at the time found."""
 _NEARLY_REAL = 1e-6
 """Imaginary part of a zero, in halves of a panel: of a double zero rounding leaves its root."""
 _WHOLE = 1e-9
@@ -94,16 +92,6 @@ def crossing_times(follows: CoordinateMap, curve: Curve, edges: Array) -> Array:
 
         # A joint that follows others itself is smooth between their crossings only.
         found = merged(found, _crossings(followed, merged(edges, found), knots, kinked=kinked))
-    return found
-
-
-def at_knots(follows: CoordinateMap, curve: Curve, times: Array) -> Mask:
-    """Whether a joint is on its way through a knot at times that may be crossings: (N,) -> (N,)."""
-    coordinates, rates = follows.with_rates(*curve(times))
-    found = np.zeros(len(times), dtype=bool)
-    for joint, knots, _ in follows.knotted:
-        apart = np.abs(coordinates[:, joint, None] - knots).min(axis=1)
-        found |= (apart <= _AT_KNOT * (1.0 + np.abs(knots).max())) & (rates[:, joint] != 0.0)
     return found
 
 
