@@ -59,7 +59,7 @@ LOWEST_TESTS ?= $(addprefix tests/, body/test_body.py cli/test_main.py deformati
 	test_array_arguments.py test_cards.py test_so3.py)
 lowest:
 	$(OLDEST) -m venv --clear $(LOWEST)
-	$(LOWEST)/bin/pip install --quiet --prefer-binary hypothesis mpmath pandas pytest pytest-xdist xarray \
+	$(LOWEST)/bin/pip install --quiet --prefer-binary hypothesis mpmath pytest pytest-xdist xarray \
 		$$($(OLDEST) tests/support/lowest_versions.py data plot robots ros viz)
 	$(LOWEST)/bin/pip install --quiet --no-deps .
 	$(LOWEST)/bin/pytest -n auto -m "not full" -W default -p no:cacheprovider $(LOWEST_TESTS)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryError, UnknownNameError
+from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryError, TrajectoryWarning, UnknownNameError
 from shapephase.shape_space.files.read import read_recorded_motion
 from support.motion_writers import write_opensim
 
@@ -456,10 +456,22 @@ def test_without_the_extra_its_name_is_told(tmp_path, monkeypatch, module, file)
 
 def test_joints_without_a_column_rest_where_one_says(tmp_path):
     (tmp_path / "m.csv").write_text(f"time,{JOINTS[0]},comment\n0,0.1,start\n0.5,0.2,\n1,0.1,end\n")
-    with pytest.raises(UnknownNameError, match=r"comment.*--ignore-extra"):
-        read_recorded_motion(tmp_path / "m.csv", BODY)
+    with pytest.warns(TrajectoryWarning, match=r"no column for.*--rest-missing"):
+        found = read_recorded_motion(tmp_path / "m.csv", BODY)
+    assert found.record["left_out"] == {"comment": "text"}
+    np.testing.assert_array_equal(found.path.shape(0.5)[1:], np.clip(0.0, *BODY.joint_limits.T)[1:])
+    # A number that nobody explains may be a joint that was misspelt, and no joint at all is no recording of the body.
+    (tmp_path / "n.csv").write_text(f"time,{JOINTS[0]},{JOINTS[1]}x\n0,0.1,3\n0.5,0.2,2\n1,0.1,1\n")
+    with pytest.raises(UnknownNameError, match=rf"--names '{JOINTS[1]}x={JOINTS[1]}'.*--ignore-extra"):
+        read_recorded_motion(tmp_path / "n.csv", BODY)
     with pytest.raises(TrajectoryError, match=r"no column for.*--rest-missing"):
-        read_recorded_motion(tmp_path / "m.csv", BODY, ignore_extra=True)
+        read_recorded_motion(tmp_path / "n.csv", BODY, ignore_extra=True)
+    (tmp_path / "n.csv").write_text(f"time,{JOINTS[0]},{JOINTS[1]}_velocity\n0,0.1,3\n0.5,0.2,2\n1,0.1,1\n")
+    with pytest.raises(TrajectoryError, match=f"--rest {JOINTS[1]}=0"):
+        read_recorded_motion(tmp_path / "n.csv", BODY)
+    (tmp_path / "n.csv").write_text("time,comment\n0,a\n0.5,b\n1,c\n")
+    with pytest.raises(TrajectoryError, match=r"no column for.*--rest-missing"):
+        read_recorded_motion(tmp_path / "n.csv", BODY)
     rest = {JOINTS[1]: "30deg", SLIDES: "200 mm", JOINTS[2]: -0.25}
     found = read_recorded_motion(tmp_path / "m.csv", BODY, ignore_extra=True, rest=rest, rest_missing=True)
     shape = dict(zip(JOINTS, found.path.shape(0.5), strict=True))
@@ -468,7 +480,6 @@ def test_joints_without_a_column_rest_where_one_says(tmp_path):
     assert shape[SLIDES] == pytest.approx(0.2, abs=1e-15)
     assert shape[JOINTS[2]] == -0.25
     assert shape[JOINTS[4]] == 0.0
-    assert found.record["left_out"] == {"comment": "no joint of the body"}
     assert found.record["at_rest"][JOINTS[1]] == pytest.approx(np.pi / 6.0, abs=1e-15)
     assert list(found.record["columns"]) == [JOINTS[0]]
     for wrong, words in (
@@ -525,7 +536,7 @@ def test_a_fault_outside_the_stretch_does_no_harm(tmp_path):
     lines = text(TIMES, SHAPES, labels()).splitlines()
     lines[1] = f"0.0{',' * len(JOINTS)}"
     (tmp_path / "m.csv").write_text("\n".join(lines))
-    with pytest.raises(TrajectoryError, match=f"row 2, column '{JOINTS[0]}': '' is no finite number"):
+    with pytest.raises(TrajectoryError, match=f"row 2, column '{JOINTS[0]}': 'nan' is no finite number"):
         read_recorded_motion(tmp_path / "m.csv", BODY)
     found = read_recorded_motion(tmp_path / "m.csv", BODY, trim=(0.01, 9.0))
     np.testing.assert_allclose(found.path.shape(found.times), SHAPES[1:], rtol=0.0, atol=1e-14)
@@ -589,11 +600,9 @@ def test_true_and_false_are_no_numbers_where_numbers_are_meant(kind, column, tmp
 
 @pytest.mark.parametrize("kind", ["mat", "matlab_73", "hdf5"])
 def test_true_and_false_that_are_not_used_do_not_disturb(kind, tmp_path):
-    file = truths_written(kind, "contact", tmp_path)
-    with pytest.raises(UnknownNameError, match="contact"):
-        sp.read_shape_path(file, BODY)
-    path = sp.read_shape_path(file, BODY, names={"contact": None})
-    assert np.array_equal(path.shape(TIMES), SHAPES)
+    found = read_recorded_motion(truths_written(kind, "contact", tmp_path), BODY)
+    assert np.array_equal(found.path.shape(TIMES), SHAPES)
+    assert found.record["left_out"] == {"contact": "text"}
 
 
 def truths_written(kind, column, folder):

@@ -3,6 +3,7 @@ from .closing import Closing
 from .mapping_files import read_names
 from .read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .smoothing import smoothed_path
+from .tables import read_table
 
 __all__ = [
     "Closing",
@@ -11,6 +12,7 @@ __all__ = [
     "read_names",
     "read_recorded_motion",
     "read_shape_path",
+    "read_table",
     "smoothed_path",
     "write_shape_path",
 ]

@@ -15,7 +15,8 @@ from ...body._link_tree import Joint
 from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import what_came
-from ._labels import ANGLES, LENGTHS, SI, Label, label
+from ._labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, label
+from ._pose_columns import CANONICAL, MRP, VECTOR
 from ._recording import Recording
 
 ESTIMATE = "estimate"
@@ -48,7 +49,7 @@ class _Group(NamedTuple):
 
     Attributes
     ----------
-    kind : "quaternion", "angles", "position", or "joints", by which the body's file moves its base
+    kind : "quaternion", "angles", "mrp", "vector", "position", or "joints", by which the body's file moves its base
     names : of the columns
     parts : for each column its part of the quaternion, or the axis it turns about
     order : of angles, the usual one: each turns about its axis as those before have turned it
@@ -74,12 +75,14 @@ def _groups() -> tuple[_Group, ...]:
         found.append(_Group("angles", turns, _AXES, "zyx"))
         for stem in ("", "t"):
             found.append(_Group("position", tuple(f"{prefix}_{stem}{axis}" for axis in _AXES)))
+    found.append(_Group("mrp", tuple(CANONICAL[MRP].values())))
+    found.append(_Group("vector", tuple(CANONICAL[VECTOR].values())))
     opensim = tuple(f"pelvis_{word}" for word in ("tilt", "list", "rotation"))
     return (*found, _Group("angles", opensim, "zxy", "zxy", _OPENSIM_AXES))
 
 
 _GROUPS = _groups()
-_KNOWN = frozenset(name for group in _GROUPS for name in group.names)
+KNOWN = frozenset(name for group in _GROUPS for name in group.names)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,9 +184,9 @@ class BaseColumns:
             return True
         if target in _VELOCITIES:
             return True
-        plain = target in _KNOWN or target in self._own_names
+        plain = target in KNOWN or target in self.own_names
         parts = Label(target, None) if plain else label(target)
-        if parts.name not in _KNOWN and parts.name not in self._own_names:
+        if parts.name not in KNOWN and parts.name not in self.own_names:
             return False
         table = self.recording.table
         if parts.name in self.found:
@@ -265,7 +268,8 @@ class BaseColumns:
         return ("attitude",) * turning + ("position",) * (sum(sliding) >= _LEAST_SLIDES)
 
     @property
-    def _own_names(self) -> tuple[str, ...]:
+    def own_names(self) -> tuple[str, ...]:
+        """What the body's own file calls coordinates of its base."""
         return (*(self.angles[0] if self.angles else ()), *(self.slides or ()), *way_names(self.way))
 
     def _stored(self, what: str) -> Array | None:
@@ -287,13 +291,15 @@ class BaseColumns:
             values = np.stack([self._values(name, group.kind) for name in group.names], axis=-1)
             usual = group.axes
             record["attitude"] = list(self._texts(group))
-            if group.kind == "quaternion":
+            if group.kind in ("mrp", "vector"):
+                turned = so3.exp(_vectors_of_mrps(values) if group.kind == "mrp" else values)
+            elif group.kind == "quaternion":
                 turned = _by_quaternions(values[:, [group.parts.index(part) for part in "xyzw"]], self.recording)
             else:
                 order = self.choices.order or group.order
                 turned = so3.matrix_from_euler(values[:, [group.parts.index(axis) for axis in order]], order)
                 record |= {"order": order, "order_said": self.choices.order is not None}
-        if "order" not in record and (group is None or group.kind == "quaternion"):
+        if "order" not in record and (group is None or group.kind in ("quaternion", "mrp", "vector")):
             self._check_parts(turned)
         if "order" not in record and self.choices.order is not None:
             raise TrajectoryError(
@@ -355,11 +361,13 @@ class BaseColumns:
         text, said = self.found[name]
         table.check_column(text)
         values = table.columns[text]
-        if kind == "quaternion":
-            if said is not None:
-                raise TrajectoryError(f"{table.where}: column {text!r} is in {said}; a quaternion has no unit")
+        if kind in ("quaternion", "mrp"):
+            if said not in (None, NO_UNIT):
+                raise TrajectoryError(
+                    f"{table.where}: column {text!r} is in {said}; a {kind} has no unit: name the column without it"
+                )
             return values
-        sizes: Mapping[str, float] = ANGLES if kind == "angles" else LENGTHS
+        sizes: Mapping[str, float] = ANGLES if kind in ("angles", "vector") else LENGTHS
         if said is not None and said != SI and said not in sizes:
             raise TrajectoryError(f"{table.where}: column {text!r} is in {said}; {', '.join(sizes)} are possible")
         found = self._lengths(text, values, said) if kind == "position" else self._angles(text, values, said)
@@ -404,6 +412,17 @@ class BaseColumns:
                 f"{table.where}: column {text!r} is in {spelled} by its name, and degrees={self.degrees} was given"
             )
         return values * (1.0 if said == SI else ANGLES[said])
+
+
+def _vectors_of_mrps(parameters: Array) -> Array:
+    """Rotation vectors (N, 3) of modified Rodrigues parameters, tan(angle / 4) about the axis, or of their shadows.
+
+    Source: Schaub and Junkins, Analytical Mechanics of Space Systems, section 3.6: the parameters of the body's axes
+    relative to the inertial ones, sigma_B/N, belong to the turn that takes the inertial axes to the body's.
+    """
+    sizes = np.linalg.norm(parameters, axis=-1, keepdims=True)
+    tiny = sizes < np.finfo(np.float64).tiny
+    return parameters * np.where(tiny, 4.0, 4.0 * np.arctan(sizes) / np.where(tiny, 1.0, sizes))
 
 
 def _by_quaternions(quaternions: Array, recording: Recording) -> Array:

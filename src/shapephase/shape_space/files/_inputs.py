@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,34 +13,29 @@ from ...arguments import check_file_name, positive_argument
 from ...body.body import Body
 from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
+from ._numbered_columns import named_columns
 from ._recording import MOST_BYTES, Table, digest, file_bytes
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
-from .formats.frames import is_frame, read_frame
+from .formats.frames import file_table, is_frame, read_frame
 from .formats.hdf5 import read_hdf5
 from .formats.matlab import read_matlab
 from .formats.motion_arrays import read_arrays
-from .formats.opensim import END, read_opensim
+from .formats.opensim import has_header, read_opensim
 from .formats.ros_motion_files import MOST_YAML, read_bag, read_ros_yaml
-from .formats.spreadsheets import read_excel, read_parquet
-from .formats.text_tables import read_delimited
+from .formats.text_tables import read_text
+from .tables import PACKED, TABLES, unpacked
 
 STANDARD_INPUT = "-"
 """Instead of a file's name: a text table, or a motion of OpenSim."""
 _TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
-    ".csv": read_delimited,
-    ".tsv": read_delimited,
-    ".txt": read_delimited,
     ".mot": read_opensim,
     ".sto": read_opensim,
     ".yaml": read_ros_yaml,
     ".yml": read_ros_yaml,
-    ".parquet": read_parquet,
     ".c3d": read_c3d,
 }
 _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
-    ".xlsx": read_excel,
-    ".xlsm": read_excel,
     ".mat": read_matlab,
     ".h5": read_hdf5,
     ".hdf5": read_hdf5,
@@ -67,7 +62,12 @@ class Input(NamedTuple):
 
 
 def read_input(
-    source: Any, body: Body, topic: str | None, timestep: float | None, order: str | None
+    source: Any,
+    body: Body,
+    topic: str | None,
+    timestep: float | None,
+    order: str | None,
+    names: Mapping[str, str | None] | None,
 ) -> tuple[Input, float | None]:
     """The table of a file, of standard input (`-`), or of a frame in memory; and the time step, if it is still needed.
 
@@ -76,6 +76,7 @@ def read_input(
     topic : which part of a bag, a workbook or a `.mat` file; None: the only one
     timestep : [s], for what has no times
     order : of the joints in arrays without names, or None
+    names : of columns, as a caller gives them
 
     Raises
     ------
@@ -92,14 +93,14 @@ def read_input(
         timestep = positive_argument(timestep, "timestep")
     if is_frame(source):
         _no_topic(topic, "a table in memory")
-        table = read_frame(source)
+        table = named_columns(read_frame(source), body, names or {}, order, timestep)
         return Input(table, table.where, None), timestep
     check_file_name(source, "file")
     if source == STANDARD_INPUT:
         _no_topic(topic, "standard input")
         return _standard_input(), timestep
     where = Path(source)
-    suffix = where.suffix.lower()
+    suffix = Path(where.stem).suffix.lower() if where.suffix.lower() == PACKED else where.suffix.lower()
     if suffix in _BAGS or os.path.isdir(where):
         if timestep is not None:
             raise TrajectoryError(f"{where}: timestep is for files without times; this one has its times")
@@ -107,16 +108,20 @@ def read_input(
         return Input(read_bag(where, topic), str(source), digest(where)), None
     if suffix in _OTHERS:
         raise TrajectoryError(f"{where}: {suffix} files are not read: {_OTHERS[suffix]}")
-    if suffix not in (*_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS):
-        kinds = (".csv", ".npz", *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS, *_BAGS)
+    if suffix not in (*TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS):
+        kinds = (".csv", ".npz", *TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS, *_BAGS)
         raise unknown_name(f"ending of the motion file {where}:", where.suffix, dict.fromkeys(kinds))
     _check_exists(where)
-    if topic is not None and suffix not in _WITH_PARTS:
+    if topic is not None and suffix not in (*TABLES, *_WITH_PARTS):
         raise TrajectoryError(
             f"{where}: topic={what_came(topic)} is for bags, workbooks and .mat files; this one has no parts"
         )
     data = file_bytes(where, MOST_YAML if suffix in _YAML else MOST_BYTES)
     sha256 = hashlib.sha256(data).hexdigest()
+    where, data = unpacked(where, data)
+    if suffix in TABLES:
+        table = named_columns(_table(where, data, topic), body, names or {}, order, timestep)
+        return Input(table, str(source), sha256), timestep
     if suffix in _ARRAYS:
         return Input(read_arrays(where, data, body, timestep, order), str(source), sha256), None
     if suffix in _WITH_BODY:
@@ -130,9 +135,15 @@ def _standard_input() -> Input:
     data = sys.stdin.buffer.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise TrajectoryError(f"{where}: more than {MOST_BYTES >> 20} MiB; write a file")
-    opensim = any(line.strip().lower() == END.encode() for line in data[:65536].splitlines())
-    table = read_opensim(where, data) if opensim else read_delimited(where, data)
+    table = read_opensim(where, data) if has_header(data) else file_table(read_text(where, data), str(where))
     return Input(table, str(where), hashlib.sha256(data).hexdigest())
+
+
+def _table(where: Path, data: bytes, topic: str | None) -> Table:
+    """A table of any kind; a motion of OpenSim that a spreadsheet has saved is one."""
+    if has_header(data):
+        return read_opensim(where, data)
+    return file_table(TABLES[where.suffix.lower()](where, data, topic), str(where))
 
 
 def _check_exists(where: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,15 +15,32 @@ from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
 from ...letters import what_came
 from ._ball_columns import continued_balls, continued_hinges, with_quaternions
-from ._base_columns import BaseChoices, BaseColumns, BaseMotion
-from ._labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, in_square_brackets, label, quantity
-from ._recording import LONGEST_NAME, Recording
+from ._base_columns import KNOWN, BaseChoices, BaseColumns, BaseMotion
+from ._labels import (
+    ANGLES,
+    LENGTHS,
+    NO_UNIT,
+    SI,
+    Label,
+    in_square_brackets,
+    is_counter,
+    joint_part,
+    label,
+    other_unit,
+    quantity,
+)
+from ._pose_columns import HINT, base_names
+from ._recording import LONGEST_NAME, Recording, warn
+from ._times import is_clock
 from ._unit_doubts import check_unit, warn_of_values
 
 _STILL = 1e-9
 """Range of a coordinate [rad, m or degrees] below which it was locked."""
+_FEW = 6
+"""Joints that a line about those without a column names."""
 _MOST_SHOWN = 50
 """Columns that an error lists."""
+_NO_JOINT = "no joint of the body"
 _SAME = 1e-6
 """Difference of two coordinates, relative to their range: what printed digits leave of one that follows another."""
 
@@ -109,17 +127,25 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     units: dict[str, str] = {}
     known: set[int] = set()
     base = BaseColumns(recording, choices.base, choices.degrees, body.base_angles, body.base_slides, body.base_joints)
-    left_out = {text: f"{what}, no column" for text, what in table.unread.items()}
+    left_out = {text: f"{what}, no column" for text, what in table.unread.items()} | dict(table.left_out)
+    targets = {text: target for text in table.columns if (target := choices.names.get(text, text)) is not None}
+    of_base = base_names(targets, {*body.joint_names, *KNOWN, *base.own_names})
+    companions: dict[str, str] = {}
+    unexplained = False
     for text, values in table.columns.items():
-        target = choices.names.get(text, text)
-        if target is None:
+        if text not in targets:
             left_out[text] = "as told by names"
             continue
+        target = targets[text]
         resolved = _resolved(target, body)
-        if resolved is None and base.take(text, target):
+        if resolved is None and base.take(text, _with_unit(of_base.get(text), target)):
             continue
         if resolved is None:
+            part = joint_part(label(target).name, body.joint_names)
+            if part is not None and part[1]:
+                companions[part[0]] = text
             left_out[text] = _why_left_out(text, target, recording, body, choices)
+            unexplained = unexplained or left_out[text] == _NO_JOINT
             continue
         joint = body.joint_names.index(resolved.name)
         unit, stated = _unit(text, resolved, joint, body, recording, choices.degrees)
@@ -133,7 +159,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     _check_unread(found, body, recording, choices)
     if body.n_shape and not found and choices.rest_missing:
         _check_meant(left_out, body, recording, choices)
-    at_rest = _rest_of_missing(found, body, where, choices)
+    at_rest = _rest_of_missing(found, body, where, choices, companions, unexplained=unexplained)
     for name, value in at_rest.items():
         shapes[:, body.joint_index(name)] = value
     for joint in range(body.n_shape):
@@ -149,20 +175,32 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     return Matched(shapes, base_motion, columns, units, at_rest, left_out | base_motion.left_out)
 
 
+def _with_unit(name: str | None, target: str) -> str:
+    """The name of a column of the base with the unit that its own label has; without such a name the label."""
+    unit = label(target).unit
+    return target if name is None else name if unit is None else f"{name} [{unit}]"
+
+
 def _resolved(target: str, body: Body) -> Label | None:
     """The joint and the unit that a name stands for, or None."""
     if target in body.joint_names:
         return Label(target, None)
     parts = label(target)
-    return parts if parts.name in body.joint_names else None
+    if parts.name in body.joint_names:
+        return parts
+    part = joint_part(parts.name, body.joint_names) if other_unit(target) is None else None
+    return Label(part[0], parts.unit) if part is not None and not part[1] else None
 
 
 def _why_left_out(text: str, target: str, recording: Recording, body: Body, choices: JointChoices) -> str:
     """Why a column that is no joint is left out; UnknownColumnError if nobody has said that it may be."""
     table = recording.table
     if text not in choices.names:
+        said = _beside_a_motion(text, recording, body)
+        if said is not None:
+            return said
         if choices.ignore_extra:
-            return "no joint of the body"
+            return _NO_JOINT
         if target in body.couplings:
             return f"follows {' and '.join(body.couplings[target].drivers) or 'nothing: it is locked'}"
         if table.format.startswith("OpenSim") and np.isfinite(values := table.columns[text]).all():
@@ -177,12 +215,31 @@ def _why_left_out(text: str, target: str, recording: Recording, body: Body, choi
         raise TrajectoryError(f"{table.where}: column {text!r}: no unit {unit!r:.40} is known; these are: {units}")
     kind = f"column in {table.where}; joint of {body.name}"
     error = unknown_name(kind, target, body.joint_names, UnknownColumnError)
-    if text in choices.names:
-        raise error
+    near = difflib.get_close_matches(target, body.joint_names, n=1)
+    joint = near[0] if near else "JOINT"
     raise UnknownColumnError(
-        f"{error}. Columns that are no joints are left out with ignore_extra=True (--ignore-extra); "
-        "names={column: joint} (--names COLUMN=JOINT) says which joint one is"
+        f"{error}; {HINT}. Say which it is: --names '{text}={joint}' (names={{{text!r}: {joint!r}}}); or leave it out: "
+        f"--names '{text}=', or --ignore-extra for all that are no joints (ignore_extra=True)"
     )
+
+
+def _beside_a_motion(text: str, recording: Recording, body: Body) -> str | None:
+    """What a column is that says nothing of the posture: a rate, a counter, a text; None where it may say something."""
+    table = recording.table
+    part = joint_part(label(text).name, body.joint_names)
+    if part is not None and part[1]:
+        return f"{part[1]} of {part[0]}"
+    unit = other_unit(text)
+    if unit is not None:
+        return f"in {unit}: no position"
+    values = table.columns[text]
+    if is_clock(text):
+        return "another clock"
+    if is_counter(text) and bool((values == np.rint(values)).all()):
+        return "counts the rows"
+    if np.isnan(values).all():
+        return "text" if table.faults.get(text) else "empty"
+    return None
 
 
 def _unit(
@@ -263,8 +320,25 @@ def _check_meant(left_out: Mapping[str, str], body: Body, recording: Recording, 
     )
 
 
-def _rest_of_missing(found: Mapping[int, str], body: Body, where: str, choices: JointChoices) -> dict[str, float]:
-    """Joint -> where it rests, of the joints without a column."""
+def _rest_of_missing(
+    found: Mapping[int, str],
+    body: Body,
+    where: str,
+    choices: JointChoices,
+    companions: Mapping[str, str],
+    *,
+    unexplained: bool,
+) -> dict[str, float]:
+    """Joint -> where it rests, of the joints without a column.
+
+    Some may be missing without a word where at least one is there, and every column is explained: none is a joint that
+    was misspelt.
+
+    Parameters
+    ----------
+    companions : joint -> a column that has its rate or effort, so that it does move
+    unexplained : whether columns were left out of which nobody knows what they are
+    """
     at_rest: dict[str, float] = {}
     for name, value in (choices.rest or {}).items():
         joint = body.joint_index(name)
@@ -272,10 +346,23 @@ def _rest_of_missing(found: Mapping[int, str], body: Body, where: str, choices: 
             raise TrajectoryError(f"{where}: rest: joint {name} has a column, {found[joint]!r}; leave one of them out")
         at_rest[name] = quantity(value, body.joint_units[joint], f"rest of joint {name}")
     missing = [name for i, name in enumerate(body.joint_names) if i not in found and name not in at_rest]
-    if choices.rest_missing:
+    moving = [name for name in missing if name in companions]
+    if moving and not choices.rest_missing:
+        name = moving[0]
+        raise TrajectoryError(
+            f"{where}: {companions[name]!r} is recorded of joint {name}, and its position is not; add a column {name}, "
+            f"or say where it rests: --rest {name}=0 (rest={{{name!r}: 0}})"
+        )
+    if choices.rest_missing or (missing and found and not unexplained):
         limits = {name: body.joint_limits[body.joint_index(name)] for name in missing}
         neutral = dict(zip(body.joint_names, body.shape().tolist(), strict=True))
         at_rest |= {name: float(np.clip(neutral[name], *limits[name])) for name in missing}
+        if not choices.rest_missing:
+            shown = ", ".join(missing[:_FEW]) + (f" and {len(missing) - _FEW} more" if len(missing) > _FEW else "")
+            warn(
+                f"{where}: no column for {shown}: {'they rest' if len(missing) > 1 else 'it rests'} at zero or the "
+                "nearest limit; --rest JOINT=VALUE (rest={joint: value}) says another place, --rest-missing this one"
+            )
     elif missing:
         raise TrajectoryError(
             f"{where}: no column for {', '.join(missing)}; add them (zeros where the joint rests), or say where they "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +42,32 @@ _BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<rou
 # Behind an underscore any unit stands, behind a blank or a point only a word that is no part of a name.
 _SUFFIXED = re.compile(r"(?P<name>.*[^\s_.])(?P<mark>[\s_.]|(?=°))(?P<unit>[^\W\d_]+|°)", re.DOTALL)
 _WORDS = {"rad", "deg", "ms"}
+_NO_UNITS = ("", "-")
+"""What stands in the brackets of columns without a unit."""
+_OTHER_UNIT = re.compile(
+    r"(rad|deg|°|m|cm|mm|rev|r)\s*([/ ]\s*(s|min)|s\^?-1|\s*s\^-1)\S*|rpm|n|nm|n\*m|n\.m|a|ma|v|w|°c|degc|pa|bar", re.I
+)
+"""Units of rates, forces and what else is recorded beside a posture."""
+_POSITIONS = ("position", "pos", "angle", "value", "q", "qpos")
+_COMPANIONS = (
+    *("velocity", "vel", "speed", "dq", "qd", "qvel", "qdot", "rate", "acceleration", "acc", "ddq", "qdd"),
+    *("effort", "torque", "tau", "force", "current", "temperature", "command", "cmd", "desired", "target", "reference"),
+)
+"""What is recorded of a joint beside its position."""
+_COUNTERS = (
+    "frame",
+    "frames",
+    "framenumber",
+    "subframe",
+    "index",
+    "sample",
+    "samples",
+    "seq",
+    "count",
+    "counter",
+    "row",
+)
+"""Names of columns that count the rows, in small letters and without marks between words."""
 _QUANTITY = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\W\d_]*|°)")
 
 
@@ -60,7 +86,10 @@ def label(text: str) -> Label:
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed is not None:
         inside = bracketed["square"] if bracketed["square"] is not None else bracketed["round"]
-        unit = unit_of(inside)
+        if inside.strip() in _NO_UNITS:
+            return Label(bracketed["name"], None)
+        # Without a blank before it, a number in brackets counts: `q[1]` is the second of them.
+        unit = None if inside.isdigit() and text[bracketed.end("name")] in "[(" else unit_of(inside)
         return Label(bracketed["name"], unit) if unit is not None else Label(text, None)
     suffixed = _SUFFIXED.fullmatch(text)
     if suffixed is not None:
@@ -68,6 +97,46 @@ def label(text: str) -> Label:
         if unit is not None and (suffixed["mark"] == "_" or unit in _WORDS):
             return Label(suffixed["name"], unit)
     return Label(text, None)
+
+
+def other_unit(text: str) -> str | None:
+    """The unit of a rate or a force behind a name in brackets; None where there is none."""
+    bracketed = _BRACKETED.fullmatch(text)
+    inside = "" if bracketed is None else bracketed["square"] or bracketed["round"] or ""
+    return inside if _OTHER_UNIT.fullmatch(inside.strip()) else None
+
+
+def is_counter(text: str) -> bool:
+    """Whether a name is that of a column which counts rows, such as `Sub Frame` or `field.header.seq`."""
+    return re.sub(r"[\s_#]", "", re.split(r"[./]", text)[-1]).lower() in _COUNTERS
+
+
+def joint_part(text: str, joints: Collection[str]) -> tuple[str, str] | None:
+    """The joint that a longer name ends or begins with, and what of it: "" where that is its position.
+
+    `/joint_states/knee/position`, `knee_pos`, `position.knee` and `/states/knee` are the knee; `knee_velocity` is
+    what is recorded beside it. None: no joint stands there.
+    """
+    for word in (*_POSITIONS, *_COMPANIONS):
+        small = text.lower()
+        for mark in "/._ ":
+            if small.endswith(mark + word):
+                stem = text[: -len(word) - 1]
+            elif small.startswith(word + mark):
+                stem = text[len(word) + 1 :]
+            else:
+                continue
+            joint = _at_the_end(stem, joints)
+            if joint is not None:
+                return joint, "" if word in _POSITIONS else word
+    joint = _at_the_end(text, joints) if "/" in text else None
+    return None if joint is None else (joint, "")
+
+
+def _at_the_end(text: str, joints: Collection[str]) -> str | None:
+    """The longest joint that a path ends with, or None."""
+    found = [name for name in joints if text == name or text.endswith(("/" + name, "." + name))]
+    return max(found, key=len, default=None)
 
 
 def unit_of(text: str) -> str | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -45,6 +44,8 @@ class Table:
     base_position : (N, 3) [m] or None
     up : the axis that the kind of file has upwards; None: it has none
     unread : name -> what it is, of arrays and other entries of the file that are no columns
+    left_out : label -> why it was left out, of columns that say nothing of the motion
+    numbered : whether columns have no names: they are called by their numbers from 1
     nameless : how columns of an array without names became those of joints; None: they have names
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
     zero_pose : whether all angles of the first sample are zero: the pose that exporters put before a motion
@@ -65,6 +66,8 @@ class Table:
     base_position: Array | None = None
     up: str | None = None
     unread: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    numbered: bool = False
     unnamed: Sequence[str] = ()
     nameless: NamelessJoints | None = None
     zero_pose: bool = False
@@ -191,18 +194,6 @@ def no_number(entry: str, place: str) -> TrajectoryError:
     text = entry.strip()
     shown = repr(text if len(text) < 40 else text[:40] + "...")
     return TrajectoryError(f"{place}: {shown} is no finite number{_way_out(text)}")
-
-
-def plain_numbers(entries: Sequence[str]) -> list[float] | None:
-    """Many entries at once; None where `number` has to look at each."""
-    together = "".join(entries)
-    if not together.isascii() or "_" in together:
-        return None
-    try:
-        values = [float(entry) for entry in entries]
-    except ValueError:
-        return None
-    return values if math.isfinite(sum(map(abs, values))) else None
 
 
 def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
@@ -14,8 +15,10 @@ from ...letters import what_came
 from ._labels import IN_A_SECOND, in_square_brackets, label, time_unit_argument
 from ._recording import Recording, Table, times_from_zero
 
-_TIMES = ("time", "times", "t", "timestamp", "timestamps")
-"""Names of a column of times, in small letters and without its unit."""
+_TIMES = ("time", "times", "t", "timestamp", "timestamps", "stamp", "datetime", "elapsed", "elapsedtime", "timetag")
+"""Names of a column of times, in small letters, without its unit and marks between words."""
+_EPOCH = (6.3e8, 4.1e9)
+"""Seconds since 1970, from 1990 to 2100: times between them, in a unit in which steps are usual ones, are such."""
 _LONG_STEP = 10.0
 """Steps as long as this [s] are rather those of another unit: a motion of joints is recorded more often."""
 _LONG_STEP_OF_MANY = 1.0
@@ -91,21 +94,28 @@ def doubtful_steps(times: Array) -> bool:
     return step >= (_LONG_STEP_OF_MANY if len(times) >= _MANY else _LONG_STEP)
 
 
+def is_clock(text: str) -> bool:
+    """Whether a label names times, at the end of a topic, too: `__time`, `Time [ms]`, `field.header.stamp`."""
+    name = re.split(r"[/.]", label(text).name)[-1]
+    return re.sub(r"[\s_%#]", "", name).lower() in _TIMES
+
+
 def _time_column(table: Table, joint_names: Collection[str], names: Mapping[str, str | None]) -> str | None:
     """The label of the column of times, or None."""
     called = {old: old if (new := names.get(old, old)) is None else new for old in table.columns}
     found = [
         old
         for old, name in called.items()
-        if name not in joint_names and label(name).name.strip().lower() in _TIMES and names.get(old, old) is not None
+        if name not in joint_names and is_clock(name) and names.get(old, old) is not None
     ]
-    plain = [old for old in found if called[old] == "time"]
+    plain = [old for old in found if label(called[old]).name.strip("_% ").lower() == "time"]
     if len(plain) == 1:
         return plain[0]
     if len(found) > 1:
         listed = " and ".join(repr(old) for old in found[:4])
         raise TrajectoryError(
-            f"{table.where}: columns {listed} are both times; leave one out, with names={{{found[-1]!r}: None}}"
+            f"{table.where}: columns {listed} are both times; leave one out: --names '{found[-1]}=' "
+            f"(names={{{found[-1]!r}: None}})"
         )
     return found[0] if found else None
 
@@ -116,7 +126,8 @@ def _timed(table: Table, column: str | None, unit: str | None, timestep: float |
         if timestep is None:
             raise TrajectoryError(
                 f"{table.where}: the header has no column `time`; it reads {_some(list(table.columns))}. Name the one "
-                "that has the times with names={column: 'time'}, or give the time between samples as timestep"
+                "that has the times: --names COLUMN=time (names={column: 'time'}); or give the time between samples: "
+                "--timestep 0.01 (timestep=0.01)"
             )
         step = positive_argument(timestep, "timestep")
         return replace(table, times=step * np.arange(len(table.rows))), "s", False
@@ -136,8 +147,29 @@ def _timed(table: Table, column: str | None, unit: str | None, timestep: float |
         raise TrajectoryError(f"{table.where}: column {column!r} is in {said}, and time_unit={unit!r} was given")
     columns = {name: values for name, values in table.columns.items() if name != column}
     clock = table.columns[column]
-    times = clock / IN_A_SECOND[unit or said or "s"]
-    return replace(table, columns=columns, times=times, clock=clock), unit or said or "s", unit is None and said is None
+    epoch = _unit_since_1970(clock) if unit is None and said is None else None
+    size = IN_A_SECOND[unit or said or epoch or "s"]
+    # Whole nanoseconds since 1970 are more than a double holds: their start is taken off before they become one.
+    times = (clock - clock[0]) / size if clock.dtype.kind == "i" else clock / size
+    table = replace(table, columns=columns, times=times, clock=clock)
+    return table, unit or said or epoch or "s", unit is None and said is None and epoch is None
+
+
+def _unit_since_1970(clock: Array) -> str | None:
+    """The unit in which times count from 1970, or None.
+
+    A clock that counts from another day in a smaller unit would have to run for weeks, and take ten thousand samples
+    a second, to be taken for this one.
+    """
+    if len(clock) < 2:
+        return None
+    with np.errstate(over="ignore"):
+        step = float(np.median(np.diff(clock)))
+    for unit in ("s", "ms", "us", "ns"):
+        size = IN_A_SECOND[unit]
+        if _EPOCH[0] <= clock[0] / size <= _EPOCH[1] and 0.0 < step / size <= _USUAL_STEP:
+            return unit
+    return None
 
 
 def _clock(table: Table) -> Array:

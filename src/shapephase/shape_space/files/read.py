@@ -95,7 +95,7 @@ def read_recorded_motion(
     file: Any,
     body: Body,
     *,
-    names: Mapping[str, str | None] | str | os.PathLike[str] | None = None,
+    names: Mapping[str, str | None] | Sequence[str] | str | os.PathLike[str] | None = None,
     degrees: bool | None = None,
     time_unit: str | None = None,
     timestep: float | None = None,
@@ -223,11 +223,12 @@ def read_recorded_motion(
     rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
     if joint_order is not None:
         check_choice(joint_order, "joint_order", WORDS)
-    given, step = read_input(file, body, topic, timestep, joint_order)
+    said = _names_argument(names)
+    given, step = read_input(file, body, topic, timestep, joint_order, said if isinstance(said, Mapping) else None)
     table = given.table
     if joint_order is not None and table.nameless is None:
         raise TrajectoryError(f"{table.where}: joint_order is for arrays without names; columns here have names")
-    mapping = _mapping(read_names(names) if isinstance(names, str | os.PathLike) else names, table)
+    mapping = _mapping(said, table)
     recording = recording_of(table, body.joint_names, mapping, time_unit, step, kept)
     choices = JointChoices(
         names=mapping, base=base, degrees=degrees, rest=rest, rest_missing=rest_missing, ignore_extra=ignore_extra
@@ -286,7 +287,7 @@ def read_shape_path(
     file: Any,
     body: Body,
     *,
-    names: Mapping[str, str | None] | str | os.PathLike[str] | None = None,
+    names: Mapping[str, str | None] | Sequence[str] | str | os.PathLike[str] | None = None,
     degrees: bool | None = None,
     time_unit: str | None = None,
     timestep: float | None = None,
@@ -433,6 +434,15 @@ def _check_rows(path: ShapePath, times: Array) -> None:
             TrajectoryWarning,
             stacklevel=3,
         )
+
+
+def _names_argument(names: Any) -> Any:
+    """What a caller says of names, with files read, and a sequence of names as those of columns by their numbers."""
+    if isinstance(names, str | os.PathLike):
+        return read_names(names)
+    if isinstance(names, Sequence):
+        return {str(number): name for number, name in enumerate(names, start=1)}
+    return names
 
 
 def _mapping(names: Mapping[str, str | None] | None, table: Table) -> dict[str, str | None]:

@@ -1,4 +1,4 @@
-"""Columns in memory, of numbers, texts or dates, as a table: what spreadsheets, data frames and arrays come to."""
+"""Columns in memory, of numbers, texts or dates, as a table: what files, data frames and arrays come to."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 from ....arrays import Array
 from ....errors import TrajectoryError
 from .._recording import Table, number
+from .table_heads import CLOCK, COMMA_NUMBER, DATE, is_value
 
-_NANO = 1e9
-"""Nanoseconds in a second."""
 _MOST_FAULTS = 1000
 """Entries of a column that are no numbers whose text is kept for messages."""
-_DAY = datetime.date(2000, 1, 1)
-"""Any day, for times of a day."""
+_WHOLE = 2**53
+"""Beyond it doubles do not have all whole numbers: times in nanoseconds stay integers until their start is off."""
+_GAPS = ("", "nan", "-nan", "nat")
 
 
 def column_table(
@@ -27,7 +27,8 @@ def column_table(
     *,
     units: Mapping[str, str] | None = None,
     row: str = "row",
-    first_row: int = 0,
+    rows: Sequence[int] | None = None,
+    comma: bool = False,
 ) -> Table:
     """The table of columns that have labels: what is no number is NaN there, and a fault; dates become seconds.
 
@@ -35,7 +36,8 @@ def column_table(
     ----------
     columns : label and values (N,)
     units : label -> unit, where it is said beside the label
-    first_row : the number of the first sample in messages
+    rows : (N,) the numbers of the samples in messages; None: from 0
+    comma : whether texts have decimal commas
 
     Raises
     ------
@@ -50,69 +52,114 @@ def column_table(
             raise TrajectoryError(f"{where}: column {position} has the name {label!r:.40}, and a text is needed")
         name = label.strip()
         if not name:
-            raise TrajectoryError(f"{where}: column {position} has no name in the header")
+            raise TrajectoryError(f"{where}: column {position} has no name in the header; write one")
         if name in found:
-            raise TrajectoryError(f"{where}: column {name[:40]} stands twice in the header")
-        found[name], faults[name], is_date = _numbers(values)
+            raise TrajectoryError(f"{where}: column {name[:40]} stands twice in the header; give each its own name")
+        found[name], faults[name], is_date = _numbers(values, comma, f"{where}: column {name!r:.60}")
         if is_date:
             said[name] = "s"
+        mixed = next((k for k, text in faults[name].items() if comma and is_value(text)), None)
+        if mixed is not None:
+            raise TrajectoryError(
+                f"{where}: {row} {mixed if rows is None else rows[mixed]}, column {name!r:.60}: "
+                f"{faults[name][mixed]!r:.40} has a decimal point, and other entries have decimal commas; write all in "
+                "one way, without marks between thousands"
+            )
     counts = {len(values) for values in found.values()}
     if len(counts) > 1:
         listed = ", ".join(f"{name} {len(values)}" for name, values in list(found.items())[:12])
         raise TrajectoryError(f"{where}: the columns have different lengths: {listed}")
-    rows = range(first_row, first_row + max(counts, default=0))
-    return Table(where=where, format=kind, columns=found, rows=rows, row=row, units=said, faults=faults)
+    labels = range(max(counts, default=0)) if rows is None else rows
+    return Table(where=where, format=kind, columns=found, rows=labels, row=row, units=said, faults=faults)
 
 
-def _numbers(values: Any) -> tuple[Array, dict[int, str], bool]:
+def _numbers(values: Any, comma: bool, place: str) -> tuple[Array, dict[int, str], bool]:
     """Values as numbers, what is none of them, and whether they are dates or durations [s]."""
     if isinstance(values, np.ma.MaskedArray):
         values = np.ma.filled(values.astype(np.float64), np.nan) if values.dtype.kind in "fiu" else values.tolist()
     array = np.asarray(values, dtype=object) if isinstance(values, list) else np.asarray(values)
     if array.dtype.kind in "mM":
         return _seconds(array), {}, True
+    if array.dtype.kind == "i" and len(array) and np.abs(array.astype(np.float64)).max() > _WHOLE:
+        return array.astype(np.int64), {}, False
     if array.dtype.kind in "fiu":
         return np.ascontiguousarray(array, dtype=np.float64), {}, False
     if array.dtype.kind == "b":
         return np.full(len(array), np.nan), dict(enumerate(map(str, array[:_MOST_FAULTS].tolist()))), False
     entries = array.tolist()
-    dates = _dates(entries)
+    dates = _dates(entries, place)
     if dates is not None:
         return dates, {}, True
     found, faults = np.empty(len(entries)), {}
     for k, entry in enumerate(entries):
-        try:
-            found[k] = float(entry) if isinstance(entry, int | float) and not isinstance(entry, bool) else _text(entry)
-        except (TrajectoryError, OverflowError):  # Python's whole numbers may be larger than any double
-            found[k] = np.nan
-            if len(faults) < _MOST_FAULTS:
-                faults[k] = "" if entry is None else str(entry)[:60]
+        value = _number(entry, comma)
+        found[k] = np.nan if value is None else value
+        if value is None and len(faults) < _MOST_FAULTS:
+            faults[k] = str(entry)[:60]
     return found, faults, False
 
 
-def _text(entry: object) -> float:
-    return number(entry if isinstance(entry, str) else "", "")
+def _number(entry: object, comma: bool) -> float | None:
+    """A number, NaN of a gap, None of another text; with decimal commas, one that has a decimal point is another."""
+    if entry is None or type(entry).__name__ in ("NAType", "NaTType"):
+        return np.nan
+    if not isinstance(entry, str):
+        try:
+            return None if isinstance(entry, bool) else float(entry)  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):  # Python's whole numbers may be larger than any double
+            return None
+    text = entry.strip()
+    if text.lower() in _GAPS:
+        return np.nan
+    if comma and "," in text:
+        text = text.replace(",", ".") if COMMA_NUMBER.fullmatch(text) and text.count(",") == 1 else "no number"
+    elif comma and "." in text:
+        return None
+    try:
+        return number(text, "")
+    except TrajectoryError:
+        return None
 
 
 def _seconds(times: Any) -> Array:
     """Dates or durations of NumPy as seconds: dates since the first of them."""
     since = times - times[0] if times.dtype.kind == "M" and len(times) else times
     durations = since.astype("timedelta64[ns]")
-    seconds = durations.astype(np.int64) / _NANO
-    return np.where(np.isnat(durations), np.nan, seconds)
+    return np.where(np.isnat(durations), np.nan, durations / np.timedelta64(1, "s"))
 
 
-def _dates(entries: Sequence[Any]) -> Array | None:
-    """Dates, times of a day or durations of Python as seconds; None where they are something else."""
-    if not entries:
+def _dates(entries: Sequence[Any], place: str) -> Array | None:
+    """Dates, times of a day or durations of Python, or texts of them, as seconds; None where they are other things.
+
+    Raises TrajectoryError for dates of which one cannot be read.
+    """
+    first = next((entry for entry in entries if entry is not None and entry != ""), None)
+    if isinstance(first, str) and (DATE.fullmatch(first.strip()) or CLOCK.fullmatch(first.strip())):
+        import pandas as pd
+
+        dated = DATE.fullmatch(first.strip()) is not None
+        texts = [str(entry).strip().replace(",", ".") for entry in entries]
+        try:
+            made = pd.to_datetime(texts, format="ISO8601", utc=True) if dated else pd.to_timedelta(_full_clock(texts))
+        except (ValueError, OverflowError) as error:
+            raise TrajectoryError(
+                f"{place}: {error!s:.120}; write all times as {first.strip()!r:.40}, or in seconds"
+            ) from None
+        return _seconds(made.tz_localize(None).to_numpy() if dated else made.to_numpy())
+    if not entries or not isinstance(first, datetime.timedelta | datetime.time | datetime.datetime):
         return None
     if all(isinstance(entry, datetime.timedelta) for entry in entries):
         return np.array([entry.total_seconds() for entry in entries])
     if all(isinstance(entry, datetime.time) for entry in entries):
-        entries = [datetime.datetime.combine(_DAY, entry) for entry in entries]
+        entries = [datetime.datetime.combine(datetime.date(2000, 1, 1), entry) for entry in entries]
     if all(isinstance(entry, datetime.datetime) for entry in entries):
         try:
             return np.array([(entry - entries[0]).total_seconds() for entry in entries])
         except TypeError:
             return None
     return None
+
+
+def _full_clock(texts: Sequence[str]) -> list[str]:
+    """Times of day with hours: `12:30.5` is 12 minutes."""
+    return [text if text.count(":") == 2 else f"00:{text}" for text in texts]

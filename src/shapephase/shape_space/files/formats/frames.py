@@ -1,7 +1,8 @@
-"""Motions that are in memory as tables of pandas or xarray; neither is imported here."""
+"""Motions that are tables of pandas or xarray: those a file was read into, and those of a caller."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,14 @@ from ....errors import TrajectoryError
 from .._labels import unit_of
 from .._recording import Table
 from .column_tables import column_table
+from .ros_echo import echoed_columns, listed_names
 
 _PANDAS = ("DataFrame",)
 _XARRAY = ("Dataset", "DataArray")
+_STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))
+"""What the two parts of a stamp of ROS are called."""
+_NANO = 1_000_000_000
+_COUNTER = "counts the rows"
 
 
 def is_frame(value: object) -> bool:
@@ -31,7 +37,41 @@ def read_frame(frame: Any) -> Table:
     TrajectoryError
         For faults, with column and row.
     """
-    return _of_pandas(frame) if _is(frame, "pandas", _PANDAS) else _of_xarray(frame)
+    if not _is(frame, "pandas", _PANDAS):
+        return _of_xarray(frame)
+    if "format" in frame.attrs:
+        return file_table(frame, frame.attrs.get("file", "the DataFrame"))
+    columns = [(_label(label), frame.iloc[:, k].to_numpy()) for k, label in enumerate(frame.columns)]
+    index, numbered = frame.index, frame.columns.dtype.kind in "iu"
+    values = index.to_numpy() if index.nlevels == 1 else None
+    if values is not None and index.name is not None:
+        columns.insert(0, (str(index.name), values))
+    elif values is not None and (values.dtype.kind in "mM" or (values.dtype.kind == "f" and not numbered)):
+        columns.insert(0, ("time", values))
+    table = column_table("the DataFrame", "pandas", columns)
+    return replace(table, numbered=numbered)
+
+
+def file_table(frame: Any, where: str) -> Table:
+    """The table of a frame that `read_table` has read: what its head says, and the numbers of its rows.
+
+    Raises TrajectoryError for faults.
+    """
+    said = frame.attrs
+    columns, dropped = _with_names([(str(label), frame.iloc[:, k].to_numpy()) for k, label in enumerate(frame)], where)
+    columns, left_out = echoed_columns(columns) if said.get("numbered") else listed_names(columns)
+    numbered = bool(said.get("numbered")) and not left_out
+    columns = _stamped(columns, said.get("rate"))
+    table = column_table(
+        where,
+        said["format"],
+        columns,
+        units=said.get("units"),
+        rows=[int(k) for k in frame.index],
+        row=said.get("row", "row"),
+        comma=said.get("comma", False),
+    )
+    return replace(table, numbered=numbered, left_out=dropped | left_out)
 
 
 def _is(value: object, package: str, kinds: tuple[str, ...]) -> bool:
@@ -40,15 +80,60 @@ def _is(value: object, package: str, kinds: tuple[str, ...]) -> bool:
     )
 
 
-def _of_pandas(frame: Any) -> Table:
-    columns = [(label, frame.iloc[:, k].to_numpy()) for k, label in enumerate(frame.columns)]
-    index = frame.index
-    values = index.to_numpy() if index.nlevels == 1 else None
-    if values is not None and index.name is not None:
-        columns.insert(0, (str(index.name), values))
-    elif values is not None and values.dtype.kind in "mM":
-        columns.insert(0, ("time", values))
-    return column_table("the DataFrame", "pandas", columns)
+def _label(label: Any) -> Any:
+    """A label as text: several levels are parts of one name."""
+    if isinstance(label, tuple):
+        return "/".join(str(part) for part in label if str(part))
+    return str(label) if isinstance(label, int | np.integer) else label
+
+
+def _with_names(columns: list[tuple[str, Any]], where: str) -> tuple[list[tuple[str, Any]], dict[str, str]]:
+    """Columns that have names, and what those without one are: an index that was written, or nothing.
+
+    Raises TrajectoryError for another column without a name.
+    """
+    found: list[tuple[str, Any]] = []
+    dropped: dict[str, str] = {}
+    has_times = any(name.lower().startswith("time") for name, _ in columns)
+    for place, (name, values) in enumerate(columns):
+        if name:
+            found.append((name, values))
+        elif values.dtype.kind == "f" and np.isnan(values).all():
+            continue
+        elif place == 0 and _counts(values):
+            dropped["column 1"] = _COUNTER
+        elif place == 0 and not has_times:
+            found.append(("time", values))
+        else:
+            raise TrajectoryError(f"{where}: column {place + 1} has no name in the header; write one, or drop it")
+    return found, dropped
+
+
+def _counts(values: Any) -> bool:
+    """Whether values are whole numbers, one after the other from 0 or 1: R writes them in quotation marks."""
+    try:
+        numbers = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        return False
+    return bool(len(numbers) and numbers[0] in (0.0, 1.0) and (np.diff(numbers) == 1.0).all())
+
+
+def _stamped(columns: list[tuple[str, Any]], rate: float | None) -> list[tuple[str, Any]]:
+    """Columns with that of the times which the two parts of a stamp, or frames and their rate, say together."""
+    by_name = dict(columns)
+    if rate is not None and "Frame" in by_name:
+        columns = [pair for pair in columns if pair[0] not in ("Frame", "Sub Frame")]
+        return [("time [s]", np.asarray(by_name["Frame"], dtype=np.float64) / rate), *columns]
+    for name in by_name:
+        for whole, parts in _STAMPS:
+            other = name.removesuffix(whole) + parts
+            if not name.endswith(whole) or other not in by_name:
+                continue
+            seconds, nano = by_name[name], by_name[other]
+            if seconds.dtype.kind in "iu" and nano.dtype.kind in "iu":
+                left = [pair for pair in columns if pair[0] not in (name, other)]
+                return [(f"{name.removesuffix(whole).rstrip('._/')} time [ns]".strip(), seconds * _NANO + nano), *left]
+    return columns
 
 
 def _of_xarray(data: Any) -> Table:
@@ -75,7 +160,7 @@ def _of_xarray(data: Any) -> Table:
         second = array.dims[1]
         if second not in array.coords:
             raise TrajectoryError(
-                f"{where}: the dimension {second!r} of {name} has no coordinate that names the joints"
+                f"{where}: the dimension {second!r} of {name} has no coordinate that names the joints; add one"
             )
         for k, joint in enumerate(array.coords[second].to_numpy().tolist()):
             columns.append((joint, np.asarray(array[:, k])))

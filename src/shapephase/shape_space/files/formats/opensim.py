@@ -2,42 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 from ....arrays import Array
 from ....errors import TrajectoryError
 from .._recording import Table
-from .text_tables import text_lines, text_table
+from .frames import file_table
+from .text_tables import BLANKS, read_text, unix_text
 
 END = "endheader"
 """The line that closes the header."""
-# Lines of an OpenSim header: files have a dozen; more is another kind of file.
-_MOST_HEADER_LINES = 1000
+_HEADER_BYTES = 2**16
+"""A header has a dozen lines."""
 # SIMM's older words for what OpenSim calls nRows and nColumns.
 _COUNTS = {"nrows": "rows", "datarows": "rows", "ncolumns": "columns", "datacolumns": "columns"}
+_SPREADSHEET = ",;"
+"""What a spreadsheet puts between columns, and behind the lines of the header."""
+
+
+def has_header(data: bytes) -> bool:
+    """Whether a line closes a header as OpenSim writes it."""
+    return any(_plain(line).lower() == END for line in data[:_HEADER_BYTES].decode(errors="replace").splitlines())
 
 
 def read_opensim(where: Path, data: bytes) -> Table:
     """An OpenSim motion or storage file: header lines up to `endheader`, names, numbers.
 
-    `inDegrees` says whether rotational coordinates are in degrees. Of a file of states, `.../<coordinate>/value` is
-    the coordinate and `.../<coordinate>/speed` is left out.
+    `inDegrees` says whether rotational coordinates are in degrees. In a file of states, `.../<coordinate>/value` is
+    the coordinate and `.../<coordinate>/speed` is left out. Where a spreadsheet has saved it, commas are between
+    columns.
 
     Raises
     ------
     TrajectoryError
         For faults, with line and column.
     """
-    lines = text_lines(data, where)
-    header = _header(lines, where)
-    rows = ((line, text.split()) for line, text in lines if text.strip())
-    _, names = next(rows, (0, []))
-    if not names:
-        raise TrajectoryError(f"{where}: no names of columns after `{END}`")
-    found = text_table(where, "OpenSim", names, rows, row="line", by_format=True, degrees=_in_degrees(header, where))
-    _check_counts(header, where, len(found.rows), len(names))
+    text = unix_text(data, where)
+    lines = text[:_HEADER_BYTES].decode(errors="replace").split("\n")
+    end = next((k for k, line in enumerate(lines) if _plain(line).lower() == END), None)
+    if end is None:
+        raise TrajectoryError(f"{where}: no line `{END}` closes the header; if it is no OpenSim file, name it .csv")
+    header = _header(lines[:end], where)
+    mark = next((mark for mark in _SPREADSHEET if lines[end].rstrip().endswith(mark)), BLANKS)
+    try:
+        frame = read_text(where, text, start=end + 1, delimiter=mark)
+    except TrajectoryError as error:
+        raise TrajectoryError(str(error).replace(": row ", ": line ", 1)) from None
+    frame.attrs |= {"format": "OpenSim", "row": "line"}
+    found = replace(file_table(frame, str(where)), by_format=True, degrees=_in_degrees(header, where))
+    _check_counts(header, where, len(found.rows), len(frame.columns))
     columns: dict[str, Array] = {}
     faults = {}
     for name, values in found.columns.items():
@@ -51,22 +65,23 @@ def read_opensim(where: Path, data: bytes) -> Table:
     return replace(found, columns=columns, faults=faults, up="y")
 
 
-def _header(lines: Iterator[tuple[int, str]], where: Path) -> dict[str, str]:
+def _plain(line: str) -> str:
+    return line.strip().strip(_SPREADSHEET + '"').strip()
+
+
+def _header(lines: list[str], where: Path) -> dict[str, str]:
     header: dict[str, str] = {}
-    for line, text in lines:
-        words = text.strip()
-        if words.lower() == END:
-            return header
-        if line > _MOST_HEADER_LINES:
-            break
-        key, mark, value = words.partition("=")
+    for line, text in enumerate(lines, start=1):
+        key, mark, value = _plain(text).partition("=")
         if not mark:
-            key, _, value = words.partition(" ")
+            key, _, value = _plain(text).partition(" ")
         key, value = key.strip().lower(), value.strip()
         known = _COUNTS.get(key, key)
         if known in ("rows", "columns", "indegrees", "datatype") and header.setdefault(known, value) != value:
-            raise TrajectoryError(f"{where}: line {line}: {words!r:.60} contradicts {header[known]!r} further up")
-    raise TrajectoryError(f"{where}: no line `{END}` closes the header; is this an OpenSim file?")
+            raise TrajectoryError(
+                f"{where}: line {line}: {_plain(text)!r:.60} contradicts {header[known]!r} further up; keep one"
+            )
+    return header
 
 
 def _in_degrees(header: dict[str, str], where: Path) -> bool | None:
@@ -89,7 +104,8 @@ def _check_counts(header: dict[str, str], where: Path, rows: int, columns: int) 
             continue
         if not said.isascii() or not said.isdigit() or (said.lstrip("0") or "0") != str(found):
             raise TrajectoryError(
-                f"{where}: the header says {said:.40} {kind}, the table has {found}; the file is cut off or was edited"
+                f"{where}: the header says {said:.40} {kind}, the table has {found}; the file is cut off or was "
+                "edited: write it anew, or correct the header"
             )
 
 

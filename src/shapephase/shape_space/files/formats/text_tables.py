@@ -1,224 +1,280 @@
-"""Text tables of joint motions, as programs and spreadsheets write them: commas, tabs, semicolons, decimal commas."""
+"""Text tables as programs and spreadsheets write them: any separator, with a header or without; read by pandas."""
 
 from __future__ import annotations
 
 import csv
 import io
 import re
-from array import array
-from collections import Counter
-from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from ....arrays import Integers
 from ....errors import TrajectoryError
-from .._labels import unit_of
-from .._recording import Table, check_text, number, plain_numbers
+from .nexus_tables import nexus_head
+from .table_heads import COMMA_NUMBER, COMMENT, head_of, is_value, numbers
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons"}
-_MOST_LINES = 2_000_000
-"""Memory: lines of a table, more than an hour at 500 samples a second."""
-_MOST_FAULTS = 1000
-"""Entries of a column that are no numbers whose text is kept for messages."""
-_COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:,\d+)*(?:[eE][-+]?\d+)?")
-_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(?:,\d{3})+")
+BLANKS = " "
+"""The delimiter of columns with any number of blanks between them."""
+_HEAD_BYTES = 2**18
+"""Part of a text that is looked at before it is read."""
+_HEAD_ROWS = 12
+_SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)
+"""The first line of a table that a spreadsheet is told its separator by."""
+_COMMA_ENTRY = rb"\s*([-+]?\d*,\d+(?:,\d+)*(?:[eE][-+]?\d+)?)\s*"
+_PLAIN = re.compile(rb'(?:^|[;\t\n"])' + _COMMA_ENTRY + rb'(?=[;\t\n"]|$)')
+_QUOTED = re.compile(rb'(?:^|[,\n])\s*"' + _COMMA_ENTRY + rb'"(?=\s*[,\n]|$)')
+_THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(?:,\d{3})+")
+_GAPS = ["", "nan", "NaN", "NAN", "-nan", "-NaN"]
+"""Entries that are gaps; any other word is a fault."""
 
 
-def read_delimited(where: Path, data: bytes) -> Table:
-    """A table with a header that names the columns, separated by commas, tabs or semicolons.
+class _Layout(NamedTuple):
+    """Where the numbers of a text begin, and how they stand there.
 
-    Numbers have a decimal point, or all of them a decimal comma, where columns are separated by something else or
-    entries are quoted. A row of units may follow the header, and comments behind `#` come before it.
+    Attributes
+    ----------
+    names : of the columns
+    units : name -> unit
+    first : the line of the first sample, from 0
+    delimiter : between columns
+    rate : frames a second, where the header says it and no column has times
+    numbered : whether no names are there
+    """
+
+    names: tuple[str, ...]
+    units: dict[str, str]
+    first: int
+    delimiter: str
+    rate: float | None = None
+    numbered: bool = False
+
+
+def read_text(
+    where: Path, data: bytes, *, section: str | None = None, start: int = 0, delimiter: str | None = None
+) -> pd.DataFrame:
+    """A text table as a frame: columns as they are labelled there, its index the numbers of the lines.
+
+    Columns are separated by commas, tabs, semicolons or blanks; decimal points, or all of them commas. A header may
+    stand in the first row, behind `#` or `%`, in several rows as Vicon Nexus writes it, or nowhere; a row of units may
+    follow. The frame's `attrs` have what else the header says.
+
+    Parameters
+    ----------
+    section : which part of a file of Nexus with several of them
+    start : lines before the table
+    delimiter : between columns; None: by the header
 
     Raises
     ------
     TrajectoryError
-        For faults, with row and column.
+        For a row of another length than the header, with its number; for what is no text.
     """
-    check_lines(data, where)
-    comments = _comments(data)
-    delimiter = _delimiter(data, where, comments)
-    comma = _has_decimal_commas(data, delimiter, where, comments)
-    rows = _rows(data, delimiter, where, comments)
-    first = next(rows, None)
-    if first is None:
-        raise TrajectoryError(f"{where}: empty; a header `time,<joint names>` and rows of numbers are needed")
-    names = [name.strip() for name in first[1]]
+    text = unix_text(data, where)
+    layout = _layout(text, where, section, start, delimiter)
+    body = text.split(b"\n", layout.first)[-1] if layout.first else text
+    if section is not None or layout.rate is not None:
+        body = body.split(b"\n\n", 1)[0]
+    comma = _has_decimal_commas(body, layout, where)
+    names, lines = _checked_rows(body, layout, where)
+    frame = _parsed(body, names, layout.delimiter, comma=comma)
+    frame.index = lines
+    empty = frame.isna().all(axis=1).to_numpy()
+    frame = frame[~empty] if empty.any() else frame
     kind = "TSV" if where.suffix.lower() == ".tsv" else "CSV"
-    return text_table(where, kind, names, rows, comma=comma)
+    frame.attrs = {"format": kind, "units": layout.units, "comma": comma, "numbered": layout.numbered}
+    if layout.rate is not None:
+        frame.attrs["rate"] = layout.rate
+    return frame
 
 
-def check_lines(data: bytes, where: Path) -> None:
-    """Raise TrajectoryError for what is no text, or has too many lines."""
-    check_text(data, where)
-    lines = data.count(b"\n") + data.count(b"\r") - data.count(b"\r\n")
-    if lines > _MOST_LINES:
-        raise TrajectoryError(f"{where}: {lines} lines, up to {_MOST_LINES} are read; write fewer samples, or NPZ")
-
-
-def text_lines(data: bytes, where: Path) -> Iterator[tuple[int, str]]:
-    """The numbered lines of a text. Raises as `check_lines`, at once."""
-    check_lines(data, where)
-    return _lines(data)
-
-
-def text_table(
-    where: Path,
-    kind: str,
-    names: list[str],
-    rows: Iterable[tuple[int, list[str]]],
-    *,
-    row: str = "row",
-    comma: bool = False,
-    by_format: bool = False,
-    degrees: bool | None = False,
-) -> Table:
-    """The table of numbered rows of texts; what is no number is NaN there, and a fault.
-
-    Raises TrajectoryError for rows of another length, and for names that stand twice or are empty.
-    """
-    _check_header(names, where)
-    numbers: list[int] = []
-    # Packed doubles: lists of Python's numbers would take five times the file's size.
-    values = array("d")
-    faults: dict[str, dict[int, str]] = {}
-    units: dict[str, str] = {}
-    for label, entries in rows:
-        if len(entries) != len(names):
-            raise _length_error(where, f"{row} {label}", entries, names)
-        if not numbers and not units:
-            units = _units(names, entries)
-            if units:
-                continue
-        quick = None if comma else plain_numbers(entries)
-        if quick is None:
-            quick = [
-                _number(
-                    entry, f"{where}: {row} {label}, column {name!r}", faults.setdefault(name, {}), len(numbers), comma
-                )
-                for name, entry in zip(names, entries, strict=True)
-            ]
-        values.extend(quick)
-        numbers.append(label)
-    table = np.frombuffer(values, dtype=np.float64).reshape(-1, len(names))
-    return Table(
-        where=str(where),
-        format=kind,
-        columns={name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(names)},
-        rows=numbers,
-        row=row,
-        by_format=by_format,
-        degrees=degrees,
-        units=units,
-        faults=faults,
-    )
-
-
-def _number(entry: str, place: str, faults: dict[int, str], sample: int, comma: bool) -> float:
-    """A number, or NaN with its text among the faults."""
-    text = entry.strip()
-    if comma and "," in text and "." not in text and _COMMA_NUMBER.fullmatch(text) and text.count(",") == 1:
-        text = text.replace(",", ".")
-    elif comma and "." in text and re.fullmatch(r"[-+\d.,eE]+", text):
-        raise TrajectoryError(
-            f"{place}: {entry.strip()!r:.40} has a decimal point, and other entries have decimal commas; write all "
-            "in one way, without marks between thousands"
-        )
+def unix_text(data: bytes, where: Path) -> bytes:
+    """A text in UTF-8 whose lines end as in Unix, also of one in UTF-16 or Latin-1. Raises TrajectoryError."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        try:
+            data = data.decode("utf-16").encode()
+        except UnicodeError as error:
+            raise TrajectoryError(f"{where}: no UTF-16 text ({error}); save it as UTF-8") from None
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    zero = data.find(b"\0")
+    if zero >= 0:
+        raise TrajectoryError(f"{where}: byte {zero} is NUL, so this is no text; export the table as CSV in UTF-8")
     try:
-        return number(text, place)
-    except TrajectoryError:
-        if len(faults) < _MOST_FAULTS:
-            faults[sample] = entry[:60]
-        return np.nan
+        data.decode()
+    except UnicodeDecodeError:
+        data = data.decode("latin-1").encode()
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
-def _units(names: list[str], entries: list[str]) -> dict[str, str]:
-    """Name -> unit, where a row has nothing but units, and at least one."""
-    found = {
-        name: unit_of(entry.strip().strip("[]()")) for name, entry in zip(names, entries, strict=True) if entry.strip()
-    }
-    return {name: unit for name, unit in found.items() if unit is not None} if all(found.values()) else {}
+def _layout(text: bytes, where: Path, section: str | None, start: int, told: str | None) -> _Layout:
+    """Names, separator and first line, by the beginning of a text."""
+    lines = text[:_HEAD_BYTES].decode(errors="replace").split("\n")
+    place, comment = start, None
+    while place < len(lines) and (not lines[place].strip() or COMMENT.match(lines[place]) or place == start):
+        said = _SEPARATOR.fullmatch(lines[place].strip())
+        if said is not None:
+            told = said[1]
+        elif COMMENT.match(lines[place]):
+            comment = lines[place]
+        elif lines[place].strip():
+            break
+        place += 1
+    shown = [k for k in range(place, len(lines)) if lines[k].strip()][:_HEAD_ROWS]
+    if not shown:
+        raise TrajectoryError(f"{where}: empty; a header `time,<joint names>` and rows of numbers are needed")
+    nexus = nexus_head(text, lines, place, section, str(where))
+    if nexus is not None:
+        return _Layout(nexus.names, nexus.units, nexus.first, nexus.delimiter, rate=nexus.rate)
+    delimiter = told or _delimiter(lines[place], where)
+    rows = [split_line(lines[k], delimiter) for k in shown]
+    said = None if comment is None else split_line(COMMENT.sub("", comment, count=1).rstrip('"'), delimiter)
+    head = head_of(rows, said, str(where))
+    first = shown[head.skipped] if head.skipped < len(shown) else shown[-1] + 1
+    return _Layout(head.names, head.units, first, delimiter, numbered=head.numbered)
 
 
-def _length_error(where: Path, place: str, entries: list[str], names: list[str]) -> TrajectoryError:
-    said = f"{where}: {place} has {len(entries)} entries, the header {len(names)}"
-    if len(entries) == 2 * len(names) and all(entry.strip().lstrip("+-").isdigit() for entry in entries):
-        said += "; decimal commas between commas cannot be told apart, separate the columns by semicolons"
-    return TrajectoryError(said)
+def split_line(line: str, delimiter: str) -> list[str]:
+    """The entries of a line, without blanks around them."""
+    if delimiter == BLANKS:
+        return [entry.strip('"') for entry in line.split()]
+    if '"' not in line:
+        return [entry.strip() for entry in line.split(delimiter)]
+    return [entry.strip() for entry in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
 
 
-def _check_header(names: list[str], where: Path) -> None:
-    doubled = [name for name, count in Counter(names).items() if count > 1]
-    if doubled:
-        shown = ", ".join(name[:40] or "without a name" for name in doubled[:5])
-        raise TrajectoryError(f"{where}: column {shown} stands twice in the header")
-    if "" in names:
-        raise TrajectoryError(f"{where}: column {names.index('') + 1} has no name in the header")
-
-
-def _lines(data: bytes) -> Iterator[tuple[int, str]]:
-    yield from enumerate(io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig"), start=1)
-
-
-def _comments(data: bytes) -> int:
-    """How many lines at the top begin with `#`; none where the last of them is the header, with numbers below it."""
-    count = 0
-    for _, line in _lines(data):
-        if not line.startswith("#"):
-            return 0 if plain_numbers(re.split("[,;\t]", line.strip())) else count
-        count += 1
-    return count
-
-
-def _rows(data: bytes, delimiter: str, where: Path, comments: int) -> Iterator[tuple[int, list[str]]]:
-    """Rows below the comments that are not blank, each with the number of its last line."""
-    text = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8-sig", newline="")
-    for _ in range(comments):
-        text.readline()
-    reader = csv.reader(text, delimiter=delimiter, strict=True)
-    try:
-        for row in reader:
-            if any(entry.strip() for entry in row):
-                yield comments + reader.line_num, row
-    except csv.Error as error:
-        raise TrajectoryError(f"{where}: row {comments + reader.line_num}: {error}") from None
-
-
-def _delimiter(data: bytes, where: Path, comments: int) -> str:
-    header = next((text for number, text in _lines(data) if number > comments and text.strip()), "")
-    unquoted = re.sub(r'"[^"]*"', "", header)
-    found = [mark for mark in _DELIMITERS if mark in unquoted]
+def _delimiter(line: str, where: Path) -> str:
+    unquoted = re.sub(r'"[^"]*"', "", line)
+    found = [mark for mark in _DELIMITERS if mark in unquoted.strip(" ")]
     if where.suffix.lower() == ".tsv" and found != ["\t"]:
-        raise TrajectoryError(
-            f"{where}: the columns of a .tsv file are separated by tabs; the header reads {header!r:.80}"
-        )
+        raise TrajectoryError(f"{where}: the columns of a .tsv file are separated by tabs; it begins {line!r:.80}")
     if len(found) > 1:
+        others = [mark for mark in found if mark != "," and all(map(is_value, split_line(line, mark)))]
+        if len(others) == 1:
+            return others[0]
         kinds = " and ".join(_DELIMITERS[mark] for mark in found)
         raise TrajectoryError(
             f"{where}: the header has {kinds}, so it is unclear which separates the columns; use one of them only"
         )
-    return found[0] if found else ","
+    if found:
+        return found[0]
+    return BLANKS if len(unquoted.split()) > 1 else ","
 
 
-def _has_decimal_commas(data: bytes, delimiter: str, where: Path, comments: int) -> bool:
+def _has_decimal_commas(body: bytes, layout: _Layout, where: Path) -> bool:
     """Whether numbers have decimal commas. Raises TrajectoryError where these may as well be marks of thousands."""
-    if (b'"' if delimiter == "," else b",") not in data:
+    if (b'"' if layout.delimiter == "," else b",") not in body:
         return False
-    rows = _rows(data, delimiter, where, comments)
-    next(rows, None)
+    if layout.delimiter == BLANKS:
+        return any(COMMA_NUMBER.fullmatch(word) for word in body[:_HEAD_BYTES].decode(errors="replace").split())
     doubtful = None
-    for label, entries in rows:
-        for entry in entries:
-            text = entry.strip()
-            if "," not in text or not _COMMA_NUMBER.fullmatch(text):
-                continue
-            if text.count(",") == 1 and not _THOUSANDS.fullmatch(text):
-                return True
-            doubtful = doubtful or (label, text)
+    for found in (_QUOTED if layout.delimiter == "," else _PLAIN).finditer(body):
+        if found[1].count(b",") == 1 and not _THOUSANDS.fullmatch(found[1]):
+            return True
+        doubtful = doubtful or found
     if doubtful is not None:
+        row = layout.first + 1 + body.count(b"\n", 0, doubtful.start(1))
         raise TrajectoryError(
-            f"{where}: row {doubtful[0]}: {doubtful[1]!r:.40} may have a decimal comma or a mark of thousands, and no "
+            f"{where}: row {row}: {doubtful[1].decode()!r:.40} may have a decimal comma or a mark of thousands, and no "
             "other entry tells which; write numbers with a decimal point, and no marks of thousands"
         )
     return False
+
+
+def _checked_rows(body: bytes, layout: _Layout, where: Path) -> tuple[tuple[str, ...], Integers]:
+    """The names of all columns, and the numbers of the lines that pandas finds to be rows.
+
+    Raises TrajectoryError for a row of another length than the header: pandas would fill or shift it.
+    """
+    if b'"' in body:
+        counts, lines = _quoted_counts(body, layout.delimiter, where, layout.first)
+    else:
+        counts = _counts(body, layout.delimiter)
+        lines = layout.first + 1 + np.flatnonzero(counts)
+        counts = counts[counts > 0]
+    names, width = layout.names, len(layout.names)
+    if len(counts) and (counts == width + 1).all() and layout.delimiter != BLANKS:
+        last = body.rstrip(b"\n").rsplit(b"\n", 1)[-1].rstrip()
+        if last.endswith(layout.delimiter.encode()):
+            names, width = (*names, ""), width + 1
+    wrong = np.flatnonzero(counts != width)
+    if len(wrong):
+        raise _length_error(where, body, layout, int(lines[wrong[0]]), int(counts[wrong[0]]))
+    return names, lines
+
+
+def _counts(body: bytes, delimiter: str) -> Integers:
+    """Entries of each line, 0 of an empty one."""
+    body = body if body.endswith(b"\n") else body + b"\n"
+    codes = np.frombuffer(body, dtype=np.uint8)
+    ends = np.flatnonzero(codes == ord("\n"))
+    if delimiter == BLANKS:
+        blank = (codes == ord(" ")) | (codes == ord("\t")) | (codes == ord("\n"))
+        starts = np.flatnonzero(~blank[1:] & blank[:-1]) + 1
+        starts = np.append(np.arange(int(not blank[0])), starts)
+        return np.diff(np.searchsorted(starts, ends), prepend=0)
+    counts = np.diff(np.searchsorted(np.flatnonzero(codes == ord(delimiter)), ends), prepend=0) + 1
+    lengths = np.diff(ends, prepend=-1) - 1
+    for k in np.flatnonzero((counts == 1) | (counts != counts[0])).tolist():
+        if not body[ends[k] - lengths[k] : ends[k]].strip(b" \t"):
+            counts[k] = 0
+    return counts
+
+
+def _quoted_counts(body: bytes, delimiter: str, where: Path, first: int) -> tuple[Integers, Integers]:
+    """Entries of each row of a text with quotes, in which lines may break, and its line, by Python's reader."""
+    found, lines = [], []
+    reader = csv.reader(
+        io.StringIO(body.decode(), newline=""), delimiter=delimiter, strict=True, skipinitialspace=delimiter == BLANKS
+    )
+    try:
+        for row in reader:
+            if row:
+                found.append(len(row))
+                lines.append(first + reader.line_num)
+    except csv.Error as error:
+        raise TrajectoryError(f"{where}: row {first + reader.line_num}: {error}; close the quotation marks") from None
+    return np.array(found, dtype=np.int64), np.array(lines, dtype=np.int64)
+
+
+def _length_error(where: Path, body: bytes, layout: _Layout, line: int, count: int) -> TrajectoryError:
+    said = f"{where}: row {line} has {count} entries, the header {len(layout.names)}"
+    entries = body.split(b"\n")[line - layout.first - 1].decode(errors="replace").split(layout.delimiter)
+    if count == 2 * len(layout.names) and all(entry.strip().lstrip("+-").isdigit() for entry in entries):
+        return TrajectoryError(
+            f"{said}; decimal commas between commas cannot be told apart, separate the columns by semicolons"
+        )
+    return TrajectoryError(f"{said}; write one entry for each name, and leave a cell empty where nothing was recorded")
+
+
+def _parsed(body: bytes, names: tuple[str, ...], delimiter: str, *, comma: bool) -> pd.DataFrame:
+    """The columns as pandas reads them, by their labels: numbers where all entries are, else texts."""
+    import pandas as pd
+
+    frame = pd.read_csv(
+        io.BytesIO(body),
+        sep=r"\s+" if delimiter == BLANKS else delimiter,
+        header=None,
+        names=list(numbers(len(names))),
+        index_col=False,
+        decimal="," if comma else ".",
+        keep_default_na=False,
+        na_values=_GAPS,
+        skipinitialspace=True,
+        low_memory=False,
+        **exact_numbers(),
+    )
+    frame.columns = list(names)
+    return frame
+
+
+def exact_numbers() -> dict[str, Any]:
+    """What has pandas read decimals to the nearest double: from 3.1 on it always does."""
+    import pandas as pd
+
+    major, minor = (int(part) for part in pd.__version__.split(".")[:2])
+    return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}

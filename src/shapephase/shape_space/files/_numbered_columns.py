@@ -1,0 +1,75 @@
+"""Tables without a header: which column is which, by how many there are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ...arrays import Array
+from ...body.body import Body
+from ...errors import TrajectoryError
+from ._nameless_joints import FREE_JOINT, nameless_joints
+from ._recording import Table, warn
+
+_TUM = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
+"""A pose as trajectories of visual odometry have it, behind the time (TUM RGB-D benchmark)."""
+_FREE = ("base_x", "base_y", "base_z", "base_qw", "base_qx", "base_qy", "base_qz")
+"""A free joint of MuJoCo."""
+_OFF_UNIT = 1e-3
+
+
+def named_columns(
+    table: Table, body: Body, names: Mapping[str, str | None], order: str | None, timestep: float | None
+) -> Table:
+    """A table whose columns have names, where `names` does not number them.
+
+    A first column that ascends has the times. Behind it are as many columns as joints, in an order of simulators, or
+    these behind a free joint, or a place and a quaternion x y z w; this is said.
+
+    Raises
+    ------
+    TrajectoryError
+        If the number of columns fits nothing, or fits two of these.
+    """
+    if not table.numbered or any(label in table.columns for label in names):
+        return table
+    values = list(table.columns.values())
+    has_times = timestep is None and len(values[0]) > 1 and bool((np.diff(values[0]) > 0.0).all())
+    first = ("time",) if has_times else ()
+    rest = values[len(first) :]
+    found, meant = None, None
+    try:
+        found = nameless_joints(body, len(rest), f"{table.where}: the table without a header", order)
+    except TrajectoryError as error:
+        if not _is_pose(rest):
+            raise TrajectoryError(_ways(body, len(values), str(error))) from None
+    if _is_pose(rest):
+        if found is not None:
+            raise TrajectoryError(
+                f"{table.where}: {len(values)} columns without a header may be {len(rest)} joints, or a place and a "
+                "quaternion; write a header, or say which: --names 1=time 2=base_x (names=['time', 'base_x', ...])"
+            )
+        meant = _TUM
+    elif found is not None:
+        meant = (*_FREE[: found.free], *found.names)
+    assert meant is not None
+    columns = dict(zip((*first, *meant), values, strict=True))
+    warn(f"{table.where}: no header; columns are taken for {', '.join(columns)}: a header would say so")
+    faults = {new: table.faults.get(old, {}) for old, new in zip(table.columns, columns)}
+    return replace(table, columns=columns, faults=faults, units={}, numbered=False, nameless=found)
+
+
+def _is_pose(values: list[Array]) -> bool:
+    if len(values) != FREE_JOINT:
+        return False
+    return bool((np.abs(np.linalg.norm(np.stack(values[3:]), axis=0) - 1.0) < _OFF_UNIT).all())
+
+
+def _ways(body: Body, count: int, why: str) -> str:
+    joints = ",".join(body.joint_names[:2])
+    return (
+        f"{why}. There are {count} columns and no header: write one, `time,{joints}...`, or name the columns by their "
+        f"numbers: --names 1=time 2={next(iter(body.joint_names), 'base_x')} (names={{'1': 'time', ...}})"
+    )
