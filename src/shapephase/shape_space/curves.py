@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +15,6 @@ from ..arguments import check_picklable
 from ..arrays import Array, Integers, check_reach, lock_arrays, read_only, real_array
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
-
-if TYPE_CHECKING:
-    from .closing_arc import ClosingArc
-    from .shape_path import ShapePath
 
 CLOSED = 1e-9
 """[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
@@ -98,46 +94,16 @@ class Fourier:
 Interpolation = Literal["not-a-knot", "periodic", "rest to rest"]
 
 
-class SampleOrigin(Protocol):
-    """How values at the knots of a path follow from recorded samples that were closed, smoothed or resampled."""
-
-    @property
-    def samples(self) -> Array:
-        """As recorded: (N, n) [rad or m]."""
-        ...
-
-    @property
-    def bias(self) -> Array:
-        """What smoothing took off the motion, as far as it is known: (knots, n) [rad or m]."""
-        ...
-
-    def path(self, samples: Array, /) -> ShapePath:
-        """What the same steps make of other samples (N, n)."""
-        ...
-
-    def by_samples(self, by_values: Array, /) -> Array:
-        """From m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
-        ...
-
-    def bias_by_samples(self, by_values: Array, /) -> Array:
-        """From m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial:
     """sum_p coefficients[p, i] (t - knots[i])^p on the i-th interval; coefficients (order, pieces, n).
 
     `through`: by which rule the polynomials follow from their values at the knots; None: by none.
-    `origin`: how these values follow from samples; None: they are the samples.
-    `arc`: the geodesic that the last of the polynomials are, behind a path that follows from samples; None: none.
     """
 
     knots: Array
     coefficients: Array
     through: Interpolation | None = None
-    origin: SampleOrigin | None = None
-    arc: ClosingArc | None = None
 
     __repr__ = short_repr
 

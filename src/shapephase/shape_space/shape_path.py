@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,6 +51,14 @@ from .scan.scanning import scanned
 _WHOLE_TURN = 2.0 * np.pi
 
 
+class PathOrigin(Protocol):
+    """How a path follows from recorded samples that were smoothed, resampled or closed."""
+
+    def path(self, samples: Array, /) -> ShapePath:
+        """Return the path that the same steps make of other samples (N, n)."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class ShapePath:
     """A motion of the joints, r(t) on [0, duration].
@@ -71,6 +79,7 @@ class ShapePath:
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
     scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
+    origin : how it follows from recorded samples; None: these are the values at its knots, or there are none
 
     Examples
     --------
@@ -90,6 +99,7 @@ class ShapePath:
     sha256: str | None = None
     record: Mapping[str, Any] | None = None
     scanner: Callable[[], FunctionScan] | None = None
+    origin: PathOrigin | None = None
     _seen: KeptValues = field(default_factory=KeptValues, init=False, repr=False)
 
     __post_init__ = lock_arrays
@@ -307,7 +317,7 @@ class ShapePath:
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
         curve = Reversed(self.curve, self.duration)
-        return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"))
+        return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"), origin=None)
 
     def stretched(self, factor: float) -> ShapePath:
         """The same shapes, `factor` times as slowly."""
@@ -317,7 +327,7 @@ class ShapePath:
         breaks[-1] = duration
         curve = Stretched(self.curve, scale, self.duration)
         scanner = DerivedScan(self, "stretched", (scale,))
-        return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner)
+        return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner, origin=None)
 
     def then(self, other: ShapePath) -> ShapePath:
         """This path, and after it another.
@@ -378,9 +388,14 @@ class ShapePath:
         if self.smooth_loop:
             breaks = breaks[[0, -1]]
         curve = Repeated(self.curve, self.duration, int(count), turns)
-        loops = self.loops * int(count)
         return replace(
-            self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops, scanner=DerivedScan(self)
+            self,
+            curve=curve,
+            duration=count * self.duration,
+            breaks=breaks,
+            loops=self.loops * int(count),
+            scanner=DerivedScan(self),
+            origin=None,
         )
 
     @cached_property
@@ -436,6 +451,17 @@ class ShapePath:
         shapes, rates = self.curve(times.ravel())
         expected_shape = (*times.shape, self.n_shape)
         return shapes.reshape(expected_shape), rates.reshape(expected_shape)
+
+
+def interpolated(
+    knots: Array, values: Array, through: Interpolation | None, joint_names: Sequence[str] | None = None
+) -> ShapePath:
+    """Return the path of the kind `through` with values at its knots; those of a periodic one without the last."""
+    if through == "rest to rest":
+        return ShapePath.waypoints(knots, values, joint_names=joint_names)
+    periodic = through == "periodic"
+    whole = np.concatenate([values, values[:1]]) if periodic else values
+    return ShapePath.spline(knots, whole, periodic, joint_names=joint_names)
 
 
 def _piecewise(
