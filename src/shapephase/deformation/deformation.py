@@ -503,7 +503,7 @@ def particles(
         if duration is not None and abs(positive_argument(duration) - length) > 1e-9 * length:
             raise ShapeError(f"duration: the samples last {length:.9g} s, got {what_came(duration)}; leave it out")
         edges = np.union1d(path.breaks, breaks_argument(breaks, length))
-        description = ParticleDescription(weights, ParticlePath(path), edges, path.oscillations)
+        description = ParticleDescription(weights, ParticlePath(path), edges, path.swings.most)
     ends, _ = description.centred(np.array([0.0, length]))
     turn = _best_turn(weights, ends[0], ends[1])
     radius = float(np.max(np.linalg.norm(ends[0], axis=-1)))

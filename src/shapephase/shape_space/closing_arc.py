@@ -61,7 +61,7 @@ class ClosingArc:
         """The path with the way back at its end."""
         curve, opened = self.curve, self.opened
         duration = float(curve.knots[-1])
-        return ShapePath(curve, duration, curve.knots, opened.n_shape, opened.joint_names, 0.5, origin=self)
+        return ShapePath(curve, duration, curve.knots, opened.n_shape, opened.joint_names, origin=self)
 
     def path(self, samples: Array) -> ShapePath:
         """Return the closed path of other samples, as `PathOrigin`; it makes the same whole turns."""

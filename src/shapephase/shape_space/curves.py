@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import Any, Literal, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +34,25 @@ class Curve(Protocol):
     def __call__(self, times: Array, /) -> tuple[Array, Array]:
         """Shapes and their rates."""
         ...
+
+
+class Swings(NamedTuple):
+    """How fast a curve can change, known before it is sampled.
+
+    Attributes
+    ----------
+    most : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
+    smooth_loop : whether it also goes smoothly from its end to its start
+    """
+
+    most: float | None = None
+    smooth_loop: bool = False
+
+
+def most_swings(counts: Sequence[float | None]) -> float | None:
+    """Return the largest of some upper bounds; None where one is unknown."""
+    known = [count for count in counts if count is not None]
+    return max(known, default=0.0) if len(known) == len(counts) else None
 
 
 class KeptValues:
@@ -82,6 +101,16 @@ class Fourier:
         n_shape = len(self.mean)
         return both[:, :n_shape] + self.mean, both[:, n_shape:]
 
+    @property
+    def occupied(self) -> Integers:
+        """The harmonics whose coefficients are not all zero, ascending."""
+        return 1 + np.flatnonzero(np.any((self.cosines != 0.0) | (self.sines != 0.0), axis=0))
+
+    @property
+    def swings(self) -> Swings:
+        """As often as the highest harmonic."""
+        return Swings(float(self.occupied.max(initial=0)), smooth_loop=True)
+
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
         """Angular frequencies (k,) [rad/s]; of the cosines and sines in the shapes and in the rates (2 k, 2 n)."""
@@ -104,6 +133,7 @@ class PiecewisePolynomial:
     knots: Array
     coefficients: Array
     through: Interpolation | None = None
+    swings: ClassVar[Swings] = Swings(0.5)
 
     __repr__ = short_repr
 
@@ -355,3 +385,15 @@ class Repeated:
         loop = np.searchsorted(starts, times, side="right") - 1
         shapes, rates = self.curve(np.minimum(times - starts[loop], self.period))
         return shapes + loop[:, None] * self.turns, rates
+
+
+def swings_of(curve: Curve) -> Swings:
+    """Return how fast a curve can change; of one that is smooth over all its loops, over the whole of it."""
+    if isinstance(curve, Joined):
+        return Swings(most_swings([swings_of(curve.first).most, swings_of(curve.second).most]))
+    if isinstance(curve, Repeated):
+        loop = swings_of(curve.curve)
+        return loop._replace(most=loop.most * curve.count) if loop.smooth_loop and loop.most else loop
+    if isinstance(curve, Reversed | Stretched | Reordered | Multiplied | Widened):
+        return swings_of(curve.curve)
+    return getattr(curve, "swings", Swings())

@@ -86,6 +86,6 @@ def _farthest(path: ShapePath) -> float:
 def _looked_at(path: ShapePath) -> Array:
     if isinstance(path.curve, PiecewisePolynomial):
         return path.breaks
-    if path.oscillations is not None:
+    if path.swings.most is not None:
         return evenly_divided(panel_edges(path), _LOOKS_OF_A_SWING)
     return path.duration / path.loops * np.mod(0.6180339887498949 * np.arange(_LOOKS), 1.0)
