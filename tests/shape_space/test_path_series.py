@@ -9,7 +9,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.errors import TrajectoryError, TrajectoryWarning
-from shapephase.shape_space._path_series import panel_edges
+from shapephase.shape_space.path_series import panel_edges
 
 CAT = sp.load_body("cat_two_halves")
 NAMES = CAT.joint_names

@@ -17,11 +17,12 @@ from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError, WrongO
 from ..inertia_tensor import second_moment
 from ..integrator.smoothness import Smoothness
 from ..letters import what_came
+from ..refinement import least_over
 from ..shape_space.curves import Swings, most_swings
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import CLOSED, ShapePath
-from ._physical_validity import check_never_on_a_line, check_triangle, least_over
+from ._physical_validity import check_never_on_a_line, check_triangle
 from ._scanned_functions import least_moment
 from .assembly_parts import Boom, Moments, MovingMass, Part, RigidPart
 from .deformation import Deformation

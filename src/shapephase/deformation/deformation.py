@@ -30,13 +30,14 @@ from ..integrator.interpolant import Interpolant
 from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler
 from ..letters import what_came
+from ..refinement import least_over
 from ..shape_space.body_path import path_gap
 from ..shape_space.family_variants import FamilyVariants
 from ..shape_space.scan.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ..shape_space.unit_doubts import followed_by
 from ._card import deformation_card
-from ._physical_validity import check_never_on_a_line, check_triangle, least_over
+from ._physical_validity import check_never_on_a_line, check_triangle
 from .descriptions import (
     ArticulatedDescription,
     Description,

@@ -18,8 +18,8 @@ from ..body.couplings.ball_joints import BallJoint
 from ..body.couplings.coordinate_map import CoordinateMap
 from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryError
-from ._path_series import merged, panel_edges, resolved_series
 from .curves import Curve, PiecewisePolynomial
+from .path_series import merged, panel_edges, resolved_series
 from .shape_path import ShapePath
 
 _ROUNDING = 64.0 * np.finfo(float).eps

@@ -25,7 +25,6 @@ from ..integrator.smoothness import Smoothness
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
 from ._card import shape_path_card
-from ._path_series import spline_times
 from .ball_columns import ball_columns, factors_between, neighbours_signs
 from .curves import (
     CLOSED,
@@ -45,6 +44,7 @@ from .curves import (
     returned_pair,
     swings_of,
 )
+from .path_series import spline_times
 from .scan._derived_scan import DerivedScan, JoinedScan
 from .scan._rate_check import check_rates
 from .scan.function_scan import FunctionScan, path_function

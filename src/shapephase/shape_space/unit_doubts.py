@@ -10,9 +10,9 @@ from ..arrays import Array
 from ..body.body import Body
 from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryWarning
-from ._path_series import evenly_divided, panel_edges
 from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import route_along
+from .path_series import evenly_divided, panel_edges
 from .shape_path import ShapePath
 
 DEGREE = np.pi / 180.0
