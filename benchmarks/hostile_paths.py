@@ -171,7 +171,7 @@ def _broken(
         pieces[1, 2, joints] += 2.0 * rate * support
     else:
         pieces[0, 1, joints] += amplitudes
-    return sp.ShapePath(PiecewisePolynomial(knots, pieces), duration, knots, n, None, 0.5)
+    return sp.ShapePath(PiecewisePolynomial(knots, pieces), duration, knots, n)
 
 
 def _binomial(n: int, k: int) -> float:

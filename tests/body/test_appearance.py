@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.body import _drawing_limits, catalog
 from shapephase.body import appearance as visuals
+from shapephase.body import catalog, drawing_limits
 from shapephase.body.appearance import inertia_box
 from shapephase.errors import VisualWarning
 from support.bodies import BODIES, joint, link, random_shapes, urdf
@@ -550,7 +550,7 @@ def reach_of(shapes, directions):
 def test_more_triangles_than_a_page_holds_are_drawn_as_hulls(tmp_path, monkeypatch, rng, flat):
     """1,280 triangles each; the hull of some points of a ball reaches at least as far as 0.97 of its radius."""
     body = crowd(tmp_path, 6, 2, flat=flat)
-    monkeypatch.setattr(_drawing_limits, "_MOST_FACES", 5_000)
+    monkeypatch.setattr(drawing_limits, "_MOST_FACES", 5_000)
     with pytest.warns(VisualWarning, match="meshes are drawn as their convex hulls: all have 15360 triangles together"):
         shapes = visuals.visuals(body)
     assert len(shapes) == 13
@@ -569,14 +569,14 @@ def test_more_triangles_than_a_page_holds_are_drawn_as_hulls(tmp_path, monkeypat
         assert drawn.is_watertight
         assert 0.9 < drawn.volume / (4.0 / 3.0 * np.pi * 1e-3) < 1.0
     directions = so3.normalised(rng.normal(size=(50, 3))).T
-    monkeypatch.setattr(_drawing_limits, "_MOST_FACES", 10**9)
+    monkeypatch.setattr(drawing_limits, "_MOST_FACES", 10**9)
     whole = visuals.visuals(body)
     np.testing.assert_allclose(reach_of(shapes[:12], directions), reach_of(whole[:12], directions), rtol=0.03)
 
 
 def test_more_shapes_than_a_page_holds_are_drawn_as_one_hull(tmp_path, monkeypatch):
     body = crowd(tmp_path, 30, kind="ball")
-    monkeypatch.setattr(_drawing_limits, "_MOST_SHAPES", 20)
+    monkeypatch.setattr(drawing_limits, "_MOST_SHAPES", 20)
     with pytest.warns(VisualWarning, match="1 links, 'a' first, are drawn as the hull of what they show: .* 31 shapes"):
         hull, ball = visuals.visuals(body)
     assert (hull.link, hull.kind, ball.kind) == ("a", "mesh", "sphere")

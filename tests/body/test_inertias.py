@@ -12,10 +12,10 @@ from benchmarks.body_leaf import extent, random_body
 
 import shapephase as sp
 from shapephase.body._changed_body import changed_body
-from shapephase.body._link_motions import link_motions
 from shapephase.body.body import Body
 from shapephase.body.family import BodyFamily
 from shapephase.body.inertial_regressor import by_link_parameters, inertial_regressor, parameters
+from shapephase.body.link_motions import link_motions
 from shapephase.body.link_rows import link_rows
 from shapephase.errors import ShapeError, UnknownNameError, UnphysicalInertiaError, UnphysicalInertiaWarning
 from support.bodies import joint, link, random_shapes, urdf

@@ -48,7 +48,7 @@ def test_the_estimate_holds_in_the_middle_of_the_loop(name, joint, harmonics, mo
 def test_a_loop_of_multiples_is_the_shorter_loop_repeated():
     body = sp.load_body("cat")
     path = loop_of(body, "waist_yaw", {4: 0.5, 8: 0.2})
-    assert (path.loops, path.oscillations) == (4, 2.0)
+    assert (path.loops, path.swings.most) == (4, 2.0)
     quarter = loop_of(body, "waist_yaw", {1: 0.5, 2: 0.2}).stretched(0.25)
     once = sp.reconstruct(sp.articulated(body, quarter), np.zeros(3))
     whole = sp.reconstruct(sp.articulated(body, path), np.zeros(3))

@@ -11,7 +11,7 @@ import casadi
 import numpy as np
 import pytest
 
-from shapephase.optimal_control._solver_callback import BestIterate, heard_interrupts, ipopt_callback
+from shapephase.optimal_control.solver_callback import BestIterate, heard_interrupts, ipopt_callback
 
 
 def test_the_cheapest_of_the_nearly_feasible_is_kept():

@@ -20,7 +20,7 @@ from shapephase.integrator.curve_integrals import curve_integrals
 from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.stepped import SteppedRotation
 from shapephase.phases import arc_phases, running_phases
-from shapephase.phases._momentum_curve import momentum_curve
+from shapephase.phases.momentum_curve import momentum_curve
 from support.compiler import needs_compiler
 from support.independent import BODIES, apart, body_of, random_loop, random_vector
 from support.series_motion import sampler_of_series

@@ -489,9 +489,9 @@ def test_a_path_is_stretched_by_a_positive_number(factor):
 def test_how_fast_a_path_may_swing_is_unknown_when_a_part_of_it_is():
     known = ShapePath.waypoints([0, 1], [[0.0], [0.0]])
     unknown = ShapePath.function(lambda t: (np.zeros((len(t), 1)),) * 2, 1.0)
-    assert known.then(known).oscillations is not None
-    assert known.then(unknown).oscillations is None
-    assert unknown.then(known).oscillations is None
+    assert known.then(known).swings.most is not None
+    assert known.then(unknown).swings.most is None
+    assert unknown.then(known).swings.most is None
 
 
 def test_names_survive_all_this():

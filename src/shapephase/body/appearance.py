@@ -21,9 +21,9 @@ from ..arrays import Array, Integers
 from ..display import short_repr
 from ..errors import InputFileNotFoundError, MissingExtraError, ModelFileError, VisualWarning
 from ..inertia_tensor import principal_axes, second_moment
-from ._drawing_limits import within_limits
 from .body import Body, MovingPart
 from .catalog import example_folder
+from .drawing_limits import within_limits
 from .engines.engine_tree import engine_shapes, expanded
 from .engines.formats import MJCF, format_of
 from .formats.urdf import macro_of, rpy_matrix

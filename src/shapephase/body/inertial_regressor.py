@@ -13,8 +13,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._link_motions import LinkMotions, components, cross, link_motions
 from .joint_chain import JointChain
+from .link_motions import LinkMotions, components, cross, link_motions
 
 PARAMETERS = 10
 """Of a link, in its axes and about the centre of mass that it has in the body the matrices were made for: mass [kg],

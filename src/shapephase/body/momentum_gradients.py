@@ -11,8 +11,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._link_motions import LinkMotions, components, cross, link_motions
 from .joint_chain import JointChain
+from .link_motions import LinkMotions, components, cross, link_motions
 
 
 def by_shape_and_rate(

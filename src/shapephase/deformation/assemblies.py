@@ -17,10 +17,12 @@ from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError, WrongO
 from ..inertia_tensor import second_moment
 from ..integrator.smoothness import Smoothness
 from ..letters import what_came
+from ..refinement import least_over
+from ..shape_space.curves import Swings, most_swings
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import CLOSED, ShapePath
-from ._physical_validity import check_never_on_a_line, check_triangle, least_over
+from ._physical_validity import check_never_on_a_line, check_triangle
 from ._scanned_functions import least_moment
 from .assembly_parts import Boom, Moments, MovingMass, Part, RigidPart
 from .deformation import Deformation
@@ -49,15 +51,15 @@ class AssemblyDescription(UngaugedDescription):
     parts : each with its moments
     origin : (3,) a point near the common centre of mass; sums are taken about it, which saves digits
     breaks : (M,) that were declared [s]
-    oscillations, loops, smooth_loop : as `Smoothness` has them
+    swings : how fast all paths together can change
+    loops : the interval is its first part, this many times
     """
 
     parts: tuple[Part, ...]
     origin: Array
     breaks: Array
-    oscillations: float | None
+    swings: Swings
     loops: int
-    smooth_loop: bool
 
     @property
     def mass(self) -> float:
@@ -113,7 +115,7 @@ class AssemblyDescription(UngaugedDescription):
 
     @cached_property
     def _scan(self) -> FunctionScan | None:
-        if self.oscillations is not None:
+        if self.swings.most is not None:
             return None
         period = self.breaks[-1] / self.loops
         return scanned(self.depends_on(), self.breaks[self.breaks <= period * (1.0 + 1e-12)])
@@ -144,9 +146,9 @@ class AssemblyDescription(UngaugedDescription):
         scan = self.scan
         return Smoothness(
             breaks=breaks,
-            oscillations=self.oscillations,
+            oscillations=self.swings.most,
             loops=self.loops,
-            smooth_loop=self.smooth_loop,
+            smooth_loop=self.swings.smooth_loop,
             resolved=scan.resolved if scan is not None else None,
         )
 
@@ -313,16 +315,14 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     breaks = np.unique(np.concatenate([[0.0], *inner, [length]]))
     loops = {path.loops for path in paths}
     together = len(loops) == 1
-    swings = [path.oscillations and path.oscillations * (1 if together else path.loops) for path in paths]
-    known = None if None in swings else max((swing for swing in swings if swing is not None), default=0.0)
+    swings = [path.swings.most and path.swings.most * (1 if together else path.loops) for path in paths]
     count = loops.pop() if together else 1
     about_zero = AssemblyDescription(
         parts=everything,
         origin=np.zeros(3),
         breaks=breaks,
-        oscillations=known,
+        swings=Swings(most_swings(swings), all(path.swings.smooth_loop for path in paths)),
         loops=count,
-        smooth_loop=all(path.smooth_loop for path in paths),
     )
     description = replace(about_zero, origin=about_zero.centre_of_mass(np.zeros(1))[0])
     check_never_on_a_line(description.moment, breaks)
@@ -339,5 +339,4 @@ def _columns(path: ShapePath, count: int, whose: str) -> ShapePath:
     if np.abs(path.gap).max() <= CLOSED:
         return path
     # A path of joints that advances by 2 pi in every loop is a loop; one of metres is not.
-    swings = None if path.oscillations is None else path.oscillations * path.loops
-    return replace(path, oscillations=swings, loops=1, smooth_loop=False)
+    return replace(path, loops=1)

@@ -30,13 +30,14 @@ from ..integrator.interpolant import Interpolant
 from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler
 from ..letters import what_came
+from ..refinement import least_over
 from ..shape_space.body_path import path_gap
 from ..shape_space.family_variants import FamilyVariants
 from ..shape_space.scan.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ..shape_space.unit_doubts import followed_by
 from ._card import deformation_card
-from ._physical_validity import check_never_on_a_line, check_triangle, least_over
+from ._physical_validity import check_never_on_a_line, check_triangle
 from .descriptions import (
     ArticulatedDescription,
     Description,
@@ -503,7 +504,7 @@ def particles(
         if duration is not None and abs(positive_argument(duration) - length) > 1e-9 * length:
             raise ShapeError(f"duration: the samples last {length:.9g} s, got {what_came(duration)}; leave it out")
         edges = np.union1d(path.breaks, breaks_argument(breaks, length))
-        description = ParticleDescription(weights, ParticlePath(path), edges, path.oscillations)
+        description = ParticleDescription(weights, ParticlePath(path), edges, path.swings.most)
     ends, _ = description.centred(np.array([0.0, length]))
     turn = _best_turn(weights, ends[0], ends[1])
     radius = float(np.max(np.linalg.norm(ends[0], axis=-1)))

@@ -223,4 +223,4 @@ def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> Shap
     ordered = path.matched(others, f"{body.name} without {', '.join(left_out)}")
     columns = np.array([body.joint_index(name) for name in others], dtype=int)
     curve = Widened(ordered.curve, columns, body.n_shape)
-    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names, scanner=None)
+    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names, scanner=None, origin=None)

@@ -224,9 +224,7 @@ def _path_of(swing: _Swing, found: DrivenAttitude, breaks: Array, tolerance: flo
                 "path; loosen the tolerance or shorten the motion"
             )
         knots = np.sort(np.concatenate([knots, 0.5 * (knots[:-1] + knots[1:])]))
-    return ShapePath(
-        curve, float(knots[-1]), knots, swing.body.n_shape, swing.body.joint_names, oscillations=0.5
-    )  # fmt: skip
+    return ShapePath(curve, float(knots[-1]), knots, swing.body.n_shape, swing.body.joint_names)
 
 
 def _all_joints(swing: _Swing, found: DrivenAttitude, times: Array, knots: Array) -> tuple[Array, Array, Array]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ..display import short_repr
 from ..errors import TrajectoryError, unknown_name
 from ..phases.return_map import closed_orbits
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.curves import Curve, Swings
 from ..shape_space.shape_path import ShapePath
 from .dives import diver_twist, five_stage_dive
 
@@ -91,7 +93,7 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0, *, body: str = 
             f"0 <= alpha < beta < {words} [rad] is needed, got alpha = {alpha:.9g}, beta = {beta:.9g}"
         )
     curve = _KaneScher(float(alpha), float(beta), float(duration), angles=len(joints))
-    return replace(_loop(curve, duration, joints), smooth_loop=True)
+    return _loop(curve, duration, joints)
 
 
 def cat_righting(duration: float = 2.0) -> ShapePath:
@@ -336,6 +338,7 @@ class _KaneScher:
     beta: float
     duration: float
     angles: int
+    swings: ClassVar[Swings] = Swings(4.0, smooth_loop=True)
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         frequency = 2.0 * np.pi / self.duration
@@ -362,6 +365,7 @@ class _CatRighting:
     largest_bend: float = 1.75867609613
     tail_share: float = 0.387753066315
     twist: float = 0.0
+    swings: ClassVar[Swings] = Swings(4.0)
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         x = times / self.duration
@@ -450,9 +454,9 @@ def _bent(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
     return np.stack([pitch, yaw], axis=-1), np.stack([pitch_rate, yaw_rate], axis=-1)
 
 
-def _loop(curve: Callable[[Array], tuple[Array, Array]], duration: float, names: tuple[str, ...]) -> ShapePath:
+def _loop(curve: Curve, duration: float, names: tuple[str, ...]) -> ShapePath:
     period = positive_argument(duration)
-    return ShapePath(curve, period, np.array([0.0, period]), len(names), names, oscillations=4.0)
+    return ShapePath(curve, period, np.array([0.0, period]), len(names), names)
 
 
 def _one_harmonic(name: str, duration: float, joints: Mapping[str, tuple[float, ...]]) -> ShapePath:

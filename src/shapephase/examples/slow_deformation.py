@@ -19,7 +19,7 @@ from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, unknown_name
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
-from ..rigid_body._momentum_orbit import separatrix_solid_angle
+from ..rigid_body import separatrix_solid_angle
 from ..rigid_body.euler_top import EulerTop
 from ._closed_form_motions import Example, diagonal, positive
 

@@ -16,13 +16,13 @@ from ._path_cost import path_cost
 from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._reduced import ReducedProgram
-from ._solver_callback import IterationCallback
 from ._spline_basis import SplineBasis
 from ._via_rows import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control
 from .plan import Start
 from .plan_options import Search
+from .solver_callback import IterationCallback
 from .task import Reorientation
 
 # How often pieces are halved where the search ends at a path whose motion misses the goal: fast joints need finer ones.

@@ -17,11 +17,11 @@ from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits
 from ._polish import end_conditions, goal_derivative, movable_points
-from ._solver_callback import BestIterate, IterationCallback
 from ._spline_basis import SplineBasis
 from ._via_rows import open_points, via_rows
 from .collocation import NlpSolution
 from .guesses.loops import start_metric
+from .solver_callback import BestIterate, IterationCallback
 from .symbolic import symbolic_body
 from .task import COSTS, Reorientation
 

@@ -23,7 +23,6 @@ from ._certificates import hamiltonian_spread
 from ._local_search import Attempt, LocalSearch, corrected_attempt, guessed_attitudes, polished_path
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
 from ._reduced import check_reducible
-from ._solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
@@ -31,6 +30,7 @@ from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
 from .plan import Plan, Progress
 from .plan_options import Goal, Limits, Search, goal_argument
+from .solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
 from .task import Reorientation, reorientation
 from .waypoints import Waypoint
 

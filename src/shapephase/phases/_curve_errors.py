@@ -17,8 +17,8 @@ from ..arrays import Array, Integers
 from ..integrator.lift import Lift
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
-from ._momentum_curve import MomentumCurve
 from .error_estimates import ArcErrors, RunningErrors, SplitErrors
+from .momentum_curve import MomentumCurve
 
 # Of what finer steps show, which is the error of steps but for a part in two hundred, and of what the perturbed series
 # shows, which is larger than what is missing.

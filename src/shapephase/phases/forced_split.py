@@ -17,7 +17,7 @@ from ..display import short_repr
 from ..errors import AccuracyNotReached, GaugeError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..refinement import halved, settled
-from ._momentum_curve import Gauge
+from .momentum_curve import Gauge
 
 # Of the largest momentum: below, or where its error is this share of it, it has no direction.
 _NO_MOMENTUM = 1e-9

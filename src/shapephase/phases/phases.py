@@ -25,10 +25,10 @@ from ..reconstruction.reconstruction import Motion
 from ..run_progress import RunProgress, watched
 from ._curve_errors import arc_errors, running_errors, split_errors
 from ._deferred import Deferred
-from ._momentum_curve import Gauge, momentum_curve
 from ._motion_parts import array_by_parts, by_parts
 from .error_estimates import ArcErrors, RunningErrors
 from .forced_split import ForcedSplit, forced_split
+from .momentum_curve import Gauge, momentum_curve
 from .phase_split import PhaseSplit, SplitMotion
 
 CLOSINGS = ("start", "reference")

@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import check_object
 from ..display import short_repr
 from ..errors import ShapePhaseError
-from ..reconstruction._athlete_axes import AthleteAxes
+from ..reconstruction import AthleteAxes
 from ..reconstruction.reconstruction import Motion
 from .phase_split import PhaseSplit
 

@@ -10,7 +10,7 @@ from .. import so3, sphere
 from ..arguments import check_flag, check_object, number_argument, times_argument
 from ..arrays import Array, finite_array
 from ..errors import ShapeError
-from ..phases._momentum_curve import Gauge, MomentumCurve, momentum_curve
+from ..phases.momentum_curve import Gauge, MomentumCurve, momentum_curve
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes

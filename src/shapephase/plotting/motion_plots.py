@@ -13,7 +13,7 @@ from ..arrays import Array, Integers
 from ..bounds.energy import energy_along
 from ..deformation.deformation import Deformation
 from ..errors import ShapeError, unknown_name
-from ..phases._momentum_curve import Gauge
+from ..phases.momentum_curve import Gauge
 from ..phases.phases import RunningPhases, running_phases
 from ..phases.split_text import CLOSED_GAP
 from ..reconstruction.reconstruction import Motion

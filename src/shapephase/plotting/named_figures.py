@@ -12,7 +12,7 @@ from ..arguments import check_file_name, check_object
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..files import write_whole
-from ..phases._momentum_curve import Gauge
+from ..phases.momentum_curve import Gauge
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.euler_top import EulerTop
 from ..shape_space.shape_path import ShapePath

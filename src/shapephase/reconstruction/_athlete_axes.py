@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array, finite_array, lock_arrays
-from ..body._link_motions import link_motions
 from ..body.body import Body
-from ..deformation._physical_validity import least_over
+from ..body.link_motions import link_motions
 from ..display import short_repr
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..inertia_tensor import principal_axes
-from ..shape_space._path_series import panel_edges
+from ..refinement import least_over
+from ..shape_space.path_series import panel_edges
 from ..shape_space.shape_path import ShapePath
 
 if TYPE_CHECKING:

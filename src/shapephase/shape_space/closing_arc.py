@@ -14,7 +14,7 @@ from ..body.momentum_gradients import energy_gradients
 from ._geodesic_changes import changes_by_ends
 from .curves import PiecewisePolynomial
 from .shape_geodesic import ShapeGeodesic, shape_geodesic, shape_speed
-from .shape_path import ShapePath
+from .shape_path import ShapePath, interpolated
 
 PIECES = 4
 """Cubics that a geodesic is written as; each is within some 1e-9 of a geodesic of a tenth of a radian."""
@@ -54,7 +54,24 @@ class ClosingArc:
         seconds = self.seconds
         knots = np.concatenate([opened.knots, opened.knots[-1] + seconds * np.arange(1, PIECES + 1) / PIECES])
         cubics = _cubics(self.way.nodes, self.way.shapes) / seconds ** np.arange(4)[:, None, None]
-        return PiecewisePolynomial(knots, np.concatenate([opened.coefficients, cubics], axis=1), arc=self)
+        return PiecewisePolynomial(knots, np.concatenate([opened.coefficients, cubics], axis=1))
+
+    @property
+    def closed(self) -> ShapePath:
+        """The path with the way back at its end."""
+        curve, opened = self.curve, self.opened
+        duration = float(curve.knots[-1])
+        return ShapePath(curve, duration, curve.knots, opened.n_shape, opened.joint_names, origin=self)
+
+    def path(self, samples: Array) -> ShapePath:
+        """Return the closed path of other samples, as `PathOrigin`; it makes the same whole turns."""
+        before, origin = self.opened.curve, self.opened.origin
+        assert isinstance(before, PiecewisePolynomial)
+        names = self.opened.joint_names
+        opened = origin.path(samples) if origin else interpolated(before.knots, samples, before.through, names)
+        turns = self.way.shapes[-1] - before(before.knots[:1])[0][0]
+        first, last = opened.curve(opened.breaks[[0, -1]])[0]
+        return ClosingArc(self.body, opened, shape_geodesic(self.body, last, first + turns)).closed
 
     def by_ends(self, by_cubics: Array) -> Array:
         """From derivatives by the coefficients of the cubics, (4, PIECES, m, n), to those by the path's first and last
@@ -75,20 +92,6 @@ class ClosingArc:
         by_shape, by_rate = energy_gradients(self.body.chain, *self.opened.curve(self.opened.breaks))
         factor = -self.seconds / (self.speed**2 * len(by_shape))
         return of_length / self.speed, factor * by_shape, factor * by_rate
-
-
-def closed_by_arc(arc: ClosingArc) -> ShapePath:
-    """The path with the way back at its end."""
-    curve, opened = arc.curve, arc.opened
-    return ShapePath(curve, float(curve.knots[-1]), curve.knots, opened.n_shape, opened.joint_names, 0.5)
-
-
-def arc_again(arc: ClosingArc, opened: ShapePath) -> ClosingArc:
-    """The way back of another path, which makes the same whole turns."""
-    before = arc.opened.curve(arc.opened.breaks[[0, -1]])[0]
-    first, last = opened.curve(opened.breaks[[0, -1]])[0]
-    turns = arc.way.shapes[-1] - before[0]
-    return ClosingArc(arc.body, opened, shape_geodesic(arc.body, last, first + turns))
 
 
 def _cubics(nodes: Array, shapes: Array) -> Array:

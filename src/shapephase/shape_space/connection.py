@@ -18,8 +18,8 @@ from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.stepped import SteppedRotation
-from ._path_series import evenly_divided, panel_edges
 from .body_path import check_closed, path_sampler
+from .path_series import evenly_divided, panel_edges
 from .shape_path import CLOSED, ShapePath
 from .unit_doubts import followed_by
 

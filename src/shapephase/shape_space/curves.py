@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import comb
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,10 +15,6 @@ from ..arguments import check_picklable
 from ..arrays import Array, Integers, check_reach, lock_arrays, read_only, real_array
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
-
-if TYPE_CHECKING:
-    from .closing_arc import ClosingArc
-    from .shape_path import ShapePath
 
 CLOSED = 1e-9
 """[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
@@ -38,6 +34,25 @@ class Curve(Protocol):
     def __call__(self, times: Array, /) -> tuple[Array, Array]:
         """Shapes and their rates."""
         ...
+
+
+class Swings(NamedTuple):
+    """How fast a curve can change, known before it is sampled.
+
+    Attributes
+    ----------
+    most : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
+    smooth_loop : whether it also goes smoothly from its end to its start
+    """
+
+    most: float | None = None
+    smooth_loop: bool = False
+
+
+def most_swings(counts: Sequence[float | None]) -> float | None:
+    """Return the largest of some upper bounds; None where one is unknown."""
+    known = [count for count in counts if count is not None]
+    return max(known, default=0.0) if len(known) == len(counts) else None
 
 
 class KeptValues:
@@ -86,6 +101,16 @@ class Fourier:
         n_shape = len(self.mean)
         return both[:, :n_shape] + self.mean, both[:, n_shape:]
 
+    @property
+    def occupied(self) -> Integers:
+        """The harmonics whose coefficients are not all zero, ascending."""
+        return 1 + np.flatnonzero(np.any((self.cosines != 0.0) | (self.sines != 0.0), axis=0))
+
+    @property
+    def swings(self) -> Swings:
+        """As often as the highest harmonic."""
+        return Swings(float(self.occupied.max(initial=0)), smooth_loop=True)
+
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
         """Angular frequencies (k,) [rad/s]; of the cosines and sines in the shapes and in the rates (2 k, 2 n)."""
@@ -98,46 +123,17 @@ class Fourier:
 Interpolation = Literal["not-a-knot", "periodic", "rest to rest"]
 
 
-class SampleOrigin(Protocol):
-    """How values at the knots of a path follow from recorded samples that were closed, smoothed or resampled."""
-
-    @property
-    def samples(self) -> Array:
-        """As recorded: (N, n) [rad or m]."""
-        ...
-
-    @property
-    def bias(self) -> Array:
-        """What smoothing took off the motion, as far as it is known: (knots, n) [rad or m]."""
-        ...
-
-    def path(self, samples: Array, /) -> ShapePath:
-        """What the same steps make of other samples (N, n)."""
-        ...
-
-    def by_samples(self, by_values: Array, /) -> Array:
-        """From m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
-        ...
-
-    def bias_by_samples(self, by_values: Array, /) -> Array:
-        """From m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
-        ...
-
-
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial:
     """sum_p coefficients[p, i] (t - knots[i])^p on the i-th interval; coefficients (order, pieces, n).
 
     `through`: by which rule the polynomials follow from their values at the knots; None: by none.
-    `origin`: how these values follow from samples; None: they are the samples.
-    `arc`: the geodesic that the last of the polynomials are, behind a path that follows from samples; None: none.
     """
 
     knots: Array
     coefficients: Array
     through: Interpolation | None = None
-    origin: SampleOrigin | None = None
-    arc: ClosingArc | None = None
+    swings: ClassVar[Swings] = Swings(0.5)
 
     __repr__ = short_repr
 
@@ -389,3 +385,15 @@ class Repeated:
         loop = np.searchsorted(starts, times, side="right") - 1
         shapes, rates = self.curve(np.minimum(times - starts[loop], self.period))
         return shapes + loop[:, None] * self.turns, rates
+
+
+def swings_of(curve: Curve) -> Swings:
+    """Return how fast a curve can change; of one that is smooth over all its loops, over the whole of it."""
+    if isinstance(curve, Joined):
+        return Swings(most_swings([swings_of(curve.first).most, swings_of(curve.second).most]))
+    if isinstance(curve, Repeated):
+        loop = swings_of(curve.curve)
+        return loop._replace(most=loop.most * curve.count) if loop.smooth_loop and loop.most else loop
+    if isinstance(curve, Reversed | Stretched | Reordered | Multiplied | Widened):
+        return swings_of(curve.curve)
+    return getattr(curve, "swings", Swings())

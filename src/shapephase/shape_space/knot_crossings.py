@@ -18,8 +18,8 @@ from ..body.couplings.ball_joints import BallJoint
 from ..body.couplings.coordinate_map import CoordinateMap
 from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryError
-from ._path_series import merged, panel_edges, resolved_series
 from .curves import Curve, PiecewisePolynomial
+from .path_series import merged, panel_edges, resolved_series
 from .shape_path import ShapePath
 
 _ROUNDING = 64.0 * np.finfo(float).eps
@@ -47,7 +47,7 @@ def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
         return route
     if route.loops > 1 and _winds(body, route):
         # What follows by a curve is elsewhere in the next loop.
-        route = replace(route, breaks=_loop_ends(route), loops=1, smooth_loop=False, scanner=None)
+        route = replace(route, breaks=_loop_ends(route), loops=1, scanner=None)
     if follows.is_smooth:
         return route
     found = crossing_times(follows, route.curve, panel_edges(route))
@@ -56,7 +56,7 @@ def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
     known = merged(route.smoothness.breaks, _loop_ends(route))
     starts = route.duration / route.loops * np.arange(route.loops)
     breaks = merged(known, (starts[:, None] + found).ravel())
-    return replace(route, breaks=breaks, smooth_loop=False, scanner=None)
+    return replace(route, breaks=breaks, scanner=None)
 
 
 def _check_signs(ball: BallJoint, route: ShapePath) -> None:

@@ -130,7 +130,7 @@ def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: Arra
 def _samples(path: ShapePath) -> PathSamples:
     """Raises WrongObjectError where a path was put through none, or joints answer to each other."""
     found = path_samples(path)
-    if found.curve.arc is not None:
+    if found.arc is not None:
         raise WrongObjectError(
             "error bars of rates are not known of a path that a geodesic closes; close it by drift or smooth "
             "(close_by, --close-by)"

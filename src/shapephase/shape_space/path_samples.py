@@ -4,18 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
 from ..arrays import Array, Integers, Mask
 from ..errors import WrongObjectError
-from .closing_arc import arc_again, closed_by_arc
+from .closing_arc import ClosingArc
 from .curves import PiecewisePolynomial, Reordered
-from .shape_path import ShapePath
+from .shape_path import PathOrigin, ShapePath, interpolated
 
 # The quintic of least jerk from 0 to 1: the powers 3, 4, 5 of the share of the time.
 _REST_TO_REST = (10.0, -15.0, 6.0)
+
+
+class SampleOrigin(PathOrigin, Protocol):
+    """How values at the knots of a path follow from recorded samples that were closed, smoothed or resampled."""
+
+    @property
+    def samples(self) -> Array:
+        """As recorded: (N, n) [rad or m]."""
+        ...
+
+    @property
+    def bias(self) -> Array:
+        """What smoothing took off the motion, as far as it is known: (knots, n) [rad or m]."""
+        ...
+
+    def by_samples(self, by_values: Array, /) -> Array:
+        """From m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        ...
+
+    def bias_by_samples(self, by_values: Array, /) -> Array:
+        """From m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        ...
 
 
 class PathBasis(NamedTuple):
@@ -44,32 +66,35 @@ class PathSamples:
     ----------
     curve : the polynomials through the samples, or through what was made of them
     order : (n,) which column of theirs is which of the path's
+    origin : how the values at their knots follow from the samples; None: they are the samples
+    arc : the geodesic that the last of the polynomials are, behind those through samples; None: none
     """
 
     curve: PiecewisePolynomial
     order: Integers
+    origin: SampleOrigin | None
+    arc: ClosingArc | None
 
     @property
     def count(self) -> int:
         """How many samples there are that may differ: of a periodic path the last is the first, unless both were
         recorded."""
-        return self._at_knots if self._source.origin is None else len(self._source.origin.samples)
+        return self._at_knots if self.origin is None else len(self.origin.samples)
 
     @property
     def values(self) -> Array:
         """(count, n) [rad or m]."""
+        if self.origin is not None:
+            return self.origin.samples[:, self.order]
         source = self._source
-        if source.origin is not None:
-            return source.origin.samples[:, self.order]
         return source(source.knots[: self._at_knots])[0][:, self.order]
 
     @property
     def bias(self) -> Array:
         """What smoothing took off the motion at the knots, as far as it is known: (knots n,) [rad or m]."""
-        origin = self._source.origin
-        if origin is None:
+        if self.origin is None:
             return np.zeros(self._at_knots * len(self.order))
-        return origin.bias[:, self.order].ravel()
+        return self.origin.bias[:, self.order].ravel()
 
     @property
     def _at_knots(self) -> int:
@@ -78,27 +103,20 @@ class PathSamples:
     @property
     def _source(self) -> PiecewisePolynomial:
         """The polynomials through samples: those before a closing geodesic."""
-        if self.curve.arc is None:
+        if self.arc is None:
             return self.curve
-        curve = self.curve.arc.opened.curve
+        curve = self.arc.opened.curve
         assert isinstance(curve, PiecewisePolynomial)
         return curve
 
     def path_through(self, values: Array) -> ShapePath:
         """The path of the same kind through other samples (count, n), made of them in the same way."""
-        arc, source = self.curve.arc, self._source
-        if arc is not None:
-            opened = PathSamples(source, self.order).path_through(values)
-            return closed_by_arc(arc_again(arc, opened))
-        times, origin = source.knots, source.origin
-        if origin is not None:
-            recorded = np.empty_like(values)
-            recorded[:, self.order] = values
-            return origin.path(recorded)
-        if source.through == "rest to rest":
-            return ShapePath.waypoints(times, values)
-        periodic = source.through == "periodic"
-        return ShapePath.spline(times, np.concatenate([values, values[:1]]) if periodic else values, periodic)
+        origin = self.arc or self.origin
+        if origin is None:
+            return interpolated(self.curve.knots, values, self.curve.through)
+        recorded = np.empty_like(values)
+        recorded[:, self.order] = values
+        return origin.path(recorded)
 
     def derivative(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
         """Sums over times of (N, k, n) derivatives by shapes and rates, by the samples: (k, count n)."""
@@ -135,7 +153,7 @@ class PathSamples:
 
         Of a path that no geodesic closes: there joints answer to each other.
         """
-        assert self.curve.arc is None
+        assert self.arc is None
         basis, count = self.basis(times), len(times)
         order = basis.powers.shape[1]
         by_coefficients = np.zeros((order, basis.total, 3, count))
@@ -150,37 +168,35 @@ class PathSamples:
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
         given = by_coefficients[:, : len(curve.knots) - 1].reshape(order, len(curve.knots) - 1, -1)
         found = rule(np.diff(curve.knots), given, curve.through == "periodic").reshape(-1, count, n_shape)
-        if self.curve.arc is not None:
+        if self.arc is not None:
             by_cubics = np.empty_like(by_coefficients[:, len(curve.knots) - 1 :])
             by_cubics[..., self.order] = by_coefficients[:, len(curve.knots) - 1 :]
-            found[[0, -1]] += self.curve.arc.by_ends(by_cubics)[..., self.order]
+            found[[0, -1]] += self.arc.by_ends(by_cubics)[..., self.order]
         return np.moveaxis(found, 0, 1).reshape(count, -1)
 
     def is_closing(self, times: Array) -> Mask:
         """Which times are on a geodesic that closes the path, whose duration follows from the path: (N,)."""
-        return times > self._source.knots[-1] if self.curve.arc is not None else np.zeros(len(times), dtype=bool)
+        return times > self._source.knots[-1] if self.arc is not None else np.zeros(len(times), dtype=bool)
 
     def seconds_by_knots(self) -> Array:
         """The derivatives of the logarithm of that duration by the values at the knots: (knots n,)."""
-        arc, source = self.curve.arc, self._source
+        arc = self.arc
         assert arc is not None
         by_ends, by_shape, by_rate = arc.seconds_by_path()
-        opened = PathSamples(source, np.arange(len(self.order)))
+        opened = PathSamples(self._source, np.arange(len(self.order)), self.origin, None)
         found = opened.by_knots(arc.opened.breaks, by_shape[:, None], by_rate[:, None]).reshape(-1, len(self.order))
         found[[0, -1]] += by_ends
         return (found[:, self.order] / arc.seconds).ravel()
 
     def by_samples(self, by_knots: Array) -> Array:
         """From derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
-        origin = self._source.origin
-        return by_knots if origin is None else self._through(origin.by_samples, by_knots)
+        return by_knots if self.origin is None else self._through(self.origin.by_samples, by_knots)
 
     def bias_by_samples(self, by_knots: Array) -> Array:
         """The same of derivatives by `bias`, which follows linearly from the samples, too."""
-        origin = self._source.origin
-        if origin is None:
+        if self.origin is None:
             return np.zeros_like(by_knots)
-        return self._through(origin.bias_by_samples, by_knots)
+        return self._through(self.origin.bias_by_samples, by_knots)
 
     @property
     def rules(self) -> tuple[Callable[[Array], Array], ...]:
@@ -206,12 +222,15 @@ def path_samples(path: ShapePath) -> PathSamples:
     curve, order = path.curve, np.arange(path.n_shape)
     while isinstance(curve, Reordered):
         curve, order = curve.curve, curve.order[order]
-    if not isinstance(curve, PiecewisePolynomial) or (curve.through is None and curve.arc is None):
+    arc = path.origin if isinstance(path.origin, ClosingArc) else None
+    if not isinstance(curve, PiecewisePolynomial) or (curve.through is None and arc is None):
         raise WrongObjectError(
             "this path was not put through samples: derivatives by samples are those of ShapePath.spline, "
             "ShapePath.waypoints and of recorded motions; of those that a geodesic closes, not if they were resampled"
         )
-    return PathSamples(curve, order)
+    # A geodesic closes a path that is open: whatever else a path follows from knows the values at its knots.
+    origin = cast("SampleOrigin | None", arc.opened.origin if arc else path.origin)
+    return PathSamples(curve, order, origin, arc)
 
 
 def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,7 +25,6 @@ from ..integrator.smoothness import Smoothness
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
 from ._card import shape_path_card
-from ._path_series import spline_times
 from .ball_columns import ball_columns, factors_between, neighbours_signs
 from .curves import (
     CLOSED,
@@ -41,14 +40,25 @@ from .curves import (
     Repeated,
     Reversed,
     Stretched,
+    Swings,
     returned_pair,
+    swings_of,
 )
+from .path_series import spline_times
 from .scan._derived_scan import DerivedScan, JoinedScan
 from .scan._rate_check import check_rates
 from .scan.function_scan import FunctionScan, path_function
 from .scan.scanning import scanned
 
 _WHOLE_TURN = 2.0 * np.pi
+
+
+class PathOrigin(Protocol):
+    """How a path follows from recorded samples that were smoothed, resampled or closed."""
+
+    def path(self, samples: Array, /) -> ShapePath:
+        """Return the path that the same steps make of other samples (N, n)."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +75,11 @@ class ShapePath:
     breaks : (M,) ascending, first 0, last `duration` [s]
     n_shape : number of joints
     joint_names : the joints in the order of the columns, or None where the path belongs to no body in particular
-    oscillations : how often the path can swing between two breaks, an upper bound; None: unknown
     loops : the path is its first `duration / loops` seconds, this many times
-    smooth_loop : whether it also goes smoothly from the end of a loop to its start
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
     scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
+    origin : how it follows from recorded samples; None: these are the values at its knots, or there are none
 
     Examples
     --------
@@ -84,12 +93,11 @@ class ShapePath:
     breaks: Array
     n_shape: int
     joint_names: tuple[str, ...] | None = None
-    oscillations: float | None = None
     loops: int = 1
-    smooth_loop: bool = False
     sha256: str | None = None
     record: Mapping[str, Any] | None = None
     scanner: Callable[[], FunctionScan] | None = None
+    origin: PathOrigin | None = None
     _seen: KeptValues = field(default_factory=KeptValues, init=False, repr=False)
 
     __post_init__ = lock_arrays
@@ -123,19 +131,15 @@ class ShapePath:
         for values, name in ((middle, "mean"), (a, "cosines"), (b, "sines")):
             check_reach(values, name)
         period = positive_argument(duration)
-        occupied = 1 + np.flatnonzero(np.any((a != 0.0) | (b != 0.0), axis=0))
-        # Harmonics that are all multiples of one number make a shorter loop, repeated.
-        loops = int(np.gcd.reduce(occupied)) if len(occupied) else 1
-        highest = int(occupied[-1]) // loops if len(occupied) else 0
+        curve = Fourier(middle.copy(), a.copy(), b.copy(), period)
         return ShapePath(
-            Fourier(middle.copy(), a.copy(), b.copy(), period),
+            curve,
             period,
             breaks=np.array([0.0, period]),
             n_shape=len(middle),
             joint_names=_names(joint_names, len(middle)),
-            oscillations=float(highest),
-            loops=loops,
-            smooth_loop=True,
+            # Harmonics that are all multiples of one number make a shorter loop, repeated.
+            loops=max(1, int(np.gcd.reduce(curve.occupied))),
         )
 
     @staticmethod
@@ -248,6 +252,12 @@ class ShapePath:
         """What `curve` gives at times at which a body is sampled, read-only: kept for the next momentum or body."""
         return self._seen(self.curve, times)
 
+    @cached_property
+    def swings(self) -> Swings:
+        """How often the path can swing between two breaks, and whether one loop goes on smoothly in the next."""
+        most, smooth = swings_of(self.curve)
+        return Swings(most / self.loops, len(self.breaks) == 2) if smooth and most is not None else Swings(most)
+
     @property
     def smoothness(self) -> Smoothness:
         """Of whatever depends smoothly on shapes and rates."""
@@ -261,9 +271,9 @@ class ShapePath:
             breaks = np.union1d(breaks, (starts[:, None] + scan.found_breaks).ravel())
         return Smoothness(
             breaks=breaks,
-            oscillations=self.oscillations,
+            oscillations=self.swings.most,
             loops=self.loops,
-            smooth_loop=self.smooth_loop,
+            smooth_loop=self.swings.smooth_loop,
             resolved=scan.resolved if scan is not None else None,
         )
 
@@ -286,7 +296,7 @@ class ShapePath:
         UndeclaredBreakWarning
             Of kinks that were not declared.
         """
-        return self._scan if self.oscillations is None else None
+        return self._scan if self.swings.most is None else None
 
     @cached_property
     def _scan(self) -> FunctionScan:
@@ -307,7 +317,7 @@ class ShapePath:
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
         curve = Reversed(self.curve, self.duration)
-        return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"))
+        return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"), origin=None)
 
     def stretched(self, factor: float) -> ShapePath:
         """The same shapes, `factor` times as slowly."""
@@ -317,7 +327,7 @@ class ShapePath:
         breaks[-1] = duration
         curve = Stretched(self.curve, scale, self.duration)
         scanner = DerivedScan(self, "stretched", (scale,))
-        return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner)
+        return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner, origin=None)
 
     def then(self, other: ShapePath) -> ShapePath:
         """This path, and after it another.
@@ -352,7 +362,6 @@ class ShapePath:
             breaks,
             self.n_shape,
             names,
-            _most_swings(self, other),
             scanner=JoinedScan([self, other]) if following is other.curve else None,
         )
 
@@ -375,12 +384,17 @@ class ShapePath:
             raise OpenPathError(f"only a loop can be repeated; joint {self._joint(joint)} ends {gap[joint]:.9g} off")
         starts = self.duration * np.arange(count)
         breaks = np.concatenate([*(start + self.breaks[:-1] for start in starts), [count * self.duration]])
-        if self.smooth_loop:
+        if self.swings.smooth_loop:
             breaks = breaks[[0, -1]]
         curve = Repeated(self.curve, self.duration, int(count), turns)
-        loops = self.loops * int(count)
         return replace(
-            self, curve=curve, duration=count * self.duration, breaks=breaks, loops=loops, scanner=DerivedScan(self)
+            self,
+            curve=curve,
+            duration=count * self.duration,
+            breaks=breaks,
+            loops=self.loops * int(count),
+            scanner=DerivedScan(self),
+            origin=None,
         )
 
     @cached_property
@@ -438,12 +452,23 @@ class ShapePath:
         return shapes.reshape(expected_shape), rates.reshape(expected_shape)
 
 
+def interpolated(
+    knots: Array, values: Array, through: Interpolation | None, joint_names: Sequence[str] | None = None
+) -> ShapePath:
+    """Return the path of the kind `through` with values at its knots; those of a periodic one without the last."""
+    if through == "rest to rest":
+        return ShapePath.waypoints(knots, values, joint_names=joint_names)
+    periodic = through == "periodic"
+    whole = np.concatenate([values, values[:1]]) if periodic else values
+    return ShapePath.spline(knots, whole, periodic, joint_names=joint_names)
+
+
 def _piecewise(
     times: Array, coefficients: Array, joint_names: Sequence[str] | None, through: Interpolation
 ) -> ShapePath:
     n_shape = coefficients.shape[2]
     curve = PiecewisePolynomial(times, coefficients, through)
-    return ShapePath(curve, float(times[-1]), times, n_shape, _names(joint_names, n_shape), 0.5)
+    return ShapePath(curve, float(times[-1]), times, n_shape, _names(joint_names, n_shape))
 
 
 def _spline_coefficients(times: Array, shapes: Array, periodic: bool) -> Array:
@@ -505,11 +530,3 @@ def _joined_names(first: ShapePath, second: ShapePath) -> tuple[str, ...] | None
             f"paths with other joints or another order of joints: {first.joint_names} and {second.joint_names}"
         )
     return named.pop() if named else None
-
-
-def _most_swings(*paths: ShapePath) -> float | None:
-    """The most oscillations between two breaks of paths; a smooth loop repeated has no breaks between its loops."""
-    found = [path.oscillations for path in paths if path.oscillations is not None]
-    if len(found) < len(paths):
-        return None
-    return max(swings * (path.loops if path.smooth_loop else 1) for swings, path in zip(found, paths, strict=True))

@@ -13,8 +13,8 @@ from ..body.body import Body
 from ..body.couplings.coupling import described
 from ..display import short_repr
 from ..inertia_tensor import principal_axes, triangle_defect
-from ._path_series import joint_extremes, times_of_fastest
 from .body_path import path_gap
+from .path_series import joint_extremes, times_of_fastest
 from .shape_path import CLOSED, ShapePath
 from .unit_doubts import followed_by
 

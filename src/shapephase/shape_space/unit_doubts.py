@@ -10,9 +10,9 @@ from ..arrays import Array
 from ..body.body import Body
 from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryWarning
-from ._path_series import evenly_divided, panel_edges
 from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import route_along
+from .path_series import evenly_divided, panel_edges
 from .shape_path import ShapePath
 
 DEGREE = np.pi / 180.0
@@ -86,6 +86,6 @@ def _farthest(path: ShapePath) -> float:
 def _looked_at(path: ShapePath) -> Array:
     if isinstance(path.curve, PiecewisePolynomial):
         return path.breaks
-    if path.oscillations is not None:
+    if path.swings.most is not None:
         return evenly_divided(panel_edges(path), _LOOKS_OF_A_SWING)
     return path.duration / path.loops * np.mod(0.6180339887498949 * np.arange(_LOOKS), 1.0)

@@ -28,7 +28,7 @@ def noisy(noise, count=600, seed=2, even=False):
 
 
 def smoother_of(path):
-    return path.curve.origin.smoother
+    return path.origin.smoother
 
 
 def jumps(path, order):

@@ -299,7 +299,7 @@ def _executor(workers: int | None, search: _InterruptibleSearch) -> Iterator[Exe
     if workers is None:
         yield None
         return
-    from ...optimal_control._solver_callback import keep_interrupts
+    from ...optimal_control.solver_callback import keep_interrupts
 
     # A process that was forked beside threads of the solver may hang.
     spawned = multiprocessing.get_context("spawn")

@@ -14,10 +14,10 @@ from ...arrays import Array, Integers
 from ...shape_space.connection import mechanical_connection
 from .._gauss import gauss_tableau
 from .._polish import end_conditions
-from .._solver_callback import BestIterate, IterationCallback, ipopt_callback
 from .._spline_basis import SplineBasis
 from ..collocation import CollocationProgram, NlpSolution, final_conditions
 from ..nodes.node_functions import node_functions
+from ..solver_callback import BestIterate, IterationCallback, ipopt_callback
 from ..task import Reorientation
 
 # Costs that the program knows.

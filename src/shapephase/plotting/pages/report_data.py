@@ -9,7 +9,7 @@ import numpy as np
 from ... import so3
 from ...arrays import Array
 from ...body.body import Body
-from ...phases._momentum_curve import Gauge, momentum_curve
+from ...phases.momentum_curve import Gauge, momentum_curve
 from ...phases.phases import running_phases
 from ...reconstruction.reconstruction import Motion
 

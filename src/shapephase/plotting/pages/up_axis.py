@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Array
-from ...body._link_motions import link_motions
 from ...body.body import Body
+from ...body.link_motions import link_motions
 from ...errors import unknown_name
 
 AXES = {

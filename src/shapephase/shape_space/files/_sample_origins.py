@@ -9,9 +9,10 @@ import numpy as np
 
 from ...arrays import Array, Mask, lock_arrays
 from ...display import short_repr
+from ..closing_arc import ClosingArc
 from ..curves import PiecewisePolynomial
 from ..path_samples import PathSamples, path_samples
-from ..shape_path import ShapePath
+from ..shape_path import ShapePath, interpolated
 from ._linear_smoother import LinearSmoother
 
 
@@ -88,21 +89,18 @@ class Prepared:
 
     def path(self, samples: Array) -> ShapePath:
         """As `SampleOrigin`."""
-        values, periodic = self.values(samples), self.smoother.periodic
         times = self.smoother.times[self.inside]
-        if periodic:
-            values = np.concatenate([values, values[:1]])
-        plain = ShapePath.spline(times, values, periodic, joint_names=self.joint_names)
+        through = "periodic" if self.smoother.periodic else "not-a-knot"
+        plain = interpolated(times, self.values(samples), through, self.joint_names)
         curve = plain.curve
         assert isinstance(curve, PiecewisePolynomial)
-        coefficients = curve.coefficients
         if self.turns.any():
             rate = self.turns / times[-1]
-            coefficients = coefficients.copy()
+            coefficients = curve.coefficients.copy()
             coefficients[0] += curve.knots[:-1, None] * rate
             coefficients[1] += rate
-        through = PiecewisePolynomial(curve.knots, coefficients, curve.through, replace(self, samples=samples))
-        return replace(plain, curve=through)
+            curve = PiecewisePolynomial(curve.knots, coefficients, curve.through)
+        return replace(plain, curve=curve, origin=replace(self, samples=samples))
 
     def by_samples(self, by_values: Array) -> Array:
         """As `SampleOrigin`."""
@@ -162,10 +160,9 @@ class Resampled:
     def bias(self) -> Array:
         """As `SampleOrigin`."""
         samples = path_samples(self.inner)
-        knots = samples.curve.knots
         taken = samples.bias.reshape(-1, self.inner.n_shape)
-        periodic = len(taken) < len(knots)
-        through = ShapePath.spline(knots, np.concatenate([taken, taken[:1]]) if periodic else taken, periodic)
+        periodic = len(taken) < len(samples.curve.knots)
+        through = interpolated(samples.curve.knots, taken, "periodic" if periodic else "not-a-knot")
         return through.shape(self.times[: self.count])
 
     def path(self, samples: Array) -> ShapePath:
@@ -195,8 +192,7 @@ def resampled(path: ShapePath, times: Array, joint_names: tuple[str, ...] | None
     plain = ShapePath.spline(times, path.shape(times), joint_names=joint_names)
     curve = plain.curve
     assert isinstance(curve, PiecewisePolynomial)
-    if isinstance(path.curve, PiecewisePolynomial) and path.curve.arc is not None:
+    if isinstance(path.origin, ClosingArc):
         # Its times follow from its samples, too.
-        return replace(plain, curve=PiecewisePolynomial(curve.knots, curve.coefficients))
-    origin = Resampled(path, times, len(times) - (curve.through == "periodic"))
-    return replace(plain, curve=PiecewisePolynomial(curve.knots, curve.coefficients, curve.through, origin))
+        return replace(plain, curve=replace(curve, through=None))
+    return replace(plain, origin=Resampled(path, times, len(times) - (curve.through == "periodic")))

@@ -14,7 +14,7 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import TrajectoryError, unknown_name
-from ..closing_arc import ClosingArc, closed_by_arc
+from ..closing_arc import ClosingArc
 from ..connection import horizontal_lift
 from ..curves import CLOSED
 from ..shape_geodesic import shape_geodesic
@@ -155,5 +155,5 @@ def _with_geodesic(opened: ShapePath, turns: Array, gap: Array, body: Body) -> t
     # What rounding leaves between the ends is no way that takes time.
     if np.abs(last - first - turns).max(initial=0.0) <= CLOSED or arc.speed == 0.0:
         return opened, Closing(by="geodesic", gap=gap, opened=opened, closed=opened, body=body)
-    closed = closed_by_arc(arc)
+    closed = arc.closed
     return closed, Closing(by="geodesic", gap=gap, opened=opened, closed=closed, body=body)

@@ -24,7 +24,7 @@ from ...errors import ShapeError, TrajectoryError, TrajectoryWarning, unknown_na
 from ...files import output_target, write_whole
 from ...letters import what_came
 from ...provenance import provenance
-from .._path_series import spline_error
+from ..path_series import spline_error
 from ..shape_path import ShapePath
 from ._base_columns import base_choices
 from ._flight import Flight, flight_choices, in_flight

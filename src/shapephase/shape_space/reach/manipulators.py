@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from ... import so3
 from ...arguments import check_flag, check_object, vector_argument
 from ...arrays import Array, finite_array
-from ...body._link_motions import link_motions
 from ...body.body import Body
+from ...body.link_motions import link_motions
 from ...errors import unknown_name
 from ..connection import mechanical_connection
 

@@ -16,10 +16,10 @@ from ...body.body import Body
 from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
-from .._path_series import panel_edges, turn_of_a_loop
 from ..body_path import check_closed
 from ..connection import integral, mechanical_connection
 from ..knot_crossings import route_along
+from ..path_series import panel_edges, turn_of_a_loop
 from ..shape_path import ShapePath
 
 _MOST_DEGREE = 6

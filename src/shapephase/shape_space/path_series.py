@@ -59,7 +59,7 @@ def panel_edges(path: ShapePath, loops: int = 1) -> Array:
     if scan is not None:
         edges = merged(merged(breaks, scan.found_breaks), scan.resolved.left)
     else:
-        edges = evenly_divided(breaks, max(1, ceil(path.oscillations or 0.0)))
+        edges = evenly_divided(breaks, max(1, ceil(path.swings.most or 0.0)))
     if loops == 1:
         return edges
     starts = period * np.arange(loops)
