@@ -111,7 +111,6 @@ def _warm_start():
 @pytest.fixture
 def warm_readers(_warm_start, monkeypatch):
     """What is read in a process of its own is read in a forked one, without the time of its imports."""
-    monkeypatch.setattr("shapephase.body.catalog.run_alone", _warm_start)
     monkeypatch.setattr("shapephase.shape_space.files.formats.parser_process.run_alone", _warm_start)
 
 

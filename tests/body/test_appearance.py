@@ -93,7 +93,7 @@ def test_boxes_of_rods_plates_and_what_cannot_exist():
 @pytest.mark.parametrize("name", BODIES)
 def test_a_model_without_a_file_is_drawn_as_boxes_that_turn_as_heavily(name, rng):
     """The solids drawn, put where `link_pose` says, have the body's locked inertia and centre of mass."""
-    path = catalog._path_of(name)[0]
+    path = catalog._path_of(name)
     body = sp.load_body(pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer()))
     assert body.link_names == sp.load_body(name).link_names
     masses = {part.links[0]: part.mass for part in body.moving_parts}

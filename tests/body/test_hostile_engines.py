@@ -135,7 +135,6 @@ YEADON = {
     "aliases that multiply": (ALIASES + measured(), "a: a number above zero is needed"),
     "a call": (measured() + "x: !!python/object/apply:os.abort []\n", "x: a number above zero is needed"),
     "fifty thousand levels": (measured() + "x: " + 50_000 * "[" + "\n", "it is no YAML file of measurements"),
-    "two megabytes": (measured() + "# " + (2 << 20) * "x" + "\n", "bytes are no file of ninety-five"),
     "a list of itself": ("measurementconversionfactor: &a [*a]\n", "a number above zero is needed"),
     "a length beyond the stars": (measured(Ls1L="1.0e+300"), r"no real body|finite|has a mass|does not accept|beyond"),
 }
@@ -154,7 +153,6 @@ XACRO = {
 }
 QUICK = (
     "a list of itself",
-    "two megabytes",
     "a call",
     "a comment without end",
     "a centre that is no number",

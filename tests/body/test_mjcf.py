@@ -479,7 +479,7 @@ def test_a_process_of_its_own_reads_it_and_leaves_nothing(good_file, tmp_path, m
     monkeypatch.setattr(asking, "run_alone", child_process.run_alone)
     monkeypatch.chdir(tmp_path)
     good_file.write_text(GOOD_MJCF.replace("<worldbody>", '<custom><text name="NaN" data="nan"/></custom><worldbody>'))
-    assert sp.load_body(good_file.name, isolate=True).n_shape == 3
+    assert sp.load_body(good_file.name).n_shape == 3
     assert [path.name for path in tmp_path.iterdir()] == ["body.xml"]
 
 

@@ -376,8 +376,6 @@ OF_SHARED_CODE = [
 
 @pytest.mark.parametrize(("code", "arguments"), full_but([*ENDINGS, *OF_SHARED_CODE], *ENDINGS))
 def test_every_command_ends_with_its_code_and_one_line(capfd, files, monkeypatch, code, arguments):
-    """Without the try in a process of its own: what that refuses is refused here alike."""
-    monkeypatch.setattr("shapephase.body.catalog._try_in_child", lambda *_: None)
     monkeypatch.chdir(files)
     before = {*files.iterdir()}
     for json_too in (False, True):

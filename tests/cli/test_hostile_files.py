@@ -19,7 +19,7 @@ CASES = cases()
 # File and line, then what people call the element, or what is wrong with the file as a whole.
 NAMED = re.compile(
     r":\d+: (link|joint|body|geom|mesh|texture|fixed|robot|<[^>]*>|"
-    r"not UTF-8|not well-formed XML|a document type|the body has \d)"
+    r"not UTF-8|not well-formed XML|a document type|the body has \d|this is|a zero byte)"
 )
 QUICK, FULL, BATCH = 600, 20_000, 100
 QUICK_OF_AN_ENGINE = 40
@@ -55,7 +55,7 @@ def test_a_hostile_or_odd_file(case: Case, worker: Worker, tmp_path):
     assert message.startswith(str(path))
     assert re.search(case.said, message), message
     assert len(message) < 1500
-    assert "17 MiB" in case.name or NAMED.match(message.removeprefix(str(path))), message
+    assert NAMED.match(message.removeprefix(str(path))), message
     if case.line is not None:
         assert message.startswith(f"{path}:{case.line}: "), message
 

@@ -21,7 +21,7 @@ _IMPORTED_LATE = (
     *("shapephase.study.study_file", "shapephase.study.export"),
 )
 """Modules that are imported when they are first needed."""
-_CALLERS = ("body.catalog", "body.engines.engine_tree", "shape_space.files.formats.parser_process")
+_CALLERS = ("body.engines.engine_tree", "shape_space.files.formats.parser_process")
 """Modules that have files read in processes of their own."""
 
 

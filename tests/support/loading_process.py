@@ -128,13 +128,12 @@ def work(memory: int) -> None:
     import shapephase.cli.main
     import shapephase.cli.motion
     import shapephase.cli.texts.result_text  # noqa: F401
-    from shapephase.body import catalog
     from shapephase.body.engines import engine_tree
     from shapephase.shape_space.files.formats import parser_process
 
     # MuJoCo and what else reads in a process of its own has limits of its own, in processes that start without these.
     engine_tree.run_alone = WarmEngine()
-    catalog.run_alone = parser_process.run_alone = WarmStart()
+    parser_process.run_alone = WarmStart()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
 

@@ -26,8 +26,8 @@ MOST_MASS = 1e30
 """[kg], and [kg m^2] for moments: their squares are still finite numbers."""
 TRIANGLE = 1e-3
 """Share of the largest moment by which it may exceed the sum of the others: files round their moments."""
-NEGATIVE = 1e-9
-"""Share of the largest moment by which another may be below zero: rounding of a rotated, thin body."""
+NEGATIVE = 1e-6
+"""Share of the largest moment by which another may be below zero: what a file with six digits has of a thin body."""
 ROUNDING = 1e-12
 """Share of the largest moment of the whole body that rounding may leave of a vanishing one."""
 _LEAST_RADIUS = 1e-4
@@ -200,7 +200,8 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
         also = f" (also {_listed(others)})" if others else ""
         raise UnphysicalInertiaError(
             f"{links[first].where}: {label.format(links[first].name)} has principal moments {moments[first]} "
-            f"kg m^2, one of them negative{also}; correct the file, or load it with on_unphysical='warn'"
+            f"kg m^2, one of them negative{also}; correct the file, or load it with on_unphysical='warn' "
+            "(--on-unphysical warn)"
         )
     broken = ~negative & (moments[:, 2] - moments[:, 1] - moments[:, 0] > TRIANGLE * moments[:, 2] + floor)
     # A radius from the largest moment: a rod may be as thin as it likes.
@@ -258,7 +259,7 @@ def hollow_warnings(
         raise UnphysicalInertiaError(
             f"{worst.where}: {label.format(worst.name)} has no mass and a moment of inertia of {largest:.4g} kg m^2, "
             f"{share:.3g} of the whole body's: no distribution of mass has that; give it its mass, or none of both, or "
-            "load it with on_unphysical='warn'"
+            "load it with on_unphysical='warn' (--on-unphysical warn)"
         )
     named = _listed([f"{label.format(link.name)} ({moment:.3g} kg m^2)" for _, moment, link in found])
     return [
@@ -280,6 +281,23 @@ def massless_warning(tree: LinkTree) -> list[str]:
     where = tree.links[idle[0]].where
     named = _listed([f"link {name!r}" for name in idle])
     return [f"{where}: {named}: moved by a joint, but without mass, and nothing with mass is attached to it"]
+
+
+def grouped(notes: Iterable[tuple[str, str, str, str]]) -> tuple[str, ...]:
+    """One sentence for each kind of note: of many joints with one fault, all names stand in one.
+
+    notes : "file:line", what it is about ("joint"), its name, and what is to be said
+    """
+    found: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for where, kind, name, said in notes:
+        found.setdefault((kind, said), []).append((where, name))
+    sentences = []
+    for (kind, said), places in found.items():
+        first = places[0][0]
+        # Later ones by their line alone.
+        names = [name if where == first else f"{name} (line {where.rpartition(':')[2]})" for where, name in places]
+        sentences.append(f"{first}: {kind}{'s' * (len(names) > 1)} {_listed(names)}: {said}")
+    return tuple(sentences)
 
 
 def _listed(names: list[str]) -> str:

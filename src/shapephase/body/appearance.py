@@ -209,7 +209,7 @@ def _unchanged(body: Body, doubts: list[str]) -> Node | None:
     if root is None or root.tag != "robot" or macro_of(root) is None:
         return root
     try:
-        return expanded(body.file, body.packages)
+        return expanded(body.file, body.packages, body.xacro_args)
     except (MissingExtraError, ModelFileError) as error:
         doubts.append(str(error))
         return None
@@ -276,9 +276,9 @@ def _urdf_shape(link: Node, node: Node, materials: dict[str, Node], looks: _Look
 
 
 def _geometry(node: Node, owner: str) -> tuple[Node, str]:
-    """The shape in a <geometry>, and its kind; extensions have a namespace before it."""
+    """The shape in a <geometry>, and its kind; extensions have a prefix before it."""
     valid = ("box", "cylinder", "sphere", "capsule", "mesh")
-    found = [(child, child.tag.rpartition("}")[2].rpartition(":")[2]) for child in node.children]
+    found = [(child, child.tag.rpartition(":")[2]) for child in node.children]
     if len(found) != 1 or found[0][1] not in valid:
         tags = ", ".join(f"<{quoted(child.tag)}>" for child, _ in found) or "nothing"
         raise node.fault(owner, f"<geometry> holds {tags}; one of {', '.join(valid)} can be shown")

@@ -56,6 +56,7 @@ class Body:
     name : str
     sha256, file : of the file it was loaded from, and where that was; None without a file
     packages : folders in which the packages that the file names were looked for
+    xacro_args : the arguments that its xacro file was expanded with
     joint_names : tuple of the independent joints, in the order of the shape vector; of a ball joint "shoulder" its
         four numbers "shoulder.x", "shoulder.y", "shoulder.z" and "shoulder.w"
     n_shape : number of their coordinates
@@ -93,6 +94,7 @@ class Body:
         self.sha256: str | None = None
         self.file: Path | None = None
         self.packages: tuple[str, ...] = ()
+        self.xacro_args: dict[str, str] = {}
         self.joint_orders: tuple[JointOrder, ...] = ()
         self.base_joints: tuple[Joint, ...] = ()
         self.base_angles: tuple[tuple[str, ...], str] | None = None

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-import subprocess
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..arguments import check_choice, check_flag, positive_argument
-from ..child_process import limit_this_process, run_alone
+from ..arguments import check_choice, positive_argument
 from ..errors import (
     IgnoredElementWarning,
     MissingExtraError,
     ModelFileError,
     ShapeError,
-    ShapePhaseError,
     UnphysicalInertiaWarning,
     WrongObjectError,
     unknown_name,
@@ -34,6 +30,7 @@ from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree, expanded
 from .engines.formats import BVH, FORMATS, MJCF, XACRO, format_of
 from .formats.bvh import bvh_tree
+from .formats.foreign import foreign_kind
 from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
 from .joint_orders import joint_orders
@@ -43,22 +40,16 @@ _OF_URDF = ("packages", "root")
 """Options of a URDF."""
 _OF_BVH = ("length_unit", "person_mass")
 """Options of a BVH file."""
-_CHILD_SECONDS = 20
-"""Time that a child process has for the imports and the file [s]; it only ends what would never end."""
-_CHILD_MEMORY = 640 * 2**20
-"""Memory that loading may take beyond that of the imports [bytes]; the largest body takes 300 MiB."""
-_NO_MEMORY = 3
-"""Exit code of a child that ran out of memory: neither 1, an uncaught error, nor 2, a wrong command line."""
 
 
 def load_body(
     source: str | os.PathLike[str] | Any,
     *,
     on_unphysical: str = "error",
-    isolate: bool = False,
     root: str | None = None,
     root_body: str | None = None,
     packages: Sequence[str | os.PathLike[str]] = (),
+    xacro_args: Mapping[str, str] | None = None,
     length_unit: float | None = None,
     person_mass: float | None = None,
 ) -> Body:
@@ -76,8 +67,6 @@ def load_body(
         a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment, or that has no mass and
         more than 1 % of the body's inertia about an axis
-    isolate : try a file first in a process of its own with limits of memory and time, so that even a crash of a parser
-        is an error; names of bodies that are installed are trusted
     root : "free" removes all joints between the world, or a root link without mass, and the body of an MJCF or a URDF;
         None: a single one is an error, as of an arm that is bolted down; two or more are the free base, with a warning.
         Their columns are the recorded base
@@ -85,6 +74,7 @@ def load_body(
         the file has several trees
     packages : folders in which the packages that a URDF or a xacro file names, `package://NAME`, `$(find NAME)`, are
         looked for, before those around the file
+    xacro_args : values of the arguments of a xacro file by name, as {"payload": "true"}
     length_unit : of a BVH file, which says none: the metres of a unit, 0.01 for centimetres
     person_mass : of the human whose skeleton a BVH file has [kg]; None: 70 kg, with a warning
 
@@ -114,17 +104,19 @@ def load_body(
     >>> cat.name, round(cat.mass, 6), cat.n_shape
     ('cat', 4.0, 23)
     """
-    check_flag(isolate, "isolate")
     check_choice(on_unphysical, "value of on_unphysical", ("error", "warn"))
-    given = loading_options(root, root_body, packages, length_unit, person_mass)
+    given = loading_options(
+        root=root,
+        root_body=root_body,
+        packages=packages,
+        xacro_args=xacro_args,
+        length_unit=length_unit,
+        person_mass=person_mass,
+    )
     if isinstance(source, str | os.PathLike):
-        path, installed = _path_of(os.fspath(source))
-        content = read_file(path)
-        # An engine reads in a process of its own anyway.
-        if isolate and not installed and format_of(content) in (None, BVH):
-            _try_in_child(content, str(path), on_unphysical, given)
+        path = _path_of(os.fspath(source))
         try:
-            body, doubts = _from_file(content, path, on_unphysical, given)
+            body, doubts = _from_file(read_file(path), path, on_unphysical, given)
         except MemoryError:
             raise ModelFileError(f"{path}:1: there is not enough memory to load it") from None
     else:
@@ -136,13 +128,17 @@ def load_body(
 
 
 def loading_options(
-    root: str | None,
-    root_body: str | None,
+    *,
+    on_unphysical: str = "error",
+    root: str | None = None,
+    root_body: str | None = None,
     packages: Sequence[str | os.PathLike[str]] = (),
+    xacro_args: Mapping[str, str] | None = None,
     length_unit: float | None = None,
     person_mass: float | None = None,
 ) -> dict[str, Any]:
-    """Of these arguments of `load_body` those that are given. Raises ShapePhaseError."""
+    """Those of these arguments of `load_body` that are given, checked. Raises ShapePhaseError."""
+    check_choice(on_unphysical, "value of on_unphysical", ("error", "warn"))
     if root is not None:
         check_choice(root, "value of root", ("free",))
     if not isinstance(root_body, str | None):
@@ -150,19 +146,29 @@ def loading_options(
     several = isinstance(packages, Sequence) and not isinstance(packages, str | bytes)
     if not several or not all(isinstance(folder, str | os.PathLike) and os.fspath(folder) for folder in packages):
         raise WrongObjectError(f"packages: folders in a list are needed, got {what_came(packages)}")
-    folders = [os.fspath(folder) for folder in packages] or None
+    if not isinstance(xacro_args, Mapping | None) or not all(isinstance(name, str) for name in xacro_args or ()):
+        raise WrongObjectError(
+            f'xacro_args: values by name are needed, such as {{"payload": "true"}}, got {what_came(xacro_args)}'
+        )
     if length_unit is not None:
         length_unit = positive_argument(length_unit, "length_unit", "a number of metres")
     if person_mass is not None:
         person_mass = positive_argument(person_mass, "person_mass", "a mass in kg")
     found = {
+        "on_unphysical": on_unphysical if on_unphysical != "error" else None,
         "root": root,
         "root_body": root_body,
-        "packages": folders,
+        "packages": [os.fspath(folder) for folder in packages] or None,
+        "xacro_args": {name: _as_xacro(value) for name, value in (xacro_args or {}).items()} or None,
         "length_unit": length_unit,
         "person_mass": person_mass,
     }
     return {name: value for name, value in found.items() if value is not None}
+
+
+def _as_xacro(value: Any) -> str:
+    """A value as it is typed behind `:=`."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:
@@ -240,47 +246,18 @@ def _example_files() -> dict[str, Path]:
     return {path.stem: path for path in sorted((folder / "robots").rglob("*.urdf"), reverse=True)}
 
 
-def _path_of(source: str | bytes) -> tuple[Path, bool]:
-    """The file of a source, and whether it comes with an installed package."""
+def _path_of(source: str | bytes) -> Path:
+    """The file of a source."""
     text = os.fsdecode(source)
     if text.startswith(_EXAMPLE):
-        return example_file(text.removeprefix(_EXAMPLE)), True
+        return example_file(text.removeprefix(_EXAMPLE))
     names = robot_names()
     if text in names and not os.path.isfile(text):
-        return robots_folder() / f"{text}.urdf", True
+        return robots_folder() / f"{text}.urdf"
     name = bool(text) and "\0" not in text and os.sep not in text and not text.endswith((".urdf", ".xml"))
     if name and not os.path.exists(text):
         raise unknown_name("body (no such file either)", quoted(text), (*names, "example:<name>"))
-    return Path(text), False
-
-
-def _try_in_child(content: bytes, where: str, on_unphysical: str, given: dict[str, Any]) -> None:
-    """Load in a child process, with limits; what kills the child is named here, what it refuses the parent refuses."""
-    source = "from shapephase.body import catalog; catalog.load_from_input()"
-    try:
-        child = run_alone(source, (where, on_unphysical, json.dumps(given)), content, _CHILD_SECONDS)
-    except subprocess.TimeoutExpired:
-        raise ModelFileError(f"{where}:1: loading it took more than {_CHILD_SECONDS} s and was stopped") from None
-    if child.returncode < 0:
-        raise ModelFileError(f"{where}:1: the parser crashed on it, signal {-child.returncode}")
-    if child.returncode == _NO_MEMORY:
-        raise ModelFileError(f"{where}:1: loading it took more than {_CHILD_MEMORY >> 20} MiB and was stopped")
-    if child.returncode:
-        said = child.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise ModelFileError(f"{where}:1: loading it in a process of its own failed: {''.join(said)}")
-
-
-def load_from_input() -> None:
-    """What a child process does: limits itself, then loads the file that comes through standard input."""
-    where, on_unphysical, given = sys.argv[1:4]
-    limit_this_process(_CHILD_MEMORY)
-    try:
-        _from_file(sys.stdin.buffer.read(), Path(where), on_unphysical, json.loads(given))
-    except MemoryError:
-        sys.exit(_NO_MEMORY)
-    except ShapePhaseError:
-        # The parent reads the same bytes and says the same.
-        pass
+    return Path(text)
 
 
 def _from_file(
@@ -288,7 +265,8 @@ def _from_file(
 ) -> tuple[Body, list[tuple[type[Warning], str]]]:
     where, poses = str(path), []
     owned = format_of(content)
-    # What makes XML dangerous ends here, whoever reads it.
+    if owned is None and (kind := foreign_kind(content)) is not None:
+        raise ModelFileError(f"{where}:1: this is {kind}")
     root = xml_tree(content, where) if owned in (None, MJCF) else None
     if root is not None and root.tag == "mujoco":
         owned = MJCF
@@ -297,7 +275,7 @@ def _from_file(
     options = {BVH: _OF_BVH, **{name: known.options for name, known in FORMATS.items()}}
     _check_unused(given, where, options.get(owned or "", _OF_URDF))
     if owned == XACRO:
-        root = expanded(path, given.get("packages", ()))
+        root = expanded(path, given.get("packages", ()), given.get("xacro_args", {}))
     if owned == BVH:
         tree = bvh_tree(content, path.stem, where, **given)
     elif root is None or owned == MJCF:
@@ -310,6 +288,7 @@ def _from_file(
     body.base_angles, body.base_slides, body.length_unit = tree.base_angles, tree.base_slides, tree.length_unit
     body.sha256, body.file = hashlib.sha256(content).hexdigest(), path.absolute()
     body.packages = tuple(map(os.path.abspath, given.get("packages", ())))
+    body.xacro_args = dict(given.get("xacro_args", {}))
     check_against_file(body, tree, where)
     check_against_engine(body, tree, poses, where)
     doubts += massless_warning(tree)
@@ -326,7 +305,9 @@ def _from_file(
 def _check_unused(given: dict[str, Any], where: str, options: tuple[str, ...]) -> None:
     for name in given:
         if name == "packages" and name not in options:
-            raise ShapeError(f"packages is for URDF and xacro files; {quoted(where)} names none")
+            raise ShapeError(f"packages is for URDF and xacro files; {quoted(where)} names none: leave --packages out")
+        if name == "xacro_args" and name not in options:
+            raise ShapeError(f"xacro_args is for xacro files; {quoted(where)} has no macros: leave --xacro out")
         if name in _OF_BVH and name not in options:
             raise ShapeError(f"{name} is for BVH files; {quoted(where)} has units and masses of its own")
         if name not in options:

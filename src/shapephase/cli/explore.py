@@ -42,7 +42,7 @@ def explore_command(
     from ..plotting.viewer import LiveView
 
     aside = check_writable(html, "--html", ".html")
-    loaded = load_body(body, isolate=True, **vars(floating))
+    loaded = load_body(body, **floating.loading)
     page, series = explore_html(loaded, joints, up=up)
     if html is not None:
         write_whole(html, lambda stream: stream.write(page.encode()))

@@ -153,7 +153,7 @@ def body_argument(body: str, floating: BodyOptions) -> Body:
         raise ShapeError(
             f"{body[:_LONGEST_SHOWN]} is a motion; the body comes before it, as in `shapephase split cat cat_righting`"
         )
-    return load_body(body, isolate=True, **vars(floating))
+    return load_body(body, **floating.loading)
 
 
 def joint_motion(

@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from ..errors import ShapeError
+
 BodyArgument = Annotated[
     str,
     Parameter(
@@ -133,6 +135,23 @@ class BodyOptions:
             "before those around the file. For example `--packages ~/ros/src`.",
         ),
     ] = ()
+    xacro: Annotated[
+        tuple[str, ...],
+        Parameter(
+            negative_iterable="",
+            consume_multiple=True,
+            show_default=False,
+            help="Of a xacro file: values of its arguments, NAME:=VALUE; for example `--xacro payload:=true`.",
+        ),
+    ] = ()
+    on_unphysical: Annotated[
+        str | None,
+        Parameter(
+            show_default=False,
+            help="Of a body whose links have inertias that no matter has: error, or warn to take them as the file has "
+            "them; for example `--on-unphysical warn`.",
+        ),
+    ] = None
     length_unit: Annotated[
         float | None,
         Parameter(
@@ -148,6 +167,21 @@ class BodyOptions:
             help="Of the human whose skeleton a BVH file has, in kg; without it 70. For example `--person-mass 62`.",
         ),
     ] = None
+
+    @property
+    def loading(self) -> dict[str, Any]:
+        """Those arguments of `load_body` that are given. Raises ShapeError for what is no NAME:=VALUE."""
+        found = {name: value for name, value in vars(self).items() if value not in (None, ()) and name != "xacro"}
+        if self.xacro:
+            found["xacro_args"] = dict(map(_xacro_argument, self.xacro))
+        return found
+
+
+def _xacro_argument(word: str) -> tuple[str, str]:
+    name, separator, value = word.partition(":=")
+    if not (name and separator):
+        raise ShapeError(f"--xacro: {word!r} is no NAME:=VALUE; type it as in --xacro payload:=true")
+    return name, value
 
 
 @Parameter(name="*")

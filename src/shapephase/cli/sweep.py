@@ -79,7 +79,7 @@ def sweep_command(
     if workers is not None and (scheduler is not None or workers < 1):
         raise ShapeError(f"--workers: a whole number above 0, and no --scheduler beside it, is needed, got {workers}")
     read = read_study(study)
-    read = replace(read, **{name: value for name, value in vars(floating).items() if value not in (None, ())})
+    read = replace(read, **floating.loading)
     try:
         with steps(1) as work, nullcontext() if scheduler is None else connected(scheduler) as client:
             work.begin(f"computing {read.cases} cases")

@@ -79,7 +79,7 @@ class Study:
     momentum, attitude, tolerance, gauge, parameters : of what is not varied; the attitude a quaternion x y z w,
         None: the identity, also along motions of the library that commands begin otherwise
     time_limit : of one case [s]; None: none
-    root, root_body, packages : what floats of the bodies' files, and where their packages are, as for `load_body`
+    root, root_body, packages, xacro_args, on_unphysical : how the bodies' files are read, as for `load_body`
     length_unit, person_mass : of the bodies' BVH files, as for `load_body` [m, kg]
 
     Raises
@@ -113,6 +113,8 @@ class Study:
     root: str | None = field(default=None, kw_only=True)
     root_body: str | None = field(default=None, kw_only=True)
     packages: Sequence[str | os.PathLike[str]] = field(default=(), kw_only=True)
+    xacro_args: Mapping[str, str] | None = field(default=None, kw_only=True)
+    on_unphysical: str = field(default="error", kw_only=True)
     length_unit: float | None = field(default=None, kw_only=True)
     person_mass: float | None = field(default=None, kw_only=True)
 
@@ -172,7 +174,15 @@ class Study:
     @property
     def loading(self) -> dict[str, Any]:
         """Arguments of `load_body` for its bodies."""
-        return loading_options(self.root, self.root_body, self.packages, self.length_unit, self.person_mass)
+        return loading_options(
+            on_unphysical=self.on_unphysical,
+            root=self.root,
+            root_body=self.root_body,
+            packages=self.packages,
+            xacro_args=self.xacro_args,
+            length_unit=self.length_unit,
+            person_mass=self.person_mass,
+        )
 
     @property
     def grid_shape(self) -> tuple[int, ...]:

@@ -58,8 +58,6 @@ _EXACT = 1e-12
 """Share of the largest terms by which the engine's numbers may differ from ours."""
 _FRAMES = 10.0
 """Times what frames lack of being orthonormal: biorbd computes with them as they are."""
-_MOST_BYTES = 16 << 20
-"""Of a file; a full body with muscles has some hundred thousand."""
 
 
 def chain_of(path: str, root_body: str | None = None) -> Chain:
@@ -72,9 +70,15 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
     chain = Chain(Path(path).stem, notes=notes)
     segments = _tree(model, root_body, notes, starts)
     base, dropped = _base(model, segments)
-    _name_base(chain, [model.segment(segments[name]) for name in (*dropped, base)])
+    way = [model.segment(segments[name]) for name in (*dropped, base)]
+    _name_base(chain, way)
+    if chain.base_angles is None or chain.base_slides is None:
+        _add_way(chain, way)
+    if dropped:
+        named = ", ".join(map(repr, dropped))
+        which, has = ("segment", "has") if len(dropped) == 1 else ("segments", "have")
+        notes.append(f"{which} {named} {has} no mass: their coordinates are the free base's, as those of {base!r}")
     for name in dropped:
-        notes.append(f"segment {name!r} has no mass: its coordinates are the free base's, as those of {base!r}")
         del segments[name]
     lack, flips = 0.0, {}
     for name, number in segments.items():
@@ -105,8 +109,6 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
 def _model(path: str, notes: list[str], starts: dict[str, int]) -> Any:
     """The model, without its meshes; lines at which segments begin go to `starts`."""
     content = Path(path).read_bytes()
-    if len(content) > _MOST_BYTES:
-        raise UnusableModelError(f"it has {len(content) >> 20} MiB; up to {_MOST_BYTES >> 20} MiB are read")
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError:
@@ -302,6 +304,20 @@ def _name_base(chain: Chain, way: list[Any]) -> None:
     unturned = not any(segment.seqR().to_string() for segment in way[:-1])
     if sorted(slides) == list(_AXES) and unturned and not any(frame[:3, 3].any() for frame in frames):
         chain.base_slides = [f"{slides[axis].name().to_string()}_Trans{axis.upper()}" for axis in _AXES]
+
+
+def _add_way(chain: Chain, way: list[Any]) -> None:
+    """The joints that move the base, as of a planar root; none where they are not hinges and slides of a real frame."""
+    moved, above = Chain(""), "root"
+    for segment in way:
+        name, frame = segment.name().to_string(), segment.localJCS().to_array()
+        turn, flip, _ = _orthonormal(frame[:3, :3], name, 1)
+        if segment.isRotationAQuaternion() or flip[2, 2] < 0.0:
+            return
+        moved.add_joints(above, name, frame[:3, 3], turn, _axes(segment, name))
+        above = name
+    if moved.moving():
+        chain.base_joints, chain.base_angles, chain.base_slides = moved.joints, None, None
 
 
 def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float] | None]]:

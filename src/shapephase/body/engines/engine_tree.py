@@ -41,12 +41,14 @@ def engine_tree(path: Path, name: str, options: Mapping[str, str]) -> tuple[Link
     return _tree_of(_answer(path, name, BODY, json.dumps(dict(options))), str(path))
 
 
-def expanded(path: Path, packages: Sequence[str]) -> Node:
+def expanded(path: Path, packages: Sequence[str], arguments: Mapping[str, str]) -> Node:
     """The root element of the URDF that a xacro file stands for; its lines are those of that.
+
+    arguments : values of the file's arguments, by name
 
     Raises what `engine_tree` raises.
     """
-    options = json.dumps({"packages": [os.path.abspath(folder) for folder in packages]})
+    options = json.dumps({"packages": list(map(os.path.abspath, packages)), "xacro_args": dict(arguments)})
     return xml_tree(_answer(path, XACRO, TEXT, options).encode(), f"{path} (expanded)")
 
 

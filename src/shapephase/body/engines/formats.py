@@ -37,7 +37,7 @@ FORMATS = {
     MJCF: Format("an MJCF model", "mujoco", "mjcf", ".mujoco_reading", ".mujoco_drawing", ("root", "root_body")),
     "biomod": Format("a bioMod model", "biorbd", "biomod", ".biorbd_reading", options=("root_body",)),
     "opensim": Format("an OpenSim model", "opensim", "opensim", ".opensim_reading", options=("root_body",)),
-    XACRO: Format("a xacro file", "xacrodoc", "xacro", ".xacro_reading", options=("packages", "root")),
+    XACRO: Format("a xacro file", "xacrodoc", "xacro", ".xacro_reading", options=("packages", "root", "xacro_args")),
     "yeadon": Format("measurements for Yeadon's model", "yeadon", "yeadon", ".yeadon_reading"),
 }
 """By our name."""

@@ -34,7 +34,7 @@ def shapes_of(path: str) -> dict[str, Any]:
     """
     compiled = compiled_model(path, drawn=True)
     model = compiled.model
-    drawn = [geom for body in range(1, model.nbody) for geom in _drawn(model, body)]
+    drawn = [geom for body in range(1, model.nbody) for geom in _drawn(compiled, body)]
     meshes = sorted({int(model.geom_dataid[geom]) for geom in drawn if _kind(model, geom) == "mesh"})
     return {
         "shapes": [_shape(compiled, geom) for geom in drawn],
@@ -42,11 +42,13 @@ def shapes_of(path: str) -> dict[str, Any]:
     }
 
 
-def _drawn(model: Any, body: int) -> list[int]:
+def _drawn(compiled: Compiled, body: int) -> list[int]:
     """Of the geoms of a body, those that the viewer shows, or all if it shows none."""
+    model = compiled.model
     first = int(model.body_geomadr[body])
     geoms = range(first, first + int(model.body_geomnum[body]))
-    solid = [geom for geom in geoms if int(model.geom_type[geom]) in _KINDS]
+    known = (geom for geom in geoms if geom not in compiled.shapeless)
+    solid = [geom for geom in known if int(model.geom_type[geom]) in _KINDS]
     return [geom for geom in solid if int(model.geom_group[geom]) in _SHOWN_GROUPS] or solid
 
 

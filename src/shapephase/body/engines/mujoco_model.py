@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import difflib
 import os
 import re
@@ -20,6 +21,7 @@ from ...arrays import Array
 from ..formats.xml_text import xml_tree
 from ..virtual_base import way_words
 from .chain import UnusableModelError
+from .mujoco_assets import compiled_without
 
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 BALL = int(mujoco.mjtJoint.mjJNT_BALL)
@@ -40,11 +42,19 @@ _TAG_LINES = 3
 
 @dataclass(frozen=True)
 class Compiled:
-    """A model, the names that its bodies have as links, and their lines where the file itself has them."""
+    """A model, the names that its bodies have as links, and their lines where the file itself has them.
+
+    Attributes
+    ----------
+    shapeless : geoms whose mesh could not be read
+    notes : what is left out
+    """
 
     model: Any
     names: list[str]
     lines: dict[tuple[str, int], int]
+    shapeless: frozenset[int] = frozenset()
+    notes: tuple[str, ...] = ()
 
     def below(self, base: int) -> list[int]:
         """A body and all that hang on it, parents first."""
@@ -75,6 +85,8 @@ def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
     Raises UnusableModelError for what it does not accept.
     """
     content = Path(path).read_bytes()
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise UnusableModelError("<mujoco>: MuJoCo reads no UTF-16; save the file as UTF-8")
     text = content.decode("utf-8-sig", errors="replace")
     _check_passed_over(content, path)
     try:
@@ -84,7 +96,7 @@ def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
         # Nor is there need of room for the contacts of a simulation.
         written.memory, written.njmax, written.nconmax = _MEMORY, -1, -1
         written.compiler.discardvisual = written.compiler.discardvisual and not drawn
-        model = written.compile()
+        model, shapeless, notes = compiled_without(written)
     except (ValueError, RuntimeError) as error:
         raise _refused(str(error), text) from None
     lines = text.splitlines()
@@ -94,7 +106,8 @@ def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
         for part in parts
     }
     begin["body", 0] = next((number for number, line in enumerate(lines, 1) if "<worldbody" in line), 1)
-    return Compiled(model, [model.body(body).name or f"body{body}" for body in range(model.nbody)], begin)
+    names = [model.body(body).name or f"body{body}" for body in range(model.nbody)]
+    return Compiled(model, names, begin, shapeless, tuple(notes))
 
 
 def _check_passed_over(content: bytes, path: str) -> None:

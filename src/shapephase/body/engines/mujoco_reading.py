@@ -53,6 +53,7 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
     """
     compiled = compiled_model(path)
     base, way, notes = base_of(compiled, root, root_body)
+    notes = [*compiled.notes, *notes]
     bodies = compiled.below(base)
     if len(bodies) > MOST_LINKS:
         raise UnusableModelError(f"<mujoco>: the body has {len(bodies)} links; up to {MOST_LINKS} are supported")

@@ -19,8 +19,6 @@ from .chain import Chain, UnusableModelError, check_name
 from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, tensor_of, value_and_slope, vector_of
 from .opensim_poses import add_poses
 
-_MOST_BYTES = 64 << 20
-"""Of a file; a full body with muscles has a few million."""
 _CUBIC = 3
 _FREE = 6
 """Coordinates of a body that floats."""
@@ -74,8 +72,6 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
     engine().Logger.setLevelString("Off")
     engine().Logger.removeFileSink()
     content = Path(path).read_bytes()
-    if len(content) > _MOST_BYTES:
-        raise UnusableModelError(f"it has {len(content) >> 20} MiB; up to {_MOST_BYTES >> 20} MiB are read")
     return _Reading(path, content.decode("utf-8", "replace"), root_body).chain()
 
 

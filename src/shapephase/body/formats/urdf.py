@@ -8,16 +8,20 @@ was read: links with their inertia and joints, nothing else.
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from ...arrays import Array
 from ...errors import ModelFileError
-from .._link_tree import LEAST_MASS, MOST_LINKS, MOST_MASS, Joint, Link, LinkTree, from_the_root
+from .._link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root, grouped
 from ..couplings.coupling import Coupling
 from ..virtual_base import ANYWHERE, IN_A_PLANE, free_base
+from .foreign import foreign_root
 from .xml_text import (
     Node,
     child_of,
@@ -33,17 +37,24 @@ from .xml_text import (
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _BALL = "spherical"
-_ROBOT_PARTS = ("link", "joint")
+_EXPRESSION = re.compile(r"\$[{(]")
+_DRAKE_JOINT = "drake:joint"
+_DRAKE_BALL = "ball"
+_UNIVERSAL = "universal"
+"""Kinds of Drake's own joints; a universal one turns about x, then about the y that was turned (`UniversalJoint`)."""
+_ROBOT_PARTS = ("link", "joint", _DRAKE_JOINT)
 _LINK_PARTS = ("inertial", "visual", "collision")
 _JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
+_MOVING = (*_ROBOT_PARTS, "parent", "child", "axis", "limit", "mimic", "inertial", "mass", "inertia")
+"""Elements that say how a body moves: in the wrong place they would be passed over, and the body be another."""
+_OF_OTHERS = {
+    "robot": ("material", "transmission", "gazebo", "sensor", "ros2_control", "mujoco", "group", "disable_collisions"),
+    "link": ("contact", "surface", "self_filter", "collision_checking", "gravity", "kinematic", "origin", "material"),
+    "joint": ("hardwareInterface", "material"),
+}
+"""Elements of other programs, which have no part in how a free body turns."""
 # The offset of an <origin> that states none [m].
 _NO_OFFSET = np.zeros(3)
-_FORMATS = {
-    "sdf": "an SDF model; convert it to URDF first (sdf2urdf of the ROS package pysdf)",
-    "html": "an HTML page, not the file itself; download the raw file",
-    "mujocoinclude": "a part of an MJCF model; load the file that includes it",
-    "COLLADA": "a mesh; load the robot's URDF",
-}
 
 
 @dataclass(frozen=True)
@@ -61,7 +72,7 @@ class _Reading:
 
     text: dict[tuple[str, str], str] = field(default_factory=dict)  # by kind of element and name
     mimics: dict[str, tuple[Node, Mimic]] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    notes: list[tuple[str, str, str, str]] = field(default_factory=list)  # as `grouped` takes them
 
 
 def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
@@ -75,18 +86,18 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
         If it is no URDF, needs xacro, or a link or joint is faulty.
     """
     if root.tag != "robot":
-        tag = root.tag.rpartition("}")[2]
-        said = _FORMATS.get(tag, "neither a URDF nor an MJCF model")
-        raise root.fault(f"<{quoted(tag)}>", f"expected <robot>: this is {said}")
+        raise root.fault(f"<{quoted(root.tag)}>", f"expected <robot>: this is {foreign_root(root.tag)}")
     if (left := macro_of(root)) is not None:
-        raise left.fault(f"<{quoted(left.tag.rpartition('}')[2])}>", "a macro or an expression that xacro has left")
-    no_misspelt_children(root, _ROBOT_PARTS, "<robot>")
+        raise left.fault(f"<{quoted(left.tag)}>", "a macro or an expression that xacro has left; define or remove it")
     name = name_of(root) if root.get("name") else "robot"
     reading = _Reading()
+    _check_parts(root, _ROBOT_PARTS, "<robot>", reading)
+    frames = frozenset(map(partial(_split_universal, root), root.all(_DRAKE_JOINT))) - {""}
     links = {key: _link(key, node, reading) for key, node in _named(root, "link").items()}
     if not links:
-        raise root.fault(f"robot {name!r}", "has no links; a body needs at least one <link>")
-    joints = {key: _joint(key, node, reading) for key, node in _named(root, "joint").items()}
+        groups = "; an SRDF file names groups of joints only: load its URDF" if root.all("group") else ""
+        raise root.fault(f"robot {name!r}", f"has no links; a body needs at least one <link>{groups}")
+    joints = {key: _joint(key, node, reading) for key, node in _named(root, "joint", _DRAKE_JOINT).items()}
     first, ordered = from_the_root(links, joints.values(), root.file)
     _check_mimics(reading.mimics, joints)
     couplings = {
@@ -94,13 +105,13 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
     }
     base = free_base(first, links, ordered, couplings, free)
     found = {base.link: links[base.link]} | {joint.child: links[joint.child] for joint in base.joints}
-    # The parser of Pinocchio knows no ball joints.
+    # The parser of Pinocchio knows no ball joints, and makes links of mere frames.
     text = None
-    if all(joint.kind != "ball" for joint in base.joints):
+    if not frames and all(joint.kind != "ball" for joint in base.joints):
         written = [("link", link) for link in found] + [("joint", joint.name) for joint in base.joints]
         text = f"<robot name={quoteattr(name)}>{''.join(reading.text[key] for key in written)}</robot>"
-    notes = (*reading.notes, *base.notes)
-    return LinkTree(name, found, base.joints, couplings, notes=notes, text=text, base_joints=base.way)
+    notes = (*grouped(reading.notes), *base.notes)
+    return LinkTree(name, found, base.joints, couplings, frames, notes, text, base_joints=base.way)
 
 
 def rpy_matrix(rpy: Array) -> Array:
@@ -115,30 +126,64 @@ def rpy_matrix(rpy: Array) -> Array:
 
 
 def macro_of(root: Node) -> Node | None:
-    """The first macro or expression of xacro; an unused xacro namespace on <robot> is harmless."""
-    for top in root.children:
-        read = top.tag in _ROBOT_PARTS
-        for node in top.walk():
-            left = "/xacro}" in node.tag or node.tag.startswith("xacro:")
-            if left or (read and any("${" in value or "$(" in value for value in node.attributes.values())):
+    """The first macro or expression of xacro: by its prefix, whatever the address, or by its address."""
+    bound = (name[6:] for name, address in root.attributes.items() if name[:6] == "xmlns:" and address[-6:] == "/xacro")
+    prefixes = tuple(f"{prefix}:" for prefix in ("xacro", *bound))
+    for top in (root, *root.children):
+        read = top is root or top.tag in _ROBOT_PARTS
+        for node in [root] if top is root else top.walk():
+            if node.tag.startswith(prefixes) or (read and any(map(_EXPRESSION.search, node.attributes.values()))):
                 return node
     return None
 
 
-def _named(root: Node, kind: str) -> dict[str, Node]:
+def _check_parts(node: Node, known: Sequence[str], owner: str, reading: _Reading) -> None:
+    """Raise ModelFileError for an element that would be lost; note those that are nobody's."""
+    no_misspelt_children(node, known, owner)
+    others = _OF_OTHERS["joint" if node.tag == _DRAKE_JOINT else node.tag]
+    for child in node.children:
+        if child.tag in known or child.tag in others:
+            continue
+        if child.tag in _MOVING:
+            raise child.fault(
+                owner, f"<{child.tag}> stands in <{node.tag}>, where nothing reads it; move it to where it belongs"
+            )
+        reading.notes.append((f"{child.file}:{child.line}", "element", f"<{quoted(child.tag)}>", "not read"))
+
+
+def _split_universal(root: Node, node: Node) -> str:
+    """Put two hinges and a link between them in the place of a universal joint; the link, or "" for other joints."""
+    if node.get("type") != _UNIVERSAL:
+        return ""
+    name = name_of(node)
+    owner = f"joint {name!r}"
+    ends = {end: name_of(needed_child(node, end, owner), "link") for end in ("parent", "child")}
+    between = f"{ends['child']}__{name}"
+
+    def part(tag: str, children: Sequence[Node] = (), **attributes: str) -> Node:
+        return Node(tag, attributes, node.file, node.line, list(children))
+
+    def hinge(letter: str, parent: str, child: str, axis: str, *more: Node) -> Node:
+        parts = (part("parent", link=parent), part("child", link=child), part("axis", xyz=axis), *more)
+        return part("joint", parts, name=f"{name}_q{letter}", type="continuous")
+
+    first = hinge("x", ends["parent"], between, "1 0 0", *node.all("origin"))
+    place, second = root.children.index(node), hinge("y", between, ends["child"], "0 1 0")
+    root.children[place : place + 1] = [part("link", name=between), first, second]
+    return between
+
+
+def _named(root: Node, *tags: str) -> dict[str, Node]:
     """The links or joints by name."""
     found: dict[str, Node] = {}
-    nodes = root.all(kind)
-    if len(nodes) > MOST_LINKS:
-        raise nodes[MOST_LINKS].fault(
-            f"<{kind}>", f"the body has {len(nodes)} {kind}s; up to {MOST_LINKS} are supported"
-        )
-    for node in nodes:
+    for node in root.children:
+        if node.tag not in tags:
+            continue
         name = name_of(node)
         if name in found:
             raise node.fault(
-                f"{kind} {name!r}",
-                f"two <{kind}> elements have this name, the first in line {found[name].line}; rename one",
+                f"{tags[0]} {name!r}",
+                f"two <{node.tag}> elements have this name, the first in line {found[name].line}; rename one",
             )
         found[name] = node
     return found
@@ -146,7 +191,7 @@ def _named(root: Node, kind: str) -> dict[str, Node]:
 
 def _link(name: str, node: Node, reading: _Reading) -> Link:
     owner, where = f"link {name!r}", f"{node.file}:{node.line}"
-    no_misspelt_children(node, _LINK_PARTS, owner)
+    _check_parts(node, _LINK_PARTS, owner, reading)
     inertial = child_of(node, "inertial", owner)
     if inertial is None:
         reading.text["link", name] = f"<link name={quoteattr(name)}/>"
@@ -175,8 +220,9 @@ def _link(name: str, node: Node, reading: _Reading) -> Link:
 
 def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     owner = f"joint {name!r}"
-    no_misspelt_children(node, _JOINT_PARTS, owner)
+    _check_parts(node, _JOINT_PARTS, owner, reading)
     kind = node.get("type") or ""
+    kind = _BALL if kind == _DRAKE_BALL else kind
     if kind not in (*_AXIS_JOINTS, _BALL, "fixed", ANYWHERE, IN_A_PLANE):
         raise node.fault(
             owner,
@@ -211,7 +257,7 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     _mimic(name, kind, node, reading)
     where = f"{node.file}:{node.line}"
     if kind == _BALL and child_of(node, "limit", owner) is not None:
-        reading.notes.append(f"{where}: {owner}: <limit> of a ball joint is ignored")
+        reading.notes.append((where, "joint", repr(name), "<limit> of a ball joint is ignored"))
     kind = "ball" if kind == _BALL else kind
     return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NO_OFFSET, limits, (effort, fastest))
 
@@ -258,7 +304,8 @@ def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
     if element is None:
         return
     if kind == "fixed":
-        reading.notes.append(f"{element.file}:{element.line}: {owner}: <mimic> of a fixed joint is ignored")
+        where = f"{element.file}:{element.line}"
+        reading.notes.append((where, "joint", repr(name), "<mimic> of a fixed joint is ignored"))
         return
     if kind not in _AXIS_JOINTS:
         raise element.fault(owner, f"a {kind} joint follows no other: it has no single number; remove the <mimic>")

@@ -183,7 +183,7 @@ def plan_command(
     aside = check_writable(html, "--html", ".html") or aside
     with steps(12 if html else 2) as work:
         work.begin("loading")
-        loaded = load_body(body, isolate=True, **vars(floating))
+        loaded = load_body(body, **floating.loading)
         start = None if from_ is None else posture(loaded, from_, "--from", first=True)
         end = to if to in (None, "free") else posture(loaded, to, "--to", first=False)
         status = ""
