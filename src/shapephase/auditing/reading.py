@@ -18,7 +18,7 @@ from ..body.body import Body
 from ..body.virtual_base import way_names
 from ..errors import InputFileNotFoundError, ShapeError, TrajectoryError, UnknownNameError
 from ..files import npz_arrays
-from ..shape_space.files._recording import MOST_BYTES, Table, file_bytes
+from ..shape_space.files._recording import Table, file_bytes
 from ..shape_space.files.formats.text_tables import read_delimited
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from .floating_trajectory import FloatingTrajectory
@@ -167,7 +167,7 @@ def _arrays(where: Path, suffix: str) -> dict[str, Any]:
     data = file_bytes(where)
     if suffix == ".npz":
         try:
-            return npz_arrays(data, 4 * MOST_BYTES)
+            return npz_arrays(data)
         except ValueError as error:
             raise TrajectoryError(f"{where}: {error}") from None
     return _of_table(read_delimited(where, data))

@@ -21,7 +21,7 @@ from .formats.hdf5 import read_hdf5
 from .formats.matlab import read_matlab
 from .formats.motion_arrays import read_arrays
 from .formats.opensim import END, read_opensim
-from .formats.ros_motion_files import MOST_YAML, read_bag, read_ros_yaml
+from .formats.ros_motion_files import read_bag, read_ros_yaml
 from .formats.spreadsheets import read_excel, read_parquet
 from .formats.text_tables import read_delimited
 
@@ -48,7 +48,6 @@ _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
 _ARRAYS = (".npz", ".npy")
 _WITH_BODY: dict[str, Callable[[Path, bytes, Body], Table]] = {".bvh": read_bvh}
 _BAGS = (".bag", ".mcap", ".db3")
-_YAML = (".yaml", ".yml")
 # What comes near, and how it becomes a motion of joints.
 _OTHERS = {
     ".trc": INVERSE_KINEMATICS,
@@ -115,7 +114,7 @@ def read_input(
         raise TrajectoryError(
             f"{where}: topic={what_came(topic)} is for bags, workbooks and .mat files; this one has no parts"
         )
-    data = file_bytes(where, MOST_YAML if suffix in _YAML else MOST_BYTES)
+    data = file_bytes(where)
     sha256 = hashlib.sha256(data).hexdigest()
     if suffix in _ARRAYS:
         return Input(read_arrays(where, data, body, timestep, order), str(source), sha256), None

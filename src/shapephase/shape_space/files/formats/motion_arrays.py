@@ -14,7 +14,7 @@ from ....body.body import Body
 from ....errors import ShapeError, TrajectoryError
 from ....files import npy_array, npz_arrays
 from .._nameless_joints import FREE_JOINT, NamelessJoints, attitudes_of, nameless_joints, placed_joints
-from .._recording import MOST_BYTES, Table
+from .._recording import Table
 
 # Where the entries x, y, z, w stand in a quaternion that begins with its scalar part.
 _SCALAR_FIRST = [1, 2, 3, 0]
@@ -203,7 +203,7 @@ def _names(stored: Any, where: Path) -> list[str]:
 
 def _members(data: bytes, where: Path) -> dict[str, Any]:
     try:
-        return npz_arrays(data, 4 * MOST_BYTES)
+        return npz_arrays(data)
     except ValueError as error:
         raise TrajectoryError(f"{where}: {error}") from None
 

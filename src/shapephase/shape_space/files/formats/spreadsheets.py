@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import re
-import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -17,19 +16,10 @@ from ....warning_filters import quiet
 from .._labels import unit_of
 from .._recording import Table
 from .column_tables import column_table
-from .parser_process import table_apart
 
-_MOST_UNPACKED = 2**28
-"""Size of a workbook's parts, unpacked [bytes]; a cell takes some forty."""
 _MOST_CELLS = 5_000_000
 """Cells of a sheet, empty ones counted: a second for each million."""
-_MOST_VALUES = 2**24
-"""Values of a Parquet file: an hour of a hundred joints at forty samples a second."""
 
-_SMALL = 2**22
-"""A workbook's parts, unpacked [bytes], that are read in this process; a Parquet file's list of its columns."""
-_FLAT = ("BOOLEAN", "INT32", "INT64", "FLOAT", "DOUBLE")
-"""Types of Parquet whose values take no more memory than is known before they are read."""
 _ROW = re.compile(rb"""<(?:\w+:)?row\b[^>]*?\sr=["']([^"']*)["']""")
 _PLAIN_ROW = re.compile(rb"[0-9]{1,18}")
 _CELL = re.compile(
@@ -55,27 +45,11 @@ def read_excel(where: Path, data: bytes, sheet: str | None) -> Table:
         For faults, with row and column; for a sheet that is not there; without openpyxl.
     """
     try:
-        import openpyxl  # noqa: F401
+        import openpyxl
     except ImportError:
         raise MissingExtraError("Excel files need openpyxl; install it with: pip install 'shapephase[data]'") from None
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            size = sum(entry.file_size for entry in archive.infolist())
-    except Exception as error:  # as below
-        raise _no_workbook(where, error) from None
-    if size > _MOST_UNPACKED:
-        raise TrajectoryError(f"{where}: {size >> 20} MiB when unpacked, up to {_MOST_UNPACKED >> 20} MiB are read")
-    if size > _SMALL:
-        return table_apart(where, data, "workbook", read_workbook, sheet)
-    return read_workbook(where, data, sheet)
-
-
-def read_workbook(where: Path, data: bytes, sheet: str | None = None) -> Table:
-    """A workbook, here and now. Raises as `read_excel`."""
-    import openpyxl
-
-    try:
-        for name, part in zip_members(data, _MOST_UNPACKED).items():
+        for name, part in zip_members(data).items():
             if _SHEETS.fullmatch(name):
                 _check_rows(part, where)
                 _check_numbers(part, where)
@@ -189,24 +163,7 @@ def read_parquet(where: Path, data: bytes) -> Table:
     except ImportError:
         raise MissingExtraError("Parquet files need pyarrow; install it with: pip install 'shapephase[data]'") from None
     try:
-        apart = int.from_bytes(data[-8:-4], "little") > _SMALL
-        leaves = [] if apart else list(parquet.ParquetFile(io.BytesIO(data)).schema)
-    except Exception as error:  # as below
-        raise _no_parquet(where, error) from None
-    if apart or any(leaf.max_repetition_level or leaf.physical_type not in _FLAT for leaf in leaves):
-        return table_apart(where, data, "Parquet", read_columns)
-    return read_columns(where, data)
-
-
-def read_columns(where: Path, data: bytes) -> Table:
-    """A Parquet file, here and now. Raises as `read_parquet`."""
-    import pyarrow.parquet as parquet
-
-    try:
         file = parquet.ParquetFile(io.BytesIO(data))
-        values = file.metadata.num_rows * file.metadata.num_columns
-        if values > _MOST_VALUES:
-            raise TrajectoryError(f"{where}: {values} values, up to {_MOST_VALUES} are read; write fewer samples")
         read = file.read(use_threads=False)
         units: dict[str, str] = {}
         columns = []
