@@ -453,7 +453,7 @@ ODD_FILES = {
         "m.npz",
         npz_bytes(qpos=np.zeros((3, 5)), time=[0, 1, 2]),
         E,
-        ["5 columns", "has 9, or 2"],
+        ["shape (3, 5)", "has 9, or 2"],
     ),
     "qpos of another length": ("m.npz", npz_bytes(qpos=np.zeros((3, 2)), time=[0, 1]), E, ["time", "(2,)"]),
     "qpos without times": ("m.npz", npz_bytes(qpos=np.zeros((3, 2))), E, ["the times of qpos", "none is there"]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,10 +16,11 @@ from ...letters import what_came
 from ._recording import MOST_BYTES, Table, digest, file_bytes
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
+from .formats.deepmimic import read_deepmimic
 from .formats.frames import is_frame, read_frame
 from .formats.hdf5 import read_hdf5
 from .formats.matlab import read_matlab
-from .formats.motion_arrays import read_arrays
+from .formats.motion_arrays import arrays_in_memory, arrays_motion, of_numbered_columns, read_arrays
 from .formats.opensim import END, read_opensim
 from .formats.ros_motion_files import read_bag, read_ros_yaml
 from .formats.spreadsheets import read_excel, read_parquet
@@ -37,6 +38,7 @@ _TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
     ".yml": read_ros_yaml,
     ".parquet": read_parquet,
     ".c3d": read_c3d,
+    ".json": read_deepmimic,
 }
 _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
     ".xlsx": read_excel,
@@ -68,10 +70,12 @@ class Input(NamedTuple):
 def read_input(
     source: Any, body: Body, topic: str | None, timestep: float | None, order: str | None
 ) -> tuple[Input, float | None]:
-    """The table of a file, of standard input (`-`), or of a frame in memory; and the time step, if it is still needed.
+    """The table of a file, of standard input (`-`), or of what is in memory; and the time step, if it is still needed.
 
     Parameters
     ----------
+    source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or what this
+        function has returned
     topic : which part of a bag, a workbook or a `.mat` file; None: the only one
     timestep : [s], for what has no times
     order : of the joints in arrays without names, or None
@@ -89,14 +93,20 @@ def read_input(
         raise ShapeError(f"topic: a name is needed, got {what_came(topic)}")
     if timestep is not None:
         timestep = positive_argument(timestep, "timestep")
+    if isinstance(source, Input):
+        return source, timestep
     if is_frame(source):
         _no_topic(topic, "a table in memory")
-        table = read_frame(source)
+        table = of_numbered_columns(read_frame(source), body, order)
         return Input(table, table.where, None), timestep
+    if isinstance(source, Mapping | tuple):
+        _no_topic(topic, "arrays in memory")
+        table, step = arrays_motion(arrays_in_memory(source), "the arrays", body, timestep, order, kind="arrays")
+        return Input(table, table.where, None), step
     check_file_name(source, "file")
     if source == STANDARD_INPUT:
         _no_topic(topic, "standard input")
-        return _standard_input(), timestep
+        return _standard_input(body, order), timestep
     where = Path(source)
     suffix = where.suffix.lower()
     if suffix in _BAGS or os.path.isdir(where):
@@ -117,21 +127,22 @@ def read_input(
     data = file_bytes(where)
     sha256 = hashlib.sha256(data).hexdigest()
     if suffix in _ARRAYS:
-        return Input(read_arrays(where, data, body, timestep, order), str(source), sha256), None
+        table, step = read_arrays(where, data, body, timestep, order)
+        return Input(table, str(source), sha256), step
     if suffix in _WITH_BODY:
         return Input(_WITH_BODY[suffix](where, data, body), str(source), sha256), timestep
     table = _WITH_PARTS[suffix](where, data, topic) if suffix in _WITH_PARTS else _TEXTS[suffix](where, data)
-    return Input(table, str(source), sha256), timestep
+    return Input(of_numbered_columns(table, body, order), str(source), sha256), timestep
 
 
-def _standard_input() -> Input:
+def _standard_input(body: Body, order: str | None) -> Input:
     where = Path("standard input")
     data = sys.stdin.buffer.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise TrajectoryError(f"{where}: more than {MOST_BYTES >> 20} MiB; write a file")
     opensim = any(line.strip().lower() == END.encode() for line in data[:65536].splitlines())
     table = read_opensim(where, data) if opensim else read_delimited(where, data)
-    return Input(table, str(where), hashlib.sha256(data).hexdigest())
+    return Input(of_numbered_columns(table, body, order), str(where), hashlib.sha256(data).hexdigest())
 
 
 def _check_exists(where: Path) -> None:

@@ -11,11 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from ....child_process import run_alone
+from ....child_process import limit_this_process, run_alone
 from ....errors import TrajectoryError
 
-_SECONDS = 180
-"""[s] for the imports and the file; it only ends what would never end."""
+_SECONDS = 30
+"""[s] for the imports and the file: the largest take five, and damaged ones may take forever."""
+_MEMORY = 2**30
+"""[bytes] beyond the imports: damaged headers make ezc3d ask for any."""
 
 
 def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:
@@ -27,7 +29,9 @@ def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:
     try:
         child = run_alone(source, (), data, _SECONDS)
     except subprocess.TimeoutExpired:
-        raise TrajectoryError(f"{where}: reading it took more than {_SECONDS} s and was stopped") from None
+        raise TrajectoryError(
+            f"{where}: reading it took more than {_SECONDS} s and was stopped; export it anew"
+        ) from None
     if child.returncode:
         said = "".join(child.stderr.decode(errors="replace").strip().splitlines()[-1:])
         why = f"the parser crashed on it, signal {-child.returncode}" if child.returncode < 0 else said[:200]
@@ -38,6 +42,7 @@ def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:
 
 def print_arrays(parse: Callable[[bytes], Mapping[str, Any]]) -> None:
     """Parse the file that comes through standard input, and print its arrays."""
-    stream = io.BytesIO()
-    np.savez(stream, **parse(sys.stdin.buffer.read()))
+    data, stream = sys.stdin.buffer.read(), io.BytesIO()
+    limit_this_process(_MEMORY)
+    np.savez(stream, **parse(data))
     sys.stdout.buffer.write(stream.getvalue())
