@@ -173,7 +173,7 @@ def test_files_that_are_not_there_or_no_motion(tmp_path, diver):
     with pytest.raises(TrajectoryError, match="no NPZ file"):
         sp.read_shape_path(tmp_path / "m.npz", diver)
     np.savez(tmp_path / "n.npz", time=[0.0, 1.0], shapes=np.zeros((2, 2)))
-    with pytest.raises(TrajectoryError, match="'joint_names' is missing"):
+    with pytest.raises(TrajectoryError, match="name its columns in `joint_names`"):
         sp.read_shape_path(tmp_path / "n.npz", diver)
     (tmp_path / "latin.csv").write_bytes(GOOD.encode() + b"\xe4,0,0\n")
     with pytest.raises(TrajectoryError, match="not UTF-8"):

@@ -85,14 +85,12 @@ def arrays_motion(
         if motion is not None:
             times = _times(arrays, motion.title.split()[-1], where, len(motion.joints), timestep)
             return _table(motion, times, where, arrays), None
-        if "shapes" in arrays:
-            if timestep is not None and kind == _NPZ:
-                raise TrajectoryError(f"{where}: timestep is for qpos without times; this file has its times")
-            return _shapes(arrays, where, kind), timestep
     except ShapeError as error:
         raise TrajectoryError(str(error)) from None
     entries = {name: value.tolist() if _is_text(value) else value for name, value in arrays.items()}
-    return arrays_table(where, kind, entries, None), timestep
+    table = arrays_table(where, kind, entries, None)
+    # Our own files are in radians and metres; what other people have by name may be in degrees.
+    return replace(table, by_format=kind == _NPZ and "shapes" in arrays), timestep
 
 
 def of_numbered_columns(table: Table, body: Body, order: str | None) -> Table:
@@ -149,42 +147,6 @@ def _table(motion: FloatingMotion, times: Array, where: str, arrays: Mapping[str
         nameless=motion.nameless,
         simulated=Simulated(motion.rates, None if step is None else float(np.ravel(step)[0])),
         unread=_unread(arrays),
-    )
-
-
-def _shapes(arrays: Mapping[str, Any], where: str, kind: str) -> Table:
-    """Our own arrays."""
-    for name in ("time", "shapes", "joint_names"):
-        if name not in arrays:
-            raise TrajectoryError(f"{where}: the array {name!r} is missing; there are {', '.join(sorted(arrays))}")
-    names = _names(arrays["joint_names"], where)
-    times = _array(arrays["time"], where, "time", (None,), "s")
-    shapes = _array(arrays["shapes"], where, "shapes", (len(times), len(names)))
-    quaternions, positions = None, arrays.get("base_position")
-    there = [name for name in ("base_quat_xyzw", "base_quat_wxyz") if name in arrays]
-    if len(there) > 1:
-        raise TrajectoryError(f"{where}: both {there[0]!r} and {there[1]!r} are there; keep one")
-    if there:
-        stored = _array(arrays[there[0]], where, there[0], (len(times), 4))
-        quaternions = stored if there[0] == "base_quat_xyzw" else stored[:, _SCALAR_FIRST]
-    if positions is not None:
-        positions = _array(positions, where, "base_position", (len(times), 3), "m")
-    columns = {name: np.ascontiguousarray(column) for name, column in zip(names, shapes.T, strict=True)}
-    table = Table(
-        where=where,
-        format=kind,
-        columns=columns,
-        rows=range(len(times)),
-        row="sample",
-        base_quat_xyzw=quaternions,
-        base_position=positions,
-        unread=_unread(arrays),
-    )
-    # What other people have in memory may be in degrees; our own files are not.
-    return (
-        replace(table, times=times, by_format=True)
-        if kind == _NPZ
-        else replace(table, columns={"time": times} | columns)
     )
 
 
