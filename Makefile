@@ -64,7 +64,7 @@ lowest:
 	$(LOWEST)/bin/pip install --quiet --no-deps .
 	$(LOWEST)/bin/pytest -n auto -m "not full" -W default -p no:cacheprovider $(LOWEST_TESTS)
 
-# Twenty minutes of mutated files and command lines; MINUTES and SEED choose others.
+# Twenty minutes of files that are damaged at random; MINUTES and SEED choose others.
 MINUTES ?= 20
 fuzz:
 	PYTHONPATH=src:tests $(BIN)/python -m fuzz --minutes $(MINUTES) $(if $(SEED),--seed $(SEED))

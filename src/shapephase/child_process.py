@@ -21,20 +21,13 @@ def run_alone(source: str, words: tuple[str, ...], data: bytes, seconds: float) 
     return subprocess.run(command, input=data, capture_output=True, timeout=seconds, env=environment)
 
 
-def limit_this_process(memory: int, seconds: int | None = None) -> None:
-    """No core dump, and only so much more memory [bytes] than is mapped now, where the system can do that.
-
-    Parameters
-    ----------
-    seconds : processor time after which the system ends the process [s]; None: as before
-    """
+def limit_this_process(memory: int) -> None:
+    """No core dump, and only so much more memory [bytes] than is mapped now, where the system can do that."""
     try:
         import resource
     except ImportError:
         return
     limits = {resource.RLIMIT_CORE: 0}
-    if seconds is not None:
-        limits[resource.RLIMIT_CPU] = seconds
     # Without /proc it is not known what is mapped, and a limit below that would refuse everything.
     with contextlib.suppress(OSError):
         pages = int(Path("/proc/self/statm").read_text().split()[0])

@@ -1,4 +1,4 @@
-"""Files out, written whole or not at all wherever they go; and NumPy's arrays in, whose headers are not believed."""
+"""Files out, written whole or not at all wherever they go; and NumPy's arrays in."""
 
 from __future__ import annotations
 
@@ -26,8 +26,6 @@ _RANDOM_BYTES = 4
 _ENDING = ".part"
 # Links that may follow one another, as in the kernel.
 _MOST_LINKS = 40
-# Of an archive, what is unpacked at once [bytes].
-_PIECE = 2**20
 # The folders whose entries are the open files of a process.
 _OPEN_FILES = re.compile(r"/dev/fd|/proc/[^/]+(/task/[0-9]+)?/fd")
 
@@ -125,60 +123,42 @@ def size_text(path: str | os.PathLike[str]) -> str:
     return f"{size:.1f} GB"
 
 
-def npz_arrays(data: bytes, most_bytes: int) -> dict[str, Any]:
-    """The arrays of an NPZ file, by name. Raises ValueError for what cannot be read, or unpacks to more than that."""
+def npz_arrays(data: bytes) -> dict[str, Any]:
+    """Arrays of an NPZ file, by name. Raises ValueError for what cannot be read; Python objects are never read."""
     try:
-        found = zip_members(data, most_bytes)
+        # Read to the end, where the checksum of a member is compared.
+        members = list(zip_members(data).items())
     except ValueError:
         raise
     except Exception as error:  # a damaged archive fails in the decoders in many ways
-        raise ValueError(f"no NPZ file that can be read ({error})") from None
-    names = [name.removesuffix(".npy") for name in found]
+        raise ValueError(f"no NPZ file that can be read ({error}); write it anew with numpy.savez") from None
+    names = [name.removesuffix(".npy") for name, _ in members]
     if len(set(names)) != len(names):
-        raise ValueError("an array stands twice in the file")
-    return {name: npy_array(content) for name, content in zip(names, found.values(), strict=True)}
+        raise ValueError("an array stands twice in the file; write it anew with numpy.savez")
+    return {name: npy_array(content) for name, (_, content) in zip(names, members, strict=True)}
 
 
-def zip_members(data: bytes, most_bytes: int) -> dict[str, bytes]:
-    """The files in a ZIP archive, by name, in no more memory than they are said to take.
+def zip_members(data: bytes) -> dict[str, bytes]:
+    """Files in a ZIP archive, by name.
 
-    Raises ValueError for more than that, for names that stand twice and for packing that takes any memory; for what is
-    damaged, whatever `zipfile` raises.
+    Raises ValueError for names that stand twice; for what is damaged, whatever `zipfile` raises.
     """
     found: dict[str, bytes] = {}
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        entries = archive.infolist()
-        # A small file can unpack to any size.
-        if sum(entry.file_size for entry in entries) > most_bytes:
-            raise ValueError(f"more than {most_bytes >> 20} MiB when unpacked")
-        for entry in entries:
+        for entry in archive.infolist():
             if entry.filename in found:
                 raise ValueError(f"{entry.filename[:40]!r} stands twice in the file")
-            if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise ValueError(f"{entry.filename[:40]!r} is packed in an unusual way; save the file anew")
-            with archive.open(entry) as stream:
-                # Asked for all at once, an entry is unpacked to the end, however small it is said to be.
-                found[entry.filename] = b"".join(iter(lambda stream=stream: stream.read(_PIECE), b""))
+            found[entry.filename] = archive.read(entry)
     return found
 
 
 def npy_array(data: bytes) -> Any:
-    """The array of an NPY file. Raises ValueError for what cannot be read; Python objects are never."""
-    try:
-        stream = io.BytesIO(data)
-        version = np.lib.format.read_magic(stream)
-        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-        shape, _, dtype = read(stream)
-    except Exception as error:  # a damaged header fails in NumPy's parser in many ways
-        raise ValueError(f"no array that can be read ({error})") from None
-    if dtype.hasobject:
-        raise ValueError("an array of Python objects; such files can run code and are never read")
-    # The header may promise more than there is, and the memory, or for entries without bytes the time, would be taken.
-    if float(np.prod(shape, dtype=np.float64)) * max(dtype.itemsize, 1) > len(data):
-        raise ValueError(f"an array of shape {shape} and type {dtype} does not fit into the file; it is cut off")
+    """Array of an NPY file. Raises ValueError for what cannot be read; Python objects are never read."""
     try:
         return np.load(io.BytesIO(data), allow_pickle=False)
-    except Exception as error:  # as above
+    except Exception as error:  # a damaged header fails in NumPy's parser in many ways
+        if "allow_pickle" in str(error):
+            error = ValueError("it holds Python objects, which can run code; save arrays of numbers and of texts")
         raise ValueError(f"no array that can be read ({error})") from None
 
 

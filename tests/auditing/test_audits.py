@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.errors import ShapeError, TrajectoryError
+from shapephase.errors import TrajectoryError
 from support.ball_bodies import BALLS, ORDER, Hinges
 from support.flown_bodies import body_of, flown, noisy
 from support.planted_faults import FAULTS, clean_run, faults_of_finding, planted, trajectory
@@ -267,5 +267,3 @@ def test_ball_joints_are_audited(tmp_path):
             position=in_free_fall(times, motion.base_position(times)),
         )
         assert [one.name for one in sp.audit(body, run).cause] == causes
-    with pytest.raises(ShapeError, match="ball joints are not read"):
-        sp.FloatingTrajectory.from_mujoco(body, times, np.zeros((61, 16)))

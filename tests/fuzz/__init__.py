@@ -1,1 +1,1 @@
-"""Fuzzing: files and command lines by grammars, each tried under limits and held against plain readers."""
+"""Files damaged at random: each is read as it stands, or refused by an error of the library."""

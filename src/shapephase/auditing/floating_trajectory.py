@@ -15,14 +15,11 @@ from ..arrays import FARTHEST, Array, finite_array
 from ..body.body import Body
 from ..body.joint_orders import WORDS
 from ..display import short_repr
-from ..errors import ShapeError, TrajectoryError, unknown_name
-from ..shape_space.files._nameless_joints import nameless_joints
+from ..errors import ShapeError, TrajectoryError
+from ..shape_space.files._recording import Rates
+from ..shape_space.files.formats.floating_arrays import MUJOCO_QPOS, PINOCCHIO_Q, FreeJoint, with_free_joint
 
 FRAMES = ("world", "base")
-_POSE = 7
-"""Numbers of a place and a quaternion."""
-_TWIST = 6
-"""Numbers of two velocities."""
 _FEWEST = 12
 """Samples: fewer say nothing of noise."""
 _LARGEST = 1e12
@@ -148,27 +145,12 @@ class FloatingTrajectory:
         (21, 3)
         """
         check_object(body, "Body", "body")
-        nameless = None
         if joint_order is not None:
             check_choice(joint_order, "joint_order", WORDS)
             if joint_names is not None:
                 raise ShapeError("joint_order is for arrays without names, and joint_names are given; leave one out")
-        if joint_names is None:
-            width = finite_array(qpos, "qpos", (None, None)).shape[1]
-            nameless = nameless_joints(body, width, "qpos", joint_order)
-            joint_names = nameless.names
-        places, rates = _arrays(body, qpos, qvel, joint_names, ("qpos", "qvel"))
-        given = _rates(rates, "base", "world")
-        quaternion = np.roll(places[:, 3:_POSE], -1, axis=1)
-        return FloatingTrajectory(
-            times=finite_array(times, "times", (None,), unit="s"),
-            position=places[:, :3],
-            quaternion=quaternion,
-            shapes=places[:, _POSE:],
-            step=step,
-            name=name,
-            joint_order=None if nameless is None else f"{nameless.title}: {', '.join(nameless.names)}",
-            **given,
+        return _of_arrays(
+            body, times, (qpos, qvel), ("qpos", "qvel"), MUJOCO_QPOS, joint_names, joint_order, step=step, name=name
         )
 
     @staticmethod
@@ -204,17 +186,7 @@ class FloatingTrajectory:
         >>> sp.FloatingTrajectory.from_pinocchio(cat, np.linspace(0.0, 1.0, 21), q).quaternion[0].tolist()
         [0.0, 0.0, 0.0, 1.0]
         """
-        places, rates = _arrays(body, q, v, joint_names, ("q", "v"))
-        given = _rates(rates, "base", "base")
-        return FloatingTrajectory(
-            times=finite_array(times, "times", (None,), unit="s"),
-            position=places[:, :3],
-            quaternion=places[:, 3:_POSE],
-            shapes=places[:, _POSE:],
-            step=step,
-            name=name,
-            **given,
-        )
+        return _of_arrays(body, times, (q, v), ("q", "v"), PINOCCHIO_Q, joint_names, None, step=step, name=name)
 
     @property
     def attitude(self) -> Array:
@@ -260,38 +232,46 @@ def _check_size(values: Array | None, what: str, most: float) -> None:
         raise TrajectoryError(f"{what}: sample {sample} has {np.abs(values[sample]).max():.6g}; up to {most:g} is read")
 
 
-def _arrays(
-    body: Body, places: ArrayLike, rates: ArrayLike | None, names: Sequence[str] | None, labels: tuple[str, str]
-) -> tuple[Array, Array | None]:
-    """Both arrays with their joints in the body's order."""
-    check_object(body, "Body", "body")
-    if body.ball_joints:
-        raise ShapeError(
-            f"{labels[0]}: arrays of bodies with ball joints are not read, for quaternions may stand in another order "
-            f"there; {body.name} has {', '.join(body.ball_joints)}. Give `shapes` with columns as body.joint_names"
-        )
-    order = list(body.joint_names if names is None else names_argument(names, "joint_names", "names of joints"))
-    for joint in body.joint_names:
-        if order.count(joint) > 1:
-            raise ShapeError(f"joint_names: {joint!r} stands {order.count(joint)} times")
-        if joint not in order:
-            raise unknown_name("joint among joint_names", joint, order)
-    columns = [order.index(joint) for joint in body.joint_names]
-    full = finite_array(places, labels[0], (None, _POSE + len(order)))
-    found = np.hstack([full[:, :_POSE], full[:, _POSE:][:, columns]])
-    if rates is None:
-        return found, None
-    turned = finite_array(rates, labels[1], (len(full), _TWIST + len(order)))
-    return found, np.hstack([turned[:, :_TWIST], turned[:, _TWIST:][:, columns]])
-
-
-def _rates(rates: Array | None, rate_axes: str, velocity_axes: str) -> dict[str, Any]:
+def rates_by_name(rates: Rates | None) -> dict[str, Any]:
+    """The fields of a trajectory that rates are."""
     if rates is None:
         return {}
     return {
-        "velocity": rates[:, :3],
-        "rate": rates[:, 3:_TWIST],
-        "joint_rates": rates[:, _TWIST:],
-        "rate_axes": rate_axes,
-        "velocity_axes": velocity_axes,
+        "rate": rates.base,
+        "velocity": rates.velocity,
+        "joint_rates": rates.joints,
+        "rate_axes": rates.base_axes,
+        "velocity_axes": rates.velocity_axes,
     }
+
+
+def _of_arrays(
+    body: Body,
+    times: ArrayLike,
+    arrays: tuple[ArrayLike, ArrayLike | None],
+    labels: tuple[str, str],
+    layout: FreeJoint,
+    joint_names: Sequence[str] | None,
+    order: str | None,
+    *,
+    step: float | None,
+    name: str,
+) -> FloatingTrajectory:
+    """The trajectory in arrays of coordinates and of rates with a free joint."""
+    check_object(body, "Body", "body")
+    names = None if joint_names is None else names_argument(joint_names, "joint_names", "names of joints")
+    places = finite_array(arrays[0], labels[0], (None, None))
+    motion = with_free_joint(layout, places, arrays[1], body, names=names, order=order, labels=labels, where=name)
+    if motion.quaternion is None:
+        raise ShapeError(f"{labels[0]}: {places.shape[1]} columns are the joints alone; the base stands before them")
+    nameless = motion.nameless if layout is MUJOCO_QPOS else None
+    return FloatingTrajectory(
+        times=finite_array(times, "times", (None,), unit="s"),
+        position=motion.position,
+        quaternion=motion.quaternion,
+        shapes=motion.shapes(body),
+        step=step,
+        name=name,
+        joint_order=None if nameless is None else f"{nameless.title}: {', '.join(nameless.names)}",
+        **rates_by_name(motion.rates),
+    )

@@ -39,8 +39,6 @@ _STEPS = (
 )
 _SAMPLES = ("edges", "coefficients")
 _VECTOR_DEGREE = 24
-# What a motion's file may unpack to [bytes]: a hundred times the longest in use.
-_MOST_BYTES = 2**31
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +112,7 @@ def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
     if not where.is_file():
         raise InputFileNotFoundError(f"{where}: there is no such file")
     try:
-        arrays = npz_arrays(where.read_bytes(), _MOST_BYTES)
+        arrays = npz_arrays(where.read_bytes())
         header = json.loads(str(arrays["header"]))
     except (OSError, ValueError, KeyError, RecursionError) as error:
         raise ResultFileError(f"{where}: no motion that can be read ({error})") from None

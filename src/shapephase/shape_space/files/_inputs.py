@@ -17,12 +17,13 @@ from ._numbered_columns import named_columns
 from ._recording import MOST_BYTES, Table, digest, file_bytes
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
+from .formats.deepmimic import read_deepmimic
 from .formats.frames import file_table, is_frame, read_frame
 from .formats.hdf5 import read_hdf5
 from .formats.matlab import read_matlab
-from .formats.motion_arrays import read_arrays
+from .formats.motion_arrays import arrays_in_memory, arrays_motion, of_numbered_columns, read_arrays
 from .formats.opensim import has_header, read_opensim
-from .formats.ros_motion_files import MOST_YAML, read_bag, read_ros_yaml
+from .formats.ros_motion_files import read_bag, read_ros_yaml
 from .formats.text_tables import read_text
 from .tables import PACKED, TABLES, unpacked
 
@@ -34,6 +35,7 @@ _TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
     ".yaml": read_ros_yaml,
     ".yml": read_ros_yaml,
     ".c3d": read_c3d,
+    ".json": read_deepmimic,
 }
 _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
     ".mat": read_matlab,
@@ -43,7 +45,6 @@ _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
 _ARRAYS = (".npz", ".npy")
 _WITH_BODY: dict[str, Callable[[Path, bytes, Body], Table]] = {".bvh": read_bvh}
 _BAGS = (".bag", ".mcap", ".db3")
-_YAML = (".yaml", ".yml")
 # What comes near, and how it becomes a motion of joints.
 _OTHERS = {
     ".trc": INVERSE_KINEMATICS,
@@ -67,12 +68,14 @@ def read_input(
     topic: str | None,
     timestep: float | None,
     order: str | None,
-    names: Mapping[str, str | None] | None,
+    names: Mapping[str, str | None] | None = None,
 ) -> tuple[Input, float | None]:
-    """The table of a file, of standard input (`-`), or of a frame in memory; and the time step, if it is still needed.
+    """The table of a file, of standard input (`-`), or of what is in memory; and the time step, if it is still needed.
 
     Parameters
     ----------
+    source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or what this
+        function has returned
     topic : which part of a bag, a workbook or a `.mat` file; None: the only one
     timestep : [s], for what has no times
     order : of the joints in arrays without names, or None
@@ -91,14 +94,20 @@ def read_input(
         raise ShapeError(f"topic: a name is needed, got {what_came(topic)}")
     if timestep is not None:
         timestep = positive_argument(timestep, "timestep")
+    if isinstance(source, Input):
+        return source, timestep
     if is_frame(source):
         _no_topic(topic, "a table in memory")
-        table = named_columns(read_frame(source), body, names or {}, order, timestep)
+        table = of_numbered_columns(named_columns(read_frame(source), body, names or {}, order, timestep), body, order)
         return Input(table, table.where, None), timestep
+    if isinstance(source, Mapping | tuple):
+        _no_topic(topic, "arrays in memory")
+        table, step = arrays_motion(arrays_in_memory(source), "the arrays", body, timestep, order, kind="arrays")
+        return Input(table, table.where, None), step
     check_file_name(source, "file")
     if source == STANDARD_INPUT:
         _no_topic(topic, "standard input")
-        return _standard_input(), timestep
+        return _standard_input(body, order), timestep
     where = Path(source)
     suffix = Path(where.stem).suffix.lower() if where.suffix.lower() == PACKED else where.suffix.lower()
     if suffix in _BAGS or os.path.isdir(where):
@@ -116,27 +125,28 @@ def read_input(
         raise TrajectoryError(
             f"{where}: topic={what_came(topic)} is for bags, workbooks and .mat files; this one has no parts"
         )
-    data = file_bytes(where, MOST_YAML if suffix in _YAML else MOST_BYTES)
+    data = file_bytes(where)
     sha256 = hashlib.sha256(data).hexdigest()
     where, data = unpacked(where, data)
     if suffix in TABLES:
         table = named_columns(_table(where, data, topic), body, names or {}, order, timestep)
-        return Input(table, str(source), sha256), timestep
+        return Input(of_numbered_columns(table, body, order), str(source), sha256), timestep
     if suffix in _ARRAYS:
-        return Input(read_arrays(where, data, body, timestep, order), str(source), sha256), None
+        table, step = read_arrays(where, data, body, timestep, order)
+        return Input(table, str(source), sha256), step
     if suffix in _WITH_BODY:
         return Input(_WITH_BODY[suffix](where, data, body), str(source), sha256), timestep
     table = _WITH_PARTS[suffix](where, data, topic) if suffix in _WITH_PARTS else _TEXTS[suffix](where, data)
-    return Input(table, str(source), sha256), timestep
+    return Input(of_numbered_columns(table, body, order), str(source), sha256), timestep
 
 
-def _standard_input() -> Input:
+def _standard_input(body: Body, order: str | None) -> Input:
     where = Path("standard input")
     data = sys.stdin.buffer.read(MOST_BYTES + 1)
     if len(data) > MOST_BYTES:
         raise TrajectoryError(f"{where}: more than {MOST_BYTES >> 20} MiB; write a file")
     table = read_opensim(where, data) if has_header(data) else file_table(read_text(where, data), str(where))
-    return Input(table, str(where), hashlib.sha256(data).hexdigest())
+    return Input(of_numbered_columns(table, body, order), str(where), hashlib.sha256(data).hexdigest())
 
 
 def _table(where: Path, data: bytes, topic: str | None) -> Table:

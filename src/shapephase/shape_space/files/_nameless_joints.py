@@ -26,6 +26,10 @@ _FITS = 0.01
 """Of the extent of the body, rms: links that lie farther from where the file has its bodies are others."""
 _ALIKE = 5.0
 """Times the least distance: orders within it are not told apart by places, which have few digits."""
+_AT_REST = 1e-6
+"""[rad/s] Bodies that turn no faster do not show how they turn."""
+_CONTRADICTS = 0.5
+"""Of the rates themselves, rms: turns between samples that are off by more are others."""
 
 
 @dataclass(frozen=True)
@@ -70,16 +74,15 @@ def nameless_joints(body: Body, width: int, where: str, order: str | None) -> Na
         Where Isaac's order depends on how its importer sorted the joints of a link.
     """
     word = order or MUJOCO
-    joints = simulator_order(body, word, body.joint_names)
-    found = {(names, free) for names, free in _columns(body, joints) if width == len(names) + free}
-    if len(found) != 1:
-        own = _own(body, joints)
+    found = joint_columns(body, width, word)
+    if found is None:
+        own = _own(body, simulator_order(body, word, body.joint_names))
         raise TrajectoryError(
             f"{where} has {width} columns; with {len(own)} joints ({', '.join(own)}) it has {len(own) + FREE_JOINT}, "
             f"or {len(own)} without the free joint; joints that follow others may be there, too. Add an array "
             "'joint_names' with the names of the columns"
         )
-    ((names, free),) = found
+    names = found.names
     other = _own(body, simulator_order(body, ISAAC_BY_NAME, body.joint_names))
     if word == ISAAC and other != _own(body, names):
         warnings.warn(
@@ -88,67 +91,124 @@ def nameless_joints(body: Body, width: int, where: str, order: str | None) -> Na
             TrajectoryWarning,
             stacklevel=2,
         )
-    return NamelessJoints(word, names, free)
+    return found
+
+
+def joint_columns(body: Body, width: int, word: str) -> NamelessJoints | None:
+    """Joints of an array of so many columns in an order; None where that is not their number."""
+    joints = simulator_order(body, word, body.joint_names)
+    found = {(names, free) for names, free in _columns(body, joints) if width == len(names) + free}
+    return None if len(found) != 1 else NamelessJoints(word, *found.pop())
 
 
 def placed_joints(
-    body: Body, joints: Array, places: Array, attitudes: Sequence[Array], where: str, order: str | None
+    body: Body,
+    joints: Array,
+    places: Array,
+    quaternions: Array,
+    where: str,
+    order: str | None,
+    *,
+    orders: int,
+    names: tuple[str, ...] | None = None,
+    spins: Array | None = None,
+    times: Array | None = None,
 ) -> tuple[NamelessJoints, int]:
-    """The joints of an array whose bodies' places are known, and which of the attitudes belongs to them.
+    """Joints of an array whose bodies' places are known, and the order of the numbers of the base's quaternion.
 
     Parameters
     ----------
     joints : (N, n) without the free joint
     places : (N, b, 3) of the bodies, the base first [m]
-    attitudes : of the base, (N, 3, 3) each, as the numbers of its quaternion may be ordered
+    quaternions : (N, 4) of the base
     order : one of `WORDS`; None: all are tried
+    orders : 1: the quaternion is w x y z; 2: it may be x y z w, too
+    names : of the columns; None: those of an order
+    spins : (N, b, 3) angular velocities of the bodies, world axes [rad/s], where they are known, at `times` (N,) [s]
+
+    Returns
+    -------
+    joints, and 0 for w x y z, 1 for x y z w
 
     Raises
     ------
     TrajectoryError
-        If no order lets the links lie where the bodies are, or several do that say different things.
+        If no order lets the links lie where the bodies are and turn as fast, or several do that say different things.
     """
     if places.ndim != 3 or places.shape[::2] != (len(joints), 3):
         raise TrajectoryError(
             f"{where}: the places of bodies have the shape {places.shape}; ({len(joints)}, bodies, 3) is needed"
         )
+    attitudes = attitudes_of(quaternions, where)[:orders]
     rows = np.unique(np.linspace(0, len(joints) - 1, _SAMPLES).astype(int))
     apart = places[rows, 1:] - places[rows, :1]
     seen = [np.einsum("tji,tkj->tki", turned[rows], apart) for turned in attitudes]
     extent = float(np.sqrt(np.mean(np.sum(apart**2, axis=-1)))) if apart.size else 0.0
-    tried: list[tuple[float, NamelessJoints, int]] = []
+    tried: list[tuple[float, NamelessJoints, int, tuple[str, ...]]] = []
     for known in (*body.joint_orders, JointOrder(OWN, body.joint_names, ())):
-        names = next((n for n, free in _columns(body, known.joints) if not free and len(n) == joints.shape[1]), None)
-        if names is None or len(known.links) != places.shape[1] or (order is not None and known.word != order):
+        columns = names or next(
+            (n for n, free in _columns(body, known.joints) if not free and len(n) == joints.shape[1]), None
+        )
+        if columns is None or len(known.links) != places.shape[1] or (order is not None and known.word != order):
             continue
-        shapes = _shapes(body, joints[rows], names)
+        shapes = _shapes(body, joints[rows], columns)
         first, *others = (body.link_pose(shapes, link)[:, :3, 3] for link in known.links)
         laid = np.stack([other - first for other in others], axis=1) if others else np.zeros_like(apart)
         for which, measured in enumerate(seen):
             off = float(np.sqrt(np.mean(np.sum((laid - measured) ** 2, axis=-1)))) if others else 0.0
-            tried.append((off, NamelessJoints(known.word, names, 0), which))
+            tried.append((off, NamelessJoints(known.word, columns, 0), which, known.links))
     if not tried:
         raise TrajectoryError(
             f"{where}: {joints.shape[1]} joints and {places.shape[1]} bodies are there, and {body.name} has "
             f"{body.n_shape} joints and {len(body.link_names)} links: the order of the joints cannot be told; add an "
             "array 'joint_names', or give joint_order (--joint-order)"
         )
-    best, chosen, which = min(tried, key=lambda each: each[0])
+    best = min(each[0] for each in tried)
     if best > _FITS * extent:
         raise TrajectoryError(
             f"{where}: in no order of the joints do the links of {body.name} lie where the file has its bodies: at "
             f"best {best:.3g} m from there, rms; is it another robot? Add an array 'joint_names' if it is not"
         )
-    meant = _shapes(body, joints, chosen.names)
-    for off, one, other in tried:
-        if off > _ALIKE * best + 1e-9 * extent:
-            continue
-        if other != which or not np.array_equal(_shapes(body, joints, one.names), meant):
+    alike = [each for each in tried if each[0] <= _ALIKE * best + 1e-9 * extent]
+    if spins is not None and times is not None and np.abs(spins).max() > _AT_REST:
+        # Places do not show turns of a link about its own origin.
+        slips = [
+            _slip(body, _shapes(body, joints, found.names), attitudes[which], links, spins, times)
+            for _, found, which, links in alike
+        ]
+        if min(slips) > _CONTRADICTS:
             raise TrajectoryError(
-                f"{where}: the places of the bodies fit {chosen.title}, and {one.title} as well; give joint_order "
-                f"(--joint-order {chosen.order} or {one.order}), or add an array 'joint_names'"
+                f"{where}: body_ang_vel_w contradicts the attitudes of the bodies in every order of joints and "
+                "quaternions; leave out what is wrong, or add 'joint_names' and base_quat_wxyz with shapes"
+            )
+        alike = [each for each, slip in zip(alike, slips, strict=True) if slip <= _ALIKE * min(slips) + 1e-6]
+    _, chosen, which, _ = min(alike, key=lambda each: each[0])
+    meant = _shapes(body, joints, chosen.names)
+    for _, other, way, _ in alike:
+        if not np.array_equal(_shapes(body, joints, other.names), meant):
+            raise TrajectoryError(
+                f"{where}: the places of the bodies fit {chosen.title}, and {other.title} as well; give joint_order "
+                f"(--joint-order {chosen.order} or {other.order}), or add an array 'joint_names'"
+            )
+        if way != which:
+            raise TrajectoryError(
+                f"{where}: the places of the bodies fit quaternions w x y z, and x y z w as well; add body_ang_vel_w, "
+                "or store shapes, joint_names and base_quat_wxyz"
             )
     return chosen, which
+
+
+def _slip(body: Body, shapes: Array, base: Array, links: Sequence[str], spins: Array, times: Array) -> float:
+    """How far links turn from how `spins` say that they do, relative to these, rms."""
+    rows = np.unique(np.linspace(0, len(times) - 2, _SAMPLES).astype(int))
+    off, size = 0.0, 0.0
+    for number, link in enumerate(links):
+        before, after = (base[k] @ body.link_pose(shapes[k], link)[:, :3, :3] for k in (rows, rows + 1))
+        turning = so3.log(after @ so3.transpose(before)) / (times[rows + 1] - times[rows])[:, None]
+        between = 0.5 * (spins[rows, number] + spins[rows + 1, number])
+        off += float(np.sum((turning - between) ** 2))
+        size += float(np.sum(between**2))
+    return float(np.sqrt(off / size)) if size else np.inf
 
 
 def _own(body: Body, names: Sequence[str]) -> tuple[str, ...]:

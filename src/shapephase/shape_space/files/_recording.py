@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,37 @@ LONGEST_NAME = 256
 """Characters of a column's name, as of a joint's name in a body's file."""
 _UNEVEN_STEPS = 100.0
 """A step this many times longer or shorter than the median is probably a gap, or one sample recorded twice."""
+
+
+class Rates(NamedTuple):
+    """Rates of a whole floating body at N samples.
+
+    Attributes
+    ----------
+    base : (N, 3) angular velocity of the base [rad/s]
+    joints : (N, n) derivatives of the body's coordinates [rad/s or m/s], of a ball joint those of its quaternion
+    base_axes, velocity_axes : "base" or "world", the axes of the velocities of the base
+    velocity : (N, 3) of the base's origin [m/s], or None
+    """
+
+    base: Array
+    joints: Array
+    base_axes: str
+    velocity: Array | None = None
+    velocity_axes: str = "world"
+
+
+class Simulated(NamedTuple):
+    """What arrays of a whole floating body say beside its coordinates.
+
+    Attributes
+    ----------
+    rates : of all samples, where they are stored
+    step : of the integrator that made them [s], where it is stored
+    """
+
+    rates: Rates | None
+    step: float | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,6 +81,7 @@ class Table:
     nameless : how columns of an array without names became those of joints; None: they have names
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
     zero_pose : whether all angles of the first sample are zero: the pose that exporters put before a motion
+    simulated : what stands beside the coordinates where these are arrays of a whole floating body; None: they are not
     """
 
     where: str
@@ -71,6 +104,7 @@ class Table:
     unnamed: Sequence[str] = ()
     nameless: NamelessJoints | None = None
     zero_pose: bool = False
+    simulated: Simulated | None = None
 
     def check_column(self, label: str) -> None:
         """Raise TrajectoryError for the first entry of a column that is no finite number."""
@@ -93,7 +127,7 @@ class Table:
         columns = {label: values[samples] for label, values in self.columns.items()}
         zero_pose = self.zero_pose and places[:1] == [0]
         rows = [self.rows[k] for k in places]
-        return replace(self, columns=columns, rows=rows, faults=faults, zero_pose=zero_pose, **part)
+        return replace(self, columns=columns, rows=rows, faults=faults, zero_pose=zero_pose, simulated=None, **part)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,154 +1,227 @@
-"""Joint motions in NumPy's files: our own NPZ, and MuJoCo's `qpos` as NPY or NPZ."""
+"""Joint motions in arrays: NumPy's files, arrays in memory, and tables whose columns are numbered as such arrays."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ....arguments import check_object
 from ....arrays import Array, finite_array
 from ....body.body import Body
 from ....errors import ShapeError, TrajectoryError
 from ....files import npy_array, npz_arrays
-from .._nameless_joints import FREE_JOINT, NamelessJoints, attitudes_of, nameless_joints, placed_joints
-from .._recording import MOST_BYTES, Table
+from ....letters import what_came
+from .._labels import SI
+from .._nameless_joints import FREE_JOINT, nameless_joints, placed_joints
+from .._recording import Rates, Simulated, Table
+from .floating_arrays import FloatingMotion, floating_motion, numbered_columns, places_of, root_width
+from .named_arrays import arrays_table
 
-# Where the entries x, y, z, w stand in a quaternion that begins with its scalar part.
+_NPZ = "NPZ"
 _SCALAR_FIRST = [1, 2, 3, 0]
+"""Where the entries x, y, z, w stand in a quaternion that begins with its scalar part."""
 _READ = (
-    *("time", "timestep", "fps", "shapes", "qpos", "joint_pos", "body_pos_w", "body_quat_w", "joint_names"),
-    *("base_quat_xyzw", "base_quat_wxyz", "base_position", "provenance"),
+    *("time", "timestep", "fps", "shapes", "qpos", "qvel", "q", "v", "qdot", "Q", "Qdot", "joint_names", "provenance"),
+    *("joint_pos", "joint_vel", "body_pos_w", "body_quat_w", "body_ang_vel_w"),
+    *("base_quat_xyzw", "base_quat_wxyz", "base_position"),
 )
 """The arrays of a file that have a meaning."""
 
 
-def read_arrays(where: Path, data: bytes, body: Body, timestep: float | None, order: str | None) -> Table:
-    """An NPZ file with `shapes`, `time`, `joint_names`, or with a simulator's arrays; an NPY file is `qpos` alone.
+def read_arrays(
+    where: Path, data: bytes, body: Body, timestep: float | None, order: str | None
+) -> tuple[Table, float | None]:
+    """Motion in an NPZ file, as `arrays_motion`; an NPY file is `qpos` alone. Raises TrajectoryError."""
+    try:
+        arrays = {"qpos": npy_array(data)} if where.suffix.lower() == ".npy" else npz_arrays(data)
+    except ValueError as error:
+        raise TrajectoryError(f"{where}: {error}") from None
+    return arrays_motion(arrays, str(where), body, timestep, order, kind=_NPZ)
 
-    Of MuJoCo's `qpos` (N, 7 + n), the first seven columns are the free joint, x y z and the quaternion w x y z; (N, n)
-    is without a free joint, or with the joints by which the body's file moves its base. Of Isaac Lab's `joint_pos`
-    (N, n) the base is the first of `body_pos_w` (N, b, 3) and `body_quat_w` (N, b, 4). The joints are the array
-    `joint_names` where there is one; else those of an order that is asked for, or that lets the links lie at
-    `body_pos_w`; else, of `qpos`, those of MuJoCo's order. Times are the array `time`, or follow from `timestep`, an
-    array of one number or the argument, or from `fps`.
+
+def arrays_in_memory(source: Any) -> dict[str, Any]:
+    """Arrays by name, of a mapping or of `(times, array, names)`. Raises ShapeError."""
+    if isinstance(source, tuple):
+        if len(source) != 3:
+            raise ShapeError(f"file: (times, array, names) are three, got {len(source)}: {what_came(source)}")
+        source = dict(zip(("time", "shapes", "joint_names"), source, strict=True))
+    return {str(name): value if isinstance(value, Mapping) else np.asarray(value) for name, value in source.items()}
+
+
+def arrays_motion(
+    arrays: Mapping[str, Any], where: str, body: Body, timestep: float | None, order: str | None, *, kind: str
+) -> tuple[Table, float | None]:
+    """Motion in arrays by name, and the time step if it is still needed.
+
+    With `qpos`, `q` or `Q` it is a simulator's or an optimiser's (see `floating_motion`), with `joint_pos` Isaac
+    Lab's: the base is the first of `body_pos_w` (N, b, 3) and `body_quat_w` (N, b, 4), and what is not named, the
+    order of joints and that of a quaternion's numbers, is the one in which the links lie at `body_pos_w` and turn as
+    `body_ang_vel_w` says. With `shapes` there are `time` and `joint_names`, too; else vectors by name are the joints.
 
     Parameters
     ----------
-    timestep : [s], for a file without times
+    timestep : [s], for arrays without times
     order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
+    kind : of the source, for people
 
     Raises
     ------
     TrajectoryError
         For faults, with the array and the entry.
     """
-    check_object(body, "Body", "body")
-    arrays = {"qpos": _loaded(data, where)} if where.suffix.lower() == ".npy" else _members(data, where)
     try:
-        if "qpos" in arrays or ("joint_pos" in arrays and "shapes" not in arrays):
-            return _simulated(arrays, where, body, timestep, order)
-        if timestep is not None:
-            raise TrajectoryError(f"{where}: timestep is for qpos without times; this file has its times")
-        return _shapes(arrays, where)
+        if "shapes" in arrays and {"qpos", "q", "Q"} & set(arrays):
+            both = min({"qpos", "q", "Q"} & set(arrays))
+            raise TrajectoryError(f"{where}: both 'shapes' and {both!r} are there; keep one")
+        if "joint_pos" in arrays and not {"shapes", "qpos"} & set(arrays):
+            return _isaac_table(arrays, where, body, timestep, order), None
+        if "q" in arrays and "joint_names" in arrays and _is_named_matrix(arrays):
+            arrays = {"shapes" if name == "q" else name: value for name, value in arrays.items()}
+        named = _placed_qpos(arrays, where, body) if order is None else None
+        motion = floating_motion(arrays if named is None else {**arrays, **named}, where, body, order)
+        if motion is not None:
+            times = _times(arrays, motion.title.split()[-1], where, len(motion.joints), timestep)
+            return _table(motion, times, where, arrays), None
     except ShapeError as error:
         raise TrajectoryError(str(error)) from None
+    entries = {name: value.tolist() if _is_text(value) else value for name, value in arrays.items()}
+    table = arrays_table(where, kind, entries, None)
+    # Our own files are in radians and metres; what other people have by name may be in degrees.
+    return replace(table, by_format=kind == _NPZ and "shapes" in arrays), timestep
 
 
-def _shapes(arrays: dict[str, Any], where: Path) -> Table:
-    for name in ("time", "shapes", "joint_names"):
-        if name not in arrays:
-            raise TrajectoryError(f"{where}: the array {name!r} is missing; there are {', '.join(sorted(arrays))}")
-    names = _names(arrays["joint_names"], where)
-    times = _array(arrays["time"], where, "time", (None,), "s")
-    shapes = _array(arrays["shapes"], where, "shapes", (len(times), len(names)))
-    quaternions, positions = _quaternions(arrays, where, len(times)), arrays.get("base_position")
-    if positions is not None:
-        positions = _array(positions, where, "base_position", (len(times), 3), "m")
-    return _table(where, "NPZ", times, shapes, names, quaternions, positions, arrays)
+def of_numbered_columns(table: Table, body: Body, order: str | None) -> Table:
+    """The table with base and joints instead of columns such as `qpos_0`, `q[1]`; others are as they were.
+
+    Raises
+    ------
+    TrajectoryError, ShapeError
+        If they are no order of coordinates of the body.
+    """
+    numbered = numbered_columns(table.columns, table.where)
+    taken = [label for labels in numbered.values() for label in labels]
+    places = next((numbered[name] for name in ("qpos", "q", "Q") if name in numbered), [])
+    fewest = body.n_shape if "qpos" in numbered else root_width(body) + body.n_shape
+    if not places or len(places) < fewest or set(taken) & set(body.joint_names):
+        return table
+    for label in taken:
+        table.check_column(label)
+    arrays: dict[str, Any] = {
+        name: np.stack([table.columns[label] for label in labels], axis=1) for name, labels in numbered.items()
+    }
+    # Samples are the rows of a table.
+    motion = floating_motion({**arrays, "time": np.arange(len(table.rows))}, table.where, body, order)
+    assert motion is not None
+    made = _table(motion, np.arange(len(table.rows), dtype=np.float64), table.where, {})
+    columns = {label: values for label, values in table.columns.items() if label not in taken}
+    return replace(
+        table,
+        columns=columns | made.columns,
+        units=dict(table.units) | dict.fromkeys(made.columns, SI),
+        base_quat_xyzw=made.base_quat_xyzw,
+        base_position=made.base_position,
+        nameless=made.nameless,
+        simulated=made.simulated,
+        up=made.up,
+    )
 
 
-def _quaternions(arrays: dict[str, Any], where: Path, count: int) -> Array | None:
-    """Of the base, x y z w, by the array whose name says its order."""
-    there = [name for name in ("base_quat_xyzw", "base_quat_wxyz") if name in arrays]
-    if len(there) > 1:
-        raise TrajectoryError(f"{where}: both {there[0]!r} and {there[1]!r} are there; keep one")
-    if not there:
-        return None
-    found = _array(arrays[there[0]], where, there[0], (count, 4))
-    return found if there[0] == "base_quat_xyzw" else found[:, _SCALAR_FIRST]
+def _table(motion: FloatingMotion, times: Array, where: str, arrays: Mapping[str, Any]) -> Table:
+    step = arrays.get("timestep")
+    return Table(
+        where=where,
+        format=motion.title,
+        columns={
+            name: np.ascontiguousarray(column) for name, column in zip(motion.names, motion.joints.T, strict=True)
+        },
+        rows=range(len(times)),
+        row="sample",
+        times=times,
+        by_format=True,
+        base_quat_xyzw=motion.quaternion,
+        base_position=motion.position,
+        up="z" if motion.title.startswith(("MuJoCo", "Isaac")) else None,
+        nameless=motion.nameless,
+        simulated=Simulated(motion.rates, None if step is None else float(np.ravel(step)[0])),
+        unread=_unread(arrays),
+    )
 
 
-def _simulated(arrays: dict[str, Any], where: Path, body: Body, timestep: float | None, order: str | None) -> Table:
-    """MuJoCo's `qpos`, or Isaac Lab's `joint_pos`."""
-    if "shapes" in arrays:
-        raise TrajectoryError(f"{where}: both 'shapes' and 'qpos' are there; keep one")
-    kind = "qpos" if "qpos" in arrays else "joint_pos"
-    values = _array(arrays[kind], where, kind, (None, None))
-    times = _simulated_times(arrays, kind, where, len(values), timestep)
-    quaternions, positions = _first_body(arrays, where, len(values))
-    named, found = arrays.get("joint_names"), None
-    if named is not None:
-        names = _names(named, where)
-        free = values.shape[1] - len(names)
-        if free not in (0, FREE_JOINT):
-            raise TrajectoryError(
-                f"{where}: {kind} has {values.shape[1]} columns; with {len(names)} joints ({', '.join(names)}) it has "
-                f"{len(names) + FREE_JOINT}, or {len(names)} without the free joint"
-            )
-        found = None
-    elif kind == "joint_pos" and (order is None or quaternions is not None):
-        found, quaternions = _placed(arrays, values, quaternions, where, body, order)
-        names, free = list(found.names), 0
-    else:
-        found = nameless_joints(body, values.shape[1], f"{where}: {kind}", order)
-        names, free = list(found.names), found.free
-        if order is None and free and "body_pos_w" in arrays:
-            found, _ = _placed(arrays, values[:, free:], values[:, 3:FREE_JOINT], where, body, None)
-            names = list(found.names)
-    if free:
-        quaternions, positions = values[:, 3:FREE_JOINT][:, _SCALAR_FIRST], values[:, :3]
-    kind = "MuJoCo qpos" if kind == "qpos" else "Isaac Lab joint_pos"
-    table = _table(where, kind, times, values[:, free:], names, quaternions, positions, arrays)
-    return replace(table, nameless=found, up="z")
-
-
-def _first_body(arrays: dict[str, Any], where: Path, count: int) -> tuple[Array | None, Array | None]:
-    """Quaternion, with its numbers as they stand there, and place of the first body; None where the file has none."""
-    found: list[Array | None] = []
-    for name, entries in (("body_quat_w", 4), ("body_pos_w", 3)):
-        there = name in arrays
-        found.append(_array(arrays[name], where, name, (count, None, entries))[:, 0] if there else None)
-    return found[0], found[1]
-
-
-def _placed(
-    arrays: dict[str, Any], joints: Array, quaternions: Array | None, where: Path, body: Body, order: str | None
-) -> tuple[NamelessJoints, Array]:
-    """Joints by where the file has the bodies, and the quaternions of the base, x y z w."""
-    if "body_pos_w" not in arrays or quaternions is None:
+def _isaac_table(arrays: Mapping[str, Any], where: str, body: Body, timestep: float | None, order: str | None) -> Table:
+    joints = _array(arrays["joint_pos"], where, "joint_pos", (None, None))
+    count = len(joints)
+    times = _times(arrays, "joint_pos", where, count, timestep)
+    quaternions, places, spins = (
+        _array(arrays[name], where, name, (count, None, entries)) if name in arrays else None
+        for name, entries in (("body_quat_w", 4), ("body_pos_w", 3), ("body_ang_vel_w", 3))
+    )
+    named = None if "joint_names" not in arrays else tuple(_names(arrays["joint_names"], where))
+    if named is not None and len(named) != joints.shape[1]:
+        raise TrajectoryError(
+            f"{where}: joint_pos has {joints.shape[1]} columns, and joint_names has {len(named)}; mend 'joint_names'"
+        )
+    if quaternions is not None and places is not None:
+        first = quaternions[:, 0]
+        nameless, which = placed_joints(
+            body, joints, places, first, where, order, names=named, spins=spins, times=times, orders=2
+        )
+        quaternions = first if which else first[:, _SCALAR_FIRST]
+        names = nameless.names
+    elif named is None and (order is None or quaternions is not None):
         raise TrajectoryError(
             f"{where}: joint_pos has no names: add an array 'joint_names', or 'body_pos_w' and 'body_quat_w', by which "
             "the order is found; or say which it is: joint_order='isaac' (--joint-order isaac)"
         )
-    places = _array(arrays["body_pos_w"], where, "body_pos_w", (len(joints), None, 3))
-    attitudes = attitudes_of(quaternions, str(where))
-    # MuJoCo's quaternions begin with w; Isaac's have done so, and do no longer.
-    found, which = placed_joints(body, joints, places, attitudes[: 1 if "qpos" in arrays else 2], str(where), order)
-    return found, quaternions if which else quaternions[:, _SCALAR_FIRST]
+    else:
+        if quaternions is not None:
+            raise TrajectoryError(
+                f"{where}: body_quat_w without body_pos_w does not show whether w stands first; add body_pos_w, or "
+                "store shapes, joint_names and base_quat_wxyz"
+            )
+        nameless = None if named else nameless_joints(body, joints.shape[1], f"{where}: joint_pos", order)
+        names = named or () if nameless is None else nameless.names
+    motion = FloatingMotion(
+        "Isaac Lab joint_pos",
+        names,
+        joints,
+        quaternion=quaternions,
+        position=None if places is None else places[:, 0],
+        nameless=None if named else nameless,
+    )
+    if spins is not None and "joint_vel" in arrays and set(body.joint_names) <= set(names):
+        moving = _array(arrays["joint_vel"], where, "joint_vel", joints.shape, "rad/s")
+        motion = motion._replace(rates=Rates(spins[:, 0], moving[:, places_of(names, body)], "world"))
+    return _table(motion, times, where, arrays)
 
 
-def _simulated_times(arrays: dict[str, Any], kind: str, where: Path, count: int, timestep: float | None) -> Array:
+def _placed_qpos(arrays: Mapping[str, Any], where: str, body: Body) -> dict[str, Any] | None:
+    """Names of the joints of `qpos` by the places of the bodies beside it, where it has none."""
+    if "qpos" not in arrays or "body_pos_w" not in arrays or "joint_names" in arrays:
+        return None
+    values = _array(arrays["qpos"], where, "qpos", (None, None))
+    if nameless_joints(body, values.shape[1], f"{where}: qpos", None).free != FREE_JOINT:
+        return None
+    places = _array(arrays["body_pos_w"], where, "body_pos_w", (len(values), None, 3))
+    found, _ = placed_joints(body, values[:, FREE_JOINT:], places, values[:, 3:FREE_JOINT], where, None, orders=1)
+    return {"joint_names": np.array(found.names), "nameless": found}
+
+
+def _times(arrays: Mapping[str, Any], kind: str, where: str, count: int, timestep: float | None) -> Array:
     given = [name for name in ("time", "timestep", "fps") if name in arrays] + ["argument"] * (timestep is not None)
+    if given[:2] == ["time", "timestep"]:
+        # The step of the integrator, where every so many samples are stored.
+        del given[1]
     if len(given) != 1:
         raise TrajectoryError(
             f"{where}: the times of {kind} come from one of the array 'time', the arrays 'timestep' and 'fps' of one "
-            f"number and the argument timestep; {'none' if not given else 'more than one'} is there"
+            f"number and the argument timestep (--timestep); {'none' if not given else 'more than one'} is there"
         )
     if given == ["time"]:
-        return _array(arrays["time"], where, "time", (count,), "s")
+        times = np.asarray(arrays["time"])
+        return _array(times.ravel() if times.size == count else times, where, "time", (count,), "s")
     name, unit = ("fps", "1/s") if given == ["fps"] else ("timestep", "s")
     step = _array(arrays.get(name, timestep), where, name, (), unit)
     if step.size != 1 or step.ravel()[0] <= 0.0:
@@ -157,33 +230,16 @@ def _simulated_times(arrays: dict[str, Any], kind: str, where: Path, count: int,
     return np.arange(count) / number if name == "fps" else np.arange(count) * number
 
 
-def _table(
-    where: Path,
-    kind: str,
-    times: Array,
-    shapes: Array,
-    names: list[str],
-    quaternions: Array | None,
-    positions: Array | None,
-    arrays: dict[str, Any],
-) -> Table:
-    return Table(
-        where=str(where),
-        format=kind,
-        columns={name: np.ascontiguousarray(column) for name, column in zip(names, shapes.T, strict=True)},
-        rows=range(len(times)),
-        row="sample",
-        times=times,
-        by_format=True,
-        base_quat_xyzw=quaternions,
-        base_position=positions,
-        unread={
-            name: f"an array {found.shape} of {found.dtype}" for name, found in arrays.items() if name not in _READ
-        },
-    )
+def _is_named_matrix(arrays: Mapping[str, Any]) -> bool:
+    """Whether `q` has the columns of `joint_names` and no others, one sample for each time."""
+    return np.shape(arrays["q"]) == (np.size(arrays.get("time", ())), np.size(arrays["joint_names"]))
 
 
-def _array(value: Any, where: Path, name: str, trailing: tuple[int | None, ...], unit: str = "") -> Array:
+def _unread(arrays: Mapping[str, Any]) -> dict[str, str]:
+    return {name: f"an array {found.shape} of {found.dtype}" for name, found in arrays.items() if name not in _READ}
+
+
+def _array(value: Any, where: str, name: str, trailing: tuple[int | None, ...], unit: str = "") -> Array:
     if np.asarray(value).dtype.kind == "b":
         raise TrajectoryError(f"{where}: {name}: numbers are needed, got an array of true and false")
     array = finite_array(value, f"{where}: {name}", trailing, unit=unit)
@@ -192,24 +248,14 @@ def _array(value: Any, where: Path, name: str, trailing: tuple[int | None, ...],
     return array
 
 
-def _names(stored: Any, where: Path) -> list[str]:
+def _is_text(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "UT" and value.ndim == 1
+
+
+def _names(stored: Any, where: str) -> list[str]:
     if stored.dtype.kind not in "UT" and stored.size:
         raise TrajectoryError(f"{where}: joint_names: text is needed, got an array of {stored.dtype}")
     names = [str(name) for name in np.ravel(stored)]
     if len(set(names)) != len(names):
         raise TrajectoryError(f"{where}: a joint name stands twice in {', '.join(names)}")
     return names
-
-
-def _members(data: bytes, where: Path) -> dict[str, Any]:
-    try:
-        return npz_arrays(data, 4 * MOST_BYTES)
-    except ValueError as error:
-        raise TrajectoryError(f"{where}: {error}") from None
-
-
-def _loaded(data: bytes, where: Path) -> Any:
-    try:
-        return npy_array(data)
-    except ValueError as error:
-        raise TrajectoryError(f"{where}: {error}") from None

@@ -75,7 +75,7 @@ def _with_unread(table: Table, entries: Mapping[str, Any]) -> Table:
     unnamed = [
         name
         for name in _MATRICES
-        if isinstance(value := entries.get(name), np.ndarray) and value.ndim == 2 and len(table.rows) in value.shape
+        if isinstance(value := entries.get(name), np.ndarray) and value.ndim > 1 and len(table.rows) in value.shape
     ]
     return replace(table, unread=unread, unnamed=unnamed)
 

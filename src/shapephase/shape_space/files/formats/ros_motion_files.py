@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,25 +11,17 @@ import numpy as np
 
 from ....arrays import Array
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
-from .._recording import LONGEST_NAME, Table, check_size, check_text, number
-from .parser_process import table_apart
-from .strict_yaml import Word, yaml_documents
+from .._recording import Table, check_text, number
+from .strict_yaml import Text, yaml_documents
 
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-MOST_YAML = 16 * 2**20
-"""Size of a YAML file [bytes]; parsed entry by entry in Python, larger ones are slow."""
-_MOST_METADATA = 2**20
-"""Size of a bag's metadata.yaml [bytes]."""
 _NANO = 10**9
 """Nanoseconds in a second."""
 # What goals and planners wrap around a trajectory.
 _WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")
 _SECONDS = ("sec", "secs")
 _NANOSECONDS = ("nanosec", "nsecs", "nsec")
-
-# How chunks say that they are compressed: in rosbag1, in MCAP, in the metadata of a folder.
-_PACKED = re.compile(rb"compression=(?!none)|\x04\0\0\0zstd|\x03\0\0\0lz4|compression_format: *\S*[a-z]")
 
 
 class _State(NamedTuple):
@@ -102,14 +92,8 @@ def read_bag(where: Path, topic: str | None) -> Table:
         import rosbags.highlevel  # noqa: F401
     except ImportError:
         raise MissingExtraError("ROS bags need rosbags; install it with: pip install 'shapephase[ros]'") from None
-    _check_sizes(where)
-    if _is_packed(where):
-        return table_apart(where, b"", "bag", read_plain_bag, topic)
-    return read_plain_bag(where, b"", topic)
-
-
-def read_plain_bag(where: Path, _: bytes, topic: str | None = None) -> Table:
-    """A bag that is read from its place, here and now. Raises as `read_bag`."""
+    if where.is_dir() and not (where / "metadata.yaml").is_file():
+        raise TrajectoryError(f"{where}: a folder without metadata.yaml, so no rosbag2; name a file in it")
     try:
         return _read_messages(where, topic)
     except ShapePhaseError:
@@ -118,42 +102,12 @@ def read_plain_bag(where: Path, _: bytes, topic: str | None = None) -> Table:
         raise TrajectoryError(f"{where}: no bag that can be read ({type(error).__name__}: {error!s:.200})") from None
 
 
-def _check_sizes(where: Path) -> None:
-    if not where.is_dir():
-        check_size(where)
-        return
-    if not (where / "metadata.yaml").is_file():
-        raise TrajectoryError(f"{where}: a folder without metadata.yaml, so no rosbag2; name a file in it")
-    check_size(where / "metadata.yaml", _MOST_METADATA)
-    for part in where.iterdir():
-        check_size(part)
-
-
-def _is_packed(where: Path) -> bool:
-    """Whether parts of a bag are compressed, so that they may unpack to any size."""
-    parts = list(where.iterdir()) if where.is_dir() else [where]
-    return any(_PACKED.search(part.read_bytes()) for part in parts if part.is_file())
-
-
-def _check_database(where: Path) -> None:
-    """Refuse a SQLite file in which reading a table runs a query of the file's own."""
-    import sqlite3
-
-    with closing(sqlite3.connect(f"{where.resolve().as_uri()}?mode=ro", uri=True)) as database:
-        kinds = "type NOT IN ('table', 'index') OR sql LIKE '%VIRTUAL%' OR sql LIKE '%GENERATED%'"
-        computed = [str(name) for (name,) in database.execute(f"SELECT name FROM sqlite_master WHERE {kinds}")]
-    if computed:
-        raise TrajectoryError(f"{where}: computed tables ({', '.join(computed)!s:.100}) are not read; record plainly")
-
-
 def _read_messages(where: Path, topic: str | None) -> Table:
     from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
     from rosbags.typesys import Stores, get_typestore
 
     first = where.suffix.lower() == ".bag" and where.is_file()
-    for part in where.glob("*.db3") if where.is_dir() else [where] * (where.suffix.lower() == ".db3"):
-        _check_database(part)
     types = get_typestore(Stores.ROS1_NOETIC if first else Stores.ROS2_HUMBLE)
     with Reader1(where) if first else Reader2(where) as reader:
         chosen = _connections(reader.connections, where, topic)
@@ -209,13 +163,6 @@ def _bag_time(time: Any) -> int:
     return time.sec * _NANO + time.nanosec
 
 
-def _check_lengths(names: Iterable[str], where: str) -> None:
-    """Raise TrajectoryError for a name that no message can show."""
-    for name in names:
-        if len(name) > LONGEST_NAME:
-            raise TrajectoryError(f"{where}: a joint's name has {len(name)} characters: {name[:40]!r}...")
-
-
 def _of_states(messages: list[_State], where: str, label: str) -> Table:
     """Messages with some of the joints each, merged by their times."""
     stamped = any(message.stamp for message in messages)
@@ -226,7 +173,6 @@ def _of_states(messages: list[_State], where: str, label: str) -> Table:
     if messages and not stamped and not any(message.recorded for message in messages):
         raise TrajectoryError(f"{where}: the messages have no times; record them with header stamps")
     joints = list(dict.fromkeys(name for message in messages for name in message.names))
-    _check_lengths(joints, where)
     rows: dict[int, dict[str, float]] = {}
     numbers: dict[int, int] = {}
     for count, (stamp, recorded, names, positions) in enumerate(messages, start=1):
@@ -255,7 +201,6 @@ def _of_states(messages: list[_State], where: str, label: str) -> Table:
 def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) -> Table:
     """One trajectory, or several one after the other by the times of their headers."""
     joints = trajectories[0].names if trajectories else []
-    _check_lengths([name for trajectory in trajectories for name in trajectory.names], where)
     for count, trajectory in enumerate(trajectories, start=1):
         doubled = [name for name, times in Counter(trajectory.names).items() if times > 1]
         if doubled:
@@ -352,19 +297,17 @@ def _yaml_trajectory(document: dict[str, Any], where: Path) -> _Trajectory:
 
 
 def _yaml_names(value: Any, place: str) -> list[str]:
-    if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
+    if not isinstance(value, list) or not all(isinstance(entry, Text) for entry in value):
         raise TrajectoryError(f"{place}: a list of joint names is needed")
-    names = [entry.text for entry in value]
-    _check_lengths(names, place)
-    return names
+    return value
 
 
 def _yaml_numbers(value: Any, place: str, key: str, names: list[str]) -> list[float]:
-    if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
+    if not isinstance(value, list) or not all(isinstance(entry, Text) for entry in value):
         raise TrajectoryError(f"{place}: {key}: a list of numbers is needed")
     labels = [*names, *("without a name" for _ in value[len(names) :])]
     return [
-        number(entry.text, f"{place} (line {entry.line}), joint {name}")
+        number(entry, f"{place} (line {entry.line}), joint {name}")
         for entry, name in zip(value, labels[: len(value)], strict=True)
     ]
 
@@ -381,8 +324,8 @@ def _yaml_stamp(document: dict[str, Any], where: Path) -> int:
 
 def _yaml_time(value: Any, place: str) -> tuple[int, float]:
     """Whole nanoseconds, and seconds: {sec, nanosec}, {secs, nsecs} or a number of seconds."""
-    if isinstance(value, Word):
-        return 0, _bounded(number(value.text, place), place)
+    if isinstance(value, Text):
+        return 0, _bounded(number(value, place), place)
     if isinstance(value, dict) and len(value) <= 2 and set(value) <= {*_SECONDS, *_NANOSECONDS}:
         total = 0
         for keys, factor in ((_SECONDS, _NANO), (_NANOSECONDS, 1)):
@@ -397,7 +340,7 @@ def _yaml_time(value: Any, place: str) -> tuple[int, float]:
 
 
 def _whole(value: Any, place: str) -> int:
-    text = value.text if isinstance(value, Word) else ""
+    text = value if isinstance(value, Text) else ""
     digits = text.removeprefix("-")
     if not digits.isascii() or not digits.isdigit() or len(digits) > 12:
         raise TrajectoryError(f"{place}: a whole number is needed, got {text!r:.40}")

@@ -1,99 +1,59 @@
-"""The part of YAML that files of numbers need: mappings, lists and plain words; no aliases, no tags."""
+"""YAML as files of numbers need it: values as they were written, and no key twice."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from ....errors import MissingExtraError, TrajectoryError
 
-# Lists and mappings inside each other: a ROS message nests half as many.
-_MOST_DEPTH = 16
 # A key whose value YAML 1.1 takes for part of the mapping around it.
 _MERGE = "<<"
-# Memory: events of the parser, about one for each value.
-_MOST_ENTRIES = 2_000_000
 
 
-class Word(NamedTuple):
-    """A scalar as it was written, and its line."""
+class Text(str):
+    """A value as it was written, and its line: `1e-3` is a text in YAML 1.1, `on` is true and 012 is ten."""
 
-    text: str
     line: int
 
 
 def yaml_documents(text: str, where: str) -> list[Any]:
-    """The documents of a YAML text that are not empty: dictionaries by text, lists, and `Word`s.
-
-    Nothing is interpreted: `1e-3`, `on` and `0x1F` are words. Built from the parser's events without recursion, so
-    that no text can do more than be long.
+    """Documents of a YAML text that are not empty: dictionaries by text, lists, and `Text`s.
 
     Raises
     ------
     MissingExtraError
         Without PyYAML.
     TrajectoryError
-        For what is no YAML, aliases, tags, doubled keys or anchors, or too many or too deep entries; the line is named.
+        For text that is not YAML, unknown tags, doubled keys and merge keys; the line is named.
     """
     try:
         import yaml
     except ImportError:
         raise MissingExtraError("YAML files need PyYAML; install it with: pip install 'shapephase[ros]'") from None
-    documents: list[Any] = []
-    stack: list[Any] = []
-    keys: list[str | None] = []
-    anchors: set[str] = set()
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+    # Without resolvers, plain values are texts.
+    safe = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    texts: Any = type("_TextLoader", (safe,), {"yaml_implicit_resolvers": {}})
+
+    def as_text(_: Any, node: Any) -> Text:
+        value = Text(node.value)
+        value.line = node.start_mark.line + 1
+        return value
+
+    def as_mapping(loader: Any, node: Any) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            key, place = loader.construct_object(key_node, deep=True), f"line {key_node.start_mark.line + 1}"
+            if not isinstance(key, Text) or key == _MERGE or key in found:
+                fault = "a key must be a plain word" if not isinstance(key, Text) else f"{key!r:.60} stands twice"
+                fault = "merge keys (<<) are not read; write the values out" if key == _MERGE else fault
+                raise TrajectoryError(f"{where}: {place}: {fault}")
+            found[key] = loader.construct_object(value_node, deep=True)
+        return found
+
+    texts.add_constructor("tag:yaml.org,2002:str", as_text)
+    texts.add_constructor("tag:yaml.org,2002:map", as_mapping)
     try:
-        for count, event in enumerate(yaml.parse(text, Loader=loader)):
-            if count > _MOST_ENTRIES:
-                raise TrajectoryError(f"{where}: more than {_MOST_ENTRIES} entries; use NPZ or a bag for that much")
-            place = f"{where}: line {event.start_mark.line + 1}"
-            if isinstance(event, yaml.AliasEvent):
-                raise TrajectoryError(f"{place}: aliases (*{event.anchor}) are not read; write the value out")
-            if isinstance(event, yaml.MappingEndEvent | yaml.SequenceEndEvent):
-                keys.pop()
-                stack.pop()
-                continue
-            if isinstance(event, yaml.DocumentStartEvent):
-                anchors.clear()
-            if not isinstance(event, yaml.ScalarEvent | yaml.MappingStartEvent | yaml.SequenceStartEvent):
-                continue
-            if event.anchor in anchors:
-                raise TrajectoryError(f"{place}: the anchor &{event.anchor} stands twice; remove anchors")
-            if event.anchor is not None:
-                anchors.add(event.anchor)
-            if event.tag is not None:
-                raise TrajectoryError(f"{place}: tags ({event.tag}) are not read; write plain numbers and names")
-            if isinstance(event, yaml.ScalarEvent):
-                value: Any = Word(event.value, event.start_mark.line + 1)
-            else:
-                value = {} if isinstance(event, yaml.MappingStartEvent) else []
-            if stack and isinstance(stack[-1], dict) and keys[-1] is None:
-                if not isinstance(value, Word):
-                    raise TrajectoryError(f"{place}: a key must be a plain word")
-                if value.text == _MERGE:
-                    raise TrajectoryError(f"{place}: merge keys ({_MERGE}) are not read; write the values out")
-                if value.text in stack[-1]:
-                    raise TrajectoryError(f"{place}: {value.text!r:.60} stands twice")
-                keys[-1] = value.text
-                continue
-            if not stack:
-                documents.append(value)
-            elif isinstance(stack[-1], dict):
-                stack[-1][keys[-1]] = value
-                keys[-1] = None
-            else:
-                stack[-1].append(value)
-            if not isinstance(value, Word):
-                if len(stack) >= _MOST_DEPTH:
-                    raise TrajectoryError(f"{place}: nested deeper than {_MOST_DEPTH}")
-                stack.append(value)
-                keys.append(None)
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        if mark is not None and "nesting depth" in str(error):
-            # PyYAML has a limit of its own, and reads ahead.
-            raise TrajectoryError(f"{where}: line {mark.line + 1}: nested deeper than {_MOST_DEPTH}") from None
-        said = " ".join(str(error).split())
-        raise TrajectoryError(f"{where}: no YAML: {said:.200}") from None
-    return [document for document in documents if not isinstance(document, Word) or document.text]
+        return [document for document in yaml.load_all(text, texts) if document not in (None, "")]
+    except (yaml.YAMLError, RecursionError) as error:
+        raise TrajectoryError(f"{where}: no YAML: {' '.join(str(error).split()):.200}; write it anew") from None

@@ -1,0 +1,76 @@
+"""Motions of DeepMimic's humanoid, in JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from ....arrays import Array
+from ....errors import TrajectoryError
+from .._recording import Table
+
+_JOINTS = (
+    *(("chest", 4), ("neck", 4), ("right_hip", 4), ("right_knee", 1), ("right_ankle", 4), ("right_shoulder", 4)),
+    *(
+        ("right_elbow", 1),
+        ("left_hip", 4),
+        ("left_knee", 1),
+        ("left_ankle", 4),
+        ("left_shoulder", 4),
+        ("left_elbow", 1),
+    ),
+)
+"""In the order of a frame: of a spherical joint four numbers, w x y z, of a hinge one."""
+_BASE = 8
+"""Numbers of a frame before them: its duration, the place of the base, its quaternion w x y z."""
+_WIDTH = _BASE + sum(count for _, count in _JOINTS)
+
+
+def read_deepmimic(where: Path, data: bytes) -> Table:
+    """Motion in JSON, `{"Loop": "wrap", "Frames": [[duration, x, y, z, qw, qx, qy, qz, joints...], ...]}`, y upwards.
+
+    Columns are called as DeepMimic's joints are, with `.x`, `.y`, `.z`, `.w` of spherical ones: the body has ball
+    joints of these names.
+
+    Raises
+    ------
+    TrajectoryError
+        For JSON that is no such motion.
+    """
+    try:
+        said = json.loads(data)
+        frames = np.array(said["Frames"], dtype=np.float64)
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        raise TrajectoryError(
+            f"{where}: no motion of DeepMimic ({type(error).__name__}: {error!s:.100}); an object with Frames, lists "
+            f"of {_WIDTH} numbers, is needed; write other motions as a table with names in its header"
+        ) from None
+    if frames.ndim != 2 or frames.shape[1] != _WIDTH or not np.isfinite(frames).all():
+        listed = ", ".join(f"{name} {count}" for name, count in _JOINTS)
+        raise TrajectoryError(
+            f"{where}: Frames has shape {frames.shape}; DeepMimic's humanoid has {_WIDTH} finite numbers: duration, x, "
+            f"y, z, quaternion w x y z, {listed}. Write motions of other bodies as a table with names in its header"
+        )
+    durations = frames[:-1, 0]
+    if np.any(durations <= 0.0):
+        raise TrajectoryError(f"{where}: frame {int(np.argmax(durations <= 0.0))} lasts {durations.min():g} s; mend it")
+    columns: dict[str, Array] = {}
+    first = _BASE
+    for name, count in _JOINTS:
+        labels = [name] if count == 1 else [f"{name}.{part}" for part in "wxyz"]
+        columns |= {label: np.ascontiguousarray(frames[:, first + k]) for k, label in enumerate(labels)}
+        first += count
+    return Table(
+        where=str(where),
+        format="DeepMimic",
+        columns=columns,
+        rows=range(len(frames)),
+        row="frame",
+        times=np.concatenate([[0.0], np.cumsum(durations)]),
+        by_format=True,
+        base_quat_xyzw=frames[:, [5, 6, 7, 4]],
+        base_position=frames[:, 1:4],
+        up="y",
+    )

@@ -1,0 +1,339 @@
+"""Arrays with all coordinates of a floating body, as simulators and optimisers store them, base and joints together."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .... import so3
+from ....arrays import Array, finite_array
+from ....body.body import Body
+from ....body.joint_orders import MUJOCO, OWN, simulator_order
+from ....body.virtual_base import way_names, way_poses
+from ....errors import ShapeError, TrajectoryError, unknown_name
+from .._nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
+from .._recording import Rates
+
+_NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot|qdot)[_\[ ]?([0-9]{1,6})\]?")
+"""Labels of a table such as qpos_0, qpos[0] and qpos0."""
+_ROOT = 6
+"""Coordinates of a root that moves freely by three slides and three hinges."""
+_OFF_UNIT = 0.1
+"""A quaternion's length may be off one by so much: an audit has to see what is wrong."""
+_NAMES_THAT_SAY_IT = (
+    "store the arrays under names that say the order: qpos (place, quaternion w x y z, joints), or base_position, "
+    "base_quat_xyzw and shapes beside joint_names"
+)
+
+
+class FreeJoint(NamedTuple):
+    """How a program lays out the coordinates of a free base, which stand before those of the joints.
+
+    Attributes
+    ----------
+    title : of the program and its array
+    quaternion : columns of x, y, z and w
+    position : columns of the place
+    rate, velocity : columns of the angular and the linear velocity, and `rate_axes`, `velocity_axes` their axes
+    order : the word for the order of joints without names
+    """
+
+    title: str
+    quaternion: list[int]
+    position: list[int]
+    rate: list[int]
+    velocity: list[int]
+    rate_axes: str
+    velocity_axes: str
+    order: str
+
+
+MUJOCO_QPOS = FreeJoint("MuJoCo qpos", [4, 5, 6, 3], [0, 1, 2], [3, 4, 5], [0, 1, 2], "base", "world", MUJOCO)
+PINOCCHIO_Q = FreeJoint("Pinocchio q", [3, 4, 5, 6], [0, 1, 2], [3, 4, 5], [0, 1, 2], "base", "base", OWN)
+# Drake numbers the joints of a URDF depth first, as MuJoCo does.
+DRAKE_Q = FreeJoint("Drake q", [1, 2, 3, 0], [4, 5, 6], [0, 1, 2], [3, 4, 5], "world", "world", MUJOCO)
+
+
+class FloatingMotion(NamedTuple):
+    """Base and joints of a floating body at N samples.
+
+    Attributes
+    ----------
+    title : of the program and its array
+    names : of the columns of `joints`
+    joints : (N, m) [rad or m]
+    quaternion : (N, 4) x y z w of the base, or None
+    position : (N, 3) of the base [m], or None
+    rates : where they are stored, too
+    nameless : how columns without names became those of joints; None: they have names, or the file's own order
+    """
+
+    title: str
+    names: tuple[str, ...]
+    joints: Array
+    quaternion: Array | None = None
+    position: Array | None = None
+    rates: Rates | None = None
+    nameless: NamelessJoints | None = None
+
+    def shapes(self, body: Body) -> Array:
+        """Coordinates of the body's independent joints in its order: (N, n). Raises UnknownNameError."""
+        return self.joints[:, places_of(self.names, body)]
+
+
+def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: str | None) -> FloatingMotion | None:
+    """Motion in one of the arrays `qpos`, `q` and `Q`; None where there is none of them.
+
+    What a file means by `q` follows from the number of its coordinates, and of Pinocchio's and Drake's order from
+    which columns are a quaternion of length one. Coordinates may stand along either axis.
+
+    Parameters
+    ----------
+    order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
+
+    Raises
+    ------
+    TrajectoryError, ShapeError
+        For arrays that fit no order, or several.
+    """
+    kind = next((name for name in ("qpos", "q", "Q") if name in arrays), None)
+    if kind is None:
+        return None
+    values = finite_array(arrays[kind], f"{where}: {kind}", (None, None))
+    names = None if "joint_names" not in arrays else tuple(map(str, np.ravel(arrays["joint_names"])))
+    count = np.size(arrays["time"]) if "time" in arrays else None
+    layouts = {"qpos": (MUJOCO_QPOS,), "q": (PINOCCHIO_Q, DRAKE_Q), "Q": ()}[kind]
+    fitting: list[tuple[FreeJoint | None, bool]] = []
+    for turned, rows in ((False, values), (True, values.T)):
+        if count is not None and len(rows) != count:
+            continue
+        width = rows.shape[1]
+        for layout in layouts:
+            free = _free_columns(layout, width, names, body, order)
+            if free is not None and (kind == "qpos" or (free and _is_unit(rows[:, layout.quaternion]))):
+                fitting.append((layout, turned))
+        if kind != "qpos" and width == root_width(body) + body.n_shape:
+            fitting.append((None, turned))
+    if len({turned for _, turned in fitting}) > 1 and kind == "qpos":
+        fitting = [each for each in fitting if _is_unit((values.T if each[1] else values)[:, 3:FREE_JOINT])]
+    if not fitting:
+        raise TrajectoryError(_misfit(kind, values, where, body, names, count, order))
+    if len(fitting) > 1:
+        raise TrajectoryError(_ambiguity(kind, fitting, where))
+    ((layout, turned),) = fitting
+    labels = {"qpos": ("qvel",), "q": ("v",), "Q": ()}[kind] if layout else ("Qdot", "qdot")
+    stored = next((arrays[label] for label in labels if label in arrays), None)
+    rates = None if stored is None else np.asarray(stored)
+    if turned:
+        values, rates = values.T, None if rates is None else rates.T
+    if layout is None:
+        return _of_root(values, rates, where, body)
+    found = with_free_joint(layout, values, rates, body, names=names, order=order, labels=(kind, *labels), where=where)
+    return found._replace(nameless=arrays.get("nameless", found.nameless))
+
+
+def with_free_joint(
+    layout: FreeJoint,
+    places: Array,
+    rates: Any,
+    body: Body,
+    *,
+    names: Sequence[str] | None,
+    order: str | None,
+    labels: Sequence[str],
+    where: str,
+) -> FloatingMotion:
+    """Motion in rows of coordinates: of the free base, where it is there, and of the joints.
+
+    Parameters
+    ----------
+    places : (N, 7 + m), or without a free joint (N, m)
+    rates : (N, 6 + k), of a ball joint its angular velocity in axes of the link that it moves; or None
+    names : of the columns of the joints; None: those of an order
+    labels : of the two arrays, for messages
+    """
+    nameless = None
+    if names is None:
+        nameless = nameless_joints(body, places.shape[1], f"{where}: {labels[0]}", order or layout.order)
+        names, free = nameless.names, nameless.free
+    else:
+        free = places.shape[1] - len(names)
+        if free not in (0, FREE_JOINT):
+            raise TrajectoryError(
+                f"{where}: {labels[0]} has {places.shape[1]} columns; with {len(names)} joints ({', '.join(names)}) it "
+                f"has {len(names) + FREE_JOINT}, or {len(names)} without the free joint; mend 'joint_names'"
+            )
+    doubled = [name for name in names if list(names).count(name) > 1]
+    if doubled:
+        raise TrajectoryError(f"{where}: joint_names: {doubled[0]!r} stands {list(names).count(doubled[0])} times")
+    joints = places[:, free:]
+    found = FloatingMotion(layout.title, tuple(names), joints, nameless=nameless)
+    if not free:
+        return found
+    quaternion, position = places[:, layout.quaternion], places[:, layout.position]
+    found = found._replace(quaternion=quaternion, position=position)
+    if rates is None:
+        return found
+    balls = sum(name.endswith(".w") for name in names)
+    moving = finite_array(rates, f"{where}: {labels[1]}", (len(places), _ROOT + len(names) - balls))
+    return found._replace(
+        rates=Rates(
+            base=moving[:, layout.rate],
+            joints=_derivatives(found, moving[:, _ROOT:], body),
+            base_axes=layout.rate_axes,
+            velocity=moving[:, layout.velocity],
+            velocity_axes=layout.velocity_axes,
+        )
+    )
+
+
+def numbered_columns(columns: Mapping[str, Any], where: str) -> dict[str, list[str]]:
+    """Labels such as `qpos_0`, `q[1]` and `Qdot2`, by array in their order; of arrays whose numbers are 0, 1, 2, ...
+
+    Raises TrajectoryError for two labels of one number.
+    """
+    found: dict[str, dict[int, str]] = {}
+    for label in columns:
+        match = _NUMBERED.fullmatch(label.strip())
+        if match is None:
+            continue
+        numbers = found.setdefault(match[1], {})
+        if int(match[2]) in numbers:
+            both = f"{numbers[int(match[2])]!r} and {label!r}"
+            raise TrajectoryError(f"{where}: columns {both} are number {int(match[2])} of {match[1]}; keep one")
+        numbers[int(match[2])] = label
+    return {
+        name: [numbers[k] for k in range(len(numbers))]
+        for name, numbers in found.items()
+        if sorted(numbers) == list(range(len(numbers)))
+    }
+
+
+def root_width(body: Body) -> int:
+    """Number of coordinates that move the base before those of the joints, in biorbd's order."""
+    return len(way_names(body.base_joints)) if body.base_joints else _ROOT
+
+
+def places_of(names: Sequence[str], body: Body) -> list[int]:
+    """Columns of the body's independent joints among those with names. Raises UnknownNameError."""
+    for joint in body.joint_names:
+        if joint not in names:
+            raise unknown_name("joint among joint_names", joint, names)
+    return [list(names).index(joint) for joint in body.joint_names]
+
+
+def _of_root(values: Array, rates: Any, where: str, body: Body) -> FloatingMotion:
+    """Motion in biorbd's generalised coordinates: those of the root in the order of the body's file, the joints."""
+    if body.ball_joints:
+        raise TrajectoryError(
+            f"{where}: Q of a model with quaternions is not read ({body.ball_joints[0]} has one); write columns by "
+            "name, or q with the quaternion x y z w of each"
+        )
+    width = root_width(body)
+    root, joints = values[:, :width], values[:, width:]
+    names = body.joint_names
+    if _is_biomod(body):
+        names = tuple(name for name in simulator_order(body, MUJOCO, names) if name in names)
+    found = FloatingMotion("biorbd Q", names, joints)
+    if rates is not None:
+        rates = np.asarray(rates)
+        if rates.shape != values.shape:
+            raise ShapeError(f"{where}: Qdot: expected shape {values.shape} as that of Q, got {rates.shape}")
+        rates = finite_array(rates, f"{where}: Qdot", values.shape)
+    if body.base_joints:
+        way = dict(zip(way_names(body.base_joints), root.T, strict=True))
+        turned, placed = way_poses(body.base_joints, way, len(values))
+        return found._replace(quaternion=so3.quat_from_matrix(turned), position=placed)
+    angles, axes = root[:, 3:], "xyz" if body.base_angles is None else body.base_angles[1]
+    found = found._replace(quaternion=so3.quat_from_matrix(so3.matrix_from_euler(angles, axes)), position=root[:, :3])
+    if rates is None:
+        return found
+    base = np.zeros((len(values), 3))
+    for k, axis in enumerate(axes):
+        # What was there before is seen from axes that have turned on.
+        turn = so3.matrix_from_euler(angles[:, [k]], axis)
+        base = so3.apply(so3.transpose(turn), base) + rates[:, 3 + k, None] * np.eye(3)["xyz".index(axis)]
+    moving = rates[:, _ROOT:][:, places_of(names, body)]
+    return found._replace(rates=Rates(base, moving, "base", rates[:, :3], "world"))
+
+
+def _is_biomod(body: Body) -> bool:
+    return body.file is not None and body.file.suffix.lower() == ".biomod"
+
+
+def _free_columns(
+    layout: FreeJoint, width: int, names: Sequence[str] | None, body: Body, order: str | None
+) -> int | None:
+    """Number of columns before those of the joints, 7 or none; None where the width does not fit."""
+    if names is not None:
+        free = width - len(names)
+        return free if free in (0, FREE_JOINT) else None
+    columns = joint_columns(body, width, order or layout.order)
+    return None if columns is None or (not columns.free and layout is not MUJOCO_QPOS) else columns.free
+
+
+def _derivatives(motion: FloatingMotion, rates: Array, body: Body) -> Array:
+    """Derivatives of the body's coordinates (N, n) from the rates of all joints in the order of the array."""
+    found: dict[str, Array] = {}
+    column, names = 0, motion.names
+    while len(found) < len(names):
+        name = names[len(found)]
+        joint, dot, part = name.rpartition(".")
+        parts = [f"{joint}.{each}" for each in "xyzw"]
+        if not dot or part not in "xyzw" or not set(parts) <= set(names):
+            found[name] = rates[:, column]
+            column += 1
+            continue
+        quaternion = motion.joints[:, [names.index(each) for each in parts]]
+        turning = np.pad(rates[:, column : column + 3], ((0, 0), (0, 1)))
+        found |= dict(zip(parts, 0.5 * so3.quat_product(quaternion, turning).T, strict=True))
+        column += 3
+    return np.stack([found[joint] for joint in body.joint_names], axis=1) if body.n_shape else rates[:, :0]
+
+
+def _is_unit(quaternions: Array) -> bool:
+    return bool(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0).max(initial=0.0) <= _OFF_UNIT)
+
+
+def _misfit(
+    kind: str,
+    values: Array,
+    where: str,
+    body: Body,
+    names: Sequence[str] | None,
+    count: int | None,
+    order: str | None,
+) -> str:
+    known = body.joint_names if names is None else tuple(names)
+    free, root = FREE_JOINT + len(known), root_width(body) + body.n_shape
+    counts = {"qpos": f"{free}, or {len(known)} without the free joint", "q": f"{free}, or {root} of biorbd's order"}
+    needed = counts.get(kind, f"{root}: three places, three angles and the joints")
+    said = f"{where}: {kind} has shape {values.shape}"
+    layout = MUJOCO_QPOS if kind == "qpos" else PINOCCHIO_Q
+    fits = [kind != "Q" and _free_columns(layout, width, names, body, order) is not None for width in values.shape]
+    rooted = [kind != "qpos" and width == root for width in values.shape]
+    samples = [values.shape[1 - k] for k in (0, 1) if fits[k] or rooted[k]]
+    if samples and count not in (None, *samples):
+        return f"{said}, {samples[0]} samples, and time has shape ({count},); store one time for each sample"
+    if kind == "q" and any(fits):
+        return (
+            f"{said}, and neither its numbers 3 to 6 (Pinocchio: place, quaternion x y z w, joints) nor 0 to 3 (Drake: "
+            f"quaternion w x y z, place, joints) are a quaternion of length 1 in every sample; {_NAMES_THAT_SAY_IT}"
+        )
+    return (
+        f"{said}; with {len(known)} joints ({', '.join(known)}) a sample has {needed} coordinates. Store an array "
+        "'joint_names' with the names of the columns of the joints if there are others"
+    )
+
+
+def _ambiguity(kind: str, fitting: Sequence[tuple[FreeJoint | None, bool]], where: str) -> str:
+    titles = list(dict.fromkeys("biorbd's" if layout is None else layout.title for layout, _ in fitting))
+    if len(titles) > 1:
+        return f"{where}: {kind} fits {' and '.join(titles)}; {_NAMES_THAT_SAY_IT}"
+    return (
+        f"{where}: {kind} has as many samples as coordinates, so that nothing shows along which axis time goes; leave "
+        f"out the last sample of {kind}, its rates and the times"
+    )
