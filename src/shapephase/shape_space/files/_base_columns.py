@@ -15,6 +15,7 @@ from ...body._link_tree import Joint
 from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import what_came
+from ._gaps import Gaps
 from ._labels import ANGLES, LENGTHS, SI, Label, label
 from ._recording import Recording
 
@@ -166,6 +167,7 @@ class BaseColumns:
     """Columns of the base as they are found in a table, one after the other."""
 
     recording: Recording
+    gaps: Gaps
     choices: BaseChoices
     degrees: bool | None
     angles: tuple[tuple[str, ...], str] | None  # that the body's file turns the base by, and their axes
@@ -274,6 +276,8 @@ class BaseColumns:
 
     def _attitude(self, group: _Group | None) -> tuple[Array | None, dict[str, Any]]:
         stored, record = self._stored("attitude"), {}
+        if group is not None:
+            self.gaps.joined(self.recording.table, self._texts(group))
         if group is None and stored is None:
             return None, {}
         if group is None:
@@ -293,6 +297,7 @@ class BaseColumns:
                 order = self.choices.order or group.order
                 turned = so3.matrix_from_euler(values[:, [group.parts.index(axis) for axis in order]], order)
                 record |= {"order": order, "order_said": self.choices.order is not None}
+        turned = turned if group is None else self.gaps.turned(self._texts(group), turned)
         if "order" not in record and (group is None or group.kind == "quaternion"):
             self._check_parts(turned)
         if "order" not in record and self.choices.order is not None:
@@ -329,9 +334,13 @@ class BaseColumns:
     def _position(self, group: _Group | None) -> Array | None:
         if group is None:
             return self._stored("position")
-        if group.kind == "joints":
-            return self._by_joints(group)[1]
-        return np.stack([self._values(name, group.kind) for name in group.names], axis=-1)
+        self.gaps.joined(self.recording.table, self._texts(group))
+        places = (
+            self._by_joints(group)[1]
+            if group.kind == "joints"
+            else np.stack([self._values(name, group.kind) for name in group.names], axis=-1)
+        )
+        return self.gaps.bridged(self._texts(group), places)
 
     def _by_joints(self, group: _Group) -> tuple[Array, Array]:
         """Attitude and place by the joints on the way to the base, seen from the world that they start from."""
@@ -353,8 +362,7 @@ class BaseColumns:
         """A column in rad, m or, of a quaternion, without unit."""
         table = self.recording.table
         text, said = self.found[name]
-        table.check_column(text)
-        values = table.columns[text]
+        values = self.gaps.held(table, text)
         if kind == "quaternion":
             if said is not None:
                 raise TrajectoryError(f"{table.where}: column {text!r} is in {said}; a quaternion has no unit")
