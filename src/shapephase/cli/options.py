@@ -205,6 +205,16 @@ def _motion_option(text: str, **more: Any) -> Parameter:
     return Parameter(help=text, show_default=False, **more)
 
 
+FillOption = Annotated[
+    str | None,
+    _motion_option(
+        "Bridge gaps (empty cells, NaN) of up to this length, in s or with a unit: joints and places by a cubic "
+        "spline, rotations by a rotation spline; gaps at the start and the end are cut off. Without it a gap is an "
+        "error. For example `--fill 0.1s` or `--fill 100ms`."
+    ),
+]
+
+
 @Parameter(name="*")
 @dataclass(frozen=True)
 class RecordingOptions:
@@ -289,6 +299,7 @@ class RecordingOptions:
             "`--resample 100`."
         ),
     ] = None
+    fill: FillOption = None
     smooth: Annotated[
         str | None,
         _motion_option(

@@ -129,7 +129,7 @@ GOOD = HEADER + "0,0,0\n1,1,1\n2,0,0\n"
         ("", "empty"),
         ("left_shoulder_abduction,right_shoulder_abduction\n0,0\n1,1\n", "no column `time`"),
         (HEADER + "0,0,0\n", "two samples or more"),
-        (HEADER + "0,0,0\n1,nan,1\n", "row 3, column 'left_shoulder_abduction': 'nan'"),
+        (HEADER + "0,0,0\n1,nan,1\n", "'left_shoulder_abduction' at the end, row 3"),
         (HEADER + "0,0,0\n1,1,inf\n", "row 3, column 'right_shoulder_abduction': 'inf'"),
         (HEADER + "0,0,0\n1,1,x\n", "'x' is no finite number"),
         (HEADER + "0,0,0\n1,1\n", "row 3 has 2 entries, the header 3"),

@@ -191,7 +191,7 @@ def _levels(body: Body, smoothed: Mapping[str, float]) -> str:
 
 def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str]:
     """What makes the path another than the samples."""
-    lines = []
+    lines = _gap_lines(record)
     if record["trim"] is not None:
         lines.append(
             f"{'kept':24}{record['samples']} of {record['samples_in_file']} samples, from {record['first_time']:.9g} "
@@ -211,6 +211,23 @@ def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str
         off = _value(body, names[joint], recorded.residual[joint])
         lines.append(f"{'off the samples':24}{off} rms at most, {names[joint]}")
     return lines
+
+
+def _gap_lines(record: Any) -> list[str]:
+    """Which gaps were filled, and what was cut off at the ends for those there."""
+    gaps, unit = record["gaps"] or {"filled": (), "cut": ()}, record["time_unit"]
+    filled = [
+        f"{_listed(gap['columns'])} from {gap['after']:.9g} to {gap['until']:.9g} {unit} ({gap['seconds']:.4g} s, by a "
+        f"{gap['by']})"
+        for gap in gaps["filled"]
+    ]
+    more = f"; and {len(filled) - _MOST_NAMES} more" if len(filled) > _MOST_NAMES else ""
+    lines = [f"{'filled':24}{'; '.join(filled[:_MOST_NAMES])}{more}"] if filled else []
+    return lines + [
+        f"{'cut off':24}{cut['samples']} samples at the {cut['at']}, where {_listed(cut['columns'])} "
+        f"{'has' if len(cut['columns']) == 1 else 'have'} no number"
+        for cut in gaps["cut"]
+    ]
 
 
 def _smoothing_lines(smoothing: Smoothing) -> list[str]:

@@ -13,6 +13,7 @@ from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
 from ..ball_columns import ball_columns, neighbours_signs
+from ._gaps import Gaps
 from ._labels import ANGLES, SI, Label, label
 from ._recording import Recording, warn
 
@@ -29,7 +30,7 @@ _MOST_ANGLE = 2.0 * np.pi
 
 
 def with_quaternions(
-    recording: Recording, body: Body, names: Mapping[str, str | None], degrees: bool | None
+    recording: Recording, body: Body, names: Mapping[str, str | None], degrees: bool | None, gaps: Gaps
 ) -> tuple[Recording, dict[str, str]]:
     """The recording with quaternions of ball joints in the place of angles; and which columns each is made of.
 
@@ -47,7 +48,7 @@ def with_quaternions(
     table = recording.table
     made: dict[str, str] = {}
     for joint in body.ball_joints:
-        found: dict[str, tuple[str, Array]] = {}
+        found: dict[str, tuple[str, str | None]] = {}
         for text in table.columns:
             target = names.get(text, text)
             parts = Label("", None) if target is None else label(target)
@@ -58,16 +59,16 @@ def with_quaternions(
             if axis in found:
                 both = f"columns {found[axis][0]!r} and {text!r} are both {parts.name}"
                 raise TrajectoryError(f"{table.where}: {both}; keep one")
-            table.check_column(text)
-            found[axis] = text, _angles(text, parts.unit, recording, degrees)
+            found[axis] = text, parts.unit
         if not found:
             continue
         lacking = [f"{joint}.r{axis}" for axis in _AXES if axis not in found]
         if lacking:
             raise TrajectoryError(f"{table.where}: ball joint {joint} turns about three axes; add {', '.join(lacking)}")
-        angles = np.stack([values for _, values in found.values()], axis=-1)
-        turned = so3.matrix_from_euler(angles, "".join(found))
         taken = [text for text, _ in found.values()]
+        gaps.joined(table, taken)
+        angles = [_angles(text, gaps.held(table, text), unit, recording, degrees) for text, unit in found.values()]
+        turned = gaps.turned(taken, so3.matrix_from_euler(np.stack(angles, axis=-1), "".join(found)))
         columns, said = {text: each for text, each in table.columns.items() if text not in taken}, ", ".join(taken)
         for part, values in zip("xyzw", so3.quat_from_matrix(turned).T, strict=True):
             if f"{joint}.{part}" in columns:
@@ -80,10 +81,10 @@ def with_quaternions(
     return replace(recording, table=table), made
 
 
-def _angles(text: str, said: str | None, recording: Recording, degrees: bool | None) -> Array:
+def _angles(text: str, values: Array, said: str | None, recording: Recording, degrees: bool | None) -> Array:
     """A column in rad."""
     table = recording.table
-    values, unit = table.columns[text], said or table.units.get(text) or label(text).unit
+    unit = said or table.units.get(text) or label(text).unit
     if unit is not None and unit != SI and unit not in ANGLES:
         raise TrajectoryError(f"{table.where}: column {text!r} is in {unit}, and a turn is in rad or degrees")
     if unit is not None and unit != SI and degrees is not None and degrees != (unit == "deg"):
@@ -106,8 +107,10 @@ def _angles(text: str, said: str | None, recording: Recording, degrees: bool | N
     return values * (1.0 if unit == SI else ANGLES[unit])
 
 
-def continued_balls(shapes: Array, body: Body, recording: Recording) -> Array:
-    """Shapes (N, n) with the quaternions of ball joints in the sign that is nearer to the sample before.
+def continued_balls(shapes: Array, body: Body, recording: Recording, gaps: Gaps, columns: Mapping[int, str]) -> Array:
+    """Shapes (N, n) with the quaternions of ball joints, bridged, in the sign that is nearer to the sample before.
+
+    columns : joint -> label
 
     Raises
     ------
@@ -123,6 +126,11 @@ def continued_balls(shapes: Array, body: Body, recording: Recording) -> Array:
                 f"{recording.place(worst)}: the quaternion x, y, z, w of ball joint {joint} has the length "
                 f"{lengths[worst]:.6g}; 1 is needed"
             )
+        labels = [columns[column] for column in range(ball.start, ball.stop) if column in columns]
+        turns = so3.matrix_from_quat(shapes[:, ball] / lengths[:, None])
+        bridged = gaps.turned(labels, turns) if labels else turns
+        changed = (bridged != turns).any(axis=(1, 2))
+        shapes[changed, ball] = so3.quat_from_matrix(bridged[changed])
     return neighbours_signs(shapes, balls)
 
 

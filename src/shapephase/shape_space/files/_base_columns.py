@@ -15,6 +15,7 @@ from ...body._link_tree import Joint
 from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import what_came
+from ._gaps import Gaps
 from ._labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, label
 from ._pose_columns import CANONICAL, MRP, VECTOR
 from ._recording import Recording
@@ -169,6 +170,7 @@ class BaseColumns:
     """Columns of the base as they are found in a table, one after the other."""
 
     recording: Recording
+    gaps: Gaps
     choices: BaseChoices
     degrees: bool | None
     angles: tuple[tuple[str, ...], str] | None  # that the body's file turns the base by, and their axes
@@ -278,6 +280,8 @@ class BaseColumns:
 
     def _attitude(self, group: _Group | None) -> tuple[Array | None, dict[str, Any]]:
         stored, record = self._stored("attitude"), {}
+        if group is not None:
+            self.gaps.joined(self.recording.table, self._texts(group))
         if group is None and stored is None:
             return None, {}
         if group is None:
@@ -299,6 +303,7 @@ class BaseColumns:
                 order = self.choices.order or group.order
                 turned = so3.matrix_from_euler(values[:, [group.parts.index(axis) for axis in order]], order)
                 record |= {"order": order, "order_said": self.choices.order is not None}
+        turned = turned if group is None else self.gaps.turned(self._texts(group), turned)
         if "order" not in record and (group is None or group.kind in ("quaternion", "mrp", "vector")):
             self._check_parts(turned)
         if "order" not in record and self.choices.order is not None:
@@ -335,9 +340,13 @@ class BaseColumns:
     def _position(self, group: _Group | None) -> Array | None:
         if group is None:
             return self._stored("position")
-        if group.kind == "joints":
-            return self._by_joints(group)[1]
-        return np.stack([self._values(name, group.kind) for name in group.names], axis=-1)
+        self.gaps.joined(self.recording.table, self._texts(group))
+        places = (
+            self._by_joints(group)[1]
+            if group.kind == "joints"
+            else np.stack([self._values(name, group.kind) for name in group.names], axis=-1)
+        )
+        return self.gaps.bridged(self._texts(group), places)
 
     def _by_joints(self, group: _Group) -> tuple[Array, Array]:
         """Attitude and place by the joints on the way to the base, seen from the world that they start from."""
@@ -359,8 +368,7 @@ class BaseColumns:
         """A column in rad, m or, of a quaternion, without unit."""
         table = self.recording.table
         text, said = self.found[name]
-        table.check_column(text)
-        values = table.columns[text]
+        values = self.gaps.held(table, text)
         if kind in ("quaternion", "mrp"):
             if said not in (None, NO_UNIT):
                 raise TrajectoryError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,10 @@ from ...arrays import FARTHEST, Array, Integers
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
 from ...letters import what_came
+from ..ball_columns import ball_columns
 from ._ball_columns import continued_balls, continued_hinges, with_quaternions
 from ._base_columns import KNOWN, BaseChoices, BaseColumns, BaseMotion
+from ._gaps import Gaps
 from ._labels import (
     ANGLES,
     LENGTHS,
@@ -31,8 +33,8 @@ from ._labels import (
 )
 from ._pose_columns import HINT, base_names
 from ._recording import LONGEST_NAME, Recording, warn
-from ._times import is_clock
-from ._unit_doubts import check_unit, warn_of_values
+from ._times import is_clock, part_of
+from ._unit_doubts import check_unit, warn_of_limits, warn_of_turns
 
 _STILL = 1e-9
 """Range of a coordinate [rad, m or degrees] below which it was locked."""
@@ -57,6 +59,7 @@ class JointChoices:
     rest_missing : whether joints without a column rest at zero, or at the limit that is nearest to it
     ignore_extra : whether columns that are no joints are left out
     base : the same of the columns of the base
+    fill : the longest gap that is bridged [s]; None: all are refused
     """
 
     names: Mapping[str, str | None]
@@ -65,6 +68,7 @@ class JointChoices:
     rest: Mapping[str, float | str] | None = None
     rest_missing: bool = False
     ignore_extra: bool = False
+    fill: float | None = None
 
     def __post_init__(self) -> None:
         """Check what a caller has said. Raises ShapeError."""
@@ -86,6 +90,7 @@ class Matched(NamedTuple):
     units : joint -> the unit in which its column was read
     at_rest : joint -> where it rests [rad or m], of joints without a column
     left_out : label -> why it was left out
+    gaps : what was filled, and cut off at the ends, as JSON can hold it; None: the recording has no gaps
     """
 
     shapes: Array
@@ -94,14 +99,15 @@ class Matched(NamedTuple):
     units: dict[str, str]
     at_rest: dict[str, float]
     left_out: dict[str, str]
+    gaps: dict[str, Any] | None
 
     def kept(self, samples: Integers) -> Matched:
         """Some of the samples, by their places."""
         return self._replace(shapes=self.shapes[samples], base=self.base.kept(samples))
 
 
-def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
-    """The shapes of a body that a recording holds.
+def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Recording, Matched]:
+    """The recording without gaps at its ends, and the shapes of a body that it holds.
 
     Raises
     ------
@@ -109,7 +115,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
         If a column is no joint of the body.
     TrajectoryError
         If a joint is missing or doubled, a value is no number or no possible coordinate, a quaternion is not of unit
-        length, or the unit of a column can only be guessed.
+        length, a gap is not to be bridged, or the unit of a column can only be guessed.
 
     Warns
     -----
@@ -120,13 +126,16 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
     for text in recording.table.columns:
         if len(text) > LONGEST_NAME:
             raise TrajectoryError(f"{where}: a column's name has {len(text)} characters: {text[:40]!r}...")
-    recording, turned = with_quaternions(recording, body, choices.names, choices.degrees)
+    gaps = Gaps(recording, choices.fill)
+    recording, turned = with_quaternions(recording, body, choices.names, choices.degrees, gaps)
     table = recording.table
     shapes = np.empty((len(recording.times), body.n_shape))
     found: dict[int, str] = {}
     units: dict[str, str] = {}
     known: set[int] = set()
-    base = BaseColumns(recording, choices.base, choices.degrees, body.base_angles, body.base_slides, body.base_joints)
+    base = BaseColumns(
+        recording, gaps, choices.base, choices.degrees, body.base_angles, body.base_slides, body.base_joints
+    )
     left_out = {text: f"{what}, no column" for text, what in table.unread.items()} | dict(table.left_out)
     targets = {text: target for text in table.columns if (target := choices.names.get(text, text)) is not None}
     of_base = base_names(targets, {*body.joint_names, *KNOWN, *base.own_names})
@@ -151,11 +160,16 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
         unit, stated = _unit(text, resolved, joint, body, recording, choices.degrees)
         if joint in found:
             raise TrajectoryError(f"{where}: columns {found[joint]!r} and {text!r} are the same joint; keep one")
-        table.check_column(text)
+        values = gaps.held(table, text)
         found[joint] = text
         units[body.joint_names[joint]] = unit
         known |= {joint} if stated else set()
         shapes[:, joint] = (1.0 if unit == NO_UNIT else (ANGLES | LENGTHS)[unit]) * values
+    for ball in ball_columns(body.joint_names):
+        quaternion = [column for column in range(ball.start, ball.stop) if column in found]
+        if quaternion:
+            gaps.joined(table, [found[column] for column in quaternion])
+            shapes[:, quaternion] = np.stack([gaps.held(table, found[column]) for column in quaternion], axis=1)
     _check_unread(found, body, recording, choices)
     if body.n_shape and not found and choices.rest_missing:
         _check_meant(left_out, body, recording, choices)
@@ -167,12 +181,18 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> Matched:
         if joint in found and joint not in known:
             check_unit(shapes[:, joint], joint, body, recording)
     shapes = continued_hinges(shapes, body, recording)
-    for joint in range(body.n_shape):
-        warn_of_values(shapes[:, joint], joint, body, recording)
-    shapes = continued_balls(shapes, body, recording)
+    for joint in np.flatnonzero(body.continuous).tolist():
+        warn_of_turns(shapes[:, joint], body.joint_names[joint], recording)
+    for joint, text in found.items():
+        if body.joint_units[joint] != NO_UNIT:
+            shapes[:, joint] = gaps.bridged([text], shapes[:, joint])
+    warn_of_limits(shapes, body, recording)
+    shapes = continued_balls(shapes, body, recording, gaps, found)
     base_motion = base.motion(ignore_extra=choices.ignore_extra)
     columns = {body.joint_names[joint]: turned.get(text, text) for joint, text in found.items()}
-    return Matched(shapes, base_motion, columns, units, at_rest, left_out | base_motion.left_out)
+    kept, filled = gaps.settled()
+    motion = Matched(shapes, base_motion, columns, units, at_rest, left_out | base_motion.left_out, filled)
+    return (recording, motion) if len(kept) == len(shapes) else (part_of(recording, kept), motion.kept(kept))
 
 
 def _with_unit(name: str | None, target: str) -> str:

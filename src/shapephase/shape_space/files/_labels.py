@@ -177,6 +177,17 @@ def quantity(value: object, unit: str, what: str) -> float:
     return number * (1.0 if said is None else sizes[said])
 
 
+def seconds(value: object, what: str) -> float:
+    """A number of seconds, or a text with a unit of time such as `0.1s` or `100ms`. Raises TrajectoryError."""
+    match = _QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
+    unit = None if match is None else unit_of(match["unit"] or "s")
+    if match is not None and unit in IN_A_SECOND:
+        return float(match["number"]) / IN_A_SECOND[unit]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise TrajectoryError(f"{what}: seconds, as 0.1, '0.1s' or '100ms', are needed, got {what_came(value)}")
+    return float(value)
+
+
 def amounts(value: object, what: str) -> dict[str, float]:
     """How much of an angle, a length, and a quaternion, which has half of its turn: {"rad": ..., "m": ..., "1": ...}.
 

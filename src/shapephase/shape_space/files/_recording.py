@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...arguments import check_time_steps
-from ...arrays import Array, Integers
+from ...arrays import Array, Integers, Mask
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 from ._nameless_joints import NamelessJoints
 
@@ -108,10 +108,22 @@ class Table:
 
     def check_column(self, label: str) -> None:
         """Raise TrajectoryError for the first entry of a column that is no finite number."""
-        bad = np.flatnonzero(~np.isfinite(self.columns[label]))
+        bad = np.flatnonzero(self.missing(label))
         if len(bad):
-            text = self.faults.get(label, {}).get(int(bad[0]), str(self.columns[label][bad[0]]))
-            raise no_number(text, f"{self.where}: {self.row} {self.rows[int(bad[0])]}, column {label!r}")
+            raise self._no_number(label, int(bad[0]))
+
+    def missing(self, label: str) -> Mask:
+        """Samples without an entry in a column: (N,). Raises TrajectoryError for a word or an infinite number."""
+        values = self.columns[label]
+        found = np.isnan(values)
+        wrong = [k for k, text in self.faults.get(label, {}).items() if not is_blank(text)]
+        if len(wrong) or np.isinf(values).any():
+            raise self._no_number(label, min([*wrong, *np.flatnonzero(np.isinf(values)).tolist()]))
+        return found
+
+    def _no_number(self, label: str, sample: int) -> TrajectoryError:
+        text = self.faults.get(label, {}).get(sample, str(self.columns[label][sample]))
+        return no_number(text, f"{self.where}: {self.row} {self.rows[sample]}, column {label!r}")
 
     def kept(self, samples: Integers) -> Table:
         """Some of the samples, by their places."""
@@ -147,6 +159,13 @@ class Recording:
     first: float
     last: float
     time_unit: str
+
+    @property
+    def clock(self) -> Array:
+        """Times as the file tells them: (N,)."""
+        found = self.table.times if self.table.clock is None else self.table.clock
+        assert found is not None
+        return found
 
     def place(self, index: int) -> str:
         """The file and the sample, for messages."""
@@ -283,7 +302,10 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
     return shifted
 
 
+def is_blank(text: str) -> bool:
+    """Whether an entry says that there is no number."""
+    return text.strip().lower() in ("", "nan", ".nan", "na", "n/a", "<na>", "nat", "null", "none", "~")
+
+
 def _way_out(text: str) -> str:
-    if not text or text.lower() in ("nan", ".nan", "na", "null", "none", "~"):
-        return "; fill the gap or drop the row"
-    return ""
+    return "; fill the gap or drop the row" if is_blank(text) else ""

@@ -16,7 +16,10 @@ _MANY_TURNS = 2.0 * _WHOLE_TURN
 """Range of a joint without limits [rad] from which on one asks; wheels turn on, but who counts their turns says so."""
 _HALF_TURN = np.pi
 """From one sample to the next [rad]: a recording that is so coarse tells nothing about the way between."""
-_SLACK = 1e-9
+_SLACK = 1e-6
+"""Of a limit, or of 1 rad or m where that is larger: optimisers and printed digits go beyond by less."""
+_MOST_SHOWN = 8
+"""Joints that a warning lists."""
 
 
 def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> None:
@@ -64,21 +67,27 @@ def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> N
         )
 
 
-def warn_of_values(values: Array, joint: int, body: Body, recording: Recording) -> None:
-    """Issue a TrajectoryWarning where a joint leaves its limits, or jumps by a whole turn: (N,) [rad or m]."""
-    name, unit = body.joint_names[joint], body.joint_units[joint]
-    lower, upper = body.joint_limits[joint]
-    beyond = np.maximum(lower - values, values - upper)
-    worst = int(np.argmax(beyond))
-    if beyond[worst] > _SLACK * max(1.0, abs(values[worst])):
-        count = int(np.count_nonzero(beyond > 0.0))
-        warn(
-            f"{recording.place(worst)}: joint {name} is at {values[worst]:.6g} {unit}, outside its limits {lower:.6g} "
-            f"to {upper:.6g} {unit} (in {count} of {len(values)} {recording.table.row}s); check the file's units and "
-            "signs"
-        )
-    if body.continuous[joint]:
-        _check_turns(values, name, recording)
+def warn_of_limits(shapes: Array, body: Body, recording: Recording) -> None:
+    """Issue one TrajectoryWarning for the joints that leave their limits: (N, n) [rad or m]."""
+    lower, upper = body.joint_limits.T
+    beyond = np.maximum(lower - shapes, shapes - upper)
+    # Infinite limits are never left.
+    nearest = np.where(lower - shapes > shapes - upper, lower, upper)
+    size = np.maximum(1.0, np.abs(np.where(np.isfinite(nearest), nearest, 0.0)))
+    excess = beyond / size
+    left = np.flatnonzero(excess.max(axis=0, initial=0.0) > _SLACK)
+    if not len(left):
+        return
+    sample, joint = np.unravel_index(int(np.argmax(excess)), excess.shape)
+    count, row, unit = int(np.count_nonzero(excess[:, joint] > _SLACK)), recording.table.row, body.joint_units[joint]
+    others = [body.joint_names[k] for k in left if k != joint]
+    more = f" and {len(others) - _MOST_SHOWN} more" if len(others) > _MOST_SHOWN else ""
+    also = f"; beyond theirs, too: {', '.join(others[:_MOST_SHOWN])}{more}" if others else ""
+    warn(
+        f"{recording.place(int(sample))}: joint {body.joint_names[joint]} is at {shapes[sample, joint]:.6g} {unit}, "
+        f"outside its limits {lower[joint]:.6g} to {upper[joint]:.6g} {unit} by {beyond[sample, joint]:.3g} {unit} (in "
+        f"{count} of {len(shapes)} {row}s){also}; check the file's units and signs (--degrees, --radians, --names)"
+    )
 
 
 def doubtful_turns(values: Array) -> bool:
@@ -86,7 +95,7 @@ def doubtful_turns(values: Array) -> bool:
     return bool(np.ptp(values) > _MANY_TURNS or np.abs(np.diff(values)).max(initial=0.0) > _HALF_TURN)
 
 
-def _check_turns(values: Array, name: str, recording: Recording) -> None:
+def warn_of_turns(values: Array, name: str, recording: Recording) -> None:
     """Warn where a joint that turns without end jumps by about 2 pi: it is read as written, as a turn."""
     jumps = np.diff(values)
     turns = np.flatnonzero((np.abs(jumps) > 1.5 * np.pi) & (np.abs(jumps) < 2.5 * np.pi))

@@ -28,6 +28,7 @@ from ..path_series import spline_error
 from ..shape_path import ShapePath
 from ._base_columns import base_choices
 from ._flight import Flight, flight_choices, in_flight
+from ._gaps import fill_argument
 from ._inputs import read_input
 from ._joint_columns import JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
@@ -106,6 +107,7 @@ def read_recorded_motion(
     ignore_extra: bool = False,
     trim: tuple[float, float] | None = None,
     resample: float | None = None,
+    fill: float | str | None = None,
     smooth: float | str | Mapping[str, float | str] | None = None,
     smooth_penalty: float | None = None,
     close: float | str | bool | None = None,
@@ -166,6 +168,10 @@ def read_recorded_motion(
     trim : the first and the last time to be kept, as the file tells the time (its unit, its start); what is smoothed is
         smoothed before it is cut
     resample : the path goes through this many of its own values a second instead, evenly spaced [1/s]
+    fill : empty cells and NaN are gaps, and an error; this bridges those of up to so many seconds from the last number
+        before to the first one after, a number or a text as "0.1s" or "100ms": joints and places by a cubic spline
+        through the other samples, attitudes and ball joints by SciPy's `RotationSpline`. The parts of a quaternion, of
+        three angles and of a place have their gaps together; gaps at the start and the end are cut off
     smooth : noise level of the samples, rms, a number [rad or m] or a text as "0.3deg" or "0.3deg,1mm", one for all
         joints or by joint (the others are interpolated); None: the path goes through all samples. See
         `smoothing.smoothed_path`.
@@ -231,22 +237,31 @@ def read_recorded_motion(
     mapping = _mapping(said, table)
     recording = recording_of(table, body.joint_names, mapping, time_unit, step, kept)
     choices = JointChoices(
-        names=mapping, base=base, degrees=degrees, rest=rest, rest_missing=rest_missing, ignore_extra=ignore_extra
+        names=mapping,
+        base=base,
+        degrees=degrees,
+        rest=rest,
+        rest_missing=rest_missing,
+        ignore_extra=ignore_extra,
+        fill=fill_argument(fill),
     )
-    motion = matched(recording, body, choices)
+    recording, motion = matched(recording, body, choices)
     recording, motion = without_first_pose(recording, motion, body)
     warn_of_fast_turns(recording, motion, body)
     recording, motion, free = in_flight(recording, motion, body, flying)
     try:
         noise = _noise_levels(smooth, body)
-        samples = Recorded(recording.times, motion.shapes, noise, body.joint_names)
+        part, around, inside = recording, motion, slice(None)
         if noise.any() and (kept is not None or free is not None):
-            samples = surrounded(
-                samples,
+            part, around, inside = surrounded(
                 recording,
+                motion,
                 lambda: recording_of(table, body.joint_names, mapping, time_unit, step, None),
-                lambda part: matched(part, body, choices).shapes,
+                lambda some: without_first_pose(*matched(some, body, choices), body),
+                choices.fill,
             )
+            motion = around.kept(np.arange(len(part.times))[inside])
+        samples = Recorded(part.times, around.shapes, noise, body.joint_names, inside)
         path, smoothing, closing = _path(samples, body, within, close_by, loop=close is None, penalty=smooth_penalty)
         check_swings(path, body)
     except (TrajectoryError, ShapeError) as error:
@@ -298,6 +313,7 @@ def read_shape_path(
     ignore_extra: bool = False,
     trim: tuple[float, float] | None = None,
     resample: float | None = None,
+    fill: float | str | None = None,
     smooth: float | str | Mapping[str, float | str] | None = None,
     smooth_penalty: float | None = None,
     close: float | str | bool | None = None,
@@ -335,6 +351,7 @@ def read_shape_path(
         ignore_extra=ignore_extra,
         trim=trim,
         resample=resample,
+        fill=fill,
         smooth=smooth,
         smooth_penalty=smooth_penalty,
         close=close,
@@ -507,6 +524,7 @@ def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
         "at_rest": motion.at_rest,
         "left_out": motion.left_out,
         "base": motion.base.record,
+        "gaps": motion.gaps,
         "joint_order": None if recording.table.nameless is None else recording.table.nameless.record,
     }
 

@@ -1,0 +1,217 @@
+"""Gaps of a recording: samples at which a column has no number, bridged where they are short."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ... import so3
+from ...arrays import Array, Integers, Mask
+from ...errors import TrajectoryError
+from ._labels import seconds
+from ._recording import Recording, Table
+
+_UNRESOLVED = 2.0 * np.pi / 3.0
+"""[rad] A rotation that turns by more across a gap may as well have gone the other way round."""
+_ROUNDING = 1e-9
+"""Share of a length by which sums of time steps may exceed it."""
+_MOST_SHOWN = 4
+"""Columns and gaps that an error lists."""
+
+
+def fill_argument(fill: float | str | None) -> float | None:
+    """The longest gap that is bridged [s]. Raises TrajectoryError."""
+    longest = None if fill is None else seconds(fill, "fill")
+    if longest is not None and longest <= 0.0:
+        raise TrajectoryError(f"fill: a time above zero is needed, such as 0.1 or '100ms', got {fill!r:.40}")
+    return longest
+
+
+class Gaps:
+    """Samples that columns of a recording lack, and their bridges.
+
+    Parameters
+    ----------
+    recording : whose times the samples have
+    longest : gap that is bridged [s], from the last number before it to the first one after it; None: all are refused
+    """
+
+    def __init__(self, recording: Recording, longest: float | None) -> None:
+        self._recording = recording
+        self._longest = longest
+        self._missing: dict[str, Mask] = {}
+        self._by: dict[str, str] = {}
+
+    def held(self, table: Table, label: str) -> Array:
+        """A column with the last number before it in each gap, which `bridged` and `turned` then replace.
+
+        Raises TrajectoryError for a word, an infinite number, and a column without numbers.
+        """
+        if label not in self._missing:
+            self._missing[label] = table.missing(label)
+        if self._missing[label].all():
+            raise TrajectoryError(
+                f"{table.where}: column {label!r} has no number; leave it out with names={{{label!r}: None}} (--names "
+                f"{label}=), and say where its joint rests (rest, --rest)"
+            )
+        return _held(table.columns[label], self._missing[label])
+
+    def joined(self, table: Table, labels: Sequence[str]) -> None:
+        """Let columns of one rotation or place have their gaps together."""
+        for label in labels:
+            self.held(table, label)
+        together = np.logical_or.reduce([self._missing[label] for label in labels])
+        self._missing |= dict.fromkeys(labels, together)
+
+    def bridged(self, labels: Sequence[str], values: Array) -> Array:
+        """Values (N, ...) of joined columns, in their gaps those of the cubic spline through the others."""
+        from scipy.interpolate import CubicSpline
+
+        missing = self._inside(labels[0])
+        if not missing.any():
+            return values
+        self._by |= dict.fromkeys(labels, "cubic spline")
+        there = ~self._missing[labels[0]]
+        found, times = values.copy(), self._recording.times
+        found[missing] = CubicSpline(times[there], values[there])(times[missing])
+        return found
+
+    def turned(self, labels: Sequence[str], turns: Array) -> Array:
+        """Rotations (N, 3, 3) of joined columns, in their gaps those of the C2 rotation spline through the others.
+
+        Raises TrajectoryError where a rotation turns too far across a gap to tell which way round.
+        """
+        from scipy.spatial.transform import Rotation, RotationSpline
+
+        missing = self._inside(labels[0])
+        if not missing.any():
+            return turns
+        self._by |= dict.fromkeys(labels, "rotation spline")
+        there = ~self._missing[labels[0]]
+        found, times, known = turns.copy(), self._recording.times, turns[there]
+        steps = so3.angle(so3.transpose(known[:-1]) @ known[1:])
+        places = np.flatnonzero(there)
+        wide = np.flatnonzero((np.diff(places) > 1) & (steps > _UNRESOLVED))
+        if len(wide):
+            before, after = int(places[wide[0]]), int(places[wide[0] + 1])
+            raise TrajectoryError(
+                f"{self._recording.table.where}: {_listed(labels)} turn by {np.degrees(steps[wide[0]]):.3g} deg across "
+                f"the gap {self._span(before, after)}: which way round is unknown; keep a stretch without it (trim, "
+                f"{self._trim_words(before, after)})"
+            )
+        found[missing] = RotationSpline(times[there], Rotation.from_matrix(known))(times[missing]).as_matrix()
+        return found
+
+    def settled(self) -> tuple[Integers, dict[str, Any] | None]:
+        """The samples that are left without gaps at the ends, and what was filled and cut, as JSON can hold it.
+
+        Raises TrajectoryError for gaps that are not to be bridged.
+        """
+        ends = {label: np.flatnonzero(~missing)[[0, -1]].tolist() for label, missing in self._missing.items()}
+        count = len(self._recording.times)
+        low = max((first for first, _ in ends.values()), default=0)
+        high = min((last for _, last in ends.values()), default=count - 1)
+        runs: dict[tuple[int, int], list[str]] = {}
+        for label in self._missing:
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], self._inside(label).astype(int), [0]])))
+            for first, past in edges.reshape(-1, 2).tolist():
+                if past > low and first <= high:
+                    runs.setdefault((first - 1, past), []).append(label)
+        outer = [
+            (name, [label for label, both in ends.items() if both[which] == at], edge, at)
+            for which, name, edge, at in ((0, "start", 0, low), (1, "end", count - 1, high))
+            if at != edge
+        ]
+        if not runs and not outer:
+            return np.arange(count), None
+        self._check(runs, outer)
+        if high - low < 1:
+            raise TrajectoryError(
+                f"{self._recording.table.where}: no two samples are left between the gaps at the start and at the end"
+            )
+        clock = self._recording.clock
+        filled = [
+            {
+                "columns": labels,
+                "after": float(clock[before]),
+                "until": float(clock[after]),
+                "seconds": self._length(before, after),
+                "samples": after - before - 1,
+                "by": self._by[labels[0]],
+            }
+            for (before, after), labels in sorted(runs.items())
+        ]
+        cut = [
+            {"columns": labels, "at": name, "samples": abs(at - edge), "from": float(clock[at])}
+            for name, labels, edge, at in outer
+        ]
+        return np.arange(low, high + 1), {"filled": filled, "cut": cut}
+
+    def _check(self, runs: dict[tuple[int, int], list[str]], outer: Sequence[tuple[str, list[str], int, int]]) -> None:
+        """Raise TrajectoryError for gaps longer than those to be bridged."""
+        lengths = {run: self._length(*run) for run in runs}
+        longest = -1.0 if self._longest is None else self._longest * (1.0 + _ROUNDING)
+        refused = sorted(run for run, length in lengths.items() if length > longest)
+        where = self._recording.table.where
+        if refused:
+            shown = [f"{_listed(runs[run])} {self._span(*run)}" for run in refused[:_MOST_SHOWN]]
+            more = f"; and {len(refused) - len(shown)} more" if len(refused) > len(shown) else ""
+            beyond = "" if self._longest is None else f"; longer than the {self._longest:g} s to be bridged"
+            need = f"{np.ceil(1e3 * max(lengths.values()) * (1.0 - _ROUNDING)) / 1e3:g}"
+            raise TrajectoryError(
+                f"{where}: no number in {'; '.join(shown)}{more}{beyond}; bridge gaps of that length with "
+                f"fill={need} (--fill {need}s), or keep a stretch without them (trim, {self._trim_words(*refused[0])})"
+            )
+        if outer and self._longest is None:
+            name, labels, edge, at = outer[0]
+            rows = self._rows(min(edge, at + 1), max(edge, at - 1))
+            raise TrajectoryError(
+                f"{where}: no number in {_listed(labels)} at the {name}, {rows}; cut such ends off with fill=0.1 "
+                "(--fill 0.1s), which also bridges gaps of up to that length"
+            )
+
+    def _inside(self, label: str) -> Mask:
+        """Missing samples with numbers before and after them."""
+        missing = self._missing.get(label)
+        if missing is None:
+            return np.zeros(len(self._recording.times), dtype=bool)
+        places = np.flatnonzero(~missing)
+        found = missing.copy()
+        found[: places[0]] = found[places[-1] :] = False
+        return found
+
+    def _length(self, before: int, after: int) -> float:
+        return float(self._recording.times[after] - self._recording.times[before])
+
+    def _span(self, before: int, after: int) -> str:
+        clock, unit, length = self._recording.clock, self._recording.time_unit, self._length(before, after)
+        rows = self._rows(before + 1, after - 1)
+        return f"from {clock[before]:.9g} to {clock[after]:.9g} {unit} ({rows}, {length:.4g} s)"
+
+    def _rows(self, first: int, last: int) -> str:
+        table = self._recording.table
+        if first == last:
+            return f"{table.row} {table.rows[first]}"
+        return f"{table.row}s {table.rows[first]} to {table.rows[last]}"
+
+    def _trim_words(self, before: int, after: int) -> str:
+        """The option that keeps the longer side of a gap."""
+        clock = self._recording.clock
+        first, last = (0, before) if before >= len(clock) - 1 - after else (after, len(clock) - 1)
+        return f"--trim {clock[first]:.9g} {clock[last]:.9g}"
+
+
+def _held(values: Array, missing: Mask) -> Array:
+    if not missing.any():
+        return values
+    there = np.where(missing, 0, np.arange(len(values)))
+    there[: np.flatnonzero(~missing)[0]] = np.flatnonzero(~missing)[0]
+    return values[np.maximum.accumulate(there)]
+
+
+def _listed(labels: Sequence[str]) -> str:
+    shown = ", ".join(repr(label) for label in labels[:_MOST_SHOWN])
+    more = f" and {len(labels) - _MOST_SHOWN} more" if len(labels) > _MOST_SHOWN else ""
+    return f"column{'s' if len(labels) > 1 else ''} {shown}{more}"
