@@ -18,8 +18,8 @@ XACRO = "xacro"
 """The one whose engine makes a URDF of it."""
 
 
-BVH = "bvh"
-"""The one that no engine owns: it is read here, and is no XML."""
+BVH, MVNX = "bvh", "mvnx"
+"""Those that no engine owns: skeletons in motion, of which persons are made here. A BVH file is no XML."""
 
 
 class Format(NamedTuple):
@@ -52,6 +52,8 @@ def format_of(content: bytes) -> str | None:
     head = content[:_HEAD].removeprefix(b"\xef\xbb\xbf")
     if re.match(rb"<mujoco[\s/>]", _after(_BEFORE_XML, head)):
         return MJCF
+    if re.match(rb"<mvnx[\s/>]", _after(_BEFORE_XML, head)):
+        return MVNX
     if re.match(rb"version\s+\d", _after(_COMMENT, head), re.IGNORECASE):
         return "biomod"
     if re.search(rb"<OpenSimDocument[\s>]", head):

@@ -19,6 +19,10 @@ from ...errors import InputFileNotFoundError, ModelFileError
 
 _MOST_BYTES = 16 * 2**20
 """Size of a file [bytes]; the largest body of example-robot-data has a fifth of a MiB."""
+_MOST_OF_MOTION = 256 * 2**20
+"""The same of a file that holds a motion, too [bytes]."""
+_MOTIONS = (".bvh", ".mvnx")
+"""Endings of such files."""
 _MOST_DEPTH = 100
 """Elements inside each other: a URDF nests a few, an MJCF as many as its longest chain of bodies."""
 _MOST_ELEMENTS = 200_000
@@ -89,6 +93,7 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
         If it is too large.
     """
     where = Path(path)
+    most = _MOST_OF_MOTION if where.suffix.lower() in _MOTIONS else _MOST_BYTES
     if "\0" in str(where):
         raise InputFileNotFoundError(f"{str(where)!r}: a path has no zero bytes")
     try:
@@ -98,13 +103,13 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
             raise InputFileNotFoundError(f"{where}: {kind}")
         with where.open("rb") as stream:
             # One byte more than allowed tells a file that is too large, however large it says it is.
-            content = stream.read(_MOST_BYTES + 1)
+            content = stream.read(most + 1)
     except InputFileNotFoundError:
         raise
     except OSError as error:
         raise InputFileNotFoundError(f"{quoted(str(where))}: cannot be read ({error.strerror})") from None
-    if len(content) > _MOST_BYTES:
-        raise ModelFileError(f"{where}: larger than {_MOST_BYTES >> 20} MiB, which no body's file is")
+    if len(content) > most:
+        raise ModelFileError(f"{where}: larger than {most >> 20} MiB, which no body's file is")
     return content
 
 
