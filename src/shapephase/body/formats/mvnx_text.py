@@ -131,9 +131,7 @@ class _Reader:
             ) from None
         if not self.segments:
             raise self.fault("no <segments>; export the file again, with orientation and position of the segments")
-        stands = {
-            frame.kind: self._poses([frame]) for frame in self.frames if frame.kind != _NORMAL and frame.numbers
-        }
+        stands = {frame.kind: self._poses([frame]) for frame in self.frames if frame.kind != _NORMAL and frame.numbers}
         frames = [frame for frame in self.frames if frame.kind == _NORMAL]
         return Suit(
             segments=tuple(self.segments),
@@ -219,8 +217,8 @@ class _Reader:
         if off.max(initial=0.0) > _OFF_UNIT:
             number, segment = np.unravel_index(int(np.argmax(off)), off.shape)
             raise MvnxFaultError(
-                f"the quaternion of {self.segments[segment]} has the length {1.0 + off[number, segment]:.4g} or as much "
-                "below 1; export the file again",
+                f"the quaternion of {self.segments[segment]} is {off[number, segment]:.2g} off length 1; export the "
+                "file again",
                 frames[number].line,
             )
         xyzw = so3.normalised(np.roll(turns, -1, axis=-1))
@@ -289,9 +287,7 @@ def suit_skeleton(suit: Suit) -> Skeleton:
         words = _CHANNELS if parent is None else _CHANNELS[3:]
         column = sum(width.shape[1] for width in channels)
         above = None if parent is None else order.index(parent)
-        bones.append(
-            Bone(name=name, line=1, parent=above, offset=offset, channels=words, column=column, tip=tip)
-        )
+        bones.append(Bone(name=name, line=1, parent=above, offset=offset, channels=words, column=column, tip=tip))
         turns = standing.turns[:, number]
         if parent is not None:
             turns = so3.transpose(standing.turns[:, parent]) @ turns

@@ -22,6 +22,7 @@ from .formats.matlab import read_matlab
 from .formats.motion_arrays import read_arrays
 from .formats.opensim import END, read_opensim
 from .formats.ros_motion_files import MOST_YAML, read_bag, read_ros_yaml
+from .formats.segment_poses import read_mvnx
 from .formats.spreadsheets import read_excel, read_parquet
 from .formats.text_tables import read_delimited
 
@@ -37,6 +38,7 @@ _TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
     ".yml": read_ros_yaml,
     ".parquet": read_parquet,
     ".c3d": read_c3d,
+    ".mvnx": read_mvnx,
 }
 _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
     ".xlsx": read_excel,
@@ -52,6 +54,7 @@ _YAML = (".yaml", ".yml")
 # What comes near, and how it becomes a motion of joints.
 _OTHERS = {
     ".trc": INVERSE_KINEMATICS,
+    ".mvn": "it is a suit's recording as its own program keeps it; export it there as MVNX, or as BVH",
     ".xls": "Excel's older files are not read; save it as .xlsx or .csv",
     ".ods": "save it as .xlsx or .csv",
     ".numbers": "save it as .xlsx or .csv",

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,12 +17,39 @@ from ...arrays import Array, Integers
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 from ._nameless_joints import NamelessJoints
 
+if TYPE_CHECKING:
+    from ._segment_poses import SegmentMotion
+
 MOST_BYTES = 256 * 2**20
 """Size of a motion file [bytes]; as numbers in memory it takes several times as much."""
 LONGEST_NAME = 256
 """Characters of a column's name, as of a joint's name in a body's file."""
 _UNEVEN_STEPS = 100.0
 """A step this many times longer or shorter than the median is probably a gap, or one sample recorded twice."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SegmentPoses:
+    """What a reader found: poses of k segments at N times.
+
+    Attributes
+    ----------
+    names : of the segments
+    turns : (N, k, 3, 3) segment axes to the room's; NaN where they were not recorded
+    origins : (N, k, 3) or None [m]
+    stands : name of a calibration pose of the file -> turns (k, 3, 3) and origins (k, 3)
+    at_centres : whether origins are centres of mass, else joints
+    of_model : what the segments are links of, by the kind of file: "opensim", "mvnx" or None
+    in_metres : whether the file says the unit of lengths
+    """
+
+    names: tuple[str, ...]
+    turns: Array
+    origins: Array | None
+    stands: Mapping[str, tuple[Array, Array]] | None = None
+    at_centres: bool = False
+    of_model: str | None = None
+    in_metres: bool = True
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -48,6 +76,8 @@ class Table:
     nameless : how columns of an array without names became those of joints; None: they have names
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
     zero_pose : whether all angles of the first sample are zero: the pose that exporters put before a motion
+    poses : of segments, before these have become joints
+    segments : what was found on the way from segments to joints
     """
 
     where: str
@@ -68,6 +98,8 @@ class Table:
     unnamed: Sequence[str] = ()
     nameless: NamelessJoints | None = None
     zero_pose: bool = False
+    poses: SegmentPoses | None = None
+    segments: SegmentMotion | None = None
 
     def check_column(self, label: str) -> None:
         """Raise TrajectoryError for the first entry of a column that is no finite number."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from ....arrays import Array
 from ....errors import TrajectoryError
 from .._recording import Table
+from .segment_poses import body_kinematics
 from .text_tables import text_lines, text_table
 
 END = "endheader"
@@ -48,13 +49,14 @@ def read_opensim(where: Path, data: bytes) -> Table:
             raise TrajectoryError(f"{where}: two columns are the coordinate {plain}, one is {name!r}; keep one")
         columns[plain] = values
         faults[plain] = found.faults.get(name, {})
-    return replace(found, columns=columns, faults=faults, up="y")
+    return body_kinematics(replace(found, columns=columns, faults=faults, up="y"), header.get("", ""))
 
 
 def _header(lines: Iterator[tuple[int, str]], where: Path) -> dict[str, str]:
     header: dict[str, str] = {}
     for line, text in lines:
         words = text.strip()
+        header.setdefault("", words)
         if words.lower() == END:
             return header
         if line > _MOST_HEADER_LINES:
