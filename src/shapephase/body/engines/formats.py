@@ -18,8 +18,12 @@ XACRO = "xacro"
 """The one whose engine makes a URDF of it."""
 
 
-BVH, MVNX = "bvh", "mvnx"
-"""Those that no engine owns: skeletons in motion, of which persons are made here. A BVH file is no XML."""
+BVH = "bvh"
+"""A skeleton in motion, which no engine owns, and no XML: it is read here."""
+
+
+MVNX = "mvnx"
+"""The poses of a suit's segments, which no engine owns, either."""
 
 
 class Format(NamedTuple):

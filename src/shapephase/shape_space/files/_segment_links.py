@@ -31,6 +31,8 @@ MOST_OFF_WAY = np.radians(20.0)
 degrees."""
 _FLAT = 1e-4
 """Share of the largest singular value, below which points are on one line."""
+_THOUSAND = (500.0, 2000.0)
+"""Recorded lengths over the body's, where those are in millimetres."""
 _PARTS = {
     "pelvis": ("pelvis", "hips"),
     "thigh": ("thigh", "upperleg", "upleg", "femur"),
@@ -130,6 +132,19 @@ class Links:
             turn = pose[:, :3, :3] @ inside[:3, :3].T
             found[frame] = turn, pose[:, :3, 3] - turn @ inside[:3, 3]
         return found
+
+    @property
+    def in_millimetres(self) -> bool:
+        """Whether segments are a thousand times as far apart as the links in the body's zero pose."""
+        if self.poses.origins is None or not self.above:
+            return False
+        rest = self.frame_poses(self.body.shape()[None])
+        pairs = [(self.frames[k], self.frames[above]) for k, above in self.above.items()]
+        own = [np.linalg.norm(rest[f.frame][1] - rest[g.frame][1]) for f, g in pairs]
+        recorded = [self.poses.origins[:, f.segment] - self.poses.origins[:, g.segment] for f, g in pairs]
+        there = [each[np.isfinite(each).all(axis=1)] for each in recorded]
+        sums = sum(float(np.median(np.linalg.norm(each, axis=1))) for each in there if len(each)), sum(own)
+        return bool(_THOUSAND[0] * sums[1] <= sums[0] <= _THOUSAND[1] * sums[1])
 
     def calibration(self, recording: Recording, choices: SegmentChoices, record: dict[str, Any]) -> Calibration:
         """How the segments lie in their frames; what was decided goes to the record.

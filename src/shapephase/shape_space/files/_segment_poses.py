@@ -14,6 +14,7 @@ from ... import so3
 from ...arrays import Array, Integers
 from ...body.body import Body
 from ...body.couplings.ball_joints import RATES, coordinate_names
+from ...display import short_repr
 from ...errors import TrajectoryError, TrajectoryWarning
 from ._recording import Recording, SegmentPoses, Table
 from ._segment_links import MOST_OFF_WAY, SHORT, Links, SegmentChoices, angle_of_ways
@@ -26,8 +27,6 @@ _MOST_OFF_HINGE = np.radians(15.0)
 """[rad] rms of what hinges leave of a turn; a knee bends by some degrees to the side."""
 _ACROSS = 1e-6
 """Cosine of the angle between hinges at right angles."""
-_THOUSAND = (500.0, 2000.0)
-"""Recorded lengths over the body's, where those are in millimetres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +41,24 @@ class SegmentMotion:
     of_poses : (M, 3) by the pose of every segment as it was recorded; None without positions [kg m^2/s]
     of_chain : (M, 3) by base and joints [kg m^2/s]
     record : links, calibration, lengths and what hinges leave over, as JSON can hold it
+
+    Examples
+    --------
+    >>> half = np.column_stack([np.zeros((3, 3)), np.ones(3)])
+    >>> poses = np.column_stack([[0.0, 0.1, 0.2], half, half])
+    >>> header = "time," + ",".join(f"{part}_q{axis}" for part in ("front", "rear") for axis in "xyzw")
+    >>> np.savetxt("cat.csv", poses, delimiter=",", header=header, comments="")
+    >>> recorded = sp.read_recorded_motion("cat.csv", sp.load_body("cat_two_halves"), calibration="links")
+    >>> recorded.segments.of_chain.tolist()
+    [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     """
 
     times: Array
     of_poses: Array | None
     of_chain: Array
     record: Mapping[str, Any]
+
+    __repr__ = short_repr
 
     def within(self, first: float, last: float) -> dict[str, Any]:
         """The record with means and rms difference of the momentum between two times [s], as JSON can hold it."""
@@ -98,6 +109,10 @@ class _Conversion:
         self.where, self.chain = recording.table.where, body.chain
         self.links = Links(self.where, poses, body, choices.names)
         self.record: dict[str, Any] = {"links": {poses.names[f.segment]: f.link for f in self.links.frames}}
+        if not poses.in_metres and self.links.in_millimetres:
+            self.record["length_unit"] = "mm, by the body's lengths"
+            assert poses.origins is not None
+            self.poses = self.links.poses = replace(poses, origins=1e-3 * poses.origins)
 
     def table(self, table: Table) -> Table:
         """The table with columns of joints and the base."""
@@ -127,8 +142,7 @@ class _Conversion:
         own = self.links.frame_poses(shapes[whole])
         places = None
         if self.poses.origins is not None:
-            origins = self._in_metres(self.poses.origins[:, used], own, whole)
-            places = origins - so3.apply(turns, calibration.origins)
+            places = self.poses.origins[:, used] - so3.apply(turns, calibration.origins)
             self._check_ways(places[whole], turns[whole], own)
         return replace(
             table,
@@ -143,21 +157,6 @@ class _Conversion:
             segments=self._momentum(turns[whole], None if places is None else places[whole], own, whole),
             poses=None,
         )
-
-    def _in_metres(self, origins: Array, own: dict[int, tuple[Array, Array]], whole: Integers) -> Array:
-        """Origins (N, k, 3) in metres; where the file says no unit, by the body's lengths."""
-        if self.poses.in_metres:
-            return origins
-        ratios = []
-        for k, above in self.links.above.items():
-            first, second = (own[self.links.frames[each].frame][1] for each in (above, k))
-            length = float(np.mean(np.linalg.norm(second - first, axis=-1)))
-            if length > SHORT:
-                ratios.append(float(np.mean(np.linalg.norm(np.diff(origins[whole][:, [above, k]], axis=1)))) / length)
-        if not ratios or not _THOUSAND[0] <= np.median(ratios) <= _THOUSAND[1]:
-            return origins
-        self.record["length_unit"] = "mm, by the body's lengths"
-        return 1e-3 * origins
 
     def _joints(self, frame: int, above: int, turn: Array) -> dict[str, Array]:
         """Joint columns between two frames that segments show: turn (N, 3, 3), child axes to the parent's."""
