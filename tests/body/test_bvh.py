@@ -226,7 +226,7 @@ def test_what_a_file_does_not_say_is_asked_or_told(tmp_path):
     assert heavier.length_unit == UNIT
     with pytest.raises(ShapeError, match="length_unit is for BVH files"):
         sp.load_body("cat", length_unit=0.01)
-    with pytest.raises(ShapeError, match="person_mass is for BVH files"):
+    with pytest.raises(ShapeError, match="person_mass is for BVH and MVNX files"):
         sp.load_body("cat", person_mass=70.0)
     with pytest.raises(TrajectoryError, match=r"length_unit: a number of metres above 0"):
         sp.load_body(file, length_unit=-1.0)

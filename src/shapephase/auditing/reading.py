@@ -37,6 +37,8 @@ def read_trajectory(
     ignore_extra: bool = False,
     base_order: str | None = None,
     base_axes: Any = None,
+    calibration: float | str | None = None,
+    length_tolerance: float | None = None,
 ) -> FloatingTrajectory:
     """A trajectory with its base.
 
@@ -104,6 +106,8 @@ def read_trajectory(
             ignore_extra=ignore_extra,
             base_order=base_order,
             base_axes=base_axes,
+            calibration=calibration,
+            length_tolerance=length_tolerance,
         )
         if recorded.base_attitude is None:
             raise TrajectoryError(

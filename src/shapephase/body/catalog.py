@@ -28,8 +28,8 @@ from ._link_tree import hollow_warnings, inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree, expanded
-from .engines.formats import BVH, FORMATS, MJCF, XACRO, format_of
-from .formats.bvh import bvh_tree
+from .engines.formats import BVH, FORMATS, MJCF, MVNX, XACRO, format_of
+from .formats.bvh import bvh_tree, mvnx_tree
 from .formats.foreign import foreign_kind
 from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
@@ -62,9 +62,9 @@ def load_body(
     ----------
     source : a path to a URDF, a xacro file (`shapephase[xacro]`), an MJCF file (`shapephase[mjcf]`), an OpenSim model
         (`shapephase[opensim]`), a bioMod model (`shapephase[biomod]`), a file of measurements for Yeadon's human
-        (`shapephase[yeadon]`), or a BVH file, whose skeleton becomes a human; a name from `robot_names()` such as
-        "cat"; "example:human", a body of the installed example-robot-data; or a `pinocchio.Model` whose root joint is
-        a free-flyer
+        (`shapephase[yeadon]`), or a BVH or MVNX file, whose skeleton becomes a human; a name from `robot_names()` such
+        as "cat"; "example:human", a body of the installed example-robot-data; or a `pinocchio.Model` whose root joint
+        is a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment, or that has no mass and
         more than 1 % of the body's inertia about an axis
     root : "free" removes all joints between the world, or a root link without mass, and the body of an MJCF or a URDF;
@@ -76,7 +76,7 @@ def load_body(
         looked for, before those around the file
     xacro_args : values of the arguments of a xacro file by name, as {"payload": "true"}
     length_unit : of a BVH file, which says none: the metres of a unit, 0.01 for centimetres
-    person_mass : of the human whose skeleton a BVH file has [kg]; None: 70 kg, with a warning
+    person_mass : of the human whose skeleton a BVH or MVNX file has [kg]; None: 70 kg, with a warning
 
     Raises
     ------
@@ -272,12 +272,14 @@ def _from_file(
         owned = MJCF
     if root is not None and root.tag == "robot" and macro_of(root) is not None:
         owned = XACRO
-    options = {BVH: _OF_BVH, **{name: known.options for name, known in FORMATS.items()}}
+    options = {BVH: _OF_BVH, MVNX: _OF_BVH[1:], **{name: known.options for name, known in FORMATS.items()}}
     _check_unused(given, where, options.get(owned or "", _OF_URDF))
     if owned == XACRO:
         root = expanded(path, given.get("packages", ()), given.get("xacro_args", {}))
     if owned == BVH:
         tree = bvh_tree(content, path.stem, where, **given)
+    elif owned == MVNX:
+        tree = mvnx_tree(content, path.stem, where, **given)
     elif root is None or owned == MJCF:
         tree, poses = engine_tree(path, owned or MJCF, given)
     else:
@@ -309,7 +311,9 @@ def _check_unused(given: dict[str, Any], where: str, options: tuple[str, ...]) -
         if name == "xacro_args" and name not in options:
             raise ShapeError(f"xacro_args is for xacro files; {quoted(where)} has no macros: leave --xacro out")
         if name in _OF_BVH and name not in options:
-            raise ShapeError(f"{name} is for BVH files; {quoted(where)} has units and masses of its own")
+            kinds = "BVH and MVNX files" if name == "person_mass" else "BVH files"
+            has = "metres" if "person_mass" in options else "units and masses of its own"
+            raise ShapeError(f"{name} is for {kinds}; {quoted(where)} has {has}")
         if name not in options:
             files = "URDF, xacro and MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
             raise ShapeError(f"{name} is for {files}; {quoted(where)} has one root, which floats")

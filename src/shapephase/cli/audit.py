@@ -8,7 +8,15 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, PrintOptions
+from .options import (
+    AS_TEXT,
+    AS_WRITTEN,
+    BodyArgument,
+    BodyOptions,
+    Calibration,
+    LengthTolerance,
+    PrintOptions,
+)
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import say_written
@@ -107,6 +115,8 @@ class TrajectoryOptions:
             "without unit; without it x,-z,y for OpenSim's pelvis, else x,y,z. For example `--base-axes x,y,z`.",
         ),
     ] = None
+    calibration: Calibration = None
+    length_tolerance: LengthTolerance = None
 
 
 AS_IT_IS = TrajectoryOptions()
@@ -170,6 +180,8 @@ def audit_command(
                 ignore_extra=reading.ignore_extra,
                 base_order=reading.base_order,
                 base_axes=reading.base_axes,
+                calibration=reading.calibration,
+                length_tolerance=reading.length_tolerance,
             )
             for file, step in zip(trajectories, each, strict=True)
         ]

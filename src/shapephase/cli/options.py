@@ -71,6 +71,23 @@ UpAxis = Annotated[
         "the recorded fall, else z, or y for a body whose left and right are across z. For example `--up y`.",
     ),
 ]
+Calibration = Annotated[
+    str | None,
+    Parameter(
+        show_default=False,
+        help="How recorded segments lie in the body's links: a time at which the body stands in its zero pose, in s or "
+        "the unit of the file, the name of such a pose in the file, or links, where they have the axes of the links; "
+        "without it as the file says. For example `--calibration 0.5`.",
+    ),
+]
+LengthTolerance = Annotated[
+    float | None,
+    Parameter(
+        show_default=False,
+        help="Share by which distances between recorded segments may differ from the body's, without unit; without it "
+        "0.1. For example `--length-tolerance 0.2`.",
+    ),
+]
 FigureFile = Annotated[
     Path, Parameter(help="Write the figure to this file, .svg, .pdf or .png; for example `--out figure.pdf`.")
 ]
@@ -363,6 +380,8 @@ class RecordingOptions:
         ),
     ] = None
     up: UpAxis = None
+    calibration: Calibration = None
+    length_tolerance: LengthTolerance = None
 
 
 @Parameter(name="*")

@@ -1,4 +1,4 @@
-"""Arrays of a whole floating body, as each program makes them: what the program itself computes of them is the truth."""
+"""Arrays of a whole floating body, as each program makes them: what it computes of them itself is the truth."""
 
 from __future__ import annotations
 
@@ -328,7 +328,7 @@ def humanoid(folder):
         kind = 'axis="0 0 1"' if name.endswith(("knee", "elbow")) else 'type="ball"'
         inside[name] = f'<body name="{name}_link" pos="0 0.2 0.1"><joint name="{name}" {kind}/>{inertial}'
     for name, above in reversed(parts):
-        inside[above] += inside[name] + "</body>" if above == "root" else inside[name] + "</body>"
+        inside[above] += inside[name] + "</body>"
     (folder / "humanoid.xml").write_text(
         '<mujoco><compiler angle="radian"/><worldbody><body name="root"><freejoint/>'
         f"{inertial}{inside['root']}</body></worldbody></mujoco>"

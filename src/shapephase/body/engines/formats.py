@@ -19,7 +19,11 @@ XACRO = "xacro"
 
 
 BVH = "bvh"
-"""The one that no engine owns: it is read here, and is no XML."""
+"""A skeleton in motion, which no engine owns, and no XML: it is read here."""
+
+
+MVNX = "mvnx"
+"""The poses of a suit's segments, which no engine owns, either."""
 
 
 class Format(NamedTuple):
@@ -52,6 +56,8 @@ def format_of(content: bytes) -> str | None:
     head = content[:_HEAD].removeprefix(b"\xef\xbb\xbf")
     if re.match(rb"<mujoco[\s/>]", _after(_BEFORE_XML, head)):
         return MJCF
+    if re.match(rb"<mvnx[\s/>]", _after(_BEFORE_XML, head)):
+        return MVNX
     if re.match(rb"version\s+\d", _after(_COMMENT, head), re.IGNORECASE):
         return "biomod"
     if re.search(rb"<OpenSimDocument[\s>]", head):

@@ -1,4 +1,4 @@
-"""A human from a BVH file: its skeleton as links and ball joints, with the masses of a person's segments.
+"""A human from a BVH or MVNX file: its skeleton as links and ball joints, with the masses of a person's segments.
 
 A bone with three channels of rotation is a rotation, whatever their order: many triples are the same one, and programs
 write any of them. One or two channels are hinges.
@@ -12,6 +12,7 @@ from ...errors import ModelFileError
 from .._link_tree import Joint, Link, LinkTree, from_the_root
 from .bvh_text import Bone, BvhFaultError, Skeleton, bvh_skeleton, check_base, check_lengths
 from .human_segments import Person, Segment, person_of
+from .mvnx_text import read_suit, suit_skeleton
 
 _MASS = 70.0
 """[kg] of a person of whom nobody has said it: a usual one of reference persons."""
@@ -44,6 +45,28 @@ def bvh_tree(
         check_lengths(skeleton, person.moving[1:])
     except BvhFaultError as error:
         raise ModelFileError(f"{where}:{error.line}: {error}") from None
+    return _tree(skeleton, person, name, where, length_unit, _notes(skeleton, person, where, person_mass))
+
+
+def mvnx_tree(content: bytes, name: str, where: str, person_mass: float | None = None) -> LinkTree:
+    """Links and joints of the person in an inertial suit; a link's axes are those of its segment.
+
+    person_mass : [kg]; None: 70 kg, with a note
+
+    Raises
+    ------
+    ModelFileError
+        For faults of the file, and for segments that are not those of a person.
+    """
+    try:
+        skeleton = suit_skeleton(read_suit(content, motion=False))
+        person = person_of(skeleton, _MASS if person_mass is None else person_mass, 1.0)
+    except BvhFaultError as error:
+        raise ModelFileError(f"{where}:{error.line}: {error}") from None
+    return _tree(skeleton, person, name, where, 1.0, _notes(skeleton, person, where, person_mass))
+
+
+def _notes(skeleton: Skeleton, person: Person, where: str, person_mass: float | None) -> list[str]:
     notes = []
     if person_mass is None:
         notes.append(f"{where}:1: the person is taken to have {_MASS:g} kg; person_mass (--person-mass) says another")
@@ -53,7 +76,7 @@ def bvh_tree(
             f"{person.frame * skeleton.step:.4g} s, in which trunk and legs are straightest; the person is "
             f"{person.height:.2f} m tall"
         )
-    return _tree(skeleton, person, name, where, length_unit, notes)
+    return notes
 
 
 def _unit_question(height: float) -> str:

@@ -40,6 +40,7 @@ def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
         *_unit_lines(record),
         *_column_lines(body, record),
         *_base_lines(record),
+        *_segment_lines(record["segments"]),
         *_change_lines(body, record, recorded),
     ]
     return ["", *lines] if lines else []
@@ -175,6 +176,40 @@ def _base_lines(record: Any) -> list[str]:
         ends = f"{flight['first_time']:.9g} to {flight['last_time']:.9g} {record['time_unit']}"
         lines.append(f"{'flight':24}{record['samples']} of {record['samples_in_file']} samples, {ends}{found}")
     return lines
+
+
+def _segment_lines(segments: Any) -> list[str]:
+    """How poses of segments became joints, and the momentum of both."""
+    if segments is None:
+        return []
+    renamed = [f"{link} from {name!r}" for name, link in segments["links"].items() if link != name]
+    lines = [f"{'segments':24}{len(segments['links'])}; {segments['calibration']}"]
+    if renamed:
+        lines.append(f"{'  links':24}{_listed(renamed)}")
+    if segments.get("lengths"):
+        worst = max(segments["lengths"], key=lambda each: abs(each["mean_m"] - each["body_m"]))
+        unit = f"; in {segments['length_unit']}" if "length_unit" in segments else ""
+        lines.append(
+            f"{'  lengths':24}farthest off from {worst['from']} to {worst['to']}: {worst['mean_m']:.4f} m on average "
+            f"(spread {worst['spread_m']:.2g} m), {worst['body_m']:.4f} m in the body{unit}"
+        )
+    left = segments.get("hinges_leave_deg", {})
+    if left:
+        name = max(left, key=lambda each: left[each])
+        lines.append(f"{'  off the hinges':24}{left[name]:.2g} deg rms at most, {name}")
+    if "momentum_of_chain" in segments:
+        said = [f"{_vector(segments['momentum_of_chain'])} of the chain"]
+        if "momentum_of_poses" in segments:
+            off = segments["momentum_difference_rms"]
+            said = [f"{_vector(segments['momentum_of_poses'])} of the segments' own poses", *said]
+            said.append(f"{off:.2g} rms apart")
+        still = " (joints without a segment at zero)" if segments["at_zero"] else ""
+        lines.append(f"{'  mean momentum':24}{', '.join(said)}   kg m^2/s{still}")
+    return lines
+
+
+def _vector(values: list[float]) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.4g}" for value in values) + ")"
 
 
 def _levels(body: Body, smoothed: Mapping[str, float]) -> str:

@@ -1,4 +1,5 @@
 from ._flight import Flight
+from ._segment_poses import SegmentMotion
 from .closing import Closing
 from .mapping_files import read_names
 from .read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
@@ -9,6 +10,7 @@ __all__ = [
     "Closing",
     "Flight",
     "RecordedMotion",
+    "SegmentMotion",
     "read_names",
     "read_recorded_motion",
     "read_shape_path",

@@ -24,6 +24,7 @@ from .formats.matlab import read_matlab
 from .formats.motion_arrays import arrays_in_memory, arrays_motion, of_numbered_columns, read_arrays
 from .formats.opensim import has_header, read_opensim
 from .formats.ros_motion_files import read_bag, read_ros_yaml
+from .formats.segment_poses import read_mvnx
 from .formats.text_tables import read_text
 from .tables import PACKED, TABLES, unpacked
 
@@ -36,6 +37,7 @@ _TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
     ".yml": read_ros_yaml,
     ".c3d": read_c3d,
     ".json": read_deepmimic,
+    ".mvnx": read_mvnx,
 }
 _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
     ".mat": read_matlab,
@@ -48,6 +50,7 @@ _BAGS = (".bag", ".mcap", ".db3")
 # What comes near, and how it becomes a motion of joints.
 _OTHERS = {
     ".trc": INVERSE_KINEMATICS,
+    ".mvn": "it is a suit's recording as its own program keeps it; export it there as MVNX, or as BVH",
     ".xls": "Excel's older files are not read; save it as .xlsx or .csv",
     ".ods": "save it as .xlsx or .csv",
     ".numbers": "save it as .xlsx or .csv",

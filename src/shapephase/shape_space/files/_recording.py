@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ...arguments import check_time_steps
 from ...arrays import Array, Integers, Mask
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 from ._nameless_joints import NamelessJoints
+
+if TYPE_CHECKING:
+    from ._segment_poses import SegmentMotion
 
 MOST_BYTES = 256 * 2**20
 """Size of a motion file [bytes]; as numbers in memory it takes several times as much."""
@@ -56,6 +59,30 @@ class Simulated(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class SegmentPoses:
+    """What a reader found: poses of k segments at N times.
+
+    Attributes
+    ----------
+    names : of the segments
+    turns : (N, k, 3, 3) segment axes to the room's; NaN where they were not recorded
+    origins : (N, k, 3) or None [m]
+    stands : name of a calibration pose of the file -> turns (k, 3, 3) and origins (k, 3)
+    at_centres : whether origins are centres of mass, else joints
+    of_model : what the segments are links of, by the kind of file: "opensim", "mvnx" or None
+    in_metres : whether the file says the unit of lengths
+    """
+
+    names: tuple[str, ...]
+    turns: Array
+    origins: Array | None
+    stands: Mapping[str, tuple[Array, Array]] | None = None
+    at_centres: bool = False
+    of_model: str | None = None
+    in_metres: bool = True
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Table:
     """What a reader found in a file, under the labels that columns have there.
 
@@ -82,6 +109,8 @@ class Table:
     unnamed : those of them that are matrices, as long as the columns, whose columns have no names
     zero_pose : whether all angles of the first sample are zero: the pose that exporters put before a motion
     simulated : what stands beside the coordinates where these are arrays of a whole floating body; None: they are not
+    poses : of segments, before these have become joints
+    segments : what was found on the way from segments to joints
     """
 
     where: str
@@ -105,6 +134,8 @@ class Table:
     nameless: NamelessJoints | None = None
     zero_pose: bool = False
     simulated: Simulated | None = None
+    poses: SegmentPoses | None = None
+    segments: SegmentMotion | None = None
 
     def check_column(self, label: str) -> None:
         """Raise TrajectoryError for the first entry of a column that is no finite number."""

@@ -35,6 +35,8 @@ from ._labels import SI, amounts, mapping_argument
 from ._recording import LONGEST_NAME, Recording, Table
 from ._sample_origins import resampled
 from ._sample_steps import warn_of_fast_turns, without_first_pose
+from ._segment_links import SegmentChoices
+from ._segment_poses import SegmentMotion, without_segments
 from ._surroundings import surrounded
 from ._swings import check_swings
 from ._times import doubtful_steps, recording_of, trim_argument
@@ -69,6 +71,7 @@ class RecordedMotion:
     smoothing : what smoothing did, with its penalty, degrees of freedom and bias; None: it was not smoothed
     closing : how a cycle was closed, and what that changed; None: it was not
     flight : the free flight that was kept; None: nobody asked for one
+    segments : angular momentum from poses of segments beside that of base and joints; None: the file has no such poses
 
     Examples
     --------
@@ -88,6 +91,7 @@ class RecordedMotion:
     smoothing: Smoothing | None = None
     closing: Closing | None = None
     flight: Flight | None = None
+    segments: SegmentMotion | None = None
 
     __repr__ = short_repr
 
@@ -117,6 +121,8 @@ def read_recorded_motion(
     flight: str | Sequence[float] | None = None,
     up: str | None = None,
     gravity: float | str | None = None,
+    calibration: float | str | None = None,
+    length_tolerance: float | None = None,
 ) -> RecordedMotion:
     """Read a recorded motion: the joints, and the base where it was recorded.
 
@@ -131,7 +137,9 @@ def read_recorded_motion(
       structure.
     - `.bvh`: the bones' turns, for the body that `load_body` makes of such a file. A first frame with all angles at
       zero, from which a joint goes over five times as far as in any step of the next second, is left out.
-    - `.c3d`: the angles that a model computed, `LKneeAngles_x` and so on; no markers.
+    - `.c3d`: the angles that a model computed, `LKneeAngles_x` and so on, or poses of segments in its group ROTATION;
+      no markers.
+    - `.mvnx`: the poses of a suit's segments.
     - `.npz`: `time` (N,), `shapes` (N, n), `joint_names` (n,); the base as `base_quat_xyzw` (N, 4), `base_position`
       (N, 3).
     - `.yaml`: ROS, a `JointTrajectory`, also inside a goal, or `JointState` messages one after the other.
@@ -145,6 +153,10 @@ def read_recorded_motion(
     The base in columns: `base_qx,base_qy,base_qz,base_qw` (or `qx` and so on), `base_roll,base_pitch,base_yaw` or
     OpenSim's `pelvis_tilt,pelvis_list,pelvis_rotation`; and `base_x,base_y,base_z` or `pelvis_tx,pelvis_ty,pelvis_tz`.
 
+    Poses of segments, also in columns `SEGMENT_qx,SEGMENT_qy,SEGMENT_qz,SEGMENT_qw` and `SEGMENT_x,SEGMENT_y,SEGMENT_z`
+    of a table, and OpenSim's BodyKinematics: segments are links by their names, ball joints take the turn between them,
+    hinges the nearest turn about their axes. Distances between joints are compared with those of the body.
+
     Units stand in the labels, as `knee [deg]`, `knee (deg)`, `knee_deg`, `boom [mm]`, `Time [ms]`, or in a row of
     units below them. Without, times are in seconds, angles in radians and lengths in metres; where they look like
     milliseconds, degrees or millimetres, this is an error that says how to tell. Angles are taken as written: a
@@ -153,8 +165,8 @@ def read_recorded_motion(
     Parameters
     ----------
     file : name of a file, "-" for standard input, a pandas `DataFrame`, or a `Dataset` or `DataArray` of xarray
-    names : name in the file -> name of the joint, also with a unit as `"boom [mm]"`, or "time"; None instead of a
-        joint leaves the column out; or the name of a file with them, see `read_names`
+    names : name in the file -> name of the joint, also with a unit as `"boom [mm]"`, or "time", or of the link that a
+        segment is; None instead leaves the column or segment out; or the name of a file with them, see `read_names`
     degrees : whether turning joints are in degrees, above what the file says; None: as the file says
     time_unit : of the times: "s", "ms", "us", "ns" or "min"; None: as the file says
     timestep : between samples, for a file without times [s]
@@ -195,6 +207,11 @@ def read_recorded_motion(
     up : the recorder's axis that points up: "x", "y", "z", "-x", "-y" or "-z"; None: that of the format (OpenSim y,
         MuJoCo and ROS z), else x, y or z, whichever has the longest fall
     gravity : by which the body falls in a flight [m/s^2]; None: 9.81; "any": units are not doubted
+    calibration : how the axes of segments become those of links: a time, as the file tells it, at which the body
+        stands in its zero pose, turned as the joints lie, or as the room where they do not tell it; the name of such a
+        pose in the file, as "tpose"; "links", these are the axes of the links; None: an MVNX file's own pose, or
+        "links" for the body of the file that the segments are from
+    length_tolerance : share by which distances between joints may differ from the body's, on average; None: 0.1
 
     Raises
     ------
@@ -231,7 +248,8 @@ def read_recorded_motion(
         check_choice(joint_order, "joint_order", WORDS)
     said = _names_argument(names)
     given, step = read_input(file, body, topic, timestep, joint_order, said if isinstance(said, Mapping) else None)
-    table = given.table
+    segments = SegmentChoices(names=said or {}, calibration=calibration, length_tolerance=length_tolerance)
+    table, said = without_segments(given.table, body, segments, time_unit, step)
     if joint_order is not None and table.nameless is None:
         raise TrajectoryError(f"{table.where}: joint_order is for arrays without names; columns here have names")
     mapping = _mapping(said, table)
@@ -295,6 +313,7 @@ def read_recorded_motion(
         smoothing=smoothing if noise.any() else None,
         closing=closing,
         flight=free,
+        segments=table.segments,
     )
 
 
@@ -323,6 +342,8 @@ def read_shape_path(
     flight: str | Sequence[float] | None = None,
     up: str | None = None,
     gravity: float | str | None = None,
+    calibration: float | str | None = None,
+    length_tolerance: float | None = None,
 ) -> ShapePath:
     """The path of `read_recorded_motion`: a C2 spline, periodic where the last sample equals the first.
 
@@ -361,6 +382,8 @@ def read_shape_path(
         flight=flight,
         up=up,
         gravity=gravity,
+        calibration=calibration,
+        length_tolerance=length_tolerance,
     ).path
 
 
@@ -525,8 +548,17 @@ def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
         "left_out": motion.left_out,
         "base": motion.base.record,
         "gaps": motion.gaps,
+        "segments": _segment_record(recording.table),
         "joint_order": None if recording.table.nameless is None else recording.table.nameless.record,
     }
+
+
+def _segment_record(table: Table) -> dict[str, Any] | None:
+    """What was found on the way from poses of segments to joints, with the momentum between the first and last time."""
+    times = table.times
+    if table.segments is None or times is None:
+        return None
+    return table.segments.within(float(times[0]), float(times[-1]))
 
 
 def _resampled(path: ShapePath, rate: float, where: str) -> ShapePath:

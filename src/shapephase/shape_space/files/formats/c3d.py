@@ -1,8 +1,9 @@
-"""Angles in C3D files: what the models of motion-capture programs compute, beside the markers."""
+"""C3D files: angles that the models of motion-capture programs compute, or poses of segments, beside the markers."""
 
 from __future__ import annotations
 
 import importlib.util
+import re
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -11,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from ....errors import MissingExtraError, TrajectoryError
-from .._labels import unit_of
+from .._labels import LENGTHS, unit_of
 from .._recording import Table
 from .column_tables import column_table
 from .parser_process import parsed
+from .segment_poses import matrix_poses
 
 INVERSE_KINEMATICS = (
     "positions of markers are no angles of joints; find those by inverse kinematics first (in OpenSim: scale the "
@@ -33,6 +35,8 @@ _AXES = "xyz"
 def read_c3d(where: Path, data: bytes) -> Table:
     """The angles of a C3D file: of each output `A` of the parameter ANGLES, the columns `A_x`, `A_y` and `A_z`.
 
+    Without angles, the poses of segments in its group ROTATION.
+
     The file is parsed in a process of its own: a damaged one can crash ezc3d.
 
     Raises
@@ -47,10 +51,15 @@ def read_c3d(where: Path, data: bytes) -> Table:
     labels, angles = found["labels"].tolist(), set(found["angles"].tolist())
     values, rate, first = found["points"], float(found["rate"]), int(found["first"])
     places = [(k, label) for k, label in enumerate(labels[: values.shape[1]]) if label in angles]
-    if not places:
+    turned = found["segments"].tolist()
+    if not places and not turned:
         raise TrajectoryError(f"{where}: {len(labels)} points and no angles among them: {INVERSE_KINEMATICS}")
+    if turned and not places:
+        rate = float(found["rotation_rate"])
     if not 0.0 < rate < np.inf:
         raise TrajectoryError(f"{where}: the parameter POINT:RATE, samples a second, is {rate:g}")
+    if turned and not places:
+        return _segments(where, turned, found, rate)
     unit = unit_of(str(found["unit"]))
     frames = first + np.arange(values.shape[2])
     columns = [(f"{label}_{axis}", values[row, k]) for k, label in places for row, axis in enumerate(_AXES)]
@@ -61,6 +70,18 @@ def read_c3d(where: Path, data: bytes) -> Table:
     return replace(table, rows=(frames + 1).tolist())
 
 
+def _segments(where: Path, labels: list[str], found: dict[str, Any], rate: float) -> Table:
+    """The poses of segments in the group ROTATION, as markerless systems write them."""
+    matrices = found["rotations"]
+    count = min(len(labels), matrices.shape[2])
+    names = tuple(re.sub(r"_?4[xX]4$", "", label) for label in labels[:count])
+    frames = int(found["first"]) * matrices.shape[3] // max(int(found["frames"]), 1) + np.arange(matrices.shape[3])
+    unit = unit_of(str(found["length_unit"]))
+    poses = matrix_poses(names, matrices[:, :, :count], LENGTHS.get(unit or ""))
+    table = column_table(str(where), "C3D", [("time", frames / rate)], units={"time": "s"}, row="frame")
+    return replace(table, rows=(frames + 1).tolist(), poses=poses)
+
+
 def parse(data: bytes) -> dict[str, Any]:
     """What the process that parses does with the bytes of a file."""
     import ezc3d
@@ -69,12 +90,20 @@ def parse(data: bytes) -> dict[str, Any]:
         copy.write(data)
         copy.flush()
         file = ezc3d.c3d(copy.name)
-    point = file["parameters"]["POINT"]
+    point, turned = file["parameters"]["POINT"], file["parameters"].get("ROTATION", {})
+    rotations = np.asarray(file["data"].get("rotations", np.empty((4, 4, 0, 0))), dtype=np.float64)
+    rate = np.array([*np.ravel(point["RATE"]["value"]), np.nan])[0]
+    frames = np.shape(file["data"]["points"])[2]
     return {
+        "segments": np.array(_texts(turned, "LABELS") if rotations.size else [], dtype=str),
+        "rotations": rotations,
+        "rotation_rate": rate * rotations.shape[3] / max(frames, 1),
+        "frames": np.array(frames),
+        "length_unit": np.array("".join(_texts(point, "UNITS")[:1])),
         "labels": np.array(_texts(point, "LABELS"), dtype=str),
         "angles": np.array(_texts(point, "ANGLES"), dtype=str),
         "unit": np.array("".join(_texts(point, "ANGLE_UNITS")[:1])),
-        "rate": np.array([*np.ravel(point["RATE"]["value"]), np.nan])[0],
+        "rate": rate,
         "first": np.array(int(file["header"]["points"]["first_frame"])),
         "points": np.asarray(file["data"]["points"], dtype=np.float64),
     }

@@ -9,6 +9,7 @@ from ....arrays import Array
 from ....errors import TrajectoryError
 from .._recording import Table
 from .frames import file_table
+from .segment_poses import body_kinematics
 from .text_tables import BLANKS, read_text, unix_text
 
 END = "endheader"
@@ -62,7 +63,7 @@ def read_opensim(where: Path, data: bytes) -> Table:
             raise TrajectoryError(f"{where}: two columns are the coordinate {plain}, one is {name!r}; keep one")
         columns[plain] = values
         faults[plain] = found.faults.get(name, {})
-    return replace(found, columns=columns, faults=faults, up="y")
+    return body_kinematics(replace(found, columns=columns, faults=faults, up="y"), header.get("", ""))
 
 
 def _plain(line: str) -> str:
@@ -72,6 +73,7 @@ def _plain(line: str) -> str:
 def _header(lines: list[str], where: Path) -> dict[str, str]:
     header: dict[str, str] = {}
     for line, text in enumerate(lines, start=1):
+        header.setdefault("", _plain(text))
         key, mark, value = _plain(text).partition("=")
         if not mark:
             key, _, value = _plain(text).partition(" ")

@@ -1,0 +1,322 @@
+"""Which link of a body each recorded segment shows, and the turn from the segment's axes to the link's.
+
+That turn C is the identity where they are the link's own, or comes from a calibration pose, in which the body stands
+in its zero pose: C = S^T G L with S the segment's turn there, L the link's in axes of the base, and G the turn of the
+base. G is that by which the links' joints lie best on the recorded origins (Kabsch, Acta Crystallographica A 32 (1976)
+922); where these do not tell it, the identity.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ... import so3
+from ...arrays import Array
+from ...body.body import Body
+from ...errors import ShapeError, TrajectoryError
+from ...letters import what_came
+from ._recording import Recording, SegmentPoses, warn
+
+OWN_AXES = "links"
+"""Instead of a calibration pose: segments have the axes of the body's links."""
+SHORT = 0.02
+"""[m] Between joints nearer to each other neither length nor direction is compared; lengths may differ by it."""
+MOST_OFF_WAY = np.radians(20.0)
+"""[rad] From the way between two joints to the body's: people are not straight; arms hanging or held out differ by 90
+degrees."""
+_FLAT = 1e-4
+"""Share of the largest singular value, below which points are on one line."""
+_THOUSAND = (500.0, 2000.0)
+"""Recorded lengths over the body's, where those are in millimetres."""
+_PARTS = {
+    "pelvis": ("pelvis", "hips"),
+    "thigh": ("thigh", "upperleg", "upleg", "femur"),
+    "shank": ("shank", "lowerleg", "lowleg", "tibia", "calf", "shin"),
+    "foot": ("foot",),
+    "toes": ("toes", "toe"),
+    "upperarm": ("upperarm", "uarm", "uparm", "humerus"),
+    "forearm": ("forearm", "larm", "lowerarm", "lowarm"),
+    "hand": ("hand",),
+}
+"""Part -> what Xsens, Theia and usual models call it, without its side."""
+_USUAL = {word: part for part, words in _PARTS.items() for word in words}
+_SIDED = re.compile(r"(?P<before>left|right|[lr](?=_))?_?(?P<part>.+?)_?(?P<behind>left|right|(?<=_)[lr])?")
+_MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}
+"""Of what files' bodies the segments are links -> how these files end."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmentChoices:
+    """How segments become links, as the caller chose.
+
+    Attributes
+    ----------
+    names : segment -> link, or None for a segment to be left out
+    calibration : a time, as the file tells it; the name of a pose of the file; "links"; None: as the file says
+    length_tolerance : share by which lengths may differ from the body's
+    """
+
+    names: Mapping[str, str | None]
+    calibration: float | str | None = None
+    length_tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check them. Raises ShapeError."""
+        off, at = self.length_tolerance, self.calibration
+        if off is not None and (isinstance(off, bool) or not isinstance(off, int | float) or not 0.0 < off < 1.0):
+            raise ShapeError(f"length_tolerance: a share between 0 and 1 is needed, as 0.1, got {what_came(off)}")
+        if at is not None and (isinstance(at, bool) or not isinstance(at, int | float | str)):
+            raise ShapeError(f"calibration: a time or {OWN_AXES!r} is needed, got {what_came(at)}")
+
+    @property
+    def given(self) -> bool:
+        """Whether anything is given that only poses of segments need."""
+        return self.calibration is not None or self.length_tolerance is not None
+
+
+class Frame(NamedTuple):
+    """A frame of the body's chain and the segment that shows it; turn and place of the link in the frame."""
+
+    frame: int
+    segment: int
+    link: str
+    turn: Array
+    place: Array
+
+
+class Calibration(NamedTuple):
+    """Turns from segment axes to those of the frames (k, 3, 3), and the segments' origins there (k, 3) [m]."""
+
+    turns: Array
+    origins: Array
+
+
+class Links:
+    """Frames of a body's chain that segments show.
+
+    Attributes
+    ----------
+    frames : parents before children; the first is the base
+    above : place of a frame among them -> that of the nearest one towards the base
+    left_out : segments that show no frame
+    """
+
+    def __init__(self, where: str, poses: SegmentPoses, body: Body, names: Mapping[str, str | None]) -> None:
+        self.where, self.poses, self.body, self.chain = where, poses, body, body.chain
+        by_frame = self._matched(names)
+        self.frames = list(by_frame.values())
+        self.left_out = [name for k, name in enumerate(poses.names) if k not in [f.segment for f in self.frames]]
+        order = {frame: place for place, frame in enumerate(by_frame)}
+        self.above = {order[frame]: order[self.shown_by(frame)] for frame in by_frame if frame}
+
+    def shown_by(self, frame: int) -> int:
+        """The nearest frame towards the base that a segment shows, other than this one."""
+        shown = {f.frame for f in self.frames}
+        while frame:
+            frame = self.chain.parents[frame - 1]
+            if frame in shown:
+                break
+        return frame
+
+    def frame_poses(self, shapes: Array) -> dict[int, tuple[Array, Array]]:
+        """Turns (M, 3, 3) and places (M, 3) of all frames with a segment or mass, in axes of the base."""
+        found = {}
+        first = {frame: link for link, (frame, _) in reversed(list(self.chain.link_frames.items()))}
+        for frame in sorted({f.frame for f in self.frames} | {*np.flatnonzero(self.chain.masses).tolist()}):
+            pose, inside = self.body.link_pose(shapes, first[frame]), self.chain.link_frames[first[frame]][1]
+            turn = pose[:, :3, :3] @ inside[:3, :3].T
+            found[frame] = turn, pose[:, :3, 3] - turn @ inside[:3, 3]
+        return found
+
+    @property
+    def in_millimetres(self) -> bool:
+        """Whether segments are a thousand times as far apart as the links in the body's zero pose."""
+        if self.poses.origins is None or not self.above:
+            return False
+        rest = self.frame_poses(self.body.shape()[None])
+        pairs = [(self.frames[k], self.frames[above]) for k, above in self.above.items()]
+        own = [np.linalg.norm(rest[f.frame][1] - rest[g.frame][1]) for f, g in pairs]
+        recorded = [self.poses.origins[:, f.segment] - self.poses.origins[:, g.segment] for f, g in pairs]
+        there = [each[np.isfinite(each).all(axis=1)] for each in recorded]
+        sums = sum(float(np.median(np.linalg.norm(each, axis=1))) for each in there if len(each)), sum(own)
+        return bool(_THOUSAND[0] * sums[1] <= sums[0] <= _THOUSAND[1] * sums[1])
+
+    def calibration(self, recording: Recording, choices: SegmentChoices, record: dict[str, Any]) -> Calibration:
+        """How the segments lie in their frames; what was decided goes to the record.
+
+        Raises
+        ------
+        TrajectoryError
+            If the file does not say it, or the body does not stand in its zero pose.
+        """
+        at, stands = choices.calibration, dict(self.poses.stands or {})
+        own = self.body.file is not None and self.body.file.suffix.lower() == _MODELS.get(
+            self.poses.of_model or "", "-"
+        )
+        if at is None and own:
+            at = OWN_AXES
+        if at == OWN_AXES:
+            record["calibration"] = "segments have the axes of the links"
+            return Calibration(np.stack([f.turn.T for f in self.frames]), self._origins())
+        time = _time_of(at)
+        if time is not None:
+            stands = {f"{time:.9g} {recording.time_unit}": self._at(time, recording)}
+        elif isinstance(at, str) and at not in stands:
+            raise TrajectoryError(
+                f"{self.where}: calibration={at!r:.40}: a time is needed, {OWN_AXES!r}, or a pose of the file, which "
+                f"has {', '.join(stands) or 'none'}; give one of these (--calibration T)"
+            )
+        elif isinstance(at, str):
+            stands = {at: stands[at]}
+        if not stands:
+            raise TrajectoryError(
+                f"{self.where}: axes of segments differ from program to program, and the file has no calibration pose. "
+                "Give calibration=T (--calibration T), a time at which the body stands in its zero pose, or "
+                f"calibration={OWN_AXES!r} (--calibration {OWN_AXES}) where segments have the axes of the links of "
+                f"{self.body.name}"
+            )
+        fits = {kind: self._fitted(*pose) for kind, pose in stands.items()}
+        kind = min(fits, key=lambda each: fits[each].off)
+        fit = fits[kind]
+        if fit.off > MOST_OFF_WAY:
+            raise TrajectoryError(
+                f"{self.where}: the body does not stand in its zero pose at {kind}: the way {fit.worst} is "
+                f"{np.degrees(fit.off):.0f} deg off; up to {np.degrees(MOST_OFF_WAY):.0f} deg are taken. Give a time "
+                "at which it does: calibration=T (--calibration T)"
+            )
+        axes = "as the joints lie" if fit.by_origins else "the room's, as the joints do not tell them"
+        record["calibration"] = f"zero pose at {kind}, axes of the base {axes}"
+        record["calibration_off_deg"] = float(np.degrees(fit.off))
+        if not fit.by_origins:
+            warn(
+                f"{self.where}: at {kind} the base of {self.body.name} is taken to have the axes of the room: the "
+                "places of segments do not tell how it is turned"
+            )
+        return fit.calibration
+
+    def _origins(self) -> Array:
+        """Of the segments in their frames: centres of mass, or the origins of links."""
+        return np.stack([self.chain.centres[f.frame] if self.poses.at_centres else f.place for f in self.frames])
+
+    def _at(self, time: float, recording: Recording) -> tuple[Array, Array | None]:
+        table = recording.table
+        clock = table.times if table.clock is None else table.clock
+        assert clock is not None
+        if not clock[0] <= time <= clock[-1]:
+            raise TrajectoryError(
+                f"{self.where}: calibration={time:.9g}: times go from {clock[0]:.9g} to {clock[-1]:.9g} "
+                f"{recording.time_unit}; give one of them (--calibration T)"
+            )
+        sample = int(np.argmin(np.abs(clock - time)))
+        if not np.isfinite(self.poses.turns[sample, [f.segment for f in self.frames]]).all():
+            raise TrajectoryError(
+                f"{recording.place(sample)}: a segment has no pose at the time of calibration; give another one "
+                "(--calibration T)"
+            )
+        return self.poses.turns[sample], None if self.poses.origins is None else self.poses.origins[sample]
+
+    def _fitted(self, turns: Array, origins: Array | None) -> _Fit:
+        used = [f.segment for f in self.frames]
+        rest = self.frame_poses(self.body.shape()[None])
+        turned = np.stack([rest[f.frame][0][0] for f in self.frames])
+        inside, base, off, worst, by_origins = self._origins(), np.eye(3), 0.0, "", False
+        if origins is not None and self.above:
+            ends = origins[used]
+            own = np.stack([rest[f.frame][1][0] for f in self.frames]) + so3.apply(turned, inside)
+            # Where the base's own origin lies is up to who wrote the file.
+            free = slice(1 if len(own) > 3 else 0, None)
+            left, sizes, right = np.linalg.svd((ends[free] - ends[free].mean(0)).T @ (own[free] - own[free].mean(0)))
+            by_origins = len(own[free]) > 2 and bool(sizes[1] > _FLAT * sizes[0])
+            if by_origins:
+                base = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+            beside = [k for k, above in self.above.items() if above == 0]
+            start = np.mean(ends[beside] - own[beside] @ base.T, axis=0)
+            if not self.poses.at_centres:
+                inside[0] = base.T @ (ends[0] - start)
+                ends = np.vstack([start + base @ own[:1].T[:, 0], ends[1:]])
+            for k, above in self.above.items():
+                apart = angle_of_ways(ends[k] - ends[above], base @ (own[k] - own[above]))
+                if apart > off:
+                    off, worst = apart, f"from {self.frames[above].link} to {self.frames[k].link}"
+        return _Fit(off, worst, by_origins, Calibration(so3.transpose(turns[used]) @ base @ turned, inside))
+
+    def _matched(self, names: Mapping[str, str | None]) -> dict[int, Frame]:
+        """Frame of the chain -> the segment that shows it, parents before children."""
+        links = self.chain.link_frames
+        plain = {_plain(link): link for link in links} | {"base": self.body.link_names[0]}
+        usual = {_usual(link): link for link in links}
+        found: dict[int, Frame] = {}
+        shown: dict[str, str] = {}
+        free = []
+        for number, segment in enumerate(self.poses.names):
+            link = names.get(segment, plain.get(_plain(segment), usual.get(_usual(segment))))
+            if link is None:
+                free += [] if segment in names else [segment]
+                continue
+            if link not in links:
+                raise TrajectoryError(
+                    f"{self.where}: names: {link!r:.60} is no link of {self.body.name}; links are {', '.join(links)}; "
+                    f"write --names {segment}=LINK"
+                )
+            if link in shown:
+                raise TrajectoryError(
+                    f"{self.where}: segments {shown[link]!r} and {segment!r} are both link {link}; leave one out with "
+                    f"names={{{segment!r}: None}} (--names {segment}=)"
+                )
+            shown[link] = segment
+            frame, pose = links[link]
+            # Of several links of one rigid part, that whose axes are the part's.
+            if frame not in found or np.array_equal(pose, np.eye(4)):
+                found[frame] = Frame(frame, number, link, pose[:3, :3], pose[:3, 3])
+        first = {frame: link for link, (frame, _) in reversed(list(links.items()))}
+        lacking = [first[frame] for frame in [0, *np.flatnonzero(self.chain.masses).tolist()] if frame not in found]
+        if 0 not in found or (lacking and free):
+            segment = free[0] if free else "SEGMENT"
+            raise TrajectoryError(
+                f"{self.where}: no segment is known as {', '.join(dict.fromkeys(lacking))} of {self.body.name}; "
+                f"segments left over are {', '.join(free) or 'none'}. Say which is which: names={{{segment!r}: "
+                f"{lacking[0]!r}}} (--names {segment}={lacking[0]}), or leave a segment out: --names {segment}="
+            )
+        return dict(sorted(found.items()))
+
+
+class _Fit(NamedTuple):
+    """A calibration, the largest angle between ways and where, and whether the base is turned by origins."""
+
+    off: float
+    worst: str
+    by_origins: bool
+    calibration: Calibration
+
+
+def angle_of_ways(recorded: Array, own: Array) -> float:
+    """The angle between two vectors [rad]; 0 where one is too short to have a direction."""
+    sizes = np.linalg.norm(recorded), np.linalg.norm(own)
+    return float(so3.angle_between(recorded / sizes[0], own / sizes[1])) if min(sizes) > SHORT else 0.0
+
+
+def _time_of(at: float | str | None) -> float | None:
+    try:
+        return None if at is None else float(at)
+    except ValueError:
+        return None
+
+
+def _plain(name: str) -> str:
+    """Letters and digits in lower case: "L_Thigh" -> "lthigh"."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def _usual(name: str) -> tuple[str, str]:
+    """Side and part of a segment, in one word for what is called differently: ("l", "thigh")."""
+    spaced = re.sub(r"[^a-z0-9]+", "_", re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()).strip("_")
+    match = _SIDED.fullmatch(spaced)
+    if match is None:
+        return "", name
+    part = match["part"].replace("_", "")
+    return (match["before"] or match["behind"] or "")[:1], _USUAL.get(part, part)
