@@ -583,14 +583,6 @@ def test_more_shapes_than_a_page_holds_are_drawn_as_one_hull(tmp_path, monkeypat
     np.testing.assert_allclose([hull.vertices.min(axis=0), hull.vertices.max(axis=0)], [[-0.1] * 3, [0.39, 0.1, 0.1]])
 
 
-def test_more_mesh_files_than_memory_holds_are_not_read(tmp_path, monkeypatch):
-    body = crowd(tmp_path, 4)
-    monkeypatch.setattr(visuals, "_MOST_BYTES_IN_ALL", 2 * (tmp_path / "ball0.stl").stat().st_size)
-    with pytest.warns(VisualWarning, match="2 meshes are not read: all have more than"):
-        shapes = visuals.visuals(body)
-    assert [shape.kind for shape in shapes] == ["mesh", "mesh", "sphere"]
-
-
 def test_visuals_of_one_mesh_share_its_numbers(tmp_path):
     first, second, *_ = visuals.visuals(crowd(tmp_path, 1, 2))
     assert first.vertices is second.vertices

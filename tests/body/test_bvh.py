@@ -333,7 +333,7 @@ FAULTS = {
     "two numbers": (lambda: edited("OFFSET 0.0 2.9 -0.2", "OFFSET 0.0 2.9"), "OFFSET and three numbers"),
     "far away": (lambda: edited("OFFSET 0.0 2.9", "OFFSET 0.0 1e200"), "an offset above"),
     "two of a name": (lambda: edited("JOINT Spine1", "JOINT Spine"), "two bones are named 'Spine'"),
-    "no name": (lambda: edited("JOINT Spine1", "JOINT"), "a name of up to"),
+    "no name": (lambda: edited("JOINT Spine1", "JOINT"), "a name of letters"),
     "a second root": (lambda: edited("JOINT Spine\n", "ROOT Spine\n"), "JOINT, End Site or } is needed, got 'ROOT"),
     "endless nesting": (
         lambda: (
@@ -342,19 +342,12 @@ FAULTS = {
         ),
         "nested more than 100 deep",
     ),
-    "endless bones": (
-        lambda: (
-            "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xrotation Yrotation Zrotation\n"
-            + "".join(f"JOINT b{k}\n{{\nOFFSET 0 0 0\nCHANNELS 0\n}}\n" for k in range(5000))
-        ),
-        "more than 1000 bones",
-    ),
     "not a number": (lambda: edited(FRAME, FRAME[:-3] + "nan"), "'nan' is no finite number"),
     "a grouped number": (lambda: edited(FRAME, FRAME[:-3] + "1_0"), "'1_0' is no finite number"),
     "a short frame": (lambda: edited(FRAME, FRAME[:-4]), "80 numbers in a frame, and the skeleton has 81 channels"),
     "frames too few": (lambda: edited("Frames: 3", "Frames: 4"), "4 are said, and 3 follow; the file is cut off"),
     "frames too many": (lambda: edited("Frames: 3", "Frames: 2"), "2 are said, and more follow"),
-    "frames without end": (lambda: edited("Frames: 3", "Frames: 999999999"), "more than 50000000 numbers"),
+    "frames without end": (lambda: edited("Frames: 3", "Frames: 999999999"), "are said, and 3 follow"),
     "no count": (lambda: edited("Frames: 3", "Frames: three"), "'three' is no number of frames"),
     "no time": (lambda: edited(f"Frame Time: {STEP!r}", "Frame Time: 0"), "a time above 0 is needed"),
     "not text": (lambda: edited("JOINT Spine1", "JOINT Sp\0ine"), "that can be printed"),

@@ -283,3 +283,29 @@ def test_one_of_several_trees_is_named_and_speeds_of_the_file_do_not_count(tmp_p
     with pytest.warns(IgnoredElementWarning, match="1 bodies that hang elsewhere are left out"):
         found = sp.load_body(tmp_path / "three.osim", root_body="trunk")
     assert (found.joint_names, found.mass) == (("bend",), 3.0)
+
+
+@needs_opensim
+@pytest.mark.filterwarnings("ignore::shapephase.errors.IgnoredElementWarning")
+def test_the_coordinates_of_a_planar_root_are_the_recorded_base(tmp_path):
+    """Along x and y of the ground, and about its z (`PlanarJoint`)."""
+    parts = (
+        osim_models.body("trunk", 2.0, "0 0.1 0", "0.1 0.2 0.15 0 0 0"),
+        osim_models.body("arm", 1.0, "0.2 0 0", "0.02 0.05 0.04 0 0 0"),
+    )
+    moves = [osim_models.coordinate(name) for name in ("tilt", "tx", "ty")]
+    joints = [
+        osim_models.joint("PlanarJoint", "root", "ground", "trunk", moves),
+        osim_models.joint("PinJoint", "elbow", "trunk", "arm", [osim_models.coordinate("bend")]),
+    ]
+    (tmp_path / "flat.osim").write_text(osim_models.model(parts, joints), encoding="utf-8")
+    body = sp.load_body(tmp_path / "flat.osim")
+    times = np.linspace(0.0, 1.0, 21)
+    rows = np.column_stack([times, 0.4 * times, 0.1 * times, np.cos(times), np.sin(times)])
+    np.savetxt(tmp_path / "m.csv", rows, delimiter=",", header="time,tilt,tx,ty,bend", comments="", fmt="%.17g")
+    recorded = sp.read_recorded_motion(tmp_path / "m.csv", body)
+    want = Rotation.from_euler("z", 0.4 * times[:, None]).as_matrix()
+    np.testing.assert_allclose(recorded.base_attitude, want, rtol=0, atol=1e-15)
+    places = np.column_stack([0.1 * times, np.cos(times), 0.0 * times])
+    np.testing.assert_allclose(recorded.base_position, places, rtol=0, atol=1e-15)
+    assert body.joint_names == ("bend",)

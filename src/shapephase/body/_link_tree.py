@@ -294,7 +294,7 @@ def grouped(notes: Iterable[tuple[str, str, str, str]]) -> tuple[str, ...]:
     sentences = []
     for (kind, said), places in found.items():
         first = places[0][0]
-        # Later ones by their line alone.
+        # Later ones by their line alone, where a line is known.
         names = [name if where == first else f"{name} (line {where.rpartition(':')[2]})" for where, name in places]
         sentences.append(f"{first}: {kind}{'s' * (len(names) > 1)} {_listed(names)}: {said}")
     return tuple(sentences)

@@ -36,10 +36,6 @@ PLAIN: Colour = (0.72, 0.74, 0.78, 1.0)
 BOX_COLOUR: Colour = (0.337, 0.706, 0.914, 1.0)
 """Of what the file gives no colour, and of inertia boxes (the sky blue of Okabe and Ito)."""
 _MESHES = (".stl", ".obj", ".dae", ".ply")
-_MOST_BYTES = 64 * 2**20
-"""Size of a mesh file [bytes]."""
-_MOST_BYTES_IN_ALL = 128 * 2**20
-"""Size of all mesh files of a body [bytes]."""
 _MOST_NAMED = 10
 """Faults that one warning lists."""
 _THINNEST = 0.01
@@ -121,7 +117,7 @@ def visuals(body: Body) -> tuple[Visual, ...]:
     (3, 'cylinder')
     """
     check_object(body, "Body", "body")
-    found, doubts = drawn_shapes(body)
+    found, doubts, _ = drawn_shapes(body)
     shown = {shape.link for shape in found}
     boxes = [_part_box(part) for part in body.moving_parts if part.mass > 0.0 and shown.isdisjoint(part.links)]
     if doubts:
@@ -131,16 +127,14 @@ def visuals(body: Body) -> tuple[Visual, ...]:
     return (*found, *boxes)
 
 
-def drawn_shapes(body: Body) -> tuple[list[Visual], list[str]]:
-    """What a body's file has to show, and what in it cannot be shown."""
+def drawn_shapes(body: Body) -> tuple[list[Visual], list[str], set[str]]:
+    """What a body's file has to show, what in it cannot be shown, and the links of which some shape is missing."""
     looks = _Looks(body.file.parent if body.file else Path(), body.packages)
     root = _unchanged(body, looks.doubts)
     if root is not None:
         _read_mjcf(body, looks) if root.tag == "mujoco" else _read_urdf(root, body, looks)
-    if looks.unread:
-        looks.doubts.append(f"{looks.unread} meshes are not read: all have more than {_MOST_BYTES_IN_ALL >> 20} MiB")
     shapes, simplified = within_limits(looks.found)
-    return shapes, looks.doubts + simplified
+    return shapes, looks.doubts + simplified, looks.partly
 
 
 def inertia_box(mass: float, inertia: Array) -> tuple[Array, Array]:
@@ -181,15 +175,15 @@ class _Looks:
     doubts: list[str] = field(default_factory=list)
     meshes: dict[Path, list[_Piece]] = field(default_factory=dict)
     scaled: dict[tuple[Path, tuple[float, ...]], list[_Piece]] = field(default_factory=dict)
-    mesh_bytes: int = 0
-    unread: int = 0
+    partly: set[str] = field(default_factory=set)
 
-    def attempt(self, shapes: Callable[[], list[Visual]]) -> None:
+    def attempt(self, link: str, shapes: Callable[[], list[Visual]]) -> None:
         """Take what can be read; what is faulty spoils the picture only."""
         try:
             self.found += shapes()
         except ModelFileError as error:
             self.doubts.append(str(error))
+            self.partly.add(link)
 
 
 def _unchanged(body: Body, doubts: list[str]) -> Node | None:
@@ -245,7 +239,7 @@ def _read_urdf(root: Node, body: Body, looks: _Looks) -> None:
         if link.get("name") not in links:
             continue
         for node in link.all("visual"):
-            looks.attempt(lambda link=link, node=node: _urdf_shape(link, node, materials, looks))
+            looks.attempt(name_of(link), lambda link=link, node=node: _urdf_shape(link, node, materials, looks))
 
 
 def _urdf_shape(link: Node, node: Node, materials: dict[str, Node], looks: _Looks) -> list[Visual]:
@@ -308,10 +302,6 @@ def _mesh_shapes(node: Node, empty: Visual, colour: Colour | None, owner: str, l
     if path.suffix.lower() not in _MESHES:
         raise node.fault(owner, f"the mesh {quoted(name)!r}: files {', '.join(_MESHES)} can be read")
     if path not in looks.meshes:
-        looks.mesh_bytes += path.stat().st_size
-        if looks.mesh_bytes > _MOST_BYTES_IN_ALL:
-            looks.unread += 1
-            return []
         looks.meshes[path] = _mesh_pieces(path, node, owner)
     scale = np.array(empty.dimensions)
     # A mirror image has its faces the other way round.
@@ -366,8 +356,6 @@ def _mesh_pieces(path: Path, node: Node, owner: str) -> list[_Piece]:
             raise node.fault(owner, f"the mesh {path.name} needs {package}: pip install 'shapephase[viz]'")
     import trimesh
 
-    if path.stat().st_size > _MOST_BYTES:
-        raise node.fault(owner, f"the mesh {path.name} is larger than {_MOST_BYTES >> 20} MiB")
     try:
         scene: Any = trimesh.load_scene(path, skip_materials=path.suffix.lower() == ".obj")
         if path.suffix.lower() == ".dae":
@@ -408,6 +396,7 @@ def _read_mjcf(body: Body, looks: _Looks) -> None:
         for number, mesh in said["meshes"].items()
     }
     links = set(body.link_names)
+    looks.partly.update(said["partly"])
     for shape in said["shapes"]:
         if shape["link"] not in links:
             continue

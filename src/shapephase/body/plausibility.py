@@ -59,8 +59,12 @@ def implausible(body: Body) -> tuple[str, ...]:
         names[frame] = names[frame] or link
     masses = chain.masses
     shapes: dict[int, list[Visual]] = {}
-    for shape in drawn_shapes(body)[0]:
+    drawn, _, partly = drawn_shapes(body)
+    for shape in drawn:
         shapes.setdefault(chain.link_frames[shape.link][0], []).append(shape)
+    # How wide a link is nobody knows while some of its shapes are missing.
+    for link in partly & chain.link_frames.keys():
+        shapes.pop(chain.link_frames[link][0], None)
     widths = {frame: _width(body, found) for frame, found in shapes.items()}
     links = _Links(names)
     for frame in np.flatnonzero(masses > 0.0).tolist():

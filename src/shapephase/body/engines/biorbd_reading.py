@@ -65,7 +65,8 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
 
     root_body : the root segment that floats, with all that hangs on it, where the file has several
     """
-    notes, starts = [], {}
+    notes: list[str | tuple[str, str, str]] = []
+    starts: dict[str, int] = {}
     model = _model(path, notes, starts)
     chain = Chain(Path(path).stem, notes=notes)
     segments = _tree(model, root_body, notes, starts)
@@ -92,7 +93,8 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
                 raise UnusableModelError(
                     f"segment {name!r}: the frame of a mirror is no base, and no joints move in it", line
                 )
-            notes.append(f"segment {name!r} has the frame of a mirror: its mass is taken over where biorbd sees it")
+            said = "with the frame of a mirror, where mass is taken over as biorbd sees it"
+            notes.append(("segment", repr(name), said))
         traits, flip = segment.characteristics(), flips[name]
         tensor = flip @ traits.inertia().to_array() @ flip
         chain.add_link(name, traits.mass(), flip @ traits.CoM().to_array(), tensor, line)
@@ -106,7 +108,7 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
     return chain
 
 
-def _model(path: str, notes: list[str], starts: dict[str, int]) -> Any:
+def _model(path: str, notes: list[Any], starts: dict[str, int]) -> Any:
     """The model, without its meshes; lines at which segments begin go to `starts`."""
     content = Path(path).read_bytes()
     try:
@@ -133,7 +135,7 @@ def _refused(said: str, starts: dict[str, int]) -> UnusableModelError:
     return UnusableModelError(f"{segment}biorbd does not accept it: {reason}", starts.get(named[1], 1) if named else 1)
 
 
-def _looked_through(text: str, notes: list[str], starts: dict[str, int]) -> str:
+def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
     """The text without meshes. Raises UnusableModelError for what biorbd would pass over."""
     kept, segment, meshes, constraints, number = [], None, 0, 0, 1
     said: list[tuple[str, int]] = []
@@ -237,7 +239,7 @@ def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int
                 )
 
 
-def _tree(model: Any, root_body: str | None, notes: list[str], starts: dict[str, int]) -> dict[str, int]:
+def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str, int]) -> dict[str, int]:
     """The root segment and all that hangs on it, with their numbers."""
     known = {model.segment(k).name().to_string(): k for k in range(model.nbSegment())}
     parents = {name: model.segment(k).parent().to_string() for name, k in known.items()}

@@ -37,7 +37,7 @@ class Chain:
     ----------
     links, joints : as the fields of `Link` and `Joint`, by name of the field
     frames : names of links that are mere steps between the axes of one joint and the next
-    notes : what the file says and is not taken up
+    notes : what the file says and is not taken up: a sentence, or kind, name and what is to be said of many alike
     poses : what the engine gives at random shapes, as `add_pose` takes it
     couplings : of joints that follow others, by name, as `couple` takes them
     base_joints : as `joints`, those that lead from the world to the base
@@ -49,7 +49,7 @@ class Chain:
     links: list[dict[str, Any]] = field(default_factory=list)
     joints: list[dict[str, Any]] = field(default_factory=list)
     frames: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    notes: list[str | tuple[str, str, str]] = field(default_factory=list)
     poses: list[dict[str, Any]] = field(default_factory=list)
     couplings: dict[str, dict[str, Any]] = field(default_factory=dict)
     base_joints: list[dict[str, Any]] = field(default_factory=list)

@@ -14,7 +14,7 @@ import numpy as np
 from ...child_process import run_alone
 from ...errors import MissingExtraError, ModelFileError
 from .._cross_check import inertia_and_momentum
-from .._link_tree import Joint, Link, LinkTree, from_the_root
+from .._link_tree import Joint, Link, LinkTree, from_the_root, grouped
 from ..body import Body
 from ..couplings.coupling import Coupling
 from ..couplings.functions import JointFunction
@@ -96,7 +96,8 @@ def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str,
     if all(joint.parent in reached and not reached.add(joint.child) for joint in joints):
         ordered = tuple(joints)
     sorted_links = {name: links[name] for name in (first, *(joint.child for joint in ordered))}
-    notes = tuple(f"{where}:1: {note}" for note in said["notes"])
+    single = (f"{where}:1: {note}" for note in said["notes"] if isinstance(note, str))
+    notes = (*single, *grouped((f"{where}:1", *note) for note in said["notes"] if not isinstance(note, str)))
     couplings = {name: _coupling(rule) for name, rule in said["couplings"].items()}
     frames = frozenset(said["frames"])
     base, slides = said["base_angles"], said["base_slides"]

@@ -38,6 +38,7 @@ def shapes_of(path: str) -> dict[str, Any]:
     meshes = sorted({int(model.geom_dataid[geom]) for geom in drawn if _kind(model, geom) == "mesh"})
     return {
         "shapes": [_shape(compiled, geom) for geom in drawn],
+        "partly": sorted({compiled.names[int(model.geom_bodyid[geom])] for geom in compiled.shapeless}),
         "meshes": {str(mesh): _mesh(model, mesh) for mesh in meshes},
     }
 

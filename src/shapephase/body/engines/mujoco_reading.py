@@ -53,12 +53,11 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
     """
     compiled = compiled_model(path)
     base, way, notes = base_of(compiled, root, root_body)
-    notes = [*compiled.notes, *notes]
     bodies = compiled.below(base)
     if len(bodies) > MOST_LINKS:
         raise UnusableModelError(f"<mujoco>: the body has {len(bodies)} links; up to {MOST_LINKS} are supported")
     own = set(bodies)
-    chain = Chain(_model_name(compiled.model) or Path(path).stem, notes=notes)
+    chain = Chain(_model_name(compiled.model) or Path(path).stem, notes=[*compiled.notes, *notes])
     rules = _rules(compiled, own, base)
     _check_carried(compiled, own)
     for body in bodies:
@@ -140,7 +139,7 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         limits = [lower, upper] if model.jnt_limited[joint] and not ball else None
         kind = "ball" if ball else "prismatic" if sliding else "continuous" if limits is None else "revolute"
         if ball and model.jnt_limited[joint]:
-            chain.notes.append(f"{owner}: the range of a ball joint is ignored")
+            chain.notes.append(("joint", repr(name), "the range of a ball joint is ignored"))
         last = joint == joints[-1]
         below = child if last else f"{child}\0{name}"
         if not last:
@@ -239,7 +238,7 @@ def _check_carried(compiled: Compiled, own: set[int]) -> None:
         if (one in own) != (other in own) and model.body_treeid[outside] >= 0:
             inside = one if one in own else other
             raise UnusableModelError(
-                f"body {compiled.names[inside]!r}: {_equality(model, number)} makes it carry "
+                f"body {compiled.names[inside]!r}: the equality {_equality(model, number)} makes it carry "
                 f"{compiled.names[outside]!r}, which is not part of the free body; remove one of them",
                 compiled.line(inside),
             )
@@ -256,20 +255,21 @@ def _check_carried(compiled: Compiled, own: set[int]) -> None:
 
 def _equality(model: Any, number: int) -> str:
     kind = "weld" if int(model.eq_type[number]) == _WELD else "connect"
-    return f"the equality {model.eq(number).name or number!r} ({kind})"
+    return f"{model.eq(number).name or number!r} ({kind})"
 
 
-def _ignored(compiled: Compiled, own: set[int]) -> list[str]:
+def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, str]]:
     """What holds or drives joints of the body, of which a free body with given joints knows nothing."""
     model = compiled.model
-    notes = []
+    notes: list[str | tuple[str, str, str]] = []
     for number in _active(model, _CONNECT, _WELD):
         one, other = _held(model, number)
         pair = f"{compiled.names[one]!r} and {compiled.names[other]!r}"
+        named = _equality(model, number)
         if one in own and other in own:
-            notes.append(f"{_equality(model, number)} of {pair} is ignored, every joint moves on its own")
+            notes.append(("equality", f"{named} of {pair}", "ignored, every joint moves on its own"))
         elif one in own or other in own:
-            notes.append(f"{_equality(model, number)} of {pair} is ignored, the body is free")
+            notes.append(("equality", f"{named} of {pair}", "ignored, the body is free"))
     tendons = [tendon for tendon in range(model.ntendon) if _led_over(model, tendon) & own]
     if tendons:
         named = listed([model.tendon(tendon).name or str(tendon) for tendon in tendons])

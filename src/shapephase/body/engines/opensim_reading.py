@@ -102,6 +102,8 @@ class _Reading:
             if coordinate.rule is not None and any(name == joint["name"] for joint in self._chain.joints):
                 self._couple(name, coordinate.rule)
         self._chain.base_angles = self._base_angles()
+        if self._chain.base_angles is None:
+            self._chain.base_joints = self._way()
         locked = {name: one.locked for name, one in self._coordinates.items()}
         add_poses(self._chain, self._path, base, {body.getName() for body in self._bodies}, locked)
         return self._chain
@@ -178,6 +180,21 @@ class _Reading:
             turned += place[0]
         return (names, turned) if len(set(names)) == len(set(turned)) == len(names) else None
 
+    def _way(self) -> list[dict[str, Any]]:
+        """The joints that move the base, as in a plane; none where one of its axes is a curve of a coordinate."""
+        try:
+            axes = self._own_axes(self._base)
+        except UnusableModelError:
+            return []
+        terms = [term for axis in axes for term in axis.rule.terms]
+        names = [name for name, _ in terms]
+        if len(set(names)) < len(names) or not all(_sign(function) for _, function in terms):
+            return []
+        whole, self._chain = self._chain, Chain("")
+        self._add_joint(self._base, axes, {axis.rule.terms[0][0]: axis.name for axis in axes if axis.rule.terms})
+        way, self._chain = self._chain, whole
+        return way.joints if way.moving() else []
+
     def _known_coordinates(self) -> dict[str, _Coordinate]:
         """By name; those of the base are not among them."""
         found: dict[str, _Coordinate] = {}
@@ -190,7 +207,7 @@ class _Reading:
                 if name in found:
                     raise self._fault(f"two coordinates are named {name!r}; give each a name of its own", name)
                 if coordinate.getDefaultIsPrescribed():
-                    self._chain.notes.append(f"coordinate {name!r} is prescribed in the file: it is free to move here")
+                    self._chain.notes.append(("coordinate", repr(name), "prescribed in the file, free to move here"))
                 clamped = coordinate.getDefaultClamped()
                 limits = (coordinate.getRangeMin(), coordinate.getRangeMax()) if clamped else (-np.inf, np.inf)
                 locked = coordinate.getDefaultValue() if coordinate.getDefaultLocked() else None
@@ -226,17 +243,16 @@ class _Reading:
             coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraint)
             if coupler is None:
                 kind = constraint.getConcreteClassName()
-                self._chain.notes.append(
-                    f"{kind} {constraint.getName()!r} is not taken up: its joints are free to move"
-                )
+                said = "not taken up: its joints are free to move"
+                self._chain.notes.append((kind, repr(constraint.getName()), said))
                 continue
             names = coupler.getIndependentCoordinateNames()
             drivers = [names.get(place) for place in range(names.getSize())]
             found[coupler.getDependentCoordinateName()] = self._rule(coupler.getFunction(), drivers, coupler.getName())
         return found
 
-    def _axes(self, joint: Any) -> list[_Axis]:
-        """In the order in which they move what is behind them, with rules of coordinates that are not locked."""
+    def _own_axes(self, joint: Any) -> list[_Axis]:
+        """The axes of a joint in the order in which they move what is behind them."""
         name, kind = joint.getName(), joint.getConcreteClassName()
         if kind == "CustomJoint":
             transform = engine().CustomJoint.safeDownCast(joint).getSpatialTransform()
@@ -248,6 +264,15 @@ class _Reading:
             ]
         else:
             raise self._fault(f"joint {name!r} is a {kind}; {', '.join(_KNOWN)} and CustomJoint are supported", name)
+        return found
+
+    def _axes(self, joint: Any) -> list[_Axis]:
+        """The axes of a joint of the body, with the values of locked coordinates."""
+        found = self._own_axes(joint)
+        for driver in (driver for axis in found for driver, _ in axis.rule.terms):
+            if driver not in self._coordinates:
+                name = joint.getName()
+                raise self._fault(f"joint {name!r} follows coordinate {driver!r}, which is the base's or unknown", name)
         return [axis._replace(rule=self._unlocked(axis.rule)) for axis in found]
 
     def _custom_axis(self, joint: str, axis: Any, number: int) -> _Axis:
@@ -255,11 +280,6 @@ class _Reading:
         drivers = [names.getValue(place) for place in range(names.size())]
         label = f"{joint}_{axis.getName() or number}"
         rule = _Rule(0.0, ()) if not axis.hasFunction() else self._rule(axis.getFunction(), drivers, joint)
-        for driver, _ in rule.terms:
-            if driver not in self._coordinates:
-                raise self._fault(
-                    f"joint {joint!r} follows coordinate {driver!r}, which is the base's or unknown", joint
-                )
         return _Axis(label, _SLIDE if number > 2 else _TURN, vector_of(axis.getAxis()), rule)
 
     def _unlocked(self, rule: _Rule) -> _Rule:

@@ -19,14 +19,8 @@ from ...arrays import FARTHEST, Array
 _START = b"HIERARCHY"
 _PLACES = ("Xposition", "Yposition", "Zposition")
 _TURNS = ("Xrotation", "Yrotation", "Zrotation")
-_MOST_BONES = 1000
-"""A skeleton with all fingers has seventy."""
 _MOST_DEPTH = 100
 """Bones from the root; one with all fingers has twelve."""
-_MOST_NAME = 200
-"""Characters: with a channel behind it, a name is still one of a joint."""
-_MOST_NUMBERS = 50_000_000
-"""Of all frames: memory, 400 MB."""
 _MOST_OFFSET = 1e6
 """Units; the square is far from what overflows."""
 _SHOWN = 40
@@ -261,14 +255,10 @@ class _Hierarchy:
         line = self.lines.number
         brace = words[-1] == "{" and len(words) > 1
         name = " ".join(words[1:-1] if brace else words[1:])
-        if not name or len(name) > _MOST_NAME or not name.isprintable():
-            raise self.lines.fault(
-                f"{words[0]} {name[:_SHOWN]!r}: a name of up to {_MOST_NAME} letters that can be printed is needed"
-            )
+        if not name or not name.isprintable():
+            raise self.lines.fault(f"{words[0]} {name[:_SHOWN]!r}: a name of letters that can be printed is needed")
         if name in self.names:
             raise self.lines.fault(f"two bones are named {name!r}; give each a name of its own")
-        if len(self.bones) >= _MOST_BONES:
-            raise self.lines.fault(f"more than {_MOST_BONES} bones, as in no skeleton")
         self._open(name, brace)
         offset, channels = self._offset(name), self._channels(name)
         self.names.add(name)
@@ -342,8 +332,6 @@ def _quick_numbers(line: str, words: list[str]) -> list[float] | None:
 
 
 def _frames(lines: _Lines, count: int, width: int) -> tuple[Array, list[int]]:
-    if count * width > _MOST_NUMBERS:
-        raise lines.fault(f"Frames: {count} frames of {width} channels are more than {_MOST_NUMBERS} numbers")
     values, at = array("d"), []
     while (line := lines.text()) is not None:
         words = line.split()
