@@ -1,4 +1,4 @@
-"""Arrays of a whole floating body, as each program makes them: what it computes of them itself is the truth."""
+"""Arrays of a whole floating body as programs make them: what the program itself computes of them is the truth."""
 
 from __future__ import annotations
 
@@ -103,7 +103,8 @@ def test_what_fits_two_orders_is_refused_with_the_names_that_say_which(tmp_path)
     np.savez(tmp_path / "m.npz", q=2.0 * q, time=TIMES)
     with pytest.raises(TrajectoryError, match=r"length 1 in every sample.*qpos"):
         sp.read_shape_path(tmp_path / "m.npz", BODY)
-    np.savez(tmp_path / "m.npz", q=q[:, :5], time=TIMES)
+    # Six and three: three angles, of which nothing says the order.
+    np.savez(tmp_path / "m.npz", q=q[:, :9], time=TIMES)
     with pytest.raises(TrajectoryError, match="joint_names"):
         sp.read_shape_path(tmp_path / "m.npz", BODY)
 

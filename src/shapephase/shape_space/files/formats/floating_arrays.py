@@ -24,7 +24,7 @@ _ROOT = 6
 _OFF_UNIT = 0.1
 """A quaternion's length may be off one by so much: an audit has to see what is wrong."""
 _NAMES_THAT_SAY_IT = (
-    "store the arrays under names that say the order: qpos (place, quaternion w x y z, joints), or base_position, "
+    "store arrays under names that say the order: qpos (place, quaternion w x y z, joints), or base_position, "
     "base_quat_xyzw and shapes beside joint_names"
 )
 
@@ -106,6 +106,7 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
     names = None if "joint_names" not in arrays else tuple(map(str, np.ravel(arrays["joint_names"])))
     count = np.size(arrays["time"]) if "time" in arrays else None
     layouts = {"qpos": (MUJOCO_QPOS,), "q": (PINOCCHIO_Q, DRAKE_Q), "Q": ()}[kind]
+    root = root_width(body, kind)
     fitting: list[tuple[FreeJoint | None, bool]] = []
     for turned, rows in ((False, values), (True, values.T)):
         if count is not None and len(rows) != count:
@@ -115,7 +116,7 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
             free = _free_columns(layout, width, names, body, order)
             if free is not None and (kind == "qpos" or (free and _is_unit(rows[:, layout.quaternion]))):
                 fitting.append((layout, turned))
-        if kind != "qpos" and width == root_width(body) + body.n_shape:
+        if kind != "qpos" and root is not None and width == root + body.n_shape:
             fitting.append((None, turned))
     if len({turned for _, turned in fitting}) > 1 and kind == "qpos":
         fitting = [each for each in fitting if _is_unit((values.T if each[1] else values)[:, 3:FREE_JOINT])]
@@ -130,7 +131,7 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
     if turned:
         values, rates = values.T, None if rates is None else rates.T
     if layout is None:
-        return _of_root(values, rates, where, body)
+        return _of_root(values, rates, where, body, root or 0)
     found = with_free_joint(layout, values, rates, body, names=names, order=order, labels=(kind, *labels), where=where)
     return found._replace(nameless=arrays.get("nameless", found.nameless))
 
@@ -212,9 +213,16 @@ def numbered_columns(columns: Mapping[str, Any], where: str) -> dict[str, list[s
     }
 
 
-def root_width(body: Body) -> int:
-    """Number of coordinates that move the base before those of the joints, in biorbd's order."""
-    return len(way_names(body.base_joints)) if body.base_joints else _ROOT
+def root_width(body: Body, kind: str) -> int | None:
+    """Number of coordinates that move the base before those of the joints; None where their order is not known.
+
+    A bioMod names them, and so does a file that moves its base by joints. `Q` of another body is biorbd's, which turns
+    about x, y and z; `q` would leave open in which order.
+    """
+    if body.base_joints:
+        return len(way_names(body.base_joints))
+    known = body.base_angles is not None and body.base_slides is not None if _is_biomod(body) else kind == "Q"
+    return _ROOT if known and (_is_biomod(body) or body.base_angles is None) else None
 
 
 def places_of(names: Sequence[str], body: Body) -> list[int]:
@@ -225,14 +233,13 @@ def places_of(names: Sequence[str], body: Body) -> list[int]:
     return [list(names).index(joint) for joint in body.joint_names]
 
 
-def _of_root(values: Array, rates: Any, where: str, body: Body) -> FloatingMotion:
+def _of_root(values: Array, rates: Any, where: str, body: Body, width: int) -> FloatingMotion:
     """Motion in biorbd's generalised coordinates: those of the root in the order of the body's file, the joints."""
     if body.ball_joints:
         raise TrajectoryError(
             f"{where}: Q of a model with quaternions is not read ({body.ball_joints[0]} has one); write columns by "
             "name, or q with the quaternion x y z w of each"
         )
-    width = root_width(body)
     root, joints = values[:, :width], values[:, width:]
     names = body.joint_names
     if _is_biomod(body):
@@ -307,25 +314,20 @@ def _misfit(
     count: int | None,
     order: str | None,
 ) -> str:
-    known = body.joint_names if names is None else tuple(names)
-    free, root = FREE_JOINT + len(known), root_width(body) + body.n_shape
-    counts = {"qpos": f"{free}, or {len(known)} without the free joint", "q": f"{free}, or {root} of biorbd's order"}
-    needed = counts.get(kind, f"{root}: three places, three angles and the joints")
-    said = f"{where}: {kind} has shape {values.shape}"
-    layout = MUJOCO_QPOS if kind == "qpos" else PINOCCHIO_Q
-    fits = [kind != "Q" and _free_columns(layout, width, names, body, order) is not None for width in values.shape]
-    rooted = [kind != "qpos" and width == root for width in values.shape]
-    samples = [values.shape[1 - k] for k in (0, 1) if fits[k] or rooted[k]]
-    if samples and count not in (None, *samples):
-        return f"{said}, {samples[0]} samples, and time has shape ({count},); store one time for each sample"
-    if kind == "q" and any(fits):
+    known, root = body.joint_names if names is None else tuple(names), root_width(body, kind)
+    said = f"{where}: {kind} has shape {values.shape}" + ("" if count is None else f", and there are {count} times")
+    if kind == "q" and any(_free_columns(PINOCCHIO_Q, width, names, body, order) for width in values.shape):
         return (
-            f"{said}, and neither its numbers 3 to 6 (Pinocchio: place, quaternion x y z w, joints) nor 0 to 3 (Drake: "
+            f"{said}; neither its numbers 3 to 6 (Pinocchio: place, quaternion x y z w, joints) nor 0 to 3 (Drake: "
             f"quaternion w x y z, place, joints) are a quaternion of length 1 in every sample; {_NAMES_THAT_SAY_IT}"
         )
+    counts = [] if kind == "Q" else [f"{FREE_JOINT + len(known)} with a free joint"]
+    counts += [f"{len(known)} without"] if kind == "qpos" else []
+    counts += [f"{root + body.n_shape} in biorbd's order"] if kind != "qpos" and root is not None else []
+    needed = " or ".join(counts) or "an unknown number"
     return (
-        f"{said}; with {len(known)} joints ({', '.join(known)}) a sample has {needed} coordinates. Store an array "
-        "'joint_names' with the names of the columns of the joints if there are others"
+        f"{said}; of {len(known)} joints ({', '.join(known)}) a sample has {needed} of coordinates; store an array "
+        f"'joint_names' if there are others, or {_NAMES_THAT_SAY_IT}"
     )
 
 

@@ -104,7 +104,7 @@ def of_numbered_columns(table: Table, body: Body, order: str | None) -> Table:
     numbered = numbered_columns(table.columns, table.where)
     taken = [label for labels in numbered.values() for label in labels]
     places = next((numbered[name] for name in ("qpos", "q", "Q") if name in numbered), [])
-    fewest = body.n_shape if "qpos" in numbered else root_width(body) + body.n_shape
+    fewest = body.n_shape + (0 if "qpos" in numbered else min(FREE_JOINT, root_width(body, "Q") or FREE_JOINT))
     if not places or len(places) < fewest or set(taken) & set(body.joint_names):
         return table
     for label in taken:
