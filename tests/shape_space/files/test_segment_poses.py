@@ -12,6 +12,7 @@ import shapephase as sp
 from shapephase.errors import IgnoredElementWarning, ShapeError, TrajectoryError, TrajectoryWarning
 from shapephase.shape_space.files import read_recorded_motion
 from support import segment_files
+from support.bodies import link, urdf
 from support.segment_files import COUNT, LINKS, THEIR_NAMES, TIMES, moved, own_axes
 
 ROUNDING = 1e-10
@@ -126,6 +127,21 @@ def test_a_calibration_pose_by_its_name_and_by_the_better_fit(tmp_path, body):
     assert "npose" in recorded.record["segments"]["calibration"]
     with pytest.raises(TrajectoryError, match=r"does not stand in its zero pose at tpose.*--calibration T"):
         read_recorded_motion(file, body, calibration="tpose")
+
+
+def test_a_pose_of_a_suit_in_other_axes_than_the_motion_is_no_calibration(tmp_path, body):
+    """`tpose-isb` has the places of the T-pose, and axes as the ISB recommends, which no other frame has."""
+    motion = moved()
+    turns, places = renamed(own_axes(motion)), renamed(motion.places)
+    others = {name: each @ Rotation.from_rotvec([0.0, 0.0, 1.5]).as_matrix() for name, each in turns.items()}
+    isb = next(
+        line for line in segment_files.mvnx_text(others, places, poses=("tpose-isb",)).splitlines() if "-isb" in line
+    )
+    text = segment_files.mvnx_text(turns, places).replace("<frames>", f"<frames>{isb}")
+    (tmp_path / "suit.mvnx").write_text(text, encoding="utf-8")
+    check(read_recorded_motion(tmp_path / "suit.mvnx", body), body, motion, ROUNDING)
+    with pytest.raises(TrajectoryError, match=r"'tpose-isb': a time is needed.*--calibration T"):
+        read_recorded_motion(tmp_path / "suit.mvnx", body, calibration="tpose-isb")
 
 
 def test_lengths_in_a_file_without_unit_are_those_of_the_body(tmp_path, body):
@@ -358,3 +374,54 @@ def test_the_binary_file_of_a_suit_says_what_to_export(tmp_path, body):
     (tmp_path / "take.mvn").write_bytes(b"\x00MVN")
     with pytest.raises(TrajectoryError, match="export it there as MVNX"):
         read_recorded_motion(tmp_path / "take.mvn", body)
+
+
+def test_a_body_whose_arms_hang_is_met_by_the_t_pose_of_a_suit(tmp_path, load_urdf):
+    """Zero where the arms hang as in the N-pose; a right angle about the axis to the front where they are held out."""
+    hanging = [link("Pelvis", 20.0, (0.3, 0.2, 0.2))]
+    names, places = ["Pelvis"], {"Pelvis": np.array([0.0, 0.0, 1.0])}
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        upper, lower = f"{side}UpperArm", f"{side}ForeArm"
+        hanging += [link(upper, 2.0, (0.02, 0.02, 0.002)), link(lower, 1.0, (0.01, 0.01, 0.001))]
+        for name, parent, child, xyz in (
+            (f"{side}Shoulder", "Pelvis", upper, f"0 {0.2 * sign} 0.5"), (f"{side}Elbow", upper, lower, "0 0 -0.3")
+        ):  # fmt: skip
+            hanging.append(
+                f'<joint name="{name}" type="spherical"><parent link="{parent}"/><child link="{child}"/>'
+                f'<origin xyz="{xyz}"/></joint>'
+            )
+        names += [upper, lower]
+        places |= {upper: np.array([0.0, 0.2 * sign, 1.5]), lower: np.array([0.0, 0.5 * sign, 1.5])}
+    lowered = np.linspace(0.0, 0.5 * np.pi, COUNT)
+    out = {name: np.tile(np.eye(3), (COUNT, 1, 1)) for name in names}
+    held = {name: np.tile(place, (COUNT, 1)) for name, place in places.items()}
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        upper, lower = f"{side}UpperArm", f"{side}ForeArm"
+        out[upper] = out[lower] = Rotation.from_euler("x", -sign * lowered[:, None]).as_matrix()
+        held[lower] = held[upper] + out[upper] @ [0.0, 0.3 * sign, 0.0]
+    file = tmp_path / "suit.mvnx"
+    file.write_text(segment_files.mvnx_text(out, held), encoding="utf-8")
+    body = load_urdf(urdf(*hanging))
+    shapes = read_recorded_motion(file, body).path.shape(TIMES)
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        shoulder = [body.joint_index(f"{side}Shoulder.{part}") for part in "xyzw"]
+        elbow = [body.joint_index(f"{side}Elbow.{part}") for part in "xyzw"]
+        turned = Rotation.from_quat(shapes[:, shoulder]).as_rotvec()
+        expected = np.outer(sign * (0.5 * np.pi - lowered), [1.0, 0.0, 0.0])
+        np.testing.assert_allclose(turned, expected, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(Rotation.from_quat(shapes[:, elbow]).magnitude(), 0.0, rtol=0, atol=ROUNDING)
+
+
+def test_two_poses_that_the_joints_do_not_tell_apart_are_asked_for(tmp_path, load_urdf):
+    """An upper arm without a forearm: nothing says whether it hangs in the body's zero pose or is held out."""
+    ball = '<joint name="arm" type="spherical"><parent link="{}"/><child link="{}"/><origin xyz="0 0.2 0.5"/></joint>'
+    pair = ("Pelvis", "LeftUpperArm")
+    body = load_urdf(urdf(*(link(name, 5.0, (0.1, 0.1, 0.05)) for name in pair), ball.format(*pair)))
+    turns = {name: np.tile(np.eye(3), (COUNT, 1, 1)) for name in pair}
+    places = {name: np.tile([0.0, 0.2 * k, 1.0 + 0.5 * k], (COUNT, 1)) for k, name in enumerate(pair)}
+    (tmp_path / "suit.mvnx").write_text(segment_files.mvnx_text(turns, places), encoding="utf-8")
+    with pytest.raises(TrajectoryError, match=r"both tpose and npose.*--calibration tpose"):
+        read_recorded_motion(tmp_path / "suit.mvnx", body)
+    with pytest.warns(TrajectoryWarning, match="axes of the room"):
+        recorded = read_recorded_motion(tmp_path / "suit.mvnx", body, calibration="tpose")
+    np.testing.assert_allclose(recorded.path.shape(TIMES), np.tile([0.0, 0.0, 0.0, 1.0], (COUNT, 1)), atol=ROUNDING)

@@ -21,7 +21,7 @@ from .bvh_text import Bone, BvhFaultError, Skeleton
 _NORMAL = "normal"
 """Type of a frame of the motion; every other type is a calibration pose."""
 _STANDING = ("tpose", "npose", "identity")
-"""Calibration poses in which a person can be laid out, the best one first."""
+"""Calibration poses, the best one to lay out a person first; others, as `tpose-isb`, have axes of their own."""
 _ON_TIME = 2e-3
 """[s] Times are whole milliseconds; frames nearer to index / frame rate are there."""
 _OFF_UNIT = 1e-3
@@ -131,7 +131,9 @@ class _Reader:
             ) from None
         if not self.segments:
             raise self.fault("no <segments>; export the file again, with orientation and position of the segments")
-        stands = {frame.kind: self._poses([frame]) for frame in self.frames if frame.kind != _NORMAL and frame.numbers}
+        stands = {
+            frame.kind: self._poses([frame]) for frame in self.frames if frame.kind in _STANDING and frame.numbers
+        }
         frames = [frame for frame in self.frames if frame.kind == _NORMAL]
         return Suit(
             segments=tuple(self.segments),

@@ -29,6 +29,8 @@ SHORT = 0.02
 MOST_OFF_WAY = np.radians(20.0)
 """[rad] From the way between two joints to the body's: people are not straight; arms hanging or held out differ by 90
 degrees."""
+_OTHER_POSE = np.radians(45.0)
+"""[rad] A segment that is turned by more between two calibration poses belongs to two different postures."""
 _FLAT = 1e-4
 """Share of the largest singular value, below which points are on one line."""
 _THOUSAND = (500.0, 2000.0)
@@ -185,10 +187,18 @@ class Links:
         fit = fits[kind]
         if fit.off > MOST_OFF_WAY:
             raise TrajectoryError(
-                f"{self.where}: the body does not stand in its zero pose at {kind}: the way {fit.worst} is "
-                f"{np.degrees(fit.off):.0f} deg off; up to {np.degrees(MOST_OFF_WAY):.0f} deg are taken. Give a time "
-                "at which it does: calibration=T (--calibration T)"
+                f"{self.where}: the body does not stand in its zero pose at {' or '.join(stands)}: the way "
+                f"{fit.worst} is {np.degrees(fit.off):.0f} deg off, and {np.degrees(MOST_OFF_WAY):.0f} deg are the "
+                "most. Give a time at which it does: calibration=T (--calibration T)"
             )
+        for other in (each for each in fits if fits[each].off <= MOST_OFF_WAY):
+            apart = so3.angle(so3.transpose(fits[other].calibration.turns) @ fit.calibration.turns)
+            if apart.max() > _OTHER_POSE:
+                raise TrajectoryError(
+                    f"{self.where}: both {kind} and {other} may be the zero pose of {self.body.name}, and "
+                    f"{self.frames[int(np.argmax(apart))].link} is turned by {np.degrees(apart.max()):.0f} deg between "
+                    f"them; say which: calibration={kind!r} (--calibration {kind})"
+                )
         axes = "as the joints lie" if fit.by_origins else "the room's, as the joints do not tell them"
         record["calibration"] = f"zero pose at {kind}, axes of the base {axes}"
         record["calibration_off_deg"] = float(np.degrees(fit.off))

@@ -19,6 +19,12 @@ from .._recording import SegmentPoses, Table
 
 _QUATERNION = re.compile(r"(?P<segment>.+?)(?:_q|_quat_?|\.q|[./]orientation[./])(?P<part>[xyzw])", re.DOTALL)
 _PLACE = re.compile(r"(?P<segment>.+?)(?:_p?|_pos_?|\.p?|[./]position[./])(?P<part>[xyz])", re.DOTALL)
+_TPOSE = "tpose"
+"""Calibration pose of a suit, arms held out."""
+_NPOSE = "npose"
+"""The same, arms hanging."""
+_ARM = ("UpperArm", "ForeArm", "Hand")
+"""Segments of a suit's arm behind their side, from the shoulder on."""
 _KINEMATICS = ("X", "Y", "Z", "Ox", "Oy", "Oz")
 """Columns of a body in OpenSim's BodyKinematics, behind its name: centre of mass, and angles about x, y, z as each
 turn before has left them."""
@@ -40,6 +46,9 @@ def read_mvnx(where: Path, data: bytes) -> Table:
         suit = read_suit(data)
     except BvhFaultError as error:
         raise TrajectoryError(f"{where}: line {error.line}: {error}") from None
+    stands = {kind: (poses.turns[0], poses.origins[0]) for kind, poses in suit.stands.items()}
+    if _TPOSE in stands and _NPOSE not in stands:
+        stands[_NPOSE] = _with_arms_down(suit.segments, *stands[_TPOSE])
     return Table(
         where=str(where),
         format="MVNX",
@@ -53,10 +62,26 @@ def read_mvnx(where: Path, data: bytes) -> Table:
             names=suit.segments,
             turns=suit.motion.turns,
             origins=suit.motion.origins,
-            stands={kind: (poses.turns[0], poses.origins[0]) for kind, poses in suit.stands.items()},
+            stands=stands,
             of_model="mvnx",
         ),
     )
+
+
+def _with_arms_down(names: tuple[str, ...], turns: Array, origins: Array) -> tuple[Array, Array]:
+    """The N-pose that belongs to a T-pose: arms lowered by a right angle about the pelvis's x axis, which is forward.
+
+    Turns (k, 3, 3) and origins (k, 3). Source: MVN User Manual (Xsens), calibration poses.
+    """
+    turns, origins = turns.copy(), origins.copy()
+    for side, angle in (("Left", -0.5 * np.pi), ("Right", 0.5 * np.pi)):
+        arm = [names.index(f"{side}{part}") for part in _ARM if f"{side}{part}" in names]
+        if not arm or "Pelvis" not in names:
+            continue
+        down = so3.exp(angle * turns[names.index("Pelvis")][:, 0])
+        shoulder = origins[arm[0]]
+        turns[arm], origins[arm] = down @ turns[arm], shoulder + (origins[arm] - shoulder) @ down.T
+    return turns, origins
 
 
 def body_kinematics(table: Table, kind: str) -> Table:
