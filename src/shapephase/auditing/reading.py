@@ -79,7 +79,7 @@ def read_trajectory(
     order = None if table.nameless is None else f"{table.nameless.title}: {', '.join(table.nameless.names)}"
     try:
         whole = table.simulated is not None and set(body.joint_names) <= set(table.columns)
-        if whole and table.simulated is not None and table.base_quat_xyzw is not None and not names:
+        if whole and table.simulated is not None and table.base_quat_xyzw is not None and names is None:
             times = table.times
             if times is None:
                 recording = recording_of(table, body.joint_names, {}, None, timestep, None)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import (
     breaks_argument,
+    check_flag,
     check_function,
     check_time_steps,
     names_argument,
@@ -164,6 +165,7 @@ class ShapePath:
         t, r, balls = _samples(times, shapes, joint_names)
         factors = factors_between(r[-1], r[0], balls)
         closes = _closes(r[-1], r[0] * factors) and len(t) > 2
+        check_flag(periodic, "periodic", allow_none=True)
         if periodic and not closes:
             joint = int(np.argmax(np.abs(r[-1] - r[0])))
             raise TrajectoryError(

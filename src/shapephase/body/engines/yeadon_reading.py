@@ -67,7 +67,7 @@ def chain_of(path: str) -> Chain:
     limits = dict(zip(human.CFGnames, human.CFGbounds, strict=True))
     _configure(human, {})
     parts = {part.label.split(":")[0]: part for part in human.segments}
-    chain = Chain(Path(path).stem, notes=notes)
+    chain = Chain(Path(path).stem, notes=list(notes))
     for key in (_ROOT, *_JOINTS):
         part = parts[key]
         if not (math.isfinite(part.mass) and part.mass > 0.0):

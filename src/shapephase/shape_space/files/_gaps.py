@@ -63,7 +63,7 @@ class Gaps:
         for label in labels:
             self.held(table, label)
         together = np.logical_or.reduce([self._missing[label] for label in labels])
-        self._missing |= dict.fromkeys(labels, together)
+        self._missing.update(dict.fromkeys(labels, together))
 
     def bridged(self, labels: Sequence[str], values: Array) -> Array:
         """Values (N, ...) of joined columns, in their gaps those of the cubic spline through the others."""

@@ -329,7 +329,7 @@ def _check_meant(left_out: Mapping[str, str], body: Body, recording: Recording, 
     Where nothing is left out but what the caller has named, as in a file of the base alone, they do rest.
     """
     table = recording.table
-    others = [repr(text) for text in left_out if text in table.columns and text not in choices.names]
+    others = [repr(text) for text, why in left_out.items() if why == _NO_JOINT]
     if not others:
         return
     more = f" and {len(others) - _MOST_SHOWN} more" if len(others) > _MOST_SHOWN else ""

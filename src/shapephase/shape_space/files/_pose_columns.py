@@ -90,14 +90,10 @@ def _part(target: str) -> _Part | None:
         return _Part(EULER, tuple(before), _EULER[last]) if _is_base(before, rooted) else None
     if last not in (*"wxyz", *"01234"):
         return None
-    while before and before[-1] not in _KIND_OF and _FRAME.fullmatch(before[-1]) and len(before) > 1:
-        before.pop()
-    kind = _KIND_OF.get(before[-1]) if before else None
-    if kind is None:
-        return _Part(PLACE, tuple(before), last) if last in "xyz" and set(before) <= _BASE else None
-    if kind == VECTOR and before[-2:-1] == ["vector"]:
-        before.pop()
-    return _Part(kind, tuple(before), last) if _is_base(before[:-1], rooted) else None
+    for k, word in enumerate(before):
+        if word in _KIND_OF and all(map(_FRAME.fullmatch, before[k + 1 :])):
+            return _Part(_KIND_OF[word], tuple(before), last) if _is_base(before[:k], rooted) else None
+    return _Part(PLACE, tuple(before), last) if last in "xyz" and set(before) <= _BASE else None
 
 
 def _is_base(before: Iterable[str], rooted: bool) -> bool:

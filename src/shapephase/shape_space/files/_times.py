@@ -149,8 +149,8 @@ def _timed(table: Table, column: str | None, unit: str | None, timestep: float |
     clock = table.columns[column]
     epoch = _unit_since_1970(clock) if unit is None and said is None else None
     size = IN_A_SECOND[unit or said or epoch or "s"]
-    # Whole nanoseconds since 1970 are more than a double holds: their start is taken off before they become one.
-    times = (clock - clock[0]) / size if clock.dtype.kind == "i" else clock / size
+    # In seconds, times since 1970 have seven digits behind the point: their start is taken off in their own unit.
+    times = clock / size if size == 1.0 else (clock - clock[0]) / size
     table = replace(table, columns=columns, times=times, clock=clock)
     return table, unit or said or epoch or "s", unit is None and said is None and epoch is None
 

@@ -247,7 +247,7 @@ def read_recorded_motion(
     if joint_order is not None:
         check_choice(joint_order, "joint_order", WORDS)
     said = _names_argument(names)
-    given, step = read_input(file, body, topic, timestep, joint_order, said if isinstance(said, Mapping) else None)
+    given, step = read_input(file, body, topic, timestep, joint_order, said)
     segments = SegmentChoices(names=said or {}, calibration=calibration, length_tolerance=length_tolerance)
     table, said = without_segments(given.table, body, segments, time_unit, step)
     if joint_order is not None and table.nameless is None:
@@ -476,12 +476,14 @@ def _check_rows(path: ShapePath, times: Array) -> None:
         )
 
 
-def _names_argument(names: Any) -> Any:
+def _names_argument(names: Any) -> Mapping[str, str | None] | None:
     """What a caller says of names, with files read, and a sequence of names as those of columns by their numbers."""
     if isinstance(names, str | os.PathLike):
         return read_names(names)
-    if isinstance(names, Sequence):
+    if isinstance(names, list | tuple):
         return {str(number): name for number, name in enumerate(names, start=1)}
+    if names is not None and not isinstance(names, Mapping):
+        raise ShapeError(f"names: a mapping, name in the file -> joint, is needed, got {what_came(names)}")
     return names
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...arguments import check_file_name
+from ...arguments import check_file_name, check_text
 from ...errors import TrajectoryError, unknown_name
 from ._recording import file_bytes
 from .formats.spreadsheets import read_excel, read_feather, read_parquet
@@ -62,6 +62,8 @@ def read_table(file: str | os.PathLike[str], *, topic: str | None = None) -> pd.
     3   0.5   0.2
     """
     check_file_name(file, "file")
+    if topic is not None:
+        check_text(topic, "topic", "a name")
     where, data = unpacked(Path(file), file_bytes(Path(file)))
     suffix = where.suffix.lower()
     if suffix not in TABLES:

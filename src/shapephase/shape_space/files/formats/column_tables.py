@@ -145,7 +145,7 @@ def _dates(entries: Sequence[Any], place: str) -> Array | None:
             raise TrajectoryError(
                 f"{place}: {error!s:.120}; write all times as {first.strip()!r:.40}, or in seconds"
             ) from None
-        return _seconds(made.tz_localize(None).to_numpy() if dated else made.to_numpy())
+        return _seconds(np.asarray(made - made[0]))
     if not entries or not isinstance(first, datetime.timedelta | datetime.time | datetime.datetime):
         return None
     if all(isinstance(entry, datetime.timedelta) for entry in entries):

@@ -132,7 +132,7 @@ def _stamped(columns: list[tuple[str, Any]], rate: float | None) -> list[tuple[s
             seconds, nano = by_name[name], by_name[other]
             if seconds.dtype.kind in "iu" and nano.dtype.kind in "iu":
                 left = [pair for pair in columns if pair[0] not in (name, other)]
-                return [(f"{name.removesuffix(whole).rstrip('._/')} time [ns]".strip(), seconds * _NANO + nano), *left]
+                return [("time [ns]", seconds * _NANO + nano), *left]
     return columns
 
 

@@ -29,6 +29,7 @@ _SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)
 _COMMA_ENTRY = rb"\s*([-+]?\d*,\d+(?:,\d+)*(?:[eE][-+]?\d+)?)\s*"
 _PLAIN = re.compile(rb'(?:^|[;\t\n"])' + _COMMA_ENTRY + rb'(?=[;\t\n"]|$)')
 _QUOTED = re.compile(rb'(?:^|[,\n])\s*"' + _COMMA_ENTRY + rb'"(?=\s*[,\n]|$)')
+_POINT = re.compile(rb"\d\.\d")
 _THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(?:,\d{3})+")
 _GAPS = ["", "nan", "NaN", "NAN", "-nan", "-NaN"]
 """Entries that are gaps; any other word is a fault."""
@@ -85,7 +86,7 @@ def read_text(
     frame = _parsed(body, names, layout.delimiter, comma=comma)
     frame.index = lines
     empty = frame.isna().all(axis=1).to_numpy()
-    frame = frame[~empty] if empty.any() else frame
+    frame = frame.loc[~empty] if empty.any() else frame
     kind = "TSV" if where.suffix.lower() == ".tsv" else "CSV"
     frame.attrs = {"format": kind, "units": layout.units, "comma": comma, "numbered": layout.numbered}
     if layout.rate is not None:
@@ -148,7 +149,7 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 
 def _delimiter(line: str, where: Path) -> str:
-    unquoted = re.sub(r'"[^"]*"', "", line)
+    unquoted = re.sub(r'"[^"]*"', "name", line)
     found = [mark for mark in _DELIMITERS if mark in unquoted.strip(" ")]
     if where.suffix.lower() == ".tsv" and found != ["\t"]:
         raise TrajectoryError(f"{where}: the columns of a .tsv file are separated by tabs; it begins {line!r:.80}")
@@ -171,8 +172,11 @@ def _has_decimal_commas(body: bytes, layout: _Layout, where: Path) -> bool:
         return False
     if layout.delimiter == BLANKS:
         return any(COMMA_NUMBER.fullmatch(word) for word in body[:_HEAD_BYTES].decode(errors="replace").split())
+    entry, head = _QUOTED if layout.delimiter == "," else _PLAIN, body[:_HEAD_BYTES]
+    if len(entry.findall(head)) < len(_POINT.findall(head)):
+        return False
     doubtful = None
-    for found in (_QUOTED if layout.delimiter == "," else _PLAIN).finditer(body):
+    for found in entry.finditer(body):
         if found[1].count(b",") == 1 and not _THOUSANDS.fullmatch(found[1]):
             return True
         doubtful = doubtful or found
