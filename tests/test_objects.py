@@ -30,8 +30,9 @@ MOMENTUM = (0.01, 0.02, 0.03)
 INNER = ("deformation.frames", "shape_space.body_path", "plotting.plot_style", "optimal_control.task",
          "optimal_control.symbolic", "body.appearance", "examples.slow_deformation.first_loop",
          "shape_space.connection.connection_slopes", "shape_space.closing_arc", "plotting.pages",
-         "shape_space.path_samples", "shape_space.path_series", "shape_space.files.formats", "phases.split_text", "phases.momentum_curve",
-         "body.engines", "shape_space.unit_doubts", "dynamics.moving_body",
+         "shape_space.path_samples", "shape_space.path_series", "shape_space.files.formats", "phases.split_text",
+         "phases.momentum_curve", "body.engines", "shape_space.unit_doubts", "shape_space.knot_crossings",
+         "dynamics.moving_body",
          "deformation.deformation.deformation_along",
          "optimal_control.extremals.hamiltonian.checked_metric",
          "optimal_control.extremals.hamiltonian.natural_scales")  # fmt: skip

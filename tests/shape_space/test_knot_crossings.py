@@ -8,7 +8,7 @@ import pytest
 import shapephase as sp
 from shapephase.body import Coupling
 from shapephase.errors import ShapeError
-from shapephase.shape_space.knot_crossings import route_along
+from shapephase.shape_space.body_path import route_along
 from support.coupled_bodies import KNOTS, LEG, TURN, TURNS, bounded, by_hand, couplings
 from support.long_runs import full_but
 

@@ -65,7 +65,7 @@ def split_command(
     from ..phases.phases import running_phases, split
     from ..phases.split_text import split_lines, wrapped
     from ..phases.whole_turns import turn_counts
-    from ..shape_space.body_path import path_gap
+    from ..shape_space.body_path import in_joint_order, path_gap
     from . import motion as motions
     from .texts.error_bar_text import error_bar_data, error_bar_lines, error_bars, joint_noise
     from .texts.recording_text import fit_data, fit_lines, recording_data, recording_lines
@@ -117,8 +117,7 @@ def split_command(
             )
             say_written(html)
     turns = turn_counts(flown.motion, result)
-    names = flown.body.joint_names
-    gap = path_gap(flown.body, flown.path.matched(names, flown.body.name))
+    gap = path_gap(flown.body, in_joint_order(flown.body, flown.path))
     open_by = "" if result.is_loop else f"{gap_text(flown.body, gap)} from its start"
     text = [
         *split_lines(result, split_heading(flown.body, motion, flown.motion), open_by),

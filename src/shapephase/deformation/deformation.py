@@ -31,11 +31,10 @@ from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler
 from ..letters import what_came
 from ..refinement import least_over
-from ..shape_space.body_path import path_gap
+from ..shape_space.body_path import path_gap, users_route_along
 from ..shape_space.family_variants import FamilyVariants
 from ..shape_space.scan.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
-from ..shape_space.unit_doubts import followed_by
 from ._card import deformation_card
 from ._physical_validity import check_never_on_a_line, check_triangle
 from .descriptions import (
@@ -91,12 +90,17 @@ class Deformation:
     __repr__, _repr_html_ = card_text, card_html
     _card = deformation_card
 
-    @cached_property
+    @property
     def breaks(self) -> Array:
         """Times between which all is smooth, those that the scan found among them: (M,), first 0, last `duration` [s].
 
         Raises and warns as `scan`.
         """
+        return self._scanned_breaks
+
+    @cached_property
+    def _scanned_breaks(self) -> Array:
+        """The declared breaks and those found: the step in which functions of a user are looked at."""
         scan = self.scan
         if scan is None or not len(scan.found_breaks):
             return self.declared_breaks
@@ -203,12 +207,12 @@ class Deformation:
         return -least, when
 
     def sampler(self) -> Sampler:
-        """A fresh sampler for the integrator.
+        """A fresh sampler for the integrator, after a look at the functions of time that a user gave.
 
-        Raises SingularInertiaError for particles that are on one line at some time.
+        Raises SingularInertiaError for particles that are on one line at some time; raises and warns as `scan`.
         """
         known = self.description
-        return Sampler(known.sample, known.smoothness(self.breaks), known.channels)
+        return Sampler(known.sample, known.smoothness(self._scanned_breaks), known.channels)
 
     def step_limits(self) -> StepLimits:
         """The longest steps of an integrator that evaluates the deformation itself, in any gauge."""
@@ -339,18 +343,18 @@ def articulated(
         check_object(path, "ShapePath", "path")
         if momenta or speeds:
             raise ShapeError("rotors are those of one body; take one of the family, family[0]")
-        return DeformationFamily(body, followed_by(body.body, path))
+        return DeformationFamily(body, users_route_along(body.body, path))
     check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     if isinstance(body, ParticleBody):
         if momenta or speeds:
             raise ShapeError("rotors are wheels of links; a body of particles has none")
-        route = followed_by(body, path)
+        route = users_route_along(body, path)
         return particles(body.masses, ParticlesAlong(body, route), route.duration, route.breaks)
     wheels = rotors_argument(body, momenta, speeds)
     if wheels:
         path = widened_path(body, path, tuple(wheel.joint for wheel in wheels))
-    return deformation_along(body, followed_by(body, path), wheels)
+    return deformation_along(body, users_route_along(body, path), wheels)
 
 
 def deformation_along(body: Body, route: ShapePath, wheels: tuple[Rotor, ...] = ()) -> Deformation:

@@ -10,8 +10,8 @@ from .. import so3
 from ..arguments import check_object
 from ..body.body import Body
 from ..errors import AccuracyNotReached, unknown_name
+from ..shape_space.body_path import route_along
 from ..shape_space.connection import mechanical_connection
-from ..shape_space.knot_crossings import route_along
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 

@@ -11,7 +11,7 @@ from ..arrays import Array, Mask
 from ..deformation.deformation import deformation_along
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ..shape_space.knot_crossings import route_along
+from ..shape_space.body_path import route_along
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits, shortest_duration

@@ -12,7 +12,7 @@ from ..arrays import Array, Mask
 from ..deformation.deformation import deformation_along
 from ..errors import TrajectoryError, unknown_name
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ..shape_space.knot_crossings import route_along
+from ..shape_space.body_path import route_along
 from ..shape_space.shape_path import ShapePath
 from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits

@@ -22,6 +22,7 @@ from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits
 from ..phases.whole_turns import turn_counts
 from ..provenance import provenance
 from ..reconstruction.reconstruction import Motion
+from ..shape_space.body_path import in_joint_order
 from ..shape_space.path_noise import path_errors, stated_noise
 from ..shape_space.shape_path import ShapePath
 from ..shape_space.summaries import body_summary, path_summary
@@ -227,7 +228,7 @@ def joint_rows(body: Body, path: ShapePath, noise: Array | None = None) -> list[
 
 def _rate_bars(body: Body, path: ShapePath, times: Array, noise: Array | None) -> Array | None:
     """Of each joint's rate at its own time: (n,); None where they are not known."""
-    route = path.matched(body.joint_names, body.name)
+    route = in_joint_order(body, path)
     if noise is None and stated_noise(route) is None:
         return None
     try:

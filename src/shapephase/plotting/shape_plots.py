@@ -13,6 +13,7 @@ from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, unknown_name
 from ..letters import what_came
+from ..shape_space.body_path import in_joint_order
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
@@ -230,7 +231,7 @@ def plot_curvature(
     i, j = _pair(joints, names)
     points = None
     if path is not None:
-        points = path.matched(names, body.name).shape(even_times(path, None))[:, [i, j]]
+        points = in_joint_order(body, path).shape(even_times(path, None))[:, [i, j]]
     rows = [
         _row(values, body, k, None if points is None else points[:, n], label)
         for n, (values, k, label) in enumerate(((first, i, "first"), (second, j, "second")))
@@ -410,7 +411,7 @@ def _row(values: ArrayLike | None, body: Body, joint: int, points: Array | None,
 def _named(path: ShapePath, body: Body | None) -> tuple[ShapePath, tuple[str, ...], tuple[str, ...]]:
     """The path in the body's order, names and units of its columns."""
     if body is not None:
-        return path.matched(body.joint_names, body.name), body.joint_names, body.joint_units
+        return in_joint_order(body, path), body.joint_names, body.joint_units
     names = path.joint_names or tuple(f"joint {k}" for k in range(path.n_shape))
     return path, names, ("rad or m",) * path.n_shape
 

@@ -197,7 +197,7 @@ METHODS = tuple(SOLVERS)
 
 def check_pieces(deformation: Deformation) -> None:
     """Raise TrajectoryError, before any memory is taken, for a recording that is too long."""
-    pieces = (len(deformation.breaks) - 1) // deformation.loops
+    pieces = (len(deformation.declared_breaks) - 1) // deformation.loops
     if pieces > _MOST_PIECES:
         raise TrajectoryError(
             f"a motion in {pieces} pieces, as a recording of as many samples has; up to {_MOST_PIECES} are integrated "

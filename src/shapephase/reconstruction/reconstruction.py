@@ -447,7 +447,6 @@ def reconstruct(
     spatial, start = initial_state_arguments(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
     with watched(progress):
-        # Whoever watches sees the look at a path, which its breaks may take.
         check_pieces(deformation)
         solution, evaluations = SOLVERS[method](deformation, at_start.reshape(-1, 3), goal, workers)
     return Motion(

@@ -1,10 +1,11 @@
-"""A shape path as the motion of a particular body: where it closes, and how the integrator samples it."""
+"""A shape path as the motion of a particular body: its columns in order, where it closes, how it is sampled."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from .. import so3
+from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.particles.point_masses import ParticleBody
@@ -12,7 +13,31 @@ from ..errors import OpenPathError
 from ..integrator import machine_code
 from ..integrator.link_tree import tree_channels
 from ..integrator.sampling import Sampler
+from .knot_crossings import with_crossings
 from .shape_path import CLOSED, ShapePath
+from .unit_doubts import warn_of_degrees
+
+
+def in_joint_order(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
+    """Return the path with its columns in the order of the body's joints. Raises as `ShapePath.matched`."""
+    check_object(body, "Body", "body", or_kind="ParticleBody")
+    check_object(path, "ShapePath", "path")
+    return path.matched(body.joint_names, body.name)
+
+
+def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
+    """Return the path in the order of the body's joints, with breaks where the body's motion is less smooth.
+
+    Raises as `in_joint_order` and `with_crossings`.
+    """
+    return with_crossings(body, in_joint_order(body, path))
+
+
+def users_route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
+    """Return the same of a path that a user gave. Warns as `warn_of_degrees`."""
+    route = route_along(body, path)
+    warn_of_degrees(body, route)
+    return route
 
 
 def path_gap(body: Body | ParticleBody, path: ShapePath) -> Array:

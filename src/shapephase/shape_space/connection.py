@@ -18,10 +18,9 @@ from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.stepped import SteppedRotation
-from .body_path import check_closed, path_sampler
+from .body_path import check_closed, path_sampler, users_route_along
 from .path_series import evenly_divided, panel_edges
 from .shape_path import CLOSED, ShapePath
-from .unit_doubts import followed_by
 
 # Points of the Gauss rule on a panel: they resolve a curvature that swings a few times there.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(16)
@@ -160,7 +159,7 @@ def holonomy(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9
     check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
-    route = followed_by(body, path)
+    route = users_route_along(body, path)
     return _lift_of_loop(body, route, goal).end[0]
 
 
@@ -244,7 +243,7 @@ def horizontal_lift(body: Body | ParticleBody, path: ShapePath, tolerance: float
     check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
-    route = followed_by(body, path)
+    route = users_route_along(body, path)
     return HorizontalLift(body, route, _lift(body, route, goal))
 
 
@@ -304,7 +303,7 @@ def holonomy_derivative(
     check_object(path, "ShapePath", "path")
     check_function(variation, "variation", "a function of times that gives changes of shape (N, m, n)")
     goal = tolerance_argument(tolerance)
-    route = followed_by(body, path)
+    route = users_route_along(body, path)
     lift = _lift_of_loop(body, route, goal)
     ends = np.array([0.0, route.duration])
     at_ends = _variation_at(variation, ends, body.n_shape)

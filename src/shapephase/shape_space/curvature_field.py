@@ -19,9 +19,8 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import Sampler
 from ..letters import what_came
-from .body_path import check_closed
+from .body_path import check_closed, route_along
 from .connection import connection_slopes
-from .knot_crossings import route_along
 from .shape_path import CLOSED, ShapePath
 
 _EPS = float(np.finfo(float).eps)

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.ball_joints import BallJoint
@@ -30,14 +29,14 @@ _WHOLE = 1e-9
 """[rad or m] by which a loop may end elsewhere and still be one."""
 
 
-def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
-    """The path with its columns in the order of the body's joints, and breaks where the body's motion is less smooth.
+def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
+    """Return a path, its columns in the order of the body's joints, with breaks where the body's motion is less smooth.
 
-    Raises as `ShapePath.matched`.
+    Raises
+    ------
+    TrajectoryError
+        If a spline goes from a quaternion of a ball joint to one of the other sign.
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
-    route = path.matched(body.joint_names, body.name)
     if isinstance(body, ParticleBody):
         return route
     follows = body.chain.follows

@@ -16,8 +16,7 @@ from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError, WrongObjectError
 from ..integrator.many_rotations import rotations_of_each
 from ..letters import what_came
-from .body_path import path_sampler
-from .knot_crossings import route_along
+from .body_path import path_sampler, route_along
 from .shape_path import ShapePath
 
 

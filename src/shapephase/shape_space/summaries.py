@@ -13,10 +13,9 @@ from ..body.body import Body
 from ..body.couplings.coupling import described
 from ..display import short_repr
 from ..inertia_tensor import principal_axes, triangle_defect
-from .body_path import path_gap
+from .body_path import path_gap, users_route_along
 from .path_series import joint_extremes, times_of_fastest
 from .shape_path import CLOSED, ShapePath
-from .unit_doubts import followed_by
 
 _KINDS = {"rad": "revolute", "m": "prismatic", "1": "ball"}
 
@@ -210,8 +209,7 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
     (1.0, True)
     """
     check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
-    route = followed_by(body, path)
+    route = users_route_along(body, path)
     lowest, highest, fastest = joint_extremes(route)
     lower, upper = body.joint_limits.T
     # A joint that is driven up to its limit is not beyond it, whatever rounding has done to the samples.

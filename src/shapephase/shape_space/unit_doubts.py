@@ -11,7 +11,6 @@ from ..body.body import Body
 from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryWarning
 from .curves import Fourier, PiecewisePolynomial
-from .knot_crossings import route_along
 from .path_series import evenly_divided, panel_edges
 from .shape_path import ShapePath
 
@@ -36,22 +35,17 @@ def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool
     return far and factor * lowest >= lower - room and factor * highest <= upper + room
 
 
-def followed_by(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
-    """As `route_along`.
+def warn_of_degrees(body: Body | ParticleBody, path: ShapePath) -> None:
+    """Warn where the angles of a path, its columns in the order of the body's joints, look like degrees.
 
     Warns
     -----
     TrajectoryWarning
-        Where angles look like degrees: a joint goes more than half a turn beyond its limits, and in degrees all would
-        stay within theirs. Of a recording this was asked when it was read.
+        If a joint goes more than half a turn beyond its limits, and in degrees all would stay within theirs. A
+        recording is asked for its unit when it is read, and no more here.
     """
-    route = route_along(body, path)
-    if route.record is None and _farthest(route) > _HALF_TURN:
-        _ask_of_degrees(body, route)
-    return route
-
-
-def _ask_of_degrees(body: Body | ParticleBody, path: ShapePath) -> None:
+    if path.record is not None or _farthest(path) <= _HALF_TURN:
+        return
     times = _looked_at(path)
     shapes, _ = path.curve(times)
     limited = np.isfinite(body.joint_limits).all(axis=1) & (np.array(body.joint_units) == "rad")

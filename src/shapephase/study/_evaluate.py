@@ -25,6 +25,7 @@ from ..integrator import machine_code
 from ..letters import printable
 from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.body_path import in_joint_order
 from ..shape_space.many_paths import final_attitudes
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
@@ -239,7 +240,7 @@ class Evaluator:
         key = _path_key(case)
         if key not in self._paths:
             self._paths.clear()
-            path = made_path(case.motion, body, case.parameters).matched(body.joint_names, body.name)
+            path = in_joint_order(body, made_path(case.motion, body, case.parameters))
             if path.sha256 is not None:
                 self._check("motion", str(case.motion), path.sha256)
             self._paths[key] = path

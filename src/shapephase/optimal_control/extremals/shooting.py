@@ -12,8 +12,8 @@ from ...arguments import check_object, tolerance_argument
 from ...arrays import Array
 from ...body.body import Body
 from ...errors import AccuracyNotReached, ShapeError
+from ...shape_space.body_path import route_along
 from ...shape_space.connection import horizontal_lift
-from ...shape_space.knot_crossings import route_along
 from ...shape_space.shape_path import ShapePath
 from ..casadi_calls import call_casadi
 from .extremal import Extremal, extremal

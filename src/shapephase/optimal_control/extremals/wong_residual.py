@@ -14,8 +14,8 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
+from ...shape_space.body_path import route_along
 from ...shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
-from ...shape_space.knot_crossings import route_along
 from ...shape_space.shape_path import ShapePath
 from ..casadi_calls import call_casadi
 from ..task import joint_coupling

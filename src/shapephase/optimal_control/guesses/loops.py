@@ -11,8 +11,8 @@ from ...arrays import Array
 from ...deformation.deformation import deformation_along
 from ...errors import PlanNotFound, ShapePhaseError
 from ...reconstruction.reconstruction import Motion, reconstruct
+from ...shape_space.body_path import route_along
 from ...shape_space.connection import curvature, mechanical_connection
-from ...shape_space.knot_crossings import route_along
 from .._spline_basis import SplineBasis
 from .._via_rows import bent_through, nearest_places
 from ..symbolic import symbolic_body

@@ -16,9 +16,8 @@ from ...body.body import Body
 from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
-from ..body_path import check_closed
+from ..body_path import check_closed, in_joint_order, route_along
 from ..connection import integral, mechanical_connection
-from ..knot_crossings import route_along
 from ..path_series import panel_edges, turn_of_a_loop
 from ..shape_path import ShapePath
 
@@ -82,8 +81,7 @@ class MinimumPerturbation:
 
     def along(self, path: ShapePath) -> Callable[[Array], tuple[Array, Array]]:
         """The frame in time, for `in_gauge`: times (N,) -> U (N, 3, 3) and its body rates (N, 3) [rad/s]."""
-        check_object(path, "ShapePath", "path")
-        route = path.matched(self.body.joint_names, self.body.name)
+        route = in_joint_order(self.body, path)
 
         def frames(times: Array) -> tuple[Array, Array]:
             shapes, rates = route.curve(times)
@@ -106,7 +104,6 @@ class MinimumPerturbation:
         AccuracyNotReached
             If the integral still changes, as where the joints go far beyond the region of the frame.
         """
-        check_object(path, "ShapePath", "path")
         route = route_along(self.body, path)
         check_closed(self.body, route)
 
