@@ -65,16 +65,19 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
     """
     where = Path(path)
     if "\0" in str(where):
-        raise InputFileNotFoundError(f"{str(where)!r}: a path has no zero bytes")
+        raise InputFileNotFoundError(f"{str(where)!r}: a path has no zero bytes; give its name as it is on disk")
     try:
         if where.is_file():
             return where.read_bytes()
-        kind = "no regular file" if where.exists() else "there is no such file"
-        raise InputFileNotFoundError(f"{where}: {'is a folder, not a file' if where.is_dir() else kind}")
+        kind = "no regular file" if where.exists() else f"there is no such file; look for it with: ls {where.parent}"
+        folder = "is a folder, not a file; name the file in it"
+        raise InputFileNotFoundError(f"{where}: {folder if where.is_dir() else kind}")
     except InputFileNotFoundError:
         raise
     except OSError as error:
-        raise InputFileNotFoundError(f"{quoted(str(where))}: cannot be read ({error.strerror})") from None
+        raise InputFileNotFoundError(
+            f"{quoted(str(where))}: cannot be read ({error.strerror}); check its name and rights: ls -l"
+        ) from None
 
 
 def xml_text(content: bytes, where: str) -> str:
