@@ -11,7 +11,7 @@
 | a file name of 300 characters | `cli/test_endings.py::test_a_name_that_is_too_long_is_named`, `test_files.py::test_the_longest_names_there_are_can_be_written` |
 | an array that only its header has | `shape_space/files/test_hostile_numbers.py::test_an_array_that_only_its_header_has` |
 | a CSV of a million rows | `test_rough_edges.py::test_a_recording_of_a_million_rows` |
-| hundreds of meshes in a page | `body/test_appearance.py::test_more_triangles_than_a_page_holds_are_drawn_as_hulls`, `body/test_appearance.py::test_more_shapes_than_a_page_holds_are_drawn_as_one_hull`, `body/test_appearance.py::test_more_mesh_files_than_memory_holds_are_not_read` |
+| hundreds of meshes in a page | `body/test_appearance.py::test_more_triangles_than_a_page_holds_are_drawn_as_hulls`, `body/test_appearance.py::test_more_shapes_than_a_page_holds_are_drawn_as_one_hull` |
 | YAML with merge keys and negative times, XML in another encoding than it says | `shape_space/files/test_hostile_numbers.py::test_yaml_that_means_something_else_than_it_seems`, `shape_space/files/test_hostile_numbers.py::test_an_encoding_that_is_said_and_not_used` |
 | names of links and joints in exotic Unicode | `plotting/test_hostile_names.py::test_pages_and_reports_of_models_with_unprintable_names`, `plotting/test_hostile_names.py::test_in_a_browser_no_name_runs_a_script_or_asks_for_anything_and_nothing_fails`, `test_rough_edges.py::test_every_command_takes_hostile_names` |
 | `check` on a torso of 60,000 kg, a link of 1e-9 kg | `body/test_plausibility.py::test_a_torso_of_sixty_tonnes`, `body/test_plausibility.py::test_a_link_of_a_microgram`, `body/test_plausibility.py::test_check_says_so_and_shows_the_parts` |

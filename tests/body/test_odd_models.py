@@ -302,6 +302,15 @@ def test_arguments_of_a_xacro_file(tmp_path, capsys):
         assert json.loads(capsys.readouterr().out)["body"]["mass"] == 5.0
 
 
+def test_a_study_gives_its_bodies_their_arguments(tmp_path):
+    written(tmp_path, XACRO, "r.urdf.xacro")
+    written(tmp_path, "time,hip\n0,0\n1,0.5\n2,0.8\n3,0.1\n", "m.csv")
+    text = 'body = "r.urdf.xacro"\nmotion = "m.csv"\n'
+    study = sp.study.read_study(written(tmp_path, text + '[xacro_args]\npayload = true\nmass = "2"\n', "s.toml"))
+    assert study.loading == {"xacro_args": {"payload": "true", "mass": "2"}}
+    assert sp.load_body(study.body, **study.loading).mass == 5.0
+
+
 def test_an_argument_that_is_missing_or_unknown_is_an_error_with_what_to_type(tmp_path):
     path = written(tmp_path, XACRO, "r.urdf.xacro")
     with pytest.raises(ModelFileError, match=r"payload; type --xacro payload:=VALUE .*: mass:=1, payload$"):

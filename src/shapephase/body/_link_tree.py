@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 
 import numpy as np
 
@@ -131,13 +132,16 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
     moving = sum(joint.kind != "fixed" for joint in joints)
     for count, most, kind in ((len(links), MOST_LINKS, "links"), (moving, MOST_JOINTS, "moving joints")):
         if count > most:
-            raise ModelFileError(f"{where}:1: the body has {count} {kind}; up to {most} are supported")
+            raise ModelFileError(f"{where}:1: the body has {count} {kind}; up to {most} are supported: leave some out")
     above: dict[str, Joint] = {}
     below: dict[str, list[Joint]] = {name: [] for name in links}
     for joint in joints:
         for end, link in (("parent", joint.parent), ("child", joint.child)):
             if link not in links:
-                raise ModelFileError(f"{joint.where}: joint {joint.name!r}: its {end} link {link!r} does not exist")
+                raise ModelFileError(
+                    f"{joint.where}: joint {joint.name!r}: its {end} link {link!r} does not exist; there is "
+                    f"{_listed(get_close_matches(link, links, 5, 0.4) or list(links)[:5])}"
+                )
         if joint.child in above:
             other = above[joint.child]
             raise ModelFileError(
@@ -157,7 +161,10 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
     while level:
         depth += 1
         if depth > MOST_DEPTH:
-            raise ModelFileError(f"{links[level[0]].where}: link {level[0]!r}: a chain of more than {MOST_DEPTH} links")
+            raise ModelFileError(
+                f"{links[level[0]].where}: link {level[0]!r}: a chain of more than {MOST_DEPTH} "
+                "links; fix some into one"
+            )
         found = [joint for parent in level for joint in below[parent]]
         sorted_joints += found
         level = [joint.child for joint in found]
@@ -165,7 +172,8 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
     lost = [name for name in links if name not in reached]
     if lost:
         raise ModelFileError(
-            f"{links[lost[0]].where}: link {lost[0]!r}: links that form a closed chain: {_listed(lost)}"
+            f"{links[lost[0]].where}: link {lost[0]!r}: links that form a closed chain: {_listed(lost)}; "
+            "remove one of their joints"
         )
     return roots[0], tuple(sorted_joints)
 
@@ -188,7 +196,9 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     for link in links:
         if not (np.isfinite(link.mass) and np.isfinite(link.inertia).all() and link.mass >= 0.0):
             numbers = f"mass {link.mass} kg and inertia {link.inertia.tolist()} kg m^2"
-            raise UnphysicalInertiaError(f"{link.where}: {label.format(link.name)}: no real body has {numbers}")
+            raise UnphysicalInertiaError(
+                f"{link.where}: {label.format(link.name)}: no real body has {numbers}; correct them"
+            )
     masses = np.array([link.mass for link in links])
     moments = np.linalg.eigvalsh(np.array([link.inertia for link in links]).reshape(-1, 3, 3))
     offsets = np.array([link.centre for link in links]).reshape(-1, 3)

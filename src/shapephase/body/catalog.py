@@ -118,7 +118,7 @@ def load_body(
         try:
             body, doubts = _from_file(read_file(path), path, on_unphysical, given)
         except MemoryError:
-            raise ModelFileError(f"{path}:1: there is not enough memory to load it") from None
+            raise ModelFileError(f"{path}:1: there is not enough memory to load it; close other programs") from None
     else:
         _check_unused(given, "a pinocchio.Model", ())
         body, doubts = _from_model(source, on_unphysical)
@@ -305,18 +305,18 @@ def _from_file(
 
 
 def _check_unused(given: dict[str, Any], where: str, options: tuple[str, ...]) -> None:
+    why = {
+        "packages": "is for URDF and xacro files; {} names none",
+        "xacro_args": "is for xacro files; {} has no macros",
+        "root": "is for URDF, xacro and MJCF files; {} has one root, which floats",
+        "root_body": "is for MJCF, OpenSim and bioMod files; {} has one root, which floats",
+        "length_unit": "is for BVH files; {} has metres",
+        "person_mass": "is for BVH and MVNX files; {} has masses of its own",
+    }
     for name in given:
-        if name == "packages" and name not in options:
-            raise ShapeError(f"packages is for URDF and xacro files; {quoted(where)} names none: leave --packages out")
-        if name == "xacro_args" and name not in options:
-            raise ShapeError(f"xacro_args is for xacro files; {quoted(where)} has no macros: leave --xacro out")
-        if name in _OF_BVH and name not in options:
-            kinds = "BVH and MVNX files" if name == "person_mass" else "BVH files"
-            has = "metres" if "person_mass" in options else "units and masses of its own"
-            raise ShapeError(f"{name} is for {kinds}; {quoted(where)} has {has}")
         if name not in options:
-            files = "URDF, xacro and MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
-            raise ShapeError(f"{name} is for {files}; {quoted(where)} has one root, which floats")
+            option = "--xacro" if name == "xacro_args" else f"--{name.replace('_', '-')}"
+            raise ShapeError(f"{name} {why[name].format(quoted(where))}: leave {option} out")
 
 
 def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:

@@ -89,7 +89,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
 
 def _made(said: Mapping[str, Any], folder: Path) -> Study:
     _check_names("entry", said, _ENTRIES)
-    _check_truths(said, "")
+    _check_truths({name: value for name, value in said.items() if name != "xacro_args"}, "")
     given: dict[str, Any] = {name: said[name] for name in _PLAIN if name in said}
     if isinstance(given.get("packages"), list):
         given["packages"] = [_folder(one, folder) for one in given["packages"]]

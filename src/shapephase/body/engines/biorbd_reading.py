@@ -144,7 +144,7 @@ def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
         words = line.split("//")[0].split()
         word = words[0].lower() if words else ""
         if any(word.startswith("/*") for word in words):
-            raise UnusableModelError("a comment that begins with /* has no end", number)
+            raise UnusableModelError("a comment that begins with /* has no end; close it by */", number)
         if word in _DROPPED:
             meshes += word == "meshfile"
             kept.append("")
@@ -178,7 +178,7 @@ def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
 def _check_closed(segment: str | None, line: int) -> None:
     """Raise UnusableModelError where a segment goes on, as in a file that is cut off."""
     if segment is not None:
-        raise UnusableModelError(f"segment {segment!r} has no endsegment", line)
+        raise UnusableModelError(f"segment {segment!r} has no endsegment; add it", line)
 
 
 def _check_word(words: list[str], word: str, segment: str, line: int) -> None:
@@ -201,13 +201,13 @@ def _check_values(segment: str, said: list[tuple[str, int]]) -> None:
         named = text.lower() in _WORDS and not (word == "parent" and not found["parent"])
         if text and not named:
             if not word:
-                raise UnusableModelError(f"segment {segment!r}: {text!r} follows no word", line)
+                raise UnusableModelError(f"segment {segment!r}: {text!r} follows no word; write `word values`", line)
             found[word].append(text)
             continue
         _check_count(segment, word, found, start)
         word, start = text.lower(), line
         if found.setdefault(word, []) and word in _ONCE:
-            raise UnusableModelError(f"segment {segment!r}: {text!r} stands twice", line)
+            raise UnusableModelError(f"segment {segment!r}: {text!r} stands twice; keep one", line)
 
 
 def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int) -> None:
@@ -245,7 +245,10 @@ def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str,
     parents = {name: model.segment(k).parent().to_string() for name, k in known.items()}
     for name, parent in parents.items():
         if parent not in known and parent.lower() not in _NO_ROOT:
-            raise UnusableModelError(f"segment {name!r}: its parent {parent!r} does not exist", starts.get(name, 1))
+            raise UnusableModelError(
+                f"segment {name!r}: its parent {parent!r} does not exist; there is {', '.join(list(known)[:5])}",
+                starts.get(name, 1),
+            )
     trees: dict[str, dict[str, int]] = {}
     for name, parent in parents.items():
         # A parent stands above its children in the file.
@@ -269,7 +272,7 @@ def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str,
         )
     root = root_body or roots[0]
     if masses[root] == 0.0:
-        raise UnusableModelError("no segment has mass", starts.get(root, 1))
+        raise UnusableModelError("no segment has mass; give them `mass` and `inertia`", starts.get(root, 1))
     if len(trees[root]) < len(known):
         notes.append(f"{len(known) - len(trees[root])} segments on other roots are left out")
     return trees[root]
@@ -345,7 +348,7 @@ def _orthonormal(matrix: Array, name: str, line: int) -> tuple[Array, Array, flo
     left, values, right = np.linalg.svd(matrix)
     nearest = left @ right
     if not np.abs(values - 1.0).max() < 1e-2:
-        raise UnusableModelError(f"segment {name!r}: its frame {matrix.tolist()} is no rotation", line)
+        raise UnusableModelError(f"segment {name!r}: its frame {matrix.tolist()} is no rotation; correct its RT", line)
     flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(nearest))])
     return nearest @ flip, flip, float(np.abs(matrix - nearest).max())
 

@@ -63,15 +63,21 @@ def _answer(path: Path, name: str, *words: str) -> Any:
     try:
         child = run_alone(source, (str(path.absolute()), name, *words), b"", _SECONDS)
     except subprocess.TimeoutExpired:
-        raise ModelFileError(f"{where}:1: {known.engine} took more than {_SECONDS} s and was stopped") from None
+        raise ModelFileError(
+            f"{where}:1: {known.engine} took more than {_SECONDS} s and was stopped; a smaller model is needed"
+        ) from None
     if child.returncode == MISSING:
         raise MissingExtraError(
             f"{where} is {known.title}, which {known.engine} reads: pip install 'shapephase[{known.extra}]'"
         )
     if child.returncode < 0:
-        raise ModelFileError(f"{where}:1: {known.engine} crashed on it, signal {-child.returncode}")
+        raise ModelFileError(
+            f"{where}:1: {known.engine} crashed on it, signal {-child.returncode}; open it in {known.engine} itself"
+        )
     if child.returncode == NO_MEMORY:
-        raise ModelFileError(f"{where}:1: {known.engine} took more than {MEMORY >> 20} MiB and was stopped")
+        raise ModelFileError(
+            f"{where}:1: {known.engine} took more than {MEMORY >> 20} MiB and was stopped; a smaller model is needed"
+        )
     if child.returncode == REFUSED:
         refused = json.loads(child.stdout)
         raise ModelFileError(f"{where}:{refused['line']}: {refused['message']}")

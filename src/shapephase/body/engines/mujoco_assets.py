@@ -16,7 +16,7 @@ from .chain import UnusableModelError
 _CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 _FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 """Of the tetrahedron that stands for a mesh."""
-_SIZES = ((0.01, 0.01, 0.01), (0.3, 0.2, 0.1))
+_EDGES = ((0.01, 0.01, 0.01), (0.3, 0.2, 0.1))
 """[m] Two tetrahedra: a body whose mass or inertia they share in has it from the mesh."""
 _OF_MASS = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 _KINDS = {"meshes": "mesh", "textures": "texture", "hfields": "height field", "skins": "skin"}
@@ -94,7 +94,7 @@ def _replace(written: mujoco.MjSpec, kind: str, asset: Any) -> None:
         return
     asset.file = ""
     if kind == "mesh":
-        _shape(asset, _SIZES[0])
+        _shape(asset, _EDGES[0])
     elif kind == "texture":
         asset.cubefiles = [""] * len(asset.cubefiles)
         asset.builtin, asset.width, asset.height = mujoco.mjtBuiltin.mjBUILTIN_FLAT, 1, 1
@@ -102,8 +102,8 @@ def _replace(written: mujoco.MjSpec, kind: str, asset: Any) -> None:
         asset.nrow, asset.ncol, asset.userdata = 2, 2, np.zeros(4)
 
 
-def _shape(mesh: Any, size: tuple[float, float, float]) -> None:
-    mesh.uservert, mesh.userface = (_CORNERS * size).ravel(), _FACES.ravel()
+def _shape(mesh: Any, edges: tuple[float, float, float]) -> None:
+    mesh.uservert, mesh.userface = (_CORNERS * edges).ravel(), _FACES.ravel()
     mesh.usernormal = mesh.usertexcoord = np.zeros(0)
 
 
@@ -117,7 +117,7 @@ def _check_masses(
     """Raise UnusableModelError for a body that has other masses with other shapes for the missing meshes."""
     masses = [np.array(getattr(model, name)) for name in _OF_MASS]
     for mesh in meshes:
-        _shape(mesh, _SIZES[1])
+        _shape(mesh, _EDGES[1])
     other = written.compile()
     changed = np.zeros(model.nbody, dtype=bool)
     for name, before in zip(_OF_MASS, masses, strict=True):

@@ -198,12 +198,14 @@ def _link(name: str, node: Node, reading: _Reading) -> Link:
         return Link(name, where)
     for part in inertial.children:
         if part.tag not in ("origin", "mass", "inertia"):
-            raise part.fault(owner, f"<inertial> holds <origin>, <mass> and <inertia>, not <{quoted(part.tag)}>")
+            raise part.fault(
+                owner, f"<inertial> holds <origin>, <mass> and <inertia>, not <{quoted(part.tag)}>; move it out"
+            )
     written = needed_child(inertial, "mass", owner)
     known_attributes(written, ("value",), owner)
     mass = number(written, "value", owner, most=MOST_MASS)
     if mass < 0.0:
-        raise written.fault(owner, f"negative mass {mass:g} kg; a mass is at least zero")
+        raise written.fault(owner, f"negative mass {mass:g} kg; a mass is at least zero: correct it")
     if 0.0 < mass < LEAST_MASS:
         raise written.fault(owner, f"mass {mass:g} kg is too small to be summed; give {LEAST_MASS:g} kg or more, or 0")
     written = needed_child(inertial, "inertia", owner)

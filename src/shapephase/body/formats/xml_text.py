@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import contextlib
 import difflib
 import math
 import os
@@ -65,16 +64,19 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
     """
     where = Path(path)
     if "\0" in str(where):
-        raise InputFileNotFoundError(f"{str(where)!r}: a path has no zero bytes")
+        raise InputFileNotFoundError(f"{str(where)!r}: a path has no zero bytes; give its name as it is on disk")
     try:
         if where.is_file():
             return where.read_bytes()
-        kind = "no regular file" if where.exists() else "there is no such file"
-        raise InputFileNotFoundError(f"{where}: {'is a folder, not a file' if where.is_dir() else kind}")
+        kind = "no regular file" if where.exists() else f"there is no such file; look for it with: ls {where.parent}"
+        folder = "is a folder, not a file; name the file in it"
+        raise InputFileNotFoundError(f"{where}: {folder if where.is_dir() else kind}")
     except InputFileNotFoundError:
         raise
     except OSError as error:
-        raise InputFileNotFoundError(f"{quoted(str(where))}: cannot be read ({error.strerror})") from None
+        raise InputFileNotFoundError(
+            f"{quoted(str(where))}: cannot be read ({error.strerror}); check its name and rights: ls -l"
+        ) from None
 
 
 def xml_text(content: bytes, where: str) -> str:
@@ -86,28 +88,23 @@ def xml_text(content: bytes, where: str) -> str:
     stated = _DECLARED.match(content.lstrip())
     # UTF-8 first: bytes that it allows are hardly ever another encoding, whatever the file states.
     encodings = ["utf-16"] if content.startswith(_UTF_16) else ["utf-8-sig", *([stated[1].decode()] if stated else [])]
-    text = None
+    starts: list[int] = []
     for encoding in encodings:
-        with contextlib.suppress(UnicodeDecodeError, LookupError):
+        try:
             text = content.decode(encoding)
             break
-    if text is None:
-        start = _first_undecodable(content)
-        line = content.count(b"\n", 0, start) + 1
-        raise ModelFileError(f"{where}:{line}: not UTF-8 text, byte {start} cannot be read; save the file as UTF-8")
+        except UnicodeDecodeError as error:
+            starts.append(error.start)
+        except LookupError:
+            continue
+    else:
+        line = content.count(b"\n", 0, starts[0]) + 1
+        raise ModelFileError(f"{where}:{line}: not UTF-8 text, byte {starts[0]} cannot be read; save the file as UTF-8")
     text = text.rstrip("\0 \t\r\n")
     if "\0" in text:
         line = text.count("\n", 0, text.index("\0")) + 1
         raise ModelFileError(f"{where}:{line}: a zero byte within the text: the file is damaged; download it again")
     return text
-
-
-def _first_undecodable(content: bytes) -> int:
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        return error.start
-    return 0
 
 
 def xml_tree(content: bytes, where: str) -> Node:
