@@ -458,7 +458,7 @@ ODD_FILES = {
         "m.npz",
         npz_bytes(qpos=np.zeros((3, 5)), time=[0, 1, 2]),
         E,
-        ["shape (3, 5)", "9 with a free joint or 2 without"],
+        ["shape (3, 5)", "9 coordinates with a free joint or 2 without"],
     ),
     "qpos of another length": ("m.npz", npz_bytes(qpos=np.zeros((3, 2)), time=[0, 1]), E, ["2 times"]),
     "qpos without times": ("m.npz", npz_bytes(qpos=np.zeros((3, 2))), E, ["the times of qpos", "none is there"]),

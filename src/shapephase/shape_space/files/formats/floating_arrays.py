@@ -321,12 +321,12 @@ def _misfit(
             f"{said}; neither its numbers 3 to 6 (Pinocchio: place, quaternion x y z w, joints) nor 0 to 3 (Drake: "
             f"quaternion w x y z, place, joints) are a quaternion of length 1 in every sample; {_NAMES_THAT_SAY_IT}"
         )
-    counts = [] if kind == "Q" else [f"{FREE_JOINT + len(known)} with a free joint"]
+    counts = [] if kind == "Q" else [f"{FREE_JOINT + len(known)} coordinates with a free joint"]
     counts += [f"{len(known)} without"] if kind == "qpos" else []
-    counts += [f"{root + body.n_shape} in biorbd's order"] if kind != "qpos" and root is not None else []
-    needed = " or ".join(counts) or "an unknown number"
+    counts += [f"{root + body.n_shape} coordinates in biorbd's order"] if kind != "qpos" and root is not None else []
+    needed = " or ".join(counts) or "coordinates of an order that is not known"
     return (
-        f"{said}; of {len(known)} joints ({', '.join(known)}) a sample has {needed} of coordinates; store an array "
+        f"{said}; of {len(known)} joints ({', '.join(known)}) a sample has {needed}; store an array "
         f"'joint_names' if there are others, or {_NAMES_THAT_SAY_IT}"
     )
 
