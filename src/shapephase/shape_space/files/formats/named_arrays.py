@@ -60,7 +60,7 @@ def arrays_table(
         if turns:
             raise TrajectoryError(
                 f"{where}: {kind} keeps no order of names, and {turns[0]!r} is one of three turns in the order of "
-                "their columns; write the quaternion in columns .x, .y, .z, .w, or a matrix with its names in joint_names"
+                "their columns; write the quaternion in columns .x, .y, .z, .w, or a matrix beside joint_names"
             )
         columns = columns or _vectors(where, inside)
         if columns:
