@@ -102,7 +102,7 @@ def test_what_fits_two_orders_is_refused_with_the_names_that_say_which(tmp_path)
         with pytest.raises(TrajectoryError, match=r"Pinocchio q and Drake q.*qpos .*base_quat_xyzw"):
             read(tmp_path / "m.npz", BODY)
     np.savez(tmp_path / "m.npz", q=2.0 * q, time=TIMES)
-    with pytest.raises(TrajectoryError, match=r"length 1 in every sample.*qpos"):
+    with pytest.raises(TrajectoryError, match=r"quaternion x y z w of length 1.*qpos"):
         sp.read_shape_path(tmp_path / "m.npz", BODY)
     # Six and three: three angles, of which nothing says the order.
     np.savez(tmp_path / "m.npz", q=q[:, :9], time=TIMES)
