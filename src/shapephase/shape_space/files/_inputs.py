@@ -13,7 +13,7 @@ from ...arguments import check_file_name, positive_argument
 from ...body.body import Body
 from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
-from ._recording import MOST_BYTES, Table, digest, file_bytes
+from ._recording import Table, digest, file_bytes
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
 from .formats.deepmimic import read_deepmimic
@@ -137,9 +137,7 @@ def read_input(
 
 def _standard_input(body: Body, order: str | None) -> Input:
     where = Path("standard input")
-    data = sys.stdin.buffer.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise TrajectoryError(f"{where}: more than {MOST_BYTES >> 20} MiB; write a file")
+    data = sys.stdin.buffer.read()
     opensim = any(line.strip().lower() == END.encode() for line in data[:65536].splitlines())
     table = read_opensim(where, data) if opensim else read_delimited(where, data)
     return Input(of_numbered_columns(table, body, order), str(where), hashlib.sha256(data).hexdigest())

@@ -173,8 +173,8 @@ def _isaac_table(arrays: Mapping[str, Any], where: str, body: Body, timestep: fl
     elif quaternions is not None or (named is None and order is None):
         raise TrajectoryError(
             f"{where}: joint_pos does not say the order of joints and quaternions: add 'body_pos_w' and 'body_quat_w', "
-            "by which both are found; store shapes, joint_names and base_quat_wxyz instead; or, without a base, say which "
-            "it is: joint_order='isaac' (--joint-order isaac)"
+            "by which both are found; store shapes, joint_names and base_quat_wxyz instead; or, without a base, say "
+            "which it is: joint_order='isaac' (--joint-order isaac)"
         )
     elif named is None:
         nameless = nameless_joints(body, joints.shape[1], f"{where}: joint_pos", order)
