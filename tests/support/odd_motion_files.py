@@ -101,14 +101,6 @@ def nothing(file):
     """No file at all."""
 
 
-def sparse(size):
-    def write(file):
-        with file.open("wb") as stream:
-            stream.truncate(size)
-
-    return write
-
-
 SHEET = [["time", LEFT, RIGHT], [0.0, 0.1, 0.2], [1.0, 0.3, 0.4], [2.0, 0.5, 0.6]]
 
 
@@ -328,7 +320,6 @@ ODD_FILES = {
         ["stands twice"],
     ),
     "half a position": ("m.csv", f"time,{BOTH},base_x_m\n0,0,0,1\n1,0,0,1\n", E, ["without base_y, base_z"]),
-    "too large": ("m.csv", sparse(2**28 + 1), E, ["256 MiB are read"]),
     "nothing but lines": ("m.csv", b"\n" * 2_000_003, E, ["empty"]),
     "not there": ("m.csv", nothing, N, ["no such file"]),
     "a pipe": ("m.csv", os.mkfifo, N, ["no regular file"]),
@@ -457,7 +448,7 @@ ODD_FILES = {
         "m.npz",
         npz_bytes(qpos=np.zeros((3, 5)), time=[0, 1, 2]),
         E,
-        ["shape (3, 5)", "9 with a free joint or 2 without"],
+        ["shape (3, 5)", "9 numbers", "alone (2)"],
     ),
     "qpos of another length": ("m.npz", npz_bytes(qpos=np.zeros((3, 2)), time=[0, 1]), E, ["2 times"]),
     "qpos without times": ("m.npz", npz_bytes(qpos=np.zeros((3, 2))), E, ["the times of qpos", "none is there"]),
@@ -467,7 +458,7 @@ ODD_FILES = {
         "m.npz",
         npz_bytes(qpos=np.tile([0, 0, 0, 2.0, 0, 0, 1, 0, 0], (3, 1)), timestep=0.1),
         E,
-        ["sample 0: the quaternion", "norm 2.23607"],
+        ["quaternion w x y z of length 1"],
     ),
     "NPY of objects": (
         "m.npy",

@@ -26,9 +26,9 @@ _ENDINGS = (".svg", ".pdf", ".png")
 Trajectories = Annotated[
     str,
     Parameter(
-        help="Its trajectories with the base: NPZ or CSV with MuJoCo's qpos and qvel, Pinocchio's q and v or biorbd's "
-        "Q and Qdot, or a recording with the attitude of the base; several are runs with different steps. For example "
-        "`run.npz`."
+        help="Its trajectories with the base: NPZ or CSV with MuJoCo's qpos and qvel, Pinocchio's or Drake's q and v, "
+        "biorbd's Q and Qdot or bioptim's q and qdot, or a recording with the attitude of the base; several are runs "
+        "with different steps. For example `run.npz`."
     ),
 ]
 

@@ -7,6 +7,7 @@ import json
 import zipfile
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -71,6 +72,14 @@ def qpos(change):
     return changed
 
 
+def turns_in_hdf5(_):
+    stream = io.BytesIO()
+    with h5py.File(stream, "w") as book:
+        for name in ("time", "hip_Zrotation", "hip_Xrotation", "hip_Yrotation"):
+            book[name] = TIMES
+    return stream.getvalue()
+
+
 def deepmimic(frames):
     return lambda _: json.dumps({"Frames": frames}).encode()
 
@@ -97,6 +106,7 @@ CASES = {
     "a MATLAB file of nothing": ("m.mat", lambda data: data[:128], "no motion"),
     "an HDF5 file cut off": ("m.h5", cut(0.5), "no HDF5 file"),
     "an HDF5 file without its signature": ("m.h5", lambda data: b"x" + data[1:], "no HDF5 file"),
+    "turns in HDF5, whose order nothing keeps": ("m.h5", turns_in_hdf5, "keeps no order"),
     "a Parquet file cut off": ("m.parquet", cut(0.8), "Parquet"),
     "a workbook cut off": ("m.xlsx", cut(0.8), "workbook"),
     "a C3D file cut off": ("m.c3d", cut(0.6), "damaged"),

@@ -134,7 +134,7 @@ def test_what_cannot_be_told_is_asked(tmp_path):
     body = sp.load_body(LEGS)
     arrays, _ = recorded_by(BREADTH)
     for change, words in (
-        ({"body_pos_w": None}, "joint_pos has no names: .*--joint-order isaac"),
+        ({"body_pos_w": None}, "joint_pos does not say the order.*--joint-order isaac"),
         ({"body_pos_w": 2.0 * arrays["body_pos_w"]}, "in no order of the joints do the links"),
         ({"body_pos_w": arrays["body_pos_w"][:, :3], "body_quat_w": arrays["body_quat_w"][:, :3]}, "cannot be told"),
         ({"fps": np.array([0.0])}, "fps: one number above 0"),

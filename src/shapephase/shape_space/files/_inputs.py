@@ -14,7 +14,7 @@ from ...body.body import Body
 from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
 from ._numbered_columns import named_columns
-from ._recording import MOST_BYTES, Table, digest, file_bytes
+from ._recording import Table, digest, file_bytes
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
 from .formats.deepmimic import read_deepmimic
@@ -145,9 +145,7 @@ def read_input(
 
 def _standard_input(body: Body, order: str | None) -> Input:
     where = Path("standard input")
-    data = sys.stdin.buffer.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise TrajectoryError(f"{where}: more than {MOST_BYTES >> 20} MiB; write a file")
+    data = sys.stdin.buffer.read()
     table = read_opensim(where, data) if has_header(data) else file_table(read_text(where, data), str(where))
     return Input(of_numbered_columns(table, body, order), str(where), hashlib.sha256(data).hexdigest())
 

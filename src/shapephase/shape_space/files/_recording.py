@@ -19,8 +19,6 @@ from ._nameless_joints import NamelessJoints
 if TYPE_CHECKING:
     from ._segment_poses import SegmentMotion
 
-MOST_BYTES = 256 * 2**20
-"""Size of a motion file [bytes]; as numbers in memory it takes several times as much."""
 LONGEST_NAME = 256
 """Characters of a column's name, as of a joint's name in a body's file."""
 _UNEVEN_STEPS = 100.0
@@ -208,35 +206,15 @@ def warn(message: str) -> None:
     warnings.warn(message, TrajectoryWarning, stacklevel=6)
 
 
-def file_bytes(where: Path, most: int = MOST_BYTES) -> bytes:
-    """The content of a regular file.
-
-    Raises
-    ------
-    InputFileNotFoundError
-        If it is not there, no file, or not to be opened.
-    TrajectoryError
-        If it is larger than `most` bytes.
-    """
-    check_size(where, most)
-    try:
-        with where.open("rb") as stream:
-            data = stream.read(most + 1)
-    except OSError as error:
-        raise InputFileNotFoundError(f"{where}: cannot be opened ({error.strerror})") from None
-    return data
-
-
-def check_size(where: Path, most: int = MOST_BYTES) -> None:
-    """Raise what `file_bytes` raises, without reading."""
+def file_bytes(where: Path) -> bytes:
+    """Content of a regular file. Raises InputFileNotFoundError if it is not there, no file, or not to be opened."""
     if not where.is_file():
         kind = "is no regular file" if where.exists() else "there is no such file"
         raise InputFileNotFoundError(f"{where}: {kind}")
-    size = where.stat().st_size
-    if size > most:
-        raise TrajectoryError(
-            f"{where}: {size / 2**20:.0f} MiB, up to {most / 2**20:g} MiB are read; write fewer samples, or NPZ"
-        )
+    try:
+        return where.read_bytes()
+    except OSError as error:
+        raise InputFileNotFoundError(f"{where}: cannot be opened ({error.strerror})") from None
 
 
 def digest(where: Path) -> str:

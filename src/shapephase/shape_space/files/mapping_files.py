@@ -10,9 +10,6 @@ from ...arguments import check_file_name
 from ...errors import ShapeError
 from ._recording import check_text, file_bytes
 
-_MOST_BYTES = 2**20
-"""Size of a mapping file [bytes]; a hundred joints take five thousand."""
-
 
 def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:
     """Read a mapping from columns to joints, for the argument `names` of `read_recorded_motion`.
@@ -36,7 +33,7 @@ def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:
     """
     check_file_name(file, "file")
     where = Path(file)
-    data = file_bytes(where, _MOST_BYTES)
+    data = file_bytes(where)
     check_text(data, where)
     text = data.decode("utf-8-sig")
     return _from_json(text, where) if where.suffix.lower() == ".json" else _from_lines(text, where)

@@ -147,8 +147,12 @@ def read_recorded_motion(
     - `.npz` with `qpos` and `time` or `timestep`, or `.npy` with the argument `timestep`: MuJoCo. With a free joint,
       the first seven columns are x y z and the quaternion w x y z; then one column for each joint, by the array
       `joint_names` or, without it, in the order in which MuJoCo compiles the body's file, or the one of `joint_order`.
-    - `.npz` with `joint_pos`, `body_pos_w`, `body_quat_w` and `fps`: Isaac Lab. Without `joint_names` the order is the
-      one in which the links lie where the bodies are.
+    - `.npz` with `q`: Pinocchio's (N, 7 + n), place, quaternion x y z w, joints, or Drake's, quaternion w x y z, place,
+      joints, whichever has quaternions of length one; of a bioMod, or as `Q`, the coordinates of biorbd and bioptim,
+      those of the root first. These and `qpos` may be transposed, and columns `q_0`, `q[1]`, ... of a table.
+    - `.npz` with `joint_pos`, `body_pos_w`, `body_quat_w`, `body_ang_vel_w` and `fps`: Isaac Lab. Without `joint_names`
+      the order is the one in which the links lie and turn as the bodies do.
+    - `.json`: DeepMimic's humanoid, for a body with ball joints and hinges of the same names.
 
     The base in columns: `base_qx,base_qy,base_qz,base_qw` (or `qx` and so on), `base_roll,base_pitch,base_yaw` or
     OpenSim's `pelvis_tilt,pelvis_list,pelvis_rotation`; and `base_x,base_y,base_z` or `pelvis_tx,pelvis_ty,pelvis_tz`.
@@ -164,9 +168,11 @@ def read_recorded_motion(
 
     Parameters
     ----------
-    file : name of a file, "-" for standard input, a pandas `DataFrame`, or a `Dataset` or `DataArray` of xarray
+    file : name of a file, "-" for standard input, a pandas `DataFrame`, a `Dataset` or `DataArray` of xarray, a mapping
+        of arrays by name as an NPZ file has them, or (times (N,), array (N, m), names (m,))
     names : name in the file -> name of the joint, also with a unit as `"boom [mm]"`, or "time", or of the link that a
-        segment is; None instead leaves the column or segment out; or the name of a file with them, see `read_names`
+        segment is; None instead leaves the column or segment out; or the name of a file with them, see `read_names`;
+        or a sequence of names, one for each column of a table without a header
     degrees : whether turning joints are in degrees, above what the file says; None: as the file says
     time_unit : of the times: "s", "ms", "us", "ns" or "min"; None: as the file says
     timestep : between samples, for a file without times [s]
@@ -224,7 +230,7 @@ def read_recorded_motion(
         flight that falls by another acceleration than gravity, by more than a tenth of it and three error bars of its
         own (with 1 cm of wander of the centre of mass), with the slips of units of length or frame rates that fit.
     MissingExtraError
-        For ROS without the extra `ros`; for `.xlsx`, `.parquet`, `.c3d`, HDF5 without the extra `data`.
+        For ROS without the extra `ros`; for `.xlsx`, `.parquet`, `.c3d`, MATLAB, HDF5 without the extra `data`.
 
     Warns
     -----

@@ -106,24 +106,23 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
     names = None if "joint_names" not in arrays else tuple(map(str, np.ravel(arrays["joint_names"])))
     count = np.size(arrays["time"]) if "time" in arrays else None
     layouts = {"qpos": (MUJOCO_QPOS,), "q": (PINOCCHIO_Q, DRAKE_Q), "Q": ()}[kind]
-    root = root_width(body, kind)
+    root = None if kind == "qpos" else root_width(body, kind)
     fitting: list[tuple[FreeJoint | None, bool]] = []
     for turned, rows in ((False, values), (True, values.T)):
-        if count is not None and len(rows) != count:
+        if count not in (None, len(rows)):
             continue
-        width = rows.shape[1]
         for layout in layouts:
-            free = _free_columns(layout, width, names, body, order)
-            if free is not None and (kind == "qpos" or (free and _is_unit(rows[:, layout.quaternion]))):
+            free = _free_columns(layout, rows.shape[1], names, body, order)
+            if free is not None and (not free or _is_unit(rows[:, layout.quaternion])):
                 fitting.append((layout, turned))
-        if kind != "qpos" and root is not None and width == root + body.n_shape:
+        if root is not None and rows.shape[1] == root + body.n_shape:
             fitting.append((None, turned))
-    if len({turned for _, turned in fitting}) > 1 and kind == "qpos":
-        fitting = [each for each in fitting if _is_unit((values.T if each[1] else values)[:, 3:FREE_JOINT])]
-    if not fitting:
-        raise TrajectoryError(_misfit(kind, values, where, body, names, count, order))
-    if len(fitting) > 1:
-        raise TrajectoryError(_ambiguity(kind, fitting, where))
+    if len(fitting) != 1:
+        raise TrajectoryError(
+            f"{where}: {kind} has shape {values.shape}"
+            + ("" if count is None else f", and there are {count} times")
+            + _misfit(kind, fitting, names or body.joint_names, None if root is None else root + body.n_shape)
+        )
     ((layout, turned),) = fitting
     labels = {"qpos": ("qvel",), "q": ("v",), "Q": ()}[kind] if layout else ("Qdot", "qdot")
     stored = next((arrays[label] for label in labels if label in arrays), None)
@@ -176,7 +175,7 @@ def with_free_joint(
         return found
     quaternion, position = places[:, layout.quaternion], places[:, layout.position]
     found = found._replace(quaternion=quaternion, position=position)
-    if rates is None:
+    if rates is None or not set(body.joint_names) <= set(names):
         return found
     balls = sum(name.endswith(".w") for name in names)
     moving = finite_array(rates, f"{where}: {labels[1]}", (len(places), _ROOT + len(names) - balls))
@@ -277,9 +276,10 @@ def _free_columns(
     """Number of columns before those of the joints, 7 or none; None where the width does not fit."""
     if names is not None:
         free = width - len(names)
-        return free if free in (0, FREE_JOINT) else None
-    columns = joint_columns(body, width, order or layout.order)
-    return None if columns is None or (not columns.free and layout is not MUJOCO_QPOS) else columns.free
+    else:
+        columns = joint_columns(body, width, order or layout.order)
+        free = None if columns is None else columns.free
+    return free if free in ((0, FREE_JOINT) if layout is MUJOCO_QPOS else (FREE_JOINT,)) else None
 
 
 def _derivatives(motion: FloatingMotion, rates: Array, body: Body) -> Array:
@@ -306,36 +306,28 @@ def _is_unit(quaternions: Array) -> bool:
 
 
 def _misfit(
-    kind: str,
-    values: Array,
-    where: str,
-    body: Body,
-    names: Sequence[str] | None,
-    count: int | None,
-    order: str | None,
+    kind: str, fitting: Sequence[tuple[FreeJoint | None, bool]], names: Sequence[str], rooted: int | None
 ) -> str:
-    known, root = body.joint_names if names is None else tuple(names), root_width(body, kind)
-    said = f"{where}: {kind} has shape {values.shape}" + ("" if count is None else f", and there are {count} times")
-    if kind == "q" and any(_free_columns(PINOCCHIO_Q, width, names, body, order) for width in values.shape):
-        return (
-            f"{said}; neither its numbers 3 to 6 (Pinocchio: place, quaternion x y z w, joints) nor 0 to 3 (Drake: "
-            f"quaternion w x y z, place, joints) are a quaternion of length 1 in every sample; {_NAMES_THAT_SAY_IT}"
-        )
-    counts = [] if kind == "Q" else [f"{FREE_JOINT + len(known)} with a free joint"]
-    counts += [f"{len(known)} without"] if kind == "qpos" else []
-    counts += [f"{root + body.n_shape} in biorbd's order"] if kind != "qpos" and root is not None else []
-    needed = " or ".join(counts) or "an unknown number"
-    return (
-        f"{said}; of {len(known)} joints ({', '.join(known)}) a sample has {needed} of coordinates; store an array "
-        f"'joint_names' if there are others, or {_NAMES_THAT_SAY_IT}"
-    )
-
-
-def _ambiguity(kind: str, fitting: Sequence[tuple[FreeJoint | None, bool]], where: str) -> str:
+    """What an error says of an array that fits no order of coordinates, or several."""
     titles = list(dict.fromkeys("biorbd's" if layout is None else layout.title for layout, _ in fitting))
     if len(titles) > 1:
-        return f"{where}: {kind} fits {' and '.join(titles)}; {_NAMES_THAT_SAY_IT}"
+        return f": it fits {' and '.join(titles)}; {_NAMES_THAT_SAY_IT}"
+    if fitting:
+        return (
+            ": as many samples as coordinates do not show along which axis time goes; leave out the last sample of "
+            f"{kind}, of its rates and of the times"
+        )
+    orders = [] if rooted is None else [f"the root and the joints in biorbd's order ({rooted} numbers)"]
+    if kind == "qpos":
+        orders += [f"place, quaternion w x y z of length 1 and joints ({FREE_JOINT + len(names)} numbers)"]
+        orders += [f"the joints alone ({len(names)})"]
+    if kind == "q":
+        orders += [
+            "Pinocchio's place and quaternion x y z w of length 1, or Drake's quaternion w x y z and place, and the "
+            f"joints ({FREE_JOINT + len(names)} numbers)"
+        ]
+    needed = ", or ".join(orders) or "coordinates of the base in an order that the body's file does not say"
     return (
-        f"{where}: {kind} has as many samples as coordinates, so that nothing shows along which axis time goes; leave "
-        f"out the last sample of {kind}, its rates and the times"
+        f"; a sample is {needed}; the joints are {', '.join(names)}. Store an array 'joint_names' if there are others, "
+        f"or {_NAMES_THAT_SAY_IT}"
     )

@@ -62,4 +62,4 @@ def read_hdf5(where: Path, data: bytes, chosen: str | None) -> Table:
         raise TrajectoryError(
             f"{where}: no HDF5 file that can be read ({type(error).__name__}: {error!s:.200}); write it anew"
         ) from None
-    return arrays_table(str(where), "HDF5", entries, chosen, units)
+    return arrays_table(str(where), "HDF5", entries, chosen, units, ordered=False)

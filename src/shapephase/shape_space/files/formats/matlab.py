@@ -56,7 +56,7 @@ def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:
     for name, value in readable.items():
         if classes[name] == "logical" and isinstance(value, np.ndarray):
             readable[name] = value.astype(bool)
-    return arrays_table(str(where), "MATLAB 7.3" if unordered else "MATLAB", readable, chosen)
+    return arrays_table(str(where), "MATLAB 7.3" if unordered else "MATLAB", readable, chosen, ordered=not unordered)
 
 
 def _plain(value: Any, unordered: bool) -> Any:

@@ -163,26 +163,22 @@ def _isaac_table(arrays: Mapping[str, Any], where: str, body: Body, timestep: fl
         raise TrajectoryError(
             f"{where}: joint_pos has {joints.shape[1]} columns, and joint_names has {len(named)}; mend 'joint_names'"
         )
+    nameless = None
     if quaternions is not None and places is not None:
         first = quaternions[:, 0]
         nameless, which = placed_joints(
             body, joints, places, first, where, order, names=named, spins=spins, times=times, orders=2
         )
         quaternions = first if which else first[:, _SCALAR_FIRST]
-        names = nameless.names
-    elif named is None and (order is None or quaternions is not None):
+    elif quaternions is not None or (named is None and order is None):
         raise TrajectoryError(
-            f"{where}: joint_pos has no names: add an array 'joint_names', or 'body_pos_w' and 'body_quat_w', by which "
-            "the order is found; or say which it is: joint_order='isaac' (--joint-order isaac)"
+            f"{where}: joint_pos does not say the order of joints and quaternions: add 'body_pos_w' and 'body_quat_w', "
+            "by which both are found; store shapes, joint_names and base_quat_wxyz instead; or, without a base, say "
+            "which it is: joint_order='isaac' (--joint-order isaac)"
         )
-    else:
-        if quaternions is not None:
-            raise TrajectoryError(
-                f"{where}: body_quat_w without body_pos_w does not show whether w stands first; add body_pos_w, or "
-                "store shapes, joint_names and base_quat_wxyz"
-            )
-        nameless = None if named else nameless_joints(body, joints.shape[1], f"{where}: joint_pos", order)
-        names = named or () if nameless is None else nameless.names
+    elif named is None:
+        nameless = nameless_joints(body, joints.shape[1], f"{where}: joint_pos", order)
+    names = named or (nameless.names if nameless else ())
     motion = FloatingMotion(
         "Isaac Lab joint_pos",
         names,

@@ -20,12 +20,20 @@ _OF_THE_BASE = {
     "base_quat_wxyz": ("base_qw", "base_qx", "base_qy", "base_qz"),
     "base_position": ("base_x", "base_y", "base_z"),
 }
+_FIRST_TURNS = ("_Xrotation", ".rx")
+"""What the name of one of the three angles of a ball joint ends with."""
 _DEEPEST = 4
 """Structures inside each other that are looked into."""
 
 
 def arrays_table(
-    where: str, kind: str, entries: Mapping[str, Any], chosen: str | None, units: Mapping[str, str] | None = None
+    where: str,
+    kind: str,
+    entries: Mapping[str, Any],
+    chosen: str | None,
+    units: Mapping[str, str] | None = None,
+    *,
+    ordered: bool = True,
 ) -> Table:
     """The table that arrays by name hold: vectors of one length, or a matrix beside the names of its columns.
 
@@ -33,6 +41,7 @@ def arrays_table(
     ----------
     entries : name -> array of numbers, list of texts, or entries of a structure
     chosen : the structure that has the motion; None: the arrays on top, or the only structure
+    ordered : whether entries stand in the order in which they were written
 
     Raises
     ------
@@ -47,6 +56,12 @@ def arrays_table(
         inside = entries[chosen]
     for _ in range(_DEEPEST):
         columns, used = _matrix(where, inside)
+        turns = [] if columns or ordered else [name for name in inside if name.endswith(_FIRST_TURNS)]
+        if turns:
+            raise TrajectoryError(
+                f"{where}: {kind} keeps no order of names, and {turns[0]!r} is one of three turns in the order of "
+                "their columns; write the quaternion in columns .x, .y, .z, .w, or a matrix beside joint_names"
+            )
         columns = columns or _vectors(where, inside)
         if columns:
             base = _base_columns(where, inside)
