@@ -179,6 +179,13 @@ FillOption = Annotated[
         "error. For example `--fill 0.1s` or `--fill 100ms`."
     ),
 ]
+LowPassOption = Annotated[
+    float | None,
+    _motion_option(
+        "Low-pass filter joints and base, over the whole recording: cut-off of a Butterworth filter of second order "
+        "run forwards and backwards (-3 dB by both passes), in Hz, in place of --smooth; for example `--lowpass 6`."
+    ),
+]
 
 
 @Parameter(name="*")
@@ -280,6 +287,7 @@ class RecordingOptions:
             "`--smooth-penalty 1e-9`."
         ),
     ] = None
+    lowpass: LowPassOption = None
     close: Annotated[
         str | None,
         _motion_option(

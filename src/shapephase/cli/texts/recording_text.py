@@ -199,7 +199,9 @@ def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str
         )
     if record["smooth"] is not None:
         lines.append(f"{'smoothed':24}for noise of {_levels(body, record['smooth'])}, rms")
-    if recorded.smoothing is not None:
+    if record["lowpass"] is not None:
+        lines += _low_pass_lines(body, record["lowpass"])
+    elif recorded.smoothing is not None:
         lines += _smoothing_lines(recorded.smoothing)
     if recorded.closing is not None:
         lines += _closing_lines(recorded.closing)
@@ -227,6 +229,23 @@ def _gap_lines(record: Any) -> list[str]:
         f"{'cut off':24}{cut['samples']} samples at the {cut['at']}, where {_listed(cut['columns'])} "
         f"{'has' if len(cut['columns']) == 1 else 'have'} no number"
         for cut in gaps["cut"]
+    ]
+
+
+def _low_pass_lines(body: Body, record: Any) -> list[str]:
+    """The filter, its noise, where it lacks samples, and what of the motion it may have taken."""
+    noise, beyond, by_noise = record["noise"], record["rms_up_to_twice_the_cut_off"], record["of_that_by_noise"]
+    twice = f"{record['twice_the_cut_off_hz']:.4g} Hz"
+    worst = max(beyond, key=lambda name: beyond[name] - by_noise[name])
+    start, end = record["affected_at_ends_s"]
+    return [
+        f"{'low-pass':24}{record['cut_off_hz']:.6g} Hz, Butterworth of second order forwards and backwards",
+        f"{'  noise':24}{_levels(body, noise) or 'none'}, rms, by what is above {twice}, "
+        "taken as white; error bars hold what passes of it",
+        f"{'  may be lost':24}{_value(body, worst, beyond[worst])} rms of {worst} up to "
+        f"{twice}, {_value(body, worst, by_noise[worst])} of it by noise; "
+        "the bars do not hold this",
+        f"{'  ends':24}the first {start:.3g} s and the last {end:.3g} s have samples on one side only",
     ]
 
 
