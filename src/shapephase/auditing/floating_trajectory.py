@@ -23,8 +23,8 @@ _POSE = 7
 """Numbers of a place and a quaternion."""
 _TWIST = 6
 """Numbers of two velocities."""
-_FEWEST = 12
-"""Samples: fewer say nothing of noise."""
+_FEWEST = 8
+"""Samples: a flight of 0.3 s at 30 frames a second; fewer say nothing of noise."""
 _LARGEST = 1e12
 """Of places, rates and times: no recorder has a clock or a place beyond it."""
 _OFF_UNIT = 0.1

@@ -321,9 +321,10 @@ class RecordingOptions:
     flight: Annotated[
         tuple[str, ...],
         _motion_option(
-            "Keep the free flight only, and fit the momentum to the recorded attitude of the base: auto (where the "
-            "centre of mass falls freely), all, or its first and last time, in s or the unit of the file; without it, "
-            "where the base is recorded and no --momentum is given, auto, or all where nothing falls. For example "
+            "Keep the free flight only, and fit the momentum to the recorded attitude of the base: auto (the longest "
+            "fall of the centre of mass), auto:2 (the second in time), all, or its first and last time, in s or the "
+            "unit of the file; without it, where the base is recorded and no --momentum is given, auto, or all where "
+            "nothing falls. For example "
             "`--flight auto` or `--flight 12.5 13.9`.",
             negative_iterable="",
             consume_multiple=True,

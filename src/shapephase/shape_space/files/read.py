@@ -194,10 +194,11 @@ def read_recorded_motion(
         text such as "x,-z,y", where the x, y and z axis of the base point to; "estimate" leaves them open, for
         `momentum_from_recording` to find; None: the same axes, but "x,-z,y" for `pelvis_tilt` and so on (OpenSim: x
         forward, y up; URDF: x forward, z up)
-    flight : what is kept is a free flight: "auto", the longest stretch on which the centre of mass falls freely; its
-        first and last time, as the file tells the time; "all"; "recorded": as "auto" where the attitude of the base is
-        recorded, all of it where its places are not recorded or do not fall, and what is kept may be anything where
-        nothing of the base is recorded; None: what is kept may be anything
+    flight : what is kept is a free flight: "auto", the longest stretch on which the centre of mass falls freely;
+        "auto:2", the second of all such stretches in time; its first and last time, as the file tells the time; "all";
+        "recorded": as "auto" where the attitude of the base is recorded, all of it where its places are not recorded or
+        do not fall, and what is kept may be anything where nothing of the base is recorded; None: what is kept may be
+        anything
     up : the recorder's axis that points up: "x", "y", "z", "-x", "-y" or "-z"; None: that of the format (OpenSim y,
         MuJoCo and ROS z), else x, y or z, whichever has the longest fall
     gravity : by which the body falls in a flight [m/s^2]; None: 9.81; "any": units are not doubted
@@ -514,9 +515,9 @@ def _smoothing_record(smoothing: Smoothing, body: Body) -> dict[str, Any]:
 
 def _low_pass_record(smoothing: Smoothing, body: Body) -> dict[str, Any]:
     """The filter, what it leaves of the noise and what it takes off the motion, as JSON can hold it."""
-    chosen, beyond, by_noise = smoothing.low_pass, smoothing.beyond, smoothing.noise_beyond
+    chosen, in_band, by_noise = smoothing.low_pass, smoothing.in_band, smoothing.noise_in_band
     assert chosen is not None
-    assert beyond is not None
+    assert in_band is not None
     assert by_noise is not None
     return {
         "cut_off_hz": chosen.cut_off,
@@ -524,7 +525,7 @@ def _low_pass_record(smoothing: Smoothing, body: Body) -> dict[str, Any]:
         "rate_hz": chosen.rate,
         "noise": dict(zip(body.joint_names, smoothing.noise.tolist(), strict=True)),
         "twice_the_cut_off_hz": chosen.twice.cut_off,
-        "rms_up_to_twice_the_cut_off": dict(zip(body.joint_names, beyond.tolist(), strict=True)),
+        "rms_up_to_twice_the_cut_off": dict(zip(body.joint_names, in_band.tolist(), strict=True)),
         "of_that_by_noise": dict(zip(body.joint_names, by_noise.tolist(), strict=True)),
         "affected_at_ends_s": list(smoothing.ends),
     }

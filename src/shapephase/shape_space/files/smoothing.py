@@ -52,8 +52,8 @@ class Smoothing:
         of that; error bars hold both
     residual : (n,) rms of samples minus path [rad or m]
     low_pass : the filter that took the place of the spline, for which the noise is an estimate; None: a spline
-    beyond : (n,) rms of what the filter of twice the cut-off would leave beside this one [rad or m]
-    noise_beyond : (n,) what the noise alone leaves there
+    in_band : (n,) rms of what the filter of twice the cut-off would leave beside this one [rad or m]
+    noise_in_band : (n,) what the noise alone leaves there
     ends : how long at the start and at the end of the path the filter lacks samples on one side [s]
     """
 
@@ -64,8 +64,8 @@ class Smoothing:
     bias_in_bars: float
     residual: Array
     low_pass: LowPass | None = None
-    beyond: Array | None = None
-    noise_beyond: Array | None = None
+    in_band: Array | None = None
+    noise_in_band: Array | None = None
     ends: tuple[float, float] = (0.0, 0.0)
 
     __repr__ = short_repr
@@ -305,8 +305,8 @@ def _filtered(
     return path, replace(
         report,
         low_pass=chosen,
-        beyond=np.sqrt(np.mean((by_wider - kept) ** 2, axis=0)),
-        noise_beyond=noise * np.sqrt(((more - shares) ** 2).sum() / count),
+        in_band=np.sqrt(np.mean((by_wider - kept) ** 2, axis=0)),
+        noise_in_band=noise * np.sqrt(((more - shares) ** 2).sum() / count),
         ends=(max(reach - float(inside[0]), 0.0), max(reach - float(samples.times[-1] - inside[-1]), 0.0)),
     )
 
