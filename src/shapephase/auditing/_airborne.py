@@ -13,7 +13,8 @@ from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 from ..letters import what_came
-from ..shape_space.files._free_fall import free_fall
+from ..shape_space.files._flight import flight_choices
+from ..shape_space.free_fall import free_fall
 from ._noise import white_noise
 from .floating_trajectory import FloatingTrajectory
 
@@ -25,6 +26,8 @@ _WINDOWS = 12
 """Over the whole trajectory, over each of which an acceleration is fitted."""
 _LEAST_WINDOW = 8
 """Samples of a window."""
+_FEWEST = 8
+"""Samples of a flight: a dive of 0.3 s at 30 frames a second."""
 _STRAIGHT = 0.5
 """Share of how far the base is off parabolas: the centre of mass of a body that nothing carries is off by less, in most
 windows; that of a body that stands or walks goes with its base, or farther."""
@@ -76,14 +79,15 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
     if not isinstance(flight, str) and isinstance(flight, Sequence | np.ndarray) and len(flight) == 2:
         first, last = float(flight[0]), float(flight[1])
         inside = np.flatnonzero((times >= first) & (times <= last))
-        if len(inside) < 3 * _LEAST_WINDOW:
+        if len(inside) < _FEWEST:
             raise TrajectoryError(
                 f"{trajectory.name}: {len(inside)} samples from {first:.9g} to {last:.9g} s; an audit needs "
-                f"{3 * _LEAST_WINDOW}, and the trajectory goes from {times[0]:.9g} to {times[-1]:.9g} s"
+                f"{_FEWEST}, and the trajectory goes from {times[0]:.9g} to {times[-1]:.9g} s"
             )
         return _part(times, centres, int(inside[0]), int(inside[-1]) + 1, "between the times given")
-    if not isinstance(flight, str) or flight != "auto":
-        raise ShapeError(f"flight: 'auto', 'all' or two times are needed, got {what_came(flight)}")
+    number = flight_choices(flight, None, None).number if isinstance(flight, str) else None
+    if not isinstance(flight, str) or (flight != "auto" and number is None):
+        raise ShapeError(f"flight: 'auto', 'auto:2', 'all' or two times are needed, got {what_came(flight)}")
     if centres is None:
         return _part(times, None, 0, len(times), "all of it: places are not given, and no fall can be looked for")
     usual = float(np.median(np.diff(times)))
@@ -92,9 +96,9 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
     at = times[::every]
     found = _accelerations(at, some)
     if np.linalg.norm(found - np.median(found, axis=0), axis=1).max() < _EVEN * _GRAVITY:
-        if np.linalg.norm(np.median(found, axis=0)) > _EVEN * _GRAVITY:
+        if number is None and np.linalg.norm(np.median(found, axis=0)) > _EVEN * _GRAVITY:
             return _part(times, centres, 0, len(times), "all of it: the centre of mass falls")
-        if _goes_straight(at, some, base):
+        if number is None and _goes_straight(at, some, base):
             return _part(times, centres, 0, len(times), "all of it: the centre of mass has no weight")
     try:
         fall = free_fall(at - at[0], some, trajectory.name)
@@ -104,8 +108,16 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
             "straight where the base does not. Are the axes of the base right (base_axes, --base-axes)? If so, and "
             "there is a flight, give its times: flight=(first, last) (--flight FIRST LAST)"
         ) from None
-    past = min(every * fall.last + 1, len(times))
-    return _part(times, centres, every * fall.first, past, f"the centre of mass falls, {fall.up} up")
+    if number is not None and number > len(fall.all_ends):
+        raise TrajectoryError(
+            f"{trajectory.name}: there is no flight number {number}, there are {len(fall.all_ends)}; take one of them "
+            f"(flight='auto:{len(fall.all_ends)}', --flight auto:{len(fall.all_ends)})"
+        )
+    first, last = fall.ends if number is None else fall.all_ends[number - 1]
+    flights = "; ".join(f"{at[one]:.6g} to {at[other]:.6g} s" for one, other in fall.all_ends)
+    others = f", of {len(fall.all_ends)} flights ({flights}; --flight auto:2)" if len(fall.all_ends) > 1 else ""
+    past = min(every * last + 1, len(times))
+    return _part(times, centres, every * first, past, f"the centre of mass falls, {fall.up} up{others}")
 
 
 def _goes_straight(times: Array, centres: Array, base: Array) -> bool:
@@ -122,8 +134,8 @@ def _centres(body: Body, trajectory: FloatingTrajectory) -> Array | None:
 
 
 def _part(times: Array, centres: Array | None, first: int, past: int, how: str) -> AirbornePart:
-    if past - first < 3 * _LEAST_WINDOW:
-        raise TrajectoryError(f"{past - first} samples are in the air; an audit needs {3 * _LEAST_WINDOW} or more")
+    if past - first < _FEWEST:
+        raise TrajectoryError(f"{past - first} samples are in the air; an audit needs {_FEWEST} or more")
     if centres is None:
         return AirbornePart(first, past, how)
     x, y, z = _acceleration(times[first:past], centres[first:past]).tolist()

@@ -46,6 +46,9 @@ class RunAudit:
     tolerance : of the momentum, by which that was decided, without unit
     recorded : whether the samples were measured, not computed
     right : whether momentum, fall and rates hold within noise or tolerance
+    momentum_bars : standard deviations of the momentum, world axes [kg m^2/s], of a flight of so few samples that it is
+        fitted as a whole; else None
+    fall_bar : standard deviation of the fall, with 1 cm of wander [m/s^2], or None
 
     Examples
     --------
@@ -77,6 +80,8 @@ class RunAudit:
     tolerance: float
     recorded: bool
     right: bool
+    momentum_bars: tuple[float, float, float] | None = None
+    fall_bar: float | None = None
 
     __repr__ = short_repr
 
@@ -121,6 +126,8 @@ class RunAudit:
             "rates_given": self.given_rates,
             "noise": asdict(self.noise),
             "momentum_kg_m2_s": self.momentum.mean(axis=0).tolist(),
+            "momentum_bars_kg_m2_s": self.momentum_bars,
+            "fall_bar_m_s2": self.fall_bar,
             "momentum_drift_kg_m2_s": self.momentum_drift,
             "momentum_drift_relative": self.relative_drift,
             "momentum_drift_of_itself": self.drift_of_itself if np.isfinite(self.drift_of_itself) else None,
@@ -188,6 +195,8 @@ class Audit:
 
     @property
     def _blame(self) -> str:
+        if any(run.momentum_bars is not None for run in self.runs):
+            return "wrong; so few samples do not tell causes apart"
         if not self.cause:
             return "wrong, and no single hypothesis explains it"
         if len(self.cause) == 1:
@@ -246,11 +255,14 @@ def _run_lines(run: RunAudit) -> list[str]:
     how = run.airborne.how.removeprefix("all of it: ")
     found = [f"{run.name}: {len(run.times)} samples from {run.first_time:.6g} to {run.last_time:.6g} s, {how}"]
     mean = " ".join(f"{part:.4g}" for part in run.momentum.mean(axis=0))
+    if run.momentum_bars is not None:
+        mean += f" ± {' '.join(f'{bar:.2g}' for bar in run.momentum_bars)}"
     drift = f"drifts by {run.relative_drift:.2g} of what turns the body"
     drift = "constant within noise" if run.momentum_ratio <= 1.0 else drift
     found.append(f"  angular momentum   {mean} kg m^2/s, {drift}")
     if run.fall_off is not None and run.fall_ratio is not None and run.airborne.acceleration is not None:
         pull = " ".join(f"{part:.4g}" for part in run.airborne.acceleration)
+        pull += f" ± {run.fall_bar:.2g}" if run.fall_bar is not None else ""
         found.append(f"  fall               {pull} m/s^2, off by {run.fall_off:.2g} m{_by_noise(run.fall_ratio)}")
     if run.agreement is not None:
         late = f", late by {1e3 * run.agreement.late:.3g} ms" if run.agreement.ratio > 1.0 else ""

@@ -31,7 +31,7 @@ def check_command(
     from ..body.plausibility import implausible, person_height
     from ..shape_space.summaries import body_summary, path_summary
     from .motion import body_argument, joint_motion
-    from .texts.recording_text import recording_data, recording_lines
+    from .texts.recording_text import flight_lines, flights_in, recording_data, recording_lines
     from .texts.result_text import body_lines, path_data, path_lines, plain, record_data, too_fast
 
     loaded = body_argument(body, floating)
@@ -50,5 +50,9 @@ def check_command(
             warnings.warn(too_fast(loaded, moved), TrajectoryWarning, stacklevel=2)
         lines += ["", *path_lines(loaded, motion, moved, recorded), *recording_lines(loaded, recorded)]
         data["motion"] = path_data(moved) | record_data(loaded, recorded) | recording_data(recorded)
+        if recorded is not None and recorded.flight is None:
+            flights = flights_in(loaded, recorded, recording)
+            lines += flight_lines(flights, recorded)
+            data["motion"]["flights"] = flights
     made_from = {} if motion is None else {"joints": list(loaded.joint_names)}
     return Outcome("\n".join(lines), data, with_verdict=True, made_from=made_from)

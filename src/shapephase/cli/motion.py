@@ -207,7 +207,7 @@ def flight_words(words: tuple[str, ...]) -> str | tuple[float, float] | None:
     try:
         first, last = map(float, words)
     except ValueError:
-        raise ShapeError(f"--flight: auto, all or two times are needed, got {' '.join(words)!r:.60}") from None
+        raise ShapeError(f"--flight: auto, auto:2, all or two times are needed, got {' '.join(words)!r:.60}") from None
     return first, last
 
 

@@ -230,6 +230,13 @@ FillOption = Annotated[
         "error. For example `--fill 0.1s` or `--fill 100ms`."
     ),
 ]
+LowPassOption = Annotated[
+    float | None,
+    _motion_option(
+        "Low-pass filter joints and base, over the whole recording: cut-off of a Butterworth filter of second order "
+        "run forwards and backwards (-3 dB by both passes), in Hz, in place of --smooth; for example `--lowpass 6`."
+    ),
+]
 
 
 @Parameter(name="*")
@@ -331,6 +338,7 @@ class RecordingOptions:
             "`--smooth-penalty 1e-9`."
         ),
     ] = None
+    lowpass: LowPassOption = None
     close: Annotated[
         str | None,
         _motion_option(
@@ -364,9 +372,10 @@ class RecordingOptions:
     flight: Annotated[
         tuple[str, ...],
         _motion_option(
-            "Keep the free flight only, and fit the momentum to the recorded attitude of the base: auto (where the "
-            "centre of mass falls freely), all, or its first and last time, in s or the unit of the file; without it, "
-            "where the base is recorded and no --momentum is given, auto, or all where nothing falls. For example "
+            "Keep the free flight only, and fit the momentum to the recorded attitude of the base: auto (the longest "
+            "fall of the centre of mass), auto:2 (the second in time), all, or its first and last time, in s or the "
+            "unit of the file; without it, where the base is recorded and no --momentum is given, auto, or all where "
+            "nothing falls. For example "
             "`--flight auto` or `--flight 12.5 13.9`.",
             negative_iterable="",
             consume_multiple=True,

@@ -80,7 +80,7 @@ def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) 
     path : through samples: `ShapePath.spline`, `ShapePath.waypoints`, or a recorded motion
     t : times (N,) [s]
     joints : standard deviation of the white noise of the samples, one or one for each joint (n,) [rad or m]; None: the
-        one that a recording was smoothed for
+        one that a recording was smoothed for, or that was estimated where it was low-pass filtered
 
     Raises
     ------
@@ -139,9 +139,10 @@ def _samples(path: ShapePath) -> PathSamples:
 
 
 def stated_noise(path: ShapePath) -> Array | None:
-    """The noise that a recording was smoothed for: (n,) [rad or m]; None where none was stated."""
+    """The noise that a recording was smoothed for, or that a low-pass filter found: (n,) [rad or m]; else None."""
     check_object(path, "ShapePath", "path")
-    said = None if path.record is None else path.record.get("smooth")
+    record = path.record or {}
+    said = record.get("smooth") or (record.get("lowpass") or {}).get("noise")
     return None if said is None else np.array([said[name] for name in path.joint_names or said])
 
 
@@ -149,7 +150,8 @@ def _levels(path: ShapePath, joints: ArrayLike | None) -> Array:
     given = stated_noise(path) if joints is None else finite_array(joints, "joints")
     if given is None:
         raise WrongObjectError(
-            "the noise of the samples is not stated: give joints, or read the recording with smooth (--smooth)"
+            "the noise of the samples is not stated: give joints, or read the recording with smooth (--smooth) or "
+            "lowpass (--lowpass)"
         )
     if given.shape not in ((), (path.n_shape,)) or np.any(given < 0.0):
         raise ShapeError(

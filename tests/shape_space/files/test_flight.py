@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.errors import ShapeError, TrajectoryError
-from shapephase.shape_space.files._free_fall import free_fall
 from shapephase.shape_space.files.read import read_recorded_motion
+from shapephase.shape_space.free_fall import free_fall
 from support.motion_writers import write_delimited, write_opensim
 
 DIVER = sp.load_body("diver")
@@ -175,7 +175,7 @@ def test_what_a_flight_needs(tmp_path):
         read_recorded_motion(file, DIVER, flight="auto", base_axes="estimate")
     with pytest.raises(TrajectoryError, match=r"2 samples are in the flight.*from 12 to 14\.49 s"):
         read_recorded_motion(file, DIVER, flight=(12.5, 12.515))
-    with pytest.raises(ShapeError, match="flight: 'auto', 'all', 'recorded' or two times"):
+    with pytest.raises(ShapeError, match=r"flight: 'auto', 'auto:2' .*, 'all', 'recorded' or two times"):
         read_recorded_motion(file, DIVER, flight="never")
     with pytest.raises(ShapeError, match="first before the last"):
         read_recorded_motion(file, DIVER, flight=(13.0, 12.0))

@@ -6,8 +6,8 @@ from scipy.interpolate import make_interp_spline
 
 import shapephase as sp
 from shapephase.errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
-from shapephase.shape_space.files._linear_smoother import LinearSmoother
 from shapephase.shape_space.files.smoothing import smoothed_path
+from shapephase.shape_space.linear_smoother import LinearSmoother
 
 NAMES = ("hip", "knee")
 

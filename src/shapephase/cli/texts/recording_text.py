@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,9 +11,14 @@ import numpy as np
 from ... import so3
 from ...arrays import Array
 from ...body.body import Body
+from ...errors import TrajectoryError
+from ...shape_space.files._base_columns import ESTIMATE
+from ...shape_space.files._labels import IN_A_SECOND
 from ...shape_space.files.closing import Closing
 from ...shape_space.files.read import RecordedMotion
 from ...shape_space.files.smoothing import Smoothing
+from ...shape_space.free_fall import GRAVITY, free_fall
+from ..options import RecordingOptions
 
 if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
@@ -174,6 +179,8 @@ def _base_lines(record: Any) -> list[str]:
             off = 1e3 * flight["off_parabola_rms_m"]
             found = f", found by the centre of mass: it falls to {off:.2g} mm as gravity says, {flight['up']} is up"
         ends = f"{flight['first_time']:.9g} to {flight['last_time']:.9g} {record['time_unit']}"
+        if len(flight.get("all", ())) > 1:
+            lines.append(f"{'flights':24}{_flight_words(flight['all'], record['time_unit'])}")
         lines.append(f"{'flight':24}{record['samples']} of {record['samples_in_file']} samples, {ends}{found}")
     return lines
 
@@ -212,6 +219,32 @@ def _vector(values: list[float]) -> str:
     return "(" + ", ".join(f"{value + 0.0:.4g}" for value in values) + ")"
 
 
+def _flight_words(flights: Sequence[Sequence[float]], unit: str) -> str:
+    listed = "; ".join(f"{number}: {first:.6g} to {last:.6g}" for number, (first, last) in enumerate(flights, 1))
+    return f"{listed} {unit} (--flight auto:1 and so on; auto is the longest)"
+
+
+def flights_in(body: Body, recorded: RecordedMotion, options: RecordingOptions) -> list[list[float]]:
+    """First and last times of all flights of a recording of which no flight was asked for, as the file tells them."""
+    record, times = recorded.record, recorded.times
+    base = record["base"] or {}
+    if recorded.base_attitude is None or recorded.base_position is None or base.get("axes") == ESTIMATE:
+        return []
+    shapes = recorded.path.shape(times)
+    centres = recorded.base_position + so3.apply(recorded.base_attitude, body.centre_of_mass(shapes))
+    try:
+        fall = free_fall(times, centres, "", up=options.up, gravity=options.gravity or GRAVITY)
+    except TrajectoryError:
+        return []
+    clock = record["first_time"] + times * IN_A_SECOND[record["time_unit"]]
+    return [[float(clock[first]), float(clock[last])] for first, last in fall.all_ends]
+
+
+def flight_lines(flights: list[list[float]], recorded: RecordedMotion) -> list[str]:
+    """These flights for people."""
+    return [f"{'flights':24}{_flight_words(flights, recorded.record['time_unit'])}"] if flights else []
+
+
 def _levels(body: Body, smoothed: Mapping[str, float]) -> str:
     """The noise of joints that turn, and of those that slide."""
     found = []
@@ -234,7 +267,9 @@ def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str
         )
     if record["smooth"] is not None:
         lines.append(f"{'smoothed':24}for noise of {_levels(body, record['smooth'])}, rms")
-    if recorded.smoothing is not None:
+    if record["lowpass"] is not None:
+        lines += _low_pass_lines(body, record["lowpass"])
+    elif recorded.smoothing is not None:
         lines += _smoothing_lines(recorded.smoothing)
     if recorded.closing is not None:
         lines += _closing_lines(recorded.closing)
@@ -262,6 +297,23 @@ def _gap_lines(record: Any) -> list[str]:
         f"{'cut off':24}{cut['samples']} samples at the {cut['at']}, where {_listed(cut['columns'])} "
         f"{'has' if len(cut['columns']) == 1 else 'have'} no number"
         for cut in gaps["cut"]
+    ]
+
+
+def _low_pass_lines(body: Body, record: Any) -> list[str]:
+    """The filter, its noise, where it lacks samples, and what of the motion it may have taken."""
+    noise, beyond, by_noise = record["noise"], record["rms_up_to_twice_the_cut_off"], record["of_that_by_noise"]
+    twice = f"{record['twice_the_cut_off_hz']:.4g} Hz"
+    worst = max(beyond, key=lambda name: beyond[name] - by_noise[name])
+    start, end = record["affected_at_ends_s"]
+    return [
+        f"{'low-pass':24}{record['cut_off_hz']:.6g} Hz, Butterworth of second order forwards and backwards",
+        f"{'  noise':24}{_levels(body, noise) or 'none'}, rms, by what is above {twice}, "
+        "taken as white; error bars hold what passes of it",
+        f"{'  may be lost':24}{_value(body, worst, beyond[worst])} rms of {worst} up to "
+        f"{twice}, {_value(body, worst, by_noise[worst])} of it by noise; "
+        "the bars do not hold this",
+        f"{'  ends':24}the first {start:.3g} s and the last {end:.3g} s have samples on one side only",
     ]
 
 

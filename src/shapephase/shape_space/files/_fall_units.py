@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Array
 from ...errors import TrajectoryError
-from ._free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
+from ..free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
 
 _LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 """[m] Units that are mixed up."""
@@ -78,7 +77,7 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
         return None
     longest = max(time for time, _, _ in falls)
     _, best = min(((off, fall) for time, off, fall in falls if time > _AS_LONG * longest), key=lambda one: one[0])
-    return replace(best, first=stride * best.first, last=stride * best.last)
+    return best.every(stride)
 
 
 def is_long(fall: FreeFall, times: Array, lengths: float = 1.0) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,9 +16,9 @@ from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
+from ..free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, fall_number, free_fall, lasts
 from ._base_columns import ESTIMATE
 from ._fall_units import check_gravity, check_parabola, is_long, slipped_fall
-from ._free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, free_fall, lasts
 from ._joint_columns import Matched
 from ._recording import Recording
 from ._times import part_of, samples_within, trim_argument
@@ -30,6 +31,7 @@ RECORDED = "recorded"
 """Instead of two times: where the base is recorded, its fall; without places or a fall all of it; else no flight."""
 ANY_GRAVITY = "any"
 """Instead of a gravity: units of length and time are not doubted."""
+_NUMBERED = re.compile(rf"{AUTO}:([1-9]\d{{0,5}})")
 # Entries of rotations that differ by less are rounding of one attitude.
 _STILL = 1e-12
 # Of a flight, to which six numbers are fitted.
@@ -46,6 +48,7 @@ class Flight:
     by : "auto", "all" or "times": how it was found
     fall : how the centre of mass falls there, where the flight was found by it
     requested : whether a caller asked for it; else the recorded base has to show that it is one
+    all_times : the first and last times of all flights of the recording, as the file tells them, where it was searched
 
     Examples
     --------
@@ -58,6 +61,7 @@ class Flight:
     by: str
     fall: FreeFall | None = None
     requested: bool = True
+    all_times: tuple[tuple[float, float], ...] = ()
 
     __repr__ = short_repr
 
@@ -68,6 +72,7 @@ class Flight:
         if self.fall is not None:
             found |= {"up": self.fall.up, "centre_noise_m": self.fall.noise, "off_parabola_rms_m": self.fall.off}
             found |= {"gravity_m_s2": self.fall.gravity, "gravity_bar_m_s2": self.fall.gravity_bar}
+            found |= {"all": [list(ends) for ends in self.all_times]}
         return found
 
 
@@ -78,6 +83,7 @@ class FlightChoices:
     Attributes
     ----------
     said : a word, two times, or None: no flight is asked for
+    number : of the flight in time, from 1 on; None: the longest one
     up : the axis that points up, or None for that of the format
     gravity : [m/s^2]; or None: units are not doubted
     """
@@ -85,6 +91,7 @@ class FlightChoices:
     said: str | tuple[float, float] | None = None
     up: str | None = None
     gravity: float | None = GRAVITY
+    number: int | None = None
 
 
 def flight_choices(flight: str | Sequence[float] | None, up: str | None, gravity: float | str | None) -> FlightChoices:
@@ -97,10 +104,16 @@ def flight_choices(flight: str | Sequence[float] | None, up: str | None, gravity
         pull = GRAVITY if gravity is None else None
     else:
         pull = positive_argument(gravity, "gravity", "an acceleration in m/s^2")
+    numbered = _NUMBERED.fullmatch(flight) if isinstance(flight, str) else None
+    if numbered is not None:
+        return FlightChoices(AUTO, up, pull, int(numbered[1]))
     if flight is None or (isinstance(flight, str) and flight in (AUTO, ALL, RECORDED)):
         return FlightChoices(flight, up, pull)
     if isinstance(flight, str) or not isinstance(flight, Sequence | np.ndarray) or len(flight) != 2:
-        raise ShapeError(f"flight: {AUTO!r}, {ALL!r}, {RECORDED!r} or two times are needed, got {what_came(flight)}")
+        raise ShapeError(
+            f"flight: {AUTO!r}, '{AUTO}:2' (the second), {ALL!r}, {RECORDED!r} or two times are needed, got "
+            f"{what_came(flight)}"
+        )
     first, last = flight
     return FlightChoices(trim_argument((first, last), "flight"), up, pull)
 
@@ -129,12 +142,14 @@ def in_flight(
             f"{where}: a flight is fitted to the recorded attitude of the base, and there is none; columns such as "
             "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed"
         )
-    fall, by = None, "times" if isinstance(said, tuple) else ALL
+    fall, flights, by = None, (), "times" if isinstance(said, tuple) else ALL
     samples = samples_within(recording, said) if isinstance(said, tuple) else np.arange(len(recording.times))
     centres = None if said == AUTO else _places(motion, body)
     if said == AUTO or (said == RECORDED and centres is not None):
         fall = _fall(recording, motion, body, choices)
         if fall is not None:
+            flights = _clock_of(recording, fall)
+            fall = _chosen(recording, motion, body, fall, flights, choices.number)
             samples, by = np.arange(fall.first, fall.last + 1), AUTO
     elif centres is not None and choices.gravity is not None and len(samples) >= _FEWEST:
         # Three samples are always a parabola.
@@ -146,7 +161,34 @@ def in_flight(
             f"{recording.first:.9g} to {recording.last:.9g} {recording.time_unit}"
         )
     part = part_of(recording, samples)
-    return part, motion.kept(samples), Flight(part.first, part.last, by, fall, said != RECORDED)
+    return part, motion.kept(samples), Flight(part.first, part.last, by, fall, said != RECORDED, flights)
+
+
+def _clock_of(recording: Recording, fall: FreeFall) -> tuple[tuple[float, float], ...]:
+    clock = recording.clock
+    return tuple((float(clock[first]), float(clock[last])) for first, last in fall.all_ends)
+
+
+def _chosen(
+    recording: Recording,
+    motion: Matched,
+    body: Body,
+    fall: FreeFall,
+    flights: tuple[tuple[float, float], ...],
+    number: int | None,
+) -> FreeFall:
+    """The flight of that number; the longest where none is asked for."""
+    if number is None:
+        return fall
+    if number > len(flights):
+        listed = ", ".join(f"{first:.6g} to {last:.6g}" for first, last in flights)
+        raise TrajectoryError(
+            f"{recording.table.where}: there is no flight number {number}; there {'are' if len(flights) > 1 else 'is'} "
+            f"{len(flights)}: {listed} {recording.time_unit}; take one of them (--flight auto:{len(flights)})"
+        )
+    centres = _places(motion, body)
+    assert centres is not None
+    return fall_number(recording.times, centres, fall, number)
 
 
 def _places(motion: Matched, body: Body) -> Array | None:

@@ -62,7 +62,7 @@ class Gaps:
         """Let columns of one rotation or place have their gaps together."""
         for label in labels:
             self.held(table, label)
-        together = np.logical_or.reduce([self._missing[label] for label in labels])
+        together = np.asarray(np.logical_or.reduce([self._missing[label] for label in labels]), dtype=np.bool_)
         self._missing.update(dict.fromkeys(labels, together))
 
     def bridged(self, labels: Sequence[str], values: Array) -> Array:

@@ -172,7 +172,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
             shapes[:, quaternion] = np.stack([gaps.held(table, found[column]) for column in quaternion], axis=1)
     _check_unread(found, body, recording, choices)
     if body.n_shape and not found and choices.rest_missing:
-        _check_meant(left_out, body, recording, choices)
+        _check_meant(left_out, body, recording)
     at_rest = _rest_of_missing(found, body, where, choices, companions, unexplained=unexplained)
     for name, value in at_rest.items():
         shapes[:, body.joint_index(name)] = value
@@ -323,7 +323,7 @@ def _check_unread(found: Mapping[int, str], body: Body, recording: Recording, ch
         )
 
 
-def _check_meant(left_out: Mapping[str, str], body: Body, recording: Recording, choices: JointChoices) -> None:
+def _check_meant(left_out: Mapping[str, str], body: Body, recording: Recording) -> None:
     """Raise TrajectoryError where all joints would rest because the columns of theirs have other names.
 
     Where nothing is left out but what the caller has named, as in a file of the base alone, they do rest.

@@ -11,9 +11,9 @@ from ...arrays import Array, Mask, lock_arrays
 from ...display import short_repr
 from ..closing_arc import ClosingArc
 from ..curves import PiecewisePolynomial
+from ..linear_smoother import LinearSmoother
 from ..path_samples import PathSamples, path_samples
 from ..shape_path import ShapePath, interpolated
-from ._linear_smoother import LinearSmoother
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -24,7 +24,7 @@ class Prepared:
     ----------
     samples : (N, n) as recorded [rad or m]
     smoother : of columns (n,); knows the times of the samples, and whether the spline is periodic
-    pilot : a smoother of a higher order, by whose motion it is known what the other one takes off
+    pilot : a smoother of a higher order, by whose motion it is known what the other one takes off; None: unknown
     inside : the samples between whose times the path is, of those that are smoothed
     turns : (n,) whole turns that a loop makes, evenly [rad]
     drift : whether what is left between the last sample and the first is taken off evenly in time
@@ -33,7 +33,7 @@ class Prepared:
 
     samples: Array
     smoother: LinearSmoother
-    pilot: LinearSmoother
+    pilot: LinearSmoother | None
     inside: slice
     turns: Array
     drift: bool
@@ -84,6 +84,8 @@ class Prepared:
     @cached_property
     def _bias(self) -> Array:
         values = self.joined(self.samples)
+        if self.pilot is None:
+            return np.zeros_like(values)[self._kept]
         motion = self.pilot(values - values[0])
         return (self.smoother(motion) - motion)[self._kept]
 
@@ -109,6 +111,8 @@ class Prepared:
     def bias_by_samples(self, by_values: Array) -> Array:
         """As `SampleOrigin`."""
         given = self._of_all(by_values)
+        if self.pilot is None:
+            return self._by_recorded(np.zeros_like(given))
         return self._by_recorded(self.pilot.transposed(self.smoother.transposed(given) - given))
 
     def _of_all(self, by_values: Array) -> Array:

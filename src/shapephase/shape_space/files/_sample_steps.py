@@ -1,16 +1,22 @@
-"""Steps from one sample of a recording to the next: a first pose apart from the motion, turns too fast to follow."""
+"""Steps between samples of a recording: a first pose apart from the motion, turns too fast to follow, even steps."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from ... import so3
 from ...arrays import Array
 from ...body.body import Body
+from ...errors import TrajectoryError
 from ._joint_columns import Matched
 from ._labels import IN_A_SECOND
 from ._recording import Recording, warn
 from ._times import part_of
+from .smoothing import filtered, filtered_attitudes
 
 _APART = 5.0
 """Times the largest rate of the next second: a body that moves on does not slow down so much from its first step on."""
@@ -20,6 +26,10 @@ _FEWEST = 4
 """Steps in it: fewer are no recording, of which one expects small steps."""
 _NO_POSE = 0.02
 """[rad or m] A smaller first step is noise, or a body that moves very little."""
+_DENSER = 1.1
+"""Of the usual rate: splines through uneven samples make that many even ones of them."""
+_ROUNDING = 1e-9
+"""Steps of time."""
 _UNRESOLVED = 2.0 * np.pi / 3.0
 """[rad] From one sample to the next, the short way: turns up to twice as long the other way round show as much."""
 
@@ -75,6 +85,40 @@ def warn_of_fast_turns(recording: Recording, motion: Matched, body: Body) -> Non
         f"from {row} {before}, at {clock:.6g} {recording.time_unit}{f' ({others} more such steps)' if others else ''}: "
         "samples so far apart do not say which way round; the shorter way is taken"
     )
+
+
+def evenly_spaced(times: Array, motion: Matched, inside: slice, rate: float) -> tuple[Array, Matched, slice]:
+    """A motion at so many even times a second [1/s], by splines through its samples, and which of them are inside.
+
+    Raises TrajectoryError for more samples a second than there are: their noise would not be that of a recording.
+    """
+    usual = 1.0 / float(np.median(np.diff(times)))
+    if rate > _DENSER * usual:
+        raise TrajectoryError(
+            f"resample: about {usual:.4g} samples a second are recorded, and lowpass takes the noise of each as its "
+            f"own; give that rate or less (resample={usual:.4g}, --resample {usual:.4g})"
+        )
+    start, stop = times[inside][[0, -1]]
+    before, past, after = (int((t - start) * rate + _ROUNDING) for t in (2.0 * start - times[0], stop, times[-1]))
+    at = np.clip(start + np.arange(-before, after + 1) / rate, times[0], times[-1])
+    base = motion.base
+    if base.attitude is not None:
+        turned = RotationSpline(times, Rotation.from_matrix(base.attitude))(at).as_matrix()
+        base = replace(base, attitude=turned)
+    if base.position is not None:
+        base = replace(base, position=CubicSpline(times, base.position)(at))
+    shapes = CubicSpline(times, motion.shapes)(at)
+    return at - at[0], motion._replace(shapes=shapes, base=base), slice(before, before + past + 1)
+
+
+def low_passed(times: Array, motion: Matched, cut_off: float) -> Matched:
+    """The motion with its base filtered: joints are filtered where their path is made."""
+    base = motion.base
+    if base.attitude is not None:
+        base = replace(base, attitude=filtered_attitudes(times, base.attitude, cut_off))
+    if base.position is not None:
+        base = replace(base, position=filtered(times, base.position, cut_off))
+    return motion._replace(base=base)
 
 
 def _steps(motion: Matched, body: Body) -> list[tuple[list[str], str, Array]]:

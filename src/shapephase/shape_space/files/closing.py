@@ -91,7 +91,7 @@ def closed_path(
         If the ends differ by more, or a joint that does not close has no noise to smooth.
     """
     check_object(body, "Body", "body")
-    way = ("smooth" if recorded.noise.any() else "drift") if by is None else by
+    way = ("smooth" if recorded.smoothed else "drift") if by is None else by
     if not isinstance(way, str) or way not in WAYS:
         raise unknown_name("way of closing", str(way)[:40], WAYS)
     first, last = recorded.kept.shapes[[0, -1]]
@@ -109,7 +109,7 @@ def closed_path(
     if way == "geodesic":
         closed, closing = _with_geodesic(opened, turns, gap, body)
         return closed, smoothing, closing
-    if way == "smooth":
+    if way == "smooth" and recorded.cut_off is None:
         _check_noise(gap, recorded.noise, body)
     closed, smoothing = prepared_path(recorded, periodic=True, penalty=penalty, turns=turns, drift=way == "drift")
     return closed, smoothing, Closing(by=way, gap=gap, opened=opened, closed=closed, body=body)

@@ -34,7 +34,7 @@ from ._joint_columns import JointChoices, Matched, matched
 from ._labels import SI, amounts, mapping_argument
 from ._recording import LONGEST_NAME, Recording, Table
 from ._sample_origins import resampled
-from ._sample_steps import warn_of_fast_turns, without_first_pose
+from ._sample_steps import evenly_spaced, low_passed, warn_of_fast_turns, without_first_pose
 from ._segment_links import SegmentChoices
 from ._segment_poses import SegmentMotion, without_segments
 from ._surroundings import surrounded
@@ -43,7 +43,7 @@ from ._times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
 from .closing import Closing, close_argument, closed_path
 from .mapping_files import read_names
-from .smoothing import Recorded, Smoothing, prepared_path
+from .smoothing import Recorded, Smoothing, is_even, prepared_path
 
 _WRITTEN = (".csv", ".npz", ".tsv")
 _MOST_SHOWN = 200
@@ -114,6 +114,7 @@ def read_recorded_motion(
     fill: float | str | None = None,
     smooth: float | str | Mapping[str, float | str] | None = None,
     smooth_penalty: float | None = None,
+    lowpass: float | None = None,
     close: float | str | bool | None = None,
     close_by: str | None = None,
     base_order: str | None = None,
@@ -194,6 +195,11 @@ def read_recorded_motion(
         joints or by joint (the others are interpolated); None: the path goes through all samples. See
         `smoothing.smoothed_path`.
     smooth_penalty : instead of the penalties that follow from the noise [s^5]
+    lowpass : in place of `smooth`, the cut-off [Hz] of a Butterworth filter of second order run forwards and backwards
+        over the whole recording, before a stretch or a flight is cut out of it: joints, places and rotations. Both
+        passes together leave 1/sqrt(2) of what swings with the cut-off. Noise is estimated by what is above twice the
+        cut-off, as white; error bars hold what passes of it. Samples that are not evenly spaced are put on even times
+        by `resample` first
     close : the largest gap between the ends of a cycle that is closed, a number [rad or m] or a text as "3deg" or
         "3deg,5mm"; None: what meets to 1e-9 runs smoothly from its end to its start, else the ends stay apart; False:
         they are not joined even then
@@ -206,10 +212,11 @@ def read_recorded_motion(
         text such as "x,-z,y", where the x, y and z axis of the base point to; "estimate" leaves them open, for
         `momentum_from_recording` to find; None: the same axes, but "x,-z,y" for `pelvis_tilt` and so on (OpenSim: x
         forward, y up; URDF: x forward, z up)
-    flight : what is kept is a free flight: "auto", the longest stretch on which the centre of mass falls freely; its
-        first and last time, as the file tells the time; "all"; "recorded": as "auto" where the attitude of the base is
-        recorded, all of it where its places are not recorded or do not fall, and what is kept may be anything where
-        nothing of the base is recorded; None: what is kept may be anything
+    flight : what is kept is a free flight: "auto", the longest stretch on which the centre of mass falls freely;
+        "auto:2", the second of all such stretches in time; its first and last time, as the file tells the time; "all";
+        "recorded": as "auto" where the attitude of the base is recorded, all of it where its places are not recorded or
+        do not fall, and what is kept may be anything where nothing of the base is recorded; None: what is kept may be
+        anything
     up : the recorder's axis that points up: "x", "y", "z", "-x", "-y" or "-z"; None: that of the format (OpenSim y,
         MuJoCo and ROS z), else x, y or z, whichever has the longest fall
     gravity : by which the body falls in a flight [m/s^2]; None: 9.81; "any": units are not doubted
@@ -252,6 +259,12 @@ def read_recorded_motion(
     rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
     if joint_order is not None:
         check_choice(joint_order, "joint_order", WORDS)
+    cut_off = None if lowpass is None else positive_argument(lowpass, "lowpass", "a frequency in Hz")
+    if cut_off is not None and not (smooth is None and smooth_penalty is None):
+        raise TrajectoryError(
+            "lowpass and smooth are two ways to do one thing; leave one of them out (lowpass, --lowpass; smooth, "
+            "--smooth; smooth_penalty, --smooth-penalty)"
+        )
     said = _names_argument(names)
     given, step = read_input(file, body, topic, timestep, joint_order, said)
     segments = SegmentChoices(names=said or {}, calibration=calibration, length_tolerance=length_tolerance)
@@ -276,7 +289,7 @@ def read_recorded_motion(
     try:
         noise = _noise_levels(smooth, body)
         part, around, inside = recording, motion, slice(None)
-        if noise.any() and (kept is not None or free is not None):
+        if (noise.any() or cut_off is not None) and (kept is not None or free is not None):
             part, around, inside = surrounded(
                 recording,
                 motion,
@@ -284,17 +297,22 @@ def read_recorded_motion(
                 lambda some: without_first_pose(*matched(some, body, choices), body),
                 choices.fill,
             )
-            motion = around.kept(np.arange(len(part.times))[inside])
-        samples = Recorded(part.times, around.shapes, noise, body.joint_names, inside)
+        at, uneven = part.times, cut_off is not None and not is_even(part.times)
+        if cut_off is not None:
+            if rate is not None and uneven:
+                at, around, inside = evenly_spaced(at, around, inside, rate)
+            around = low_passed(at, around, cut_off)
+        motion, times = around.kept(np.arange(len(at))[inside]), at[inside] - at[inside][0]
+        samples = Recorded(at, around.shapes, noise, body.joint_names, inside, cut_off)
         path, smoothing, closing = _path(samples, body, within, close_by, loop=close is None, penalty=smooth_penalty)
         check_swings(path, body)
     except (TrajectoryError, ShapeError) as error:
         raise TrajectoryError(f"{table.where}: {error}") from None
-    if rate is not None:
+    if rate is not None and not uneven:
         path = _resampled(path, rate, table.where)
     residual = np.zeros(body.n_shape)
-    if smooth is not None or rate is not None or closing is not None:
-        residual = np.sqrt(np.mean((motion.shapes - path.shape(recording.times)) ** 2, axis=0))
+    if samples.smoothed or rate is not None or closing is not None:
+        residual = np.sqrt(np.mean((motion.shapes - path.shape(times)) ** 2, axis=0))
     record = {
         "file": given.name,
         "sha256": given.sha256,
@@ -302,6 +320,7 @@ def read_recorded_motion(
         "trim": kept,
         **_record(recording, motion),
         "smooth": dict(zip(body.joint_names, noise.tolist(), strict=True)) if noise.any() else None,
+        "lowpass": None if cut_off is None else _low_pass_record(smoothing, body),
         "smoothing": _smoothing_record(smoothing, body) if noise.any() else None,
         "closing": None if closing is None else _closing_record(closing, body),
         "flight": None if free is None else free.record,
@@ -311,12 +330,12 @@ def read_recorded_motion(
     return RecordedMotion(
         path=path,
         residual=residual,
-        times=recording.times,
+        times=times,
         base_attitude=motion.base.attitude,
         base_position=motion.base.position,
         format=table.format,
         record=record,
-        smoothing=smoothing if noise.any() else None,
+        smoothing=smoothing if samples.smoothed else None,
         closing=closing,
         flight=free,
         segments=table.segments,
@@ -341,6 +360,7 @@ def read_shape_path(
     fill: float | str | None = None,
     smooth: float | str | Mapping[str, float | str] | None = None,
     smooth_penalty: float | None = None,
+    lowpass: float | None = None,
     close: float | str | bool | None = None,
     close_by: str | None = None,
     base_order: str | None = None,
@@ -381,6 +401,7 @@ def read_shape_path(
         fill=fill,
         smooth=smooth,
         smooth_penalty=smooth_penalty,
+        lowpass=lowpass,
         close=close,
         close_by=close_by,
         base_order=base_order,
@@ -530,6 +551,24 @@ def _smoothing_record(smoothing: Smoothing, body: Body) -> dict[str, Any]:
         "degrees_of_freedom": dict(zip(body.joint_names, smoothing.degrees_of_freedom.tolist(), strict=True)),
         "bias_rms": dict(zip(body.joint_names, rms.tolist(), strict=True)),
         "bias_in_bars": smoothing.bias_in_bars,
+    }
+
+
+def _low_pass_record(smoothing: Smoothing, body: Body) -> dict[str, Any]:
+    """The filter, what it leaves of the noise and what it takes off the motion, as JSON can hold it."""
+    chosen, in_band, by_noise = smoothing.low_pass, smoothing.in_band, smoothing.noise_in_band
+    assert chosen is not None
+    assert in_band is not None
+    assert by_noise is not None
+    return {
+        "cut_off_hz": chosen.cut_off,
+        "filter": "Butterworth, second order, forwards and backwards",
+        "rate_hz": chosen.rate,
+        "noise": dict(zip(body.joint_names, smoothing.noise.tolist(), strict=True)),
+        "twice_the_cut_off_hz": chosen.twice.cut_off,
+        "rms_up_to_twice_the_cut_off": dict(zip(body.joint_names, in_band.tolist(), strict=True)),
+        "of_that_by_noise": dict(zip(body.joint_names, by_noise.tolist(), strict=True)),
+        "affected_at_ends_s": list(smoothing.ends),
     }
 
 

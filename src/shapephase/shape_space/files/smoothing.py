@@ -8,15 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ... import so3
 from ...arguments import check_flag, positive_argument
 from ...arrays import Array, Mask, finite_array, lock_arrays
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
-from ..ball_columns import ball_columns
+from ..ball_columns import ball_columns, neighbours_signs
 from ..curves import CLOSED
+from ..linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, LowPass, likeliest, width_of
 from ..shape_path import ShapePath
-from ._linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, likeliest, width_of
 from ._recording import warn
 from ._sample_origins import Prepared
 
@@ -26,6 +27,12 @@ _WIDEST_GAP = 5.0 * np.sqrt(2.0)
 """Largest gap of a loop in noise levels: five standard deviations of the difference of two samples."""
 _REACH = 6.0
 """Widths that are smoothed over: what is farther from a sample counts there by exp(-6/2) of 1/6 of it, or less."""
+_UNEVEN = 1e-3
+"""Share of a step by which steps of evenly spaced samples differ."""
+_SHORTEST = 0.5
+"""Length of an averaged unit quaternion: below, attitudes within the filter's reach are over 120 deg apart."""
+_REACH_OF_FILTER = 0.7
+"""Periods of the cut-off from an end: the weights of an open end are within 4 % of the largest weight inside."""
 _EXACT = 1e-9
 """Noise below this share of the samples' spread counts as none: the samples are interpolated."""
 
@@ -44,6 +51,10 @@ class Smoothing:
     bias_in_bars : its rms, of the joint where it is largest beside what is left of the noise: in standard deviations
         of that; error bars hold both
     residual : (n,) rms of samples minus path [rad or m]
+    low_pass : the filter that took the place of the spline, for which the noise is an estimate; None: a spline
+    in_band : (n,) rms of what the filter of twice the cut-off would leave beside this one [rad or m]
+    noise_in_band : (n,) what the noise alone leaves there
+    ends : how long at the start and at the end of the path the filter lacks samples on one side [s]
     """
 
     noise: Array
@@ -52,6 +63,10 @@ class Smoothing:
     bias: Array
     bias_in_bars: float
     residual: Array
+    low_pass: LowPass | None = None
+    in_band: Array | None = None
+    noise_in_band: Array | None = None
+    ends: tuple[float, float] = (0.0, 0.0)
 
     __repr__ = short_repr
 
@@ -134,6 +149,7 @@ class Recorded:
     noise : (n,) rms [rad or m]
     joint_names : n names, or None
     inside : the samples that are kept; those before and after them are there to be smoothed with them
+    cut_off : of the low-pass filter that takes the place of smoothing by the noise [Hz], or None
     """
 
     times: Array
@@ -141,6 +157,12 @@ class Recorded:
     noise: Array
     joint_names: tuple[str, ...] | None
     inside: slice = field(default_factory=lambda: slice(None))
+    cut_off: float | None = None
+
+    @property
+    def smoothed(self) -> bool:
+        """Whether the path is near the samples, and not through them."""
+        return self.cut_off is not None or bool(self.noise.any())
 
     @property
     def kept(self) -> Recorded:
@@ -179,12 +201,13 @@ def prepared_path(
     turns : (n,) whole turns that are taken off evenly before, and given back afterwards [rad]
     drift : whether the gap between last and first sample is taken off evenly
     """
-    noise = recorded.noise
+    noise, turned = recorded.noise, np.zeros(len(recorded.noise)) if turns is None else turns
+    if recorded.cut_off is not None:
+        return _filtered(recorded, recorded.cut_off, periodic, turned, drift=drift)
     given = None if penalty is None else positive_argument(penalty, "smooth_penalty", "a penalty in s^5")
     if given is not None and not noise.any():
         raise TrajectoryError("smooth_penalty: state the noise of the samples too (smooth, --smooth)")
     alone = recorded.kept
-    turned = np.zeros(len(noise)) if turns is None else turns
     if noise.any():
         if len(alone.times) < _FEWEST:
             raise TrajectoryError(f"smoothing needs {_FEWEST} samples or more, got {len(alone.times)}")
@@ -198,6 +221,94 @@ def prepared_path(
     samples, steps = _smoothed(recorded, given, periodic, turned, drift=drift)
     path = steps.path(samples.shapes)
     return path, _report(samples, steps, path)
+
+
+def low_pass(times: Array, cut_off: float) -> LowPass:
+    """The filter of evenly spaced samples. Raises TrajectoryError for others, and for a cut-off beyond them."""
+    rate = (len(times) - 1) / float(times[-1] - times[0])
+    if len(times) < _FEWEST:
+        raise TrajectoryError(f"lowpass: {_FEWEST} samples or more are needed, got {len(times)}; leave lowpass out")
+    if not is_even(times):
+        steps = np.diff(times)
+        raise TrajectoryError(
+            f"lowpass: samples are {steps.min():.6g} to {steps.max():.6g} s apart, and a filter needs even steps; give "
+            f"resample={rate:.4g} (--resample {rate:.4g}), or smooth (--smooth) in place of lowpass"
+        )
+    if cut_off >= 0.5 * rate:
+        raise TrajectoryError(
+            f"lowpass: {rate:.6g} samples a second hold frequencies below {0.5 * rate:.6g} Hz, got a cut-off of "
+            f"{cut_off:.6g} Hz; give a lower one, as lowpass={0.1 * rate:.2g} (--lowpass {0.1 * rate:.2g})"
+        )
+    return LowPass(cut_off, rate)
+
+
+def is_even(times: Array) -> bool:
+    """Whether all steps are equal to a thousandth."""
+    steps = np.diff(times)
+    return bool(np.ptp(steps) <= _UNEVEN * steps.mean())
+
+
+def filtered(times: Array, values: Array, cut_off: float) -> Array:
+    """Values (N, k), filtered."""
+    smoother = low_pass(times, cut_off).smoother(times - times[0], False, values.shape[1])
+    return values[0] + smoother(values - values[0])
+
+
+def filtered_attitudes(times: Array, attitudes: Array, cut_off: float) -> Array:
+    """Attitudes (N, 3, 3), filtered as rotations.
+
+    The mean rate of turn, fixed in space, is taken off, so that a constant one comes through as it is; the quaternions
+    that are left are filtered, and made unit again. Of a small wobble at the frequency f on a turn whose rate differs
+    from the mean by w [rad/s], this leaves the mean of the shares h of the frequencies f - w/(4 pi) and f + w/(4 pi),
+    and half of their difference turned by a right angle about the axis of w, both over the share of w/(4 pi).
+
+    Raises TrajectoryError where turns are too fast for the cut-off.
+    """
+    steps = so3.log(attitudes[1:] @ so3.transpose(attitudes[:-1]))
+    carried = so3.exp((times - times[0])[:, None] * steps.sum(axis=0) / (times[-1] - times[0]))
+    left = neighbours_signs(so3.quat_from_matrix(so3.transpose(carried) @ attitudes), (slice(0, 4),))
+    found = filtered(times, left, cut_off)
+    _check_lengths(found, cut_off, "the base")
+    return carried @ so3.matrix_from_quat(so3.normalised(found))
+
+
+def _check_lengths(quaternions: Array, cut_off: float, name: str) -> None:
+    if np.linalg.norm(quaternions, axis=1).min() < _SHORTEST:
+        raise TrajectoryError(
+            f"lowpass: {name} turns too fast for a cut-off of {cut_off:.6g} Hz, which averages opposite attitudes; "
+            "give a higher one (lowpass, --lowpass)"
+        )
+
+
+def _filtered(
+    recorded: Recorded, cut_off: float, periodic: bool, turns: Array, *, drift: bool
+) -> tuple[ShapePath, Smoothing]:
+    """The path of filtered samples; its noise is estimated by what is left above twice the cut-off."""
+    samples = recorded.kept if periodic else recorded.around(len(recorded.times))
+    columns, count = len(recorded.noise), len(samples.times)
+    chosen = low_pass(samples.times, cut_off)
+    smoother, wider = (each.smoother(samples.times, periodic, columns) for each in (chosen, chosen.twice))
+    none = _steps(samples, np.ones(columns, dtype=bool), periodic, turns, drift=drift)
+    steps = replace(none, smoother=smoother, pilot=None)
+    first, *_ = joined = steps.joined(samples.shapes)
+    values = joined - first
+    kept, by_wider = smoother(values), wider(values)
+    for ball in ball_columns(recorded.joint_names):
+        _check_lengths((first + kept)[:, ball], cut_off, f"a ball joint (column {ball.start})")
+    shares, more = chosen.responses(count), chosen.twice.responses(count)
+    noise = np.sqrt(((values - by_wider) ** 2).sum(axis=0) / max(((1.0 - more) ** 2).sum(), 1e-300))
+    noise = np.where(noise > _EXACT * _spread(values), noise, 0.0)
+    path = steps.path(samples.shapes)
+    report = _report(replace(samples, noise=noise), steps, path)
+    inside = samples.times[samples.inside]
+    reach = 0.0 if periodic else _REACH_OF_FILTER / cut_off
+    return path, replace(
+        report,
+        low_pass=chosen,
+        in_band=np.sqrt(np.mean((by_wider - kept) ** 2, axis=0)),
+        noise_in_band=noise * np.sqrt(((more - shares) ** 2).sum() / count),
+        ends=(max(reach - float(inside[0]), 0.0), max(reach - float(samples.times[-1] - inside[-1]), 0.0)),
+    )
 
 
 def _steps(samples: Recorded, smoothed: Mask, periodic: bool, turns: Array, *, drift: bool) -> Prepared:

@@ -7,13 +7,13 @@ what accelerates upwards by g pushes off, or lands.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array, Integers, Mask
-from ...errors import TrajectoryError
+from ..arrays import Array, Integers, Mask
+from ..errors import TrajectoryError
 
 GRAVITY = 9.81
 """[m/s^2] On earth it differs by a quarter of a per cent, which moves nothing by a millimetre within a second."""
@@ -56,6 +56,7 @@ class FreeFall:
     noise : of each coordinate of the centre of mass, by which it was found [m]
     off : how far the centre of mass is from its parabola, rms of a coordinate [m]
     gravity, gravity_bar : how fast it falls, and the standard deviation of that, with 1 cm of wander [m/s^2]
+    all_ends : first and last samples of all falls of the recording along that axis, in time
     """
 
     first: int
@@ -65,11 +66,17 @@ class FreeFall:
     off: float
     gravity: float
     gravity_bar: float
+    all_ends: tuple[tuple[int, int], ...]
 
     @property
     def ends(self) -> tuple[int, int]:
         """First and last sample."""
         return self.first, self.last
+
+    def every(self, stride: int) -> FreeFall:
+        """The same by samples of a recording of which every so many-th was searched."""
+        ends = tuple((stride * first, stride * last) for first, last in self.all_ends)
+        return replace(self, first=stride * self.first, last=stride * self.last, all_ends=ends)
 
 
 class _Windows(NamedTuple):
@@ -171,25 +178,47 @@ def _fall(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | N
     noise = centre_noise(times, centres)
     window = _shortest(noise, gravity)
     windows = _windows(times, centres, window)
-    sign, axis = (-1.0 if up.startswith("-") else 1.0), "xyz".index(up[-1])
-    pull = 0.5 * sign * gravity
+    axis = "xyz".index(up[-1])
+    pull = 0.5 * gravity * (-1.0 if up.startswith("-") else 1.0)
     squares = windows.squares + 2.0 * pull * windows.mixed[:, axis] + pull**2 * windows.parabola
     falls = squares <= noise**2 * (windows.free + _CHANCE * np.sqrt(2.0 * windows.free))
     straight = centres.copy()
     straight[:, axis] += pull * (times - times[0]) ** 2
-    found = _longest(times, straight, windows, falls, noise, window, gravity)
-    if found is None:
+    found = _all_ends(times, straight, windows, falls, noise, window, gravity)
+    if not found:
         return None
-    inside = slice(found[0], found[1] + 1)
+    longest = max(found, key=lambda ends: lasts(times, ends))
+    return _described(times, centres, straight, longest, tuple(found), up, noise)
+
+
+def fall_number(times: Array, centres: Array, fall: FreeFall, number: int) -> FreeFall:
+    """Another fall of the same recording, by its number in time from 1 on."""
+    straight = centres.copy()
+    upwards = -1.0 if fall.up.startswith("-") else 1.0
+    straight[:, "xyz".index(fall.up[-1])] += 0.5 * upwards * fall.gravity * (times - times[0]) ** 2
+    return _described(times, centres, straight, fall.all_ends[number - 1], fall.all_ends, fall.up, fall.noise)
+
+
+def _described(
+    times: Array,
+    centres: Array,
+    straight: Array,
+    ends: tuple[int, int],
+    all_ends: tuple[tuple[int, int], ...],
+    up: str,
+    noise: float,
+) -> FreeFall:
+    inside = slice(ends[0], ends[1] + 1)
+    sign, axis = ("-" if up.startswith("-") else "+"), "xyz".index(up[-1])
     measured, bar = measured_fall(times[inside], centres[inside], noise)
     return FreeFall(
-        found[0],
-        found[1],
-        f"{'-' if sign < 0.0 else '+'}{'xyz'[axis]}",
+        *ends,
+        f"{sign}{up[-1]}",
         noise,
         _off_line(times[inside], straight[inside]),
-        float(-sign * measured[axis]),
+        float(-float(f"{sign}1") * measured[axis]),
         bar,
+        all_ends,
     )
 
 
@@ -214,18 +243,23 @@ def _white_noise(times: Array, centres: Array) -> float:
     return float(np.median(np.abs(np.einsum("nk,nkc->nc", weights, values)))) / _NORMAL_MEDIAN
 
 
-def _longest(
+def _all_ends(
     times: Array, straight: Array, windows: _Windows, falls: Mask, noise: float, window: float, gravity: float
-) -> tuple[int, int] | None:
-    """First and last sample of the longest stretch along which a curve is straight."""
+) -> list[tuple[int, int]]:
+    """First and last samples of the stretches along which a curve is straight, in time."""
     runs = np.flatnonzero(np.diff(np.concatenate([[False], falls, [False]]).astype(int))).reshape(-1, 2)
-    best: tuple[int, int] | None = None
+    best: list[tuple[int, int]] = []
     for first, past in runs.tolist():
         found = _bounded(
             times, straight, int(windows.starts[first]), int(windows.ends[past - 1]), noise, window, gravity
         )
-        if found is not None and (best is None or lasts(times, found) > lasts(times, best)):
-            best = found
+        if found is None:
+            continue
+        if best and found[0] <= best[-1][1]:
+            # One flight with a doubtful window in it.
+            best[-1] = max(best[-1], found, key=lambda ends: lasts(times, ends))
+        else:
+            best.append(found)
     return best
 
 

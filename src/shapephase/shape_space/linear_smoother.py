@@ -1,4 +1,4 @@
-"""Smoothing splines, linear maps of the samples: their penalties, their transposes, and what they take off a motion."""
+"""Smoothing splines and low-pass filters, linear maps of samples: their penalties, transposes and responses."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array, lock_arrays
+from ..arrays import Array, lock_arrays
 
 ORDER = 3
 """Of the derivative whose square is penalized: quintic splines, whose second derivative is smooth."""
 PILOT_ORDER = 5
 """Of the smoother that knows the motion's third derivative at the ends, where a quintic spline has none."""
+BUTTERWORTH = 2
+"""Order of a Butterworth filter that is run forwards and backwards."""
+_HALF_POWER = np.sqrt(2.0) - 1.0
+"""Of both passes together at the cut-off, in place of 1 for each: 1/(1 + (sqrt(2) - 1)) = 1/sqrt(2), or -3 dB."""
 _NARROWEST = 10.0**-0.5
 """Width that is tried, in steps of time: next to nothing is smoothed."""
 _WIDEST = 10.0**2.5
@@ -32,22 +36,28 @@ class LinearSmoother:
     Its values are those of a spline of degree 2 order - 1, natural at the ends of what is open: derivatives from the
     order-th on are zero there.
 
+    With `digital`, the values are those of a Butterworth filter of second order run forwards and backwards over evenly
+    spaced samples: 1/(1 + penalty K) is its squared frequency response, and ends are free as those of a spline.
+
     Attributes
     ----------
     times : (N,) of the samples, ascending from 0 [s]
     periodic : whether first and last sample are measurements of one value, which then weighs twice
     penalties : (n,) of each column [s^(2 order - 1)]; of zero, nothing is smoothed
     order : of the derivative that is penalized
+    digital : whether K is that of the Butterworth filter; without it, that of the spline
 
     Notes
     -----
-    Source: Reinsch 1967; Wahba 1990, Spline Models for Observational Data, section 1.3.
+    Source: Reinsch 1967; Wahba 1990, Spline Models for Observational Data, section 1.3; Pollock 2000, Journal of
+    Econometrics 99, 317 (the filter of a finite stretch).
     """
 
     times: Array
     periodic: bool
     penalties: Array
     order: int = ORDER
+    digital: bool = False
 
     __post_init__ = lock_arrays
 
@@ -80,11 +90,54 @@ class LinearSmoother:
     @property
     def weights(self) -> Array:
         """(count,)."""
-        return _weights(self.count, self.periodic)
+        return self._system.weights
 
     @cached_property
     def _system(self) -> _Roughness:
-        return _Roughness(self.times, self.periodic, self.order)
+        return _Roughness(self.times, self.periodic, self.order, digital=self.digital)
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A Butterworth filter of second order, run forwards and backwards.
+
+    Attributes
+    ----------
+    cut_off : at which both passes together leave 1/sqrt(2) of an amplitude [Hz]
+    rate : samples a second [Hz]
+
+    Notes
+    -----
+    Both passes leave 1/(1 + (sqrt(2) - 1) (tan(pi f/rate)/tan(pi cut_off/rate))^4). Source: Winter 2009, Biomechanics
+    and Motor Control of Human Movement, section 3.4.4.2.
+    """
+
+    cut_off: float
+    rate: float
+
+    @property
+    def twice(self) -> LowPass:
+        """The filter of twice the cut-off, on the scale of the tangent, which half the sampling rate ends."""
+        return LowPass(self.rate / np.pi * float(np.arctan(2.0 * self._tangent)), self.rate)
+
+    def response(self, frequency: Array) -> Array:
+        """The share of an amplitude that is left."""
+        with np.errstate(over="ignore"):
+            return 1.0 / (1.0 + _HALF_POWER * (np.tan(np.pi * frequency / self.rate) / self._tangent) ** 4)
+
+    def responses(self, count: int) -> Array:
+        """The shares of what so many samples can hold beside a line: (count - 2,)."""
+        return self.response(0.5 * self.rate * np.arange(1, count - 1) / (count - 1))
+
+    def smoother(self, times: Array, periodic: bool, columns: int) -> LinearSmoother:
+        """The filter of evenly spaced samples, so many columns alike."""
+        unit = float(times[-1]) / (len(times) - 1)
+        penalty = _HALF_POWER / (2.0 * self._tangent) ** 4 * unit ** (2 * BUTTERWORTH - 1)
+        return LinearSmoother(times, periodic, np.full(columns, penalty), BUTTERWORTH, digital=True)
+
+    @property
+    def _tangent(self) -> float:
+        return float(np.tan(np.pi * self.cut_off / self.rate))
 
 
 def likeliest(
@@ -130,12 +183,6 @@ def width_of(smoother: LinearSmoother) -> float:
     return scaled ** (0.5 / smoother.order)
 
 
-def _weights(count: int, periodic: bool) -> Array:
-    found = np.ones(count)
-    found[0] = 2.0 if periodic else 1.0
-    return found
-
-
 def _widths(count: int) -> Array:
     most = min(_WIDEST, max(float(count), 1.0))
     number = int(_WIDTHS_A_DECADE * np.log10(most / _NARROWEST)) + 1
@@ -166,12 +213,16 @@ class _Roughness:
     where a hundred samples are smoothed over.
     """
 
-    def __init__(self, times: Array, periodic: bool, order: int) -> None:
+    def __init__(self, times: Array, periodic: bool, order: int, *, digital: bool = False) -> None:
         self._unit = float(times[-1]) / (len(times) - 1)
         self._order = order
         self._count = len(times) - periodic
-        self.weights = _weights(self._count, periodic)
-        self._differences, self._gram = _splines(times / self._unit, periodic, order)
+        self.weights = np.ones(self._count)
+        if digital:
+            self._differences, self._gram = _butterworth(self._count, periodic)
+        else:
+            self.weights[0] = 2.0 if periodic else 1.0
+            self._differences, self._gram = _splines(times / self._unit, periodic, order)
         self.modes = self._count - (1 if periodic else order)
         """What is penalized at all: all but constants, or polynomials below the order."""
 
@@ -234,6 +285,26 @@ class _Roughness:
         """Values and B-splines in the order of time, so that the matrix is a band."""
         middles = np.arange(self._differences.shape[1]) + 0.5 * self._order
         return np.argsort(np.concatenate([np.arange(self._count), middles]), kind="stable")
+
+
+def _butterworth(count: int, periodic: bool) -> tuple[Any, Any]:
+    """Sparse Q (count, k) and R (k, k) of `_Roughness`, whose quotient |Q|^2/R is (2 tan(w/2))^4 at w radians a step.
+
+    Q takes second differences, and R is what (1 + z)^2/4 leaves of white noise.
+    """
+    from scipy.sparse import coo_array
+
+    splines = count if periodic else max(count - BUTTERWORTH, 0)
+    first = np.arange(splines)
+
+    def band(entries: list[float], shift: int, rows: int) -> Any:
+        places = first[:, None] + np.arange(len(entries)) + shift
+        columns, values = np.broadcast_to(first[:, None], places.shape), np.broadcast_to(entries, places.shape)
+        inside = np.ones_like(places, dtype=bool) if periodic else (places >= 0) & (places < rows)
+        there = (values[inside], (places[inside] % max(rows, 1), columns[inside]))
+        return coo_array(there, shape=(rows, splines)).tocsc()
+
+    return band([1.0, -2.0, 1.0], 0, count), band([1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16], -2, splines)
 
 
 def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
