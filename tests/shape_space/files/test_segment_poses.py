@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
+from shapephase.cli.main import main
 from shapephase.errors import IgnoredElementWarning, ShapeError, TrajectoryError, TrajectoryWarning
 from shapephase.shape_space.files import read_recorded_motion
 from support import segment_files
@@ -425,3 +427,31 @@ def test_two_poses_that_the_joints_do_not_tell_apart_are_asked_for(tmp_path, loa
     with pytest.warns(TrajectoryWarning, match="axes of the room"):
         recorded = read_recorded_motion(tmp_path / "suit.mvnx", body, calibration="tpose")
     np.testing.assert_allclose(recorded.path.shape(TIMES), np.tile([0.0, 0.0, 0.0, 1.0], (COUNT, 1)), atol=ROUNDING)
+
+
+def test_check_prints_the_momentum_of_both_and_gives_it_to_programs(tmp_path, capsys, body):
+    motion = moved()
+    file, _ = write(tmp_path, "", motion, own_axes(motion))
+    expected = segment_files.momentum_between(motion).mean(axis=0)
+    main(["check", str(body.file), str(file), "--calibration", "0", "--json"])
+    found = json.loads(capsys.readouterr().out)["motion"]["recording"]["segments"]
+    for name in ("momentum_of_poses", "momentum_of_chain"):
+        np.testing.assert_allclose(found[name], expected, rtol=0, atol=ROUNDING)
+    main(["check", str(body.file), str(file), "--calibration", "0", "--length-tolerance", "0.05"])
+    line = next(line for line in capsys.readouterr().out.splitlines() if "mean momentum" in line)
+    assert f"({', '.join(f'{value:.4g}' for value in expected)}) of the segments' own poses" in line
+
+
+def test_quaternions_of_a_sensor_beside_the_joints_are_no_segments(tmp_path):
+    """A table of joints with the base stays one, whatever else has a quaternion."""
+    cat = sp.load_body("cat_two_halves")
+    turns = Rotation.from_rotvec(np.outer(TIMES, [0.1, 0.2, 0.3])).as_quat()
+    columns = {"time": TIMES, **{name: 0.1 * np.sin(k + TIMES) for k, name in enumerate(cat.joint_names)}}
+    columns |= {f"{what}_q{axis}": turns[:, k] for what in ("base", "imu") for k, axis in enumerate("xyzw")}
+    rows = [",".join(map(repr, row)) for row in np.column_stack(list(columns.values())).tolist()]
+    (tmp_path / "log.csv").write_text("\n".join([",".join(columns), *rows]), encoding="utf-8")
+    recorded = read_recorded_motion(tmp_path / "log.csv", cat, ignore_extra=True)
+    assert recorded.segments is None
+    np.testing.assert_allclose(
+        Rotation.from_matrix(recorded.base_attitude).as_rotvec(), np.outer(TIMES, [0.1, 0.2, 0.3]), rtol=0, atol=1e-14
+    )

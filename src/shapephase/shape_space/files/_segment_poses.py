@@ -16,8 +16,9 @@ from ...body.body import Body
 from ...body.couplings.ball_joints import RATES, coordinate_names
 from ...display import short_repr
 from ...errors import TrajectoryError, TrajectoryWarning
+from ._labels import label
 from ._recording import Recording, SegmentPoses, Table
-from ._segment_links import MOST_OFF_WAY, SHORT, Links, SegmentChoices, angle_of_ways
+from ._segment_links import MOST_OFF_WAY, SHORT, Links, SegmentChoices, angle_of_ways, known_links
 from ._times import recording_of
 from .formats.segment_poses import pose_columns
 
@@ -25,6 +26,8 @@ _LENGTH_TOLERANCE = 0.1
 """Share by which a distance between joints may differ from the body's: momentum is then off by a fifth."""
 _MOST_OFF_HINGE = np.radians(15.0)
 """[rad] rms of what hinges leave of a turn; a knee bends by some degrees to the side."""
+_FEWEST = 2
+"""Segments of a table: one alone is the base."""
 _ACROSS = 1e-6
 """Cosine of the angle between hinges at right angles."""
 
@@ -84,9 +87,13 @@ def without_segments(
         If segments and links do not match, axes are not known, or lengths, ways between joints or turns of hinges are
         none that the body can have.
     """
-    if table.poses is None:
-        table = pose_columns(table, choices.names)
     names = dict(choices.names)
+    if table.poses is None:
+        posed = pose_columns(table, choices.names)
+        segments = () if posed.poses is None else posed.poses.names
+        few = len({*known_links(body, segments), *(names.keys() & set(segments))}) < _FEWEST
+        # Beside columns of joints, quaternions of the base and of a sensor are no segments.
+        table = table if few and any(label(text).name in body.joint_names for text in table.columns) else posed
     if table.poses is None:
         if choices.given:
             raise TrajectoryError(
@@ -153,7 +160,7 @@ class _Conversion:
             },
             base_quat_xyzw=_quaternions(turns[:, 0]),
             base_position=None if places is None else places[:, 0],
-            unread={**table.unread, **dict.fromkeys(self.links.left_out, "a segment without a part of its own")},
+            unread={**table.unread, **dict.fromkeys(self.links.left_out, "a segment that no joint needs")},
             segments=self._momentum(turns[whole], None if places is None else places[whole], own, whole),
             poses=None,
         )
