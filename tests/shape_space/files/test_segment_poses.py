@@ -282,6 +282,8 @@ def test_the_person_in_a_suit_is_that_of_a_bvh_file_of_the_same_bones(tmp_path):
         ("knee", {"calibration": 0.0}, r"knee_l leave \d+ deg.*--calibration T"),
         ("half", {"calibration": 0.0}, r"'torso' has no columns torso_x.*--names torso="),
         ("unit", {"calibration": 0.0}, r"row 2: the quaternion of 'hips' has the length 2"),
+        ("cell", {"calibration": 0.0}, r"row 2, column 'hips_qx': 'abc'"),
+        ("rad", {"calibration": 0.0}, r"'hips_x \[rad\]' is in rad.*--names"),
         ("column", {"calibration": 0.0}, r"joint knee_l has a column.*--names knee_l="),
     ],
 )
@@ -303,6 +305,13 @@ def test_what_cannot_be_meant_is_refused_with_the_way_on(tmp_path, body, change,
     if change == "half":
         text = text.replace("torso_x", "torso_speed")
         options = options | {"ignore_extra": True}
+    if change == "rad":
+        text = text.replace("hips_x", "hips_x [rad]")
+    if change == "cell":
+        header, first, *others = text.splitlines()
+        cells = first.split(",")
+        cells[2] = "abc"
+        text = "\n".join([header, ",".join(cells), *others])
     if change == "unit":
         header, first, *others = text.splitlines()
         cells = first.split(",")
@@ -349,6 +358,18 @@ def test_faults_of_a_suits_file_are_named_with_their_line(tmp_path, body, change
     (tmp_path / "suit.mvnx").write_text(change(text), encoding="utf-8")
     with pytest.raises(TrajectoryError, match=rf"line \d+: .*{message}"):
         read_recorded_motion(tmp_path / "suit.mvnx", body)
+
+
+def test_a_segment_without_places_may_be_left_out(tmp_path, body):
+    """A hand that no link shows, without places: the rest is as it was."""
+    motion = moved()
+    turns = own_axes(motion)
+    text = segment_files.table_text({**turns, "hand": turns["torso"]}, {**motion.places, "hand": motion.places["hips"]})
+    for axis in "xyz":
+        text = text.replace(f"hand_{axis}", f"hand_speed_{axis}")
+    (tmp_path / "poses.csv").write_text(text, encoding="utf-8")
+    options = {"names": {"hand": None, **{f"hand_speed_{axis}": None for axis in "xyz"}}}
+    check(read_recorded_motion(tmp_path / "poses.csv", body, calibration=0.0, **options), body, motion, ROUNDING)
 
 
 def test_velocities_of_bodies_are_no_positions(tmp_path, body):
@@ -447,6 +468,7 @@ def test_quaternions_of_a_sensor_beside_the_joints_are_no_segments(tmp_path):
     cat = sp.load_body("cat_two_halves")
     turns = Rotation.from_rotvec(np.outer(TIMES, [0.1, 0.2, 0.3])).as_quat()
     columns = {"time": TIMES, **{name: 0.1 * np.sin(k + TIMES) for k, name in enumerate(cat.joint_names)}}
+    columns |= {f"base_{axis}": np.ones(COUNT) for axis in "xyz"}
     columns |= {f"{what}_q{axis}": turns[:, k] for what in ("base", "imu") for k, axis in enumerate("xyzw")}
     rows = [",".join(map(repr, row)) for row in np.column_stack(list(columns.values())).tolist()]
     (tmp_path / "log.csv").write_text("\n".join([",".join(columns), *rows]), encoding="utf-8")

@@ -16,9 +16,8 @@ from ...body.body import Body
 from ...body.couplings.ball_joints import RATES, coordinate_names
 from ...display import short_repr
 from ...errors import TrajectoryError, TrajectoryWarning
-from ._labels import label
 from ._recording import Recording, SegmentPoses, Table
-from ._segment_links import MOST_OFF_WAY, SHORT, Links, SegmentChoices, angle_of_ways, known_links
+from ._segment_links import MOST_OFF_WAY, SHORT, Links, SegmentChoices, angle_of_ways
 from ._times import recording_of
 from .formats.segment_poses import pose_columns
 
@@ -26,8 +25,6 @@ _LENGTH_TOLERANCE = 0.1
 """Share by which a distance between joints may differ from the body's: momentum is then off by a fifth."""
 _MOST_OFF_HINGE = np.radians(15.0)
 """[rad] rms of what hinges leave of a turn; a knee bends by some degrees to the side."""
-_FEWEST = 2
-"""Segments of a table: one alone is the base."""
 _ACROSS = 1e-6
 """Cosine of the angle between hinges at right angles."""
 
@@ -89,11 +86,7 @@ def without_segments(
     """
     names = dict(choices.names)
     if table.poses is None:
-        posed = pose_columns(table, choices.names)
-        segments = () if posed.poses is None else posed.poses.names
-        few = len({*known_links(body, segments), *(names.keys() & set(segments))}) < _FEWEST
-        # Beside columns of joints, quaternions of the base and of a sensor are no segments.
-        table = table if few and any(label(text).name in body.joint_names for text in table.columns) else posed
+        table = pose_columns(table, names, body)
     if table.poses is None:
         if choices.given:
             raise TrajectoryError(
