@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.cli.main import main
-from shapephase.errors import IgnoredElementWarning, ShapeError, TrajectoryError, TrajectoryWarning
+from shapephase.errors import IgnoredElementWarning, ModelFileError, ShapeError, TrajectoryError, TrajectoryWarning
 from shapephase.shape_space.files import read_recorded_motion
 from support import segment_files
 from support.bodies import link, urdf
@@ -477,3 +477,20 @@ def test_quaternions_of_a_sensor_beside_the_joints_are_no_segments(tmp_path):
     np.testing.assert_allclose(
         Rotation.from_matrix(recorded.base_attitude).as_rotvec(), np.outer(TIMES, [0.1, 0.2, 0.3]), rtol=0, atol=1e-14
     )
+
+
+def test_joints_that_are_no_tree_make_no_body_and_a_prop_is_no_part_of_it(tmp_path):
+    names, _, _, tposed = suit()
+    still = {name: np.tile(np.eye(3), (2, 1, 1)) for name in names}
+    places = {name: np.tile(place, (2, 1)) for name, place in tposed.items()}
+    text = suit_text(
+        {**still, "Prop1": still["Head"]}, {**places, "Prop1": places["Head"]}, {**tposed, "Prop1": np.ones(3)}
+    )
+    (tmp_path / "suit.mvnx").write_text(text, encoding="utf-8")
+    with pytest.warns(IgnoredElementWarning):
+        body = sp.load_body(tmp_path / "suit.mvnx", person_mass=60.0)
+    assert set(body.link_names) == set(names)
+    cut = re.sub(r'<joint label="jL3">.*?</joint>', "", text)
+    (tmp_path / "cut.mvnx").write_text(cut, encoding="utf-8")
+    with pytest.raises(ModelFileError, match=r"cut\.mvnx:1: joints have 2 roots"):
+        sp.load_body(tmp_path / "cut.mvnx")
