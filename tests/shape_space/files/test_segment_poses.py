@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.errors import IgnoredElementWarning, ShapeError, TrajectoryError, TrajectoryWarning
+from shapephase.cli.main import main
+from shapephase.errors import IgnoredElementWarning, ModelFileError, ShapeError, TrajectoryError, TrajectoryWarning
 from shapephase.shape_space.files import read_recorded_motion
 from support import segment_files
 from support.bodies import link, urdf
@@ -280,6 +282,8 @@ def test_the_person_in_a_suit_is_that_of_a_bvh_file_of_the_same_bones(tmp_path):
         ("knee", {"calibration": 0.0}, r"knee_l leave \d+ deg.*--calibration T"),
         ("half", {"calibration": 0.0}, r"'torso' has no columns torso_x.*--names torso="),
         ("unit", {"calibration": 0.0}, r"row 2: the quaternion of 'hips' has the length 2"),
+        ("cell", {"calibration": 0.0}, r"row 2, column 'hips_qx': 'abc'"),
+        ("rad", {"calibration": 0.0}, r"'hips_x \[rad\]' is in rad.*--names"),
         ("column", {"calibration": 0.0}, r"joint knee_l has a column.*--names knee_l="),
     ],
 )
@@ -301,6 +305,13 @@ def test_what_cannot_be_meant_is_refused_with_the_way_on(tmp_path, body, change,
     if change == "half":
         text = text.replace("torso_x", "torso_speed")
         options = options | {"ignore_extra": True}
+    if change == "rad":
+        text = text.replace("hips_x", "hips_x [rad]")
+    if change == "cell":
+        header, first, *others = text.splitlines()
+        cells = first.split(",")
+        cells[2] = "abc"
+        text = "\n".join([header, ",".join(cells), *others])
     if change == "unit":
         header, first, *others = text.splitlines()
         cells = first.split(",")
@@ -347,6 +358,18 @@ def test_faults_of_a_suits_file_are_named_with_their_line(tmp_path, body, change
     (tmp_path / "suit.mvnx").write_text(change(text), encoding="utf-8")
     with pytest.raises(TrajectoryError, match=rf"line \d+: .*{message}"):
         read_recorded_motion(tmp_path / "suit.mvnx", body)
+
+
+def test_a_segment_without_places_may_be_left_out(tmp_path, body):
+    """A hand that no link shows, without places: the rest is as it was."""
+    motion = moved()
+    turns = own_axes(motion)
+    text = segment_files.table_text({**turns, "hand": turns["torso"]}, {**motion.places, "hand": motion.places["hips"]})
+    for axis in "xyz":
+        text = text.replace(f"hand_{axis}", f"hand_speed_{axis}")
+    (tmp_path / "poses.csv").write_text(text, encoding="utf-8")
+    options = {"names": {"hand": None, **{f"hand_speed_{axis}": None for axis in "xyz"}}}
+    check(read_recorded_motion(tmp_path / "poses.csv", body, calibration=0.0, **options), body, motion, ROUNDING)
 
 
 def test_velocities_of_bodies_are_no_positions(tmp_path, body):
@@ -425,3 +448,49 @@ def test_two_poses_that_the_joints_do_not_tell_apart_are_asked_for(tmp_path, loa
     with pytest.warns(TrajectoryWarning, match="axes of the room"):
         recorded = read_recorded_motion(tmp_path / "suit.mvnx", body, calibration="tpose")
     np.testing.assert_allclose(recorded.path.shape(TIMES), np.tile([0.0, 0.0, 0.0, 1.0], (COUNT, 1)), atol=ROUNDING)
+
+
+def test_check_prints_the_momentum_of_both_and_gives_it_to_programs(tmp_path, capsys, body):
+    motion = moved()
+    file, _ = write(tmp_path, "", motion, own_axes(motion))
+    expected = segment_files.momentum_between(motion).mean(axis=0)
+    main(["check", str(body.file), str(file), "--calibration", "0", "--json"])
+    found = json.loads(capsys.readouterr().out)["motion"]["recording"]["segments"]
+    for name in ("momentum_of_poses", "momentum_of_chain"):
+        np.testing.assert_allclose(found[name], expected, rtol=0, atol=ROUNDING)
+    main(["check", str(body.file), str(file), "--calibration", "0", "--length-tolerance", "0.05"])
+    line = next(line for line in capsys.readouterr().out.splitlines() if "mean momentum" in line)
+    assert f"({', '.join(f'{value:.4g}' for value in expected)}) of the segments' own poses" in line
+
+
+def test_quaternions_of_a_sensor_beside_the_joints_are_no_segments(tmp_path):
+    """A table of joints with the base stays one, whatever else has a quaternion."""
+    cat = sp.load_body("cat_two_halves")
+    turns = Rotation.from_rotvec(np.outer(TIMES, [0.1, 0.2, 0.3])).as_quat()
+    columns = {"time": TIMES, **{name: 0.1 * np.sin(k + TIMES) for k, name in enumerate(cat.joint_names)}}
+    columns |= {f"base_{axis}": np.ones(COUNT) for axis in "xyz"}
+    columns |= {f"{what}_q{axis}": turns[:, k] for what in ("base", "imu") for k, axis in enumerate("xyzw")}
+    rows = [",".join(map(repr, row)) for row in np.column_stack(list(columns.values())).tolist()]
+    (tmp_path / "log.csv").write_text("\n".join([",".join(columns), *rows]), encoding="utf-8")
+    recorded = read_recorded_motion(tmp_path / "log.csv", cat, ignore_extra=True)
+    assert recorded.segments is None
+    np.testing.assert_allclose(
+        Rotation.from_matrix(recorded.base_attitude).as_rotvec(), np.outer(TIMES, [0.1, 0.2, 0.3]), rtol=0, atol=1e-14
+    )
+
+
+def test_joints_that_are_no_tree_make_no_body_and_a_prop_is_no_part_of_it(tmp_path):
+    names, _, _, tposed = suit()
+    still = {name: np.tile(np.eye(3), (2, 1, 1)) for name in names}
+    places = {name: np.tile(place, (2, 1)) for name, place in tposed.items()}
+    text = suit_text(
+        {**still, "Prop1": still["Head"]}, {**places, "Prop1": places["Head"]}, {**tposed, "Prop1": np.ones(3)}
+    )
+    (tmp_path / "suit.mvnx").write_text(text, encoding="utf-8")
+    with pytest.warns(IgnoredElementWarning):
+        body = sp.load_body(tmp_path / "suit.mvnx", person_mass=60.0)
+    assert set(body.link_names) == set(names)
+    cut = re.sub(r'<joint label="jL3">.*?</joint>', "", text)
+    (tmp_path / "cut.mvnx").write_text(cut, encoding="utf-8")
+    with pytest.raises(ModelFileError, match=r"cut\.mvnx:1: joints have 2 roots"):
+        sp.load_body(tmp_path / "cut.mvnx")

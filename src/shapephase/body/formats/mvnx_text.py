@@ -270,11 +270,12 @@ def suit_skeleton(suit: Suit) -> Skeleton:
     MvnxFaultError
         If joints are missing, or are no tree.
     """
-    roots = [number for number in range(len(suit.segments)) if number not in suit.joints]
+    # A prop in a hand is a segment without joints.
+    roots = sorted({parent for parent, _ in suit.joints.values()} - suit.joints.keys())
     if len(roots) != 1:
         raise MvnxFaultError(
-            f"{len(roots)} segments hang on no other, and the joints of a body are a tree; export the file again, "
-            "with <joints> and points, or load another body",
+            f"joints have {len(roots)} roots among the {len(suit.segments)} segments, and those of a body have one; "
+            "export the file again, with <joints> and points, or load another body",
             1,
         )
     standing = next((suit.stands[kind] for kind in _STANDING if kind in suit.stands), suit.motion)

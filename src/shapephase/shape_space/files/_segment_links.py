@@ -9,7 +9,7 @@ base. G is that by which the links' joints lie best on the recorded origins (Kab
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -48,6 +48,8 @@ _PARTS = {
 """Part -> what Xsens, Theia and usual models call it, without its side."""
 _USUAL = {word: part for part, words in _PARTS.items() for word in words}
 _SIDED = re.compile(r"(?P<before>left|right|[lr](?=_))?_?(?P<part>.+?)_?(?P<behind>left|right|(?<=_)[lr])?")
+_ROOM = ("worldbody", "world", "ground")
+"""What files call the room among the segments."""
 _MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}
 """Of what files' bodies the segments are links -> how these files end."""
 
@@ -258,15 +260,14 @@ class Links:
     def _matched(self, names: Mapping[str, str | None]) -> dict[int, Frame]:
         """Frame of the chain -> the segment that shows it, parents before children."""
         links = self.chain.link_frames
-        plain = {_plain(link): link for link in links} | {"base": self.body.link_names[0]}
-        usual = {_usual(link): link for link in links}
+        known = known_links(self.body, self.poses.names)
         found: dict[int, Frame] = {}
         shown: dict[str, str] = {}
         free = []
         for number, segment in enumerate(self.poses.names):
-            link = names.get(segment, plain.get(_plain(segment), usual.get(_usual(segment))))
+            link = names.get(segment, known.get(segment))
             if link is None:
-                free += [] if segment in names else [segment]
+                free += [] if segment in names or _plain(segment) in _ROOM else [segment]
                 continue
             if link not in links:
                 raise TrajectoryError(
@@ -302,6 +303,18 @@ class _Fit(NamedTuple):
     worst: str
     by_origins: bool
     calibration: Calibration
+
+
+def known_links(body: Body, segments: Iterable[str]) -> dict[str, str]:
+    """Segment -> link, of those that are known by their names."""
+    links = body.chain.link_frames
+    plain = {_plain(link): link for link in links}
+    if "base" not in plain:
+        plain["base"] = body.link_names[0]
+    parts = [_usual(link) for link in links]
+    usual = {part: link for part, link in zip(parts, links, strict=True) if parts.count(part) == 1}
+    found = {segment: plain.get(_plain(segment), usual.get(_usual(segment))) for segment in segments}
+    return {segment: link for segment, link in found.items() if link is not None}
 
 
 def angle_of_ways(recorded: Array, own: Array) -> float:

@@ -84,9 +84,9 @@ def without_segments(
         If segments and links do not match, axes are not known, or lengths, ways between joints or turns of hinges are
         none that the body can have.
     """
-    if table.poses is None:
-        table = pose_columns(table, choices.names)
     names = dict(choices.names)
+    if table.poses is None:
+        table = pose_columns(table, names, body)
     if table.poses is None:
         if choices.given:
             raise TrajectoryError(
@@ -153,7 +153,7 @@ class _Conversion:
             },
             base_quat_xyzw=_quaternions(turns[:, 0]),
             base_position=None if places is None else places[:, 0],
-            unread={**table.unread, **dict.fromkeys(self.links.left_out, "a segment without a part of its own")},
+            unread={**table.unread, **dict.fromkeys(self.links.left_out, "a segment that no joint needs")},
             segments=self._momentum(turns[whole], None if places is None else places[whole], own, whole),
             poses=None,
         )

@@ -11,11 +11,13 @@ import numpy as np
 
 from .... import so3
 from ....arrays import Array
+from ....body.body import Body
 from ....body.formats.bvh_text import BvhFaultError
 from ....body.formats.mvnx_text import read_suit
 from ....errors import TrajectoryError
-from .._labels import LENGTHS, label
+from .._labels import LENGTHS, SI, label
 from .._recording import SegmentPoses, Table
+from .._segment_links import known_links
 
 _QUATERNION = re.compile(r"(?P<segment>.+?)(?:_q|_quat_?|\.q|[./]orientation[./])(?P<part>[xyzw])", re.DOTALL)
 _PLACE = re.compile(r"(?P<segment>.+?)(?:_p?|_pos_?|\.p?|[./]position[./])(?P<part>[xyz])", re.DOTALL)
@@ -30,6 +32,10 @@ _KINEMATICS = ("X", "Y", "Z", "Ox", "Oy", "Oz")
 turn before has left them."""
 _OFF_ROTATION = 1e-3
 """Of S^T S - 1: files have single precision."""
+_OFF_UNIT = 0.1
+"""A quaternion's length may be off one by so much: what interpolates them leaves that."""
+_FEWEST = 2
+"""Segments of a table: one alone is the base."""
 _WHOLE_BODY = "center_of_mass"
 """What BodyKinematics has behind the bodies, without angles."""
 
@@ -98,7 +104,7 @@ def body_kinematics(table: Table, kind: str) -> Table:
     labels = {body: [f"{body}_{axis}" for axis in _KINEMATICS] for body in bodies}
     if not bodies or any(name not in table.columns for names in labels.values() for name in names):
         return table
-    if not kind.strip().lower().startswith("position"):
+    if "pos" not in kind.lower() and "_pos" not in Path(table.where).name.lower():
         raise TrajectoryError(
             f"{table.where}: line 1: {kind.strip()[:40]!r} of bodies, and positions are needed; give the file that "
             "BodyKinematics writes beside it, ..._pos_global.sto"
@@ -130,10 +136,18 @@ def matrix_poses(names: tuple[str, ...], matrices: Array, metre: float | None) -
     return SegmentPoses(names=names, turns=turns, origins=origins, in_metres=metre is not None)
 
 
-def pose_columns(table: Table, names: Mapping[str, str | None]) -> Table:
+def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> Table:
     """The table with its columns `SEGMENT_qw`, `_qx`, `_qy`, `_qz` and `_x`, `_y`, `_z` as poses of segments.
 
-    One segment alone is the base, and stays as it is.
+    One segment alone is the base, and stays as it is; so do, beside columns of joints, quaternions that are not of two
+    links.
+
+    names : label or segment -> joint or link, or None for what is left out
+
+    Raises
+    ------
+    TrajectoryError
+        If places are missing, a quaternion is none, or a unit is none of lengths.
     """
     parts: dict[str, dict[str, str]] = {}
     places: dict[str, dict[str, str]] = {}
@@ -145,41 +159,59 @@ def pose_columns(table: Table, names: Mapping[str, str | None]) -> Table:
             if match is not None:
                 found.setdefault(match["segment"], {})[match["part"]] = text
                 break
-    whole = [segment for segment, found in parts.items() if len(found) == len("xyzw")]
-    if len(whole) < 2:
+    segments = [segment for segment, found in parts.items() if len(found) == len("xyzw")]
+    links = {*known_links(body, segments), *(names.keys() & set(segments))}
+    of_joints = any(label(text).name in body.joint_names for text in table.columns)
+    if len(segments) < _FEWEST or (of_joints and len(links) < _FEWEST):
         return table
-    placed = [segment for segment in whole if len(places.get(segment, {})) == len("xyz")]
-    if placed and len(placed) < len(whole):
-        lacking = next(segment for segment in whole if segment not in placed)
-        raise TrajectoryError(
-            f"{table.where}: segment {lacking!r} has no columns {lacking}_x, {lacking}_y, {lacking}_z, and others have "
-            f"places; add them, or leave the segment out with names={{{lacking!r}: None}} (--names {lacking}=)"
-        )
-    numbers = np.stack([[table.columns[parts[segment][part]] for part in "xyzw"] for segment in whole]).transpose(
-        2, 0, 1
+    placed = [segment for segment in segments if len(places.get(segment, {})) == len("xyz")]
+    for segment in segments:
+        if placed and segment not in placed and names.get(segment, segment) is not None:
+            raise TrajectoryError(
+                f"{table.where}: segment {segment!r} has no columns {segment}_x, {segment}_y, {segment}_z, and others "
+                f"have places; add them, or leave the segment out with names={{{segment!r}: None}} (--names {segment}=)"
+            )
+    used = {text for segment in segments for each in (parts, places) for text in each.get(segment, {}).values()}
+    for text in used:
+        if any(cell.strip().lower() not in ("", "nan") for cell in table.faults.get(text, {}).values()):
+            table.check_column(text)
+    poses = SegmentPoses(
+        names=tuple(segments),
+        turns=_turned(table, segments, parts),
+        origins=_placed(table, segments, places) if placed else None,
     )
+    return replace(table, columns={text: each for text, each in table.columns.items() if text not in used}, poses=poses)
+
+
+def _turned(table: Table, segments: list[str], parts: Mapping[str, Mapping[str, str]]) -> Array:
+    """The turns (N, k, 3, 3) of quaternions in columns; NaN where they are empty."""
+    numbers = np.stack([[table.columns[parts[name][part]] for name in segments] for part in "xyzw"], axis=-1)
+    numbers = numbers.transpose(1, 0, 2)
     lengths = np.linalg.norm(numbers, axis=-1)
-    off = np.abs(lengths - 1.0) > 0.1
-    if off.any():
-        row, segment = np.argwhere(off)[0]
+    off = np.argwhere(np.abs(lengths - 1.0) > _OFF_UNIT)
+    if len(off):
+        row, segment = off[0]
         raise TrajectoryError(
-            f"{table.where}: {table.row} {table.rows[row]}: the quaternion of {whole[segment]!r} has the length "
-            f"{lengths[row, segment]:.6g}; 1 is needed, in the order of the labels"
+            f"{table.where}: {table.row} {table.rows[row]}: the quaternion of {segments[segment]!r} has the length "
+            f"{lengths[row, segment]:.6g}, and 1 is needed; correct it, or leave the segment out (--names "
+            f"{segments[segment]}=)"
         )
     turns = np.full((*lengths.shape, 3, 3), np.nan)
     there = np.isfinite(lengths)
     turns[there] = so3.matrix_from_quat(so3.normalised(numbers[there]))
-    origins = None
-    if placed:
-        units = {
-            text: table.units.get(text) or label(text).unit or "m"
-            for found in places.values()
-            for text in found.values()
-        }
-        origins = np.stack(
-            [[LENGTHS[units[places[s][axis]]] * table.columns[places[s][axis]] for axis in "xyz"] for s in whole]
-        ).transpose(2, 0, 1)
-    used = {text for segment in whole for found in (parts, places) for text in found.get(segment, {}).values()}
-    columns = {text: values for text, values in table.columns.items() if text not in used}
-    poses = SegmentPoses(names=tuple(whole), turns=turns, origins=origins)
-    return replace(table, columns=columns, poses=poses)
+    return turns
+
+
+def _placed(table: Table, segments: list[str], places: Mapping[str, Mapping[str, str]]) -> Array:
+    """Origins (N, k, 3) [m] in columns; NaN of segments without them."""
+    origins = np.full((len(table.rows), len(segments), 3), np.nan)
+    for k, segment in enumerate(segments):
+        for axis, text in places.get(segment, {}).items():
+            unit = table.units.get(text) or label(text).unit or "m"
+            if unit not in LENGTHS and unit != SI:
+                raise TrajectoryError(
+                    f"{table.where}: column {text!r} is in {unit}, and a place is in {', '.join(LENGTHS)}; leave it "
+                    f"out with names={{{text!r}: None}} (--names {text}=), or write its unit"
+                )
+            origins[:, k, "xyz".index(axis)] = LENGTHS.get(unit, 1.0) * table.columns[text]
+    return origins
