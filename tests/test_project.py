@@ -1,5 +1,6 @@
 """The project itself: what a wheel and an editable install find, how fast it imports, what the README says."""
 
+import ast
 import datetime
 import os
 import re
@@ -8,7 +9,7 @@ import sys
 import tomllib
 import zipfile
 from functools import cache
-from importlib.util import find_spec
+from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import Any
 
@@ -253,6 +254,24 @@ def test_the_layers_are_those_of_the_import_contract(page):
         "contracts"
     ]
     assert said == [set(re.findall(r"\w+", layer)) for layer in contracts[0]["layers"] if layer != "__main__"]
+
+
+def test_no_room_imports_what_is_private_to_another():
+    """Neither a module nor a name that begins with an underscore; lazy imports and those for types count, too."""
+    source, wrong = ROOT / "src", []
+    for file in source.rglob("*.py"):
+        package = ".".join(file.relative_to(source).parts[:-1])
+        for line in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(line, ast.ImportFrom):
+                module = resolve_name("." * line.level + (line.module or ""), package)
+                names = [f"{module}.{name.name}" for name in line.names]
+            else:
+                names = [name.name for name in line.names] if isinstance(line, ast.Import) else []
+            room = f"{package}.".split(".")[:2]
+            for parts in (name.split(".") for name in names):
+                if parts[0] == "shapephase" and parts[:2] != room and any(re.match("_[^_]", part) for part in parts):
+                    wrong.append(f"{file.relative_to(source)}:{line.lineno} {'.'.join(parts)}")
+    assert not wrong
 
 
 def test_nothing_refers_to_a_note_outside_the_repository():

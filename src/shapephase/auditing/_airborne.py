@@ -13,7 +13,7 @@ from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 from ..letters import what_came
-from ..shape_space.files._flight import flight_choices
+from ..shape_space.files.flight import flight_choices
 from ..shape_space.free_fall import free_fall
 from ._noise import white_noise
 from .floating_trajectory import FloatingTrajectory

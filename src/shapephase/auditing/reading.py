@@ -14,8 +14,8 @@ from ..arguments import check_choice, check_file_name, check_object, positive_ar
 from ..body.body import Body
 from ..body.joint_orders import WORDS
 from ..errors import ShapeError, TrajectoryError
-from ..shape_space.files._inputs import read_input
-from ..shape_space.files._times import recording_of
+from ..shape_space.files.inputs import read_input
+from ..shape_space.files.times import recording_of
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from .floating_trajectory import FloatingTrajectory, rates_by_name
 

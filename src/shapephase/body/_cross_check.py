@@ -10,7 +10,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
-from ._link_tree import LinkTree
+from .link_tree import LinkTree
 from .body import Body
 from .couplings.ball_joints import coordinate_names
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
-from ._link_tree import Link, LinkTree, inertia_warnings
+from .link_tree import Link, LinkTree, inertia_warnings
 
 # Name of the joint that lets the base move: no file is likely to have one of this name.
 _ROOT = "shapephase_free_flyer"

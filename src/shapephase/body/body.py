@@ -32,7 +32,7 @@ from ._centroidal_maps import (
 )
 from ._changed_body import changed_body, coupled_body
 from ._given_inertias import Given, given_inertias
-from ._link_tree import Joint
+from .link_tree import Joint
 from .couplings.coupling import Coupling
 from .couplings.joint_map import JointMap
 from .joint_chain import joint_chain

@@ -24,7 +24,7 @@ from ..errors import (
 )
 from ..letters import what_came
 from ._cross_check import check_against_file
-from ._link_tree import hollow_warnings, inertia_warnings, massless_warning
+from .link_tree import hollow_warnings, inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree, expanded

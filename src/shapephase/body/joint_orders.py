@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..arguments import check_object
-from ._link_tree import Joint, LinkTree
+from .link_tree import Joint, LinkTree
 from .virtual_base import joint_coordinates
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
-from ._link_tree import Joint, Link
+from .link_tree import Joint, Link
 from .couplings.ball_joints import coordinate_names
 from .couplings.coupling import Coupling
 

@@ -22,8 +22,8 @@ from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.machine_code import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import RunProgress
-from ..shape_space.files._base_columns import ESTIMATE
-from ..shape_space.files._flight import ANY_GRAVITY, RECORDED
+from ..shape_space.files.base_columns import ESTIMATE
+from ..shape_space.files.flight import ANY_GRAVITY, RECORDED
 from ..shape_space.files.mapping_files import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath

@@ -14,7 +14,7 @@ from ..body.family import BodyFamily
 from ..errors import ShapeError, unknown_name
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.files._labels import NO_UNIT, amounts
+from ..shape_space.files.labels import NO_UNIT, amounts
 from ..shape_space.path_samples import columns_without_samples, path_samples
 from ..shape_space.summaries import body_summary
 from .inertia_errors import InertiaErrors

@@ -17,7 +17,7 @@ from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import RunProgress
-from ..shape_space.files._flight import ALL, turns
+from ..shape_space.files.flight import ALL, turns
 from ..shape_space.files.read import RecordedMotion
 from ..warning_filters import quiet
 from .recorded_momentum import RecordedMomentum, momentum_from_recording, warn_of_drift

@@ -14,7 +14,7 @@ import numpy as np
 from ...child_process import run_alone
 from ...errors import MissingExtraError, ModelFileError
 from .._cross_check import inertia_and_momentum
-from .._link_tree import Joint, Link, LinkTree, from_the_root, grouped
+from ..link_tree import Joint, Link, LinkTree, from_the_root, grouped
 from ..body import Body
 from ..couplings.coupling import Coupling
 from ..couplings.functions import JointFunction

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 
 from ...arrays import Array
-from .._link_tree import MOST_LINKS, MOST_MASS
+from ..link_tree import MOST_LINKS, MOST_MASS
 from .chain import Chain, UnusableModelError, ball_names, ball_state, check_name, locked_inertia
 from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, listed, rotation
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import ModelFileError
-from .._link_tree import Joint, Link, LinkTree, from_the_root
+from ..link_tree import Joint, Link, LinkTree, from_the_root
 from .bvh_text import Bone, BvhFaultError, Skeleton, bvh_skeleton, check_base, check_lengths
 from .human_segments import Person, Segment, person_of
 from .mvnx_text import read_suit, suit_skeleton

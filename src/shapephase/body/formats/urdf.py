@@ -18,7 +18,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import ModelFileError
-from .._link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root, grouped
+from ..link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root, grouped
 from ..couplings.coupling import Coupling
 from ..virtual_base import ANYWHERE, IN_A_PLANE, free_base
 from .foreign import foreign_root

@@ -13,7 +13,7 @@ from ...body.body import Body
 from ...phases.phase_split import PhaseSplit
 from ...plain_data import plain
 from ...reconstruction.reconstruction import Motion
-from ...shape_space.files._labels import amounts
+from ...shape_space.files.labels import amounts
 from ...shape_space.files.read import RecordedMotion
 from ..options import EXACT, ErrorOptions
 

@@ -12,8 +12,8 @@ from ... import so3
 from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
-from ...shape_space.files._base_columns import ESTIMATE
-from ...shape_space.files._labels import IN_A_SECOND
+from ...shape_space.files.base_columns import ESTIMATE
+from ...shape_space.files.labels import IN_A_SECOND
 from ...shape_space.files.closing import Closing
 from ...shape_space.files.read import RecordedMotion
 from ...shape_space.files.smoothing import Smoothing

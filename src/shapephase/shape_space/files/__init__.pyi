@@ -1,4 +1,4 @@
-from ._flight import Flight
+from .flight import Flight
 from ._segment_poses import SegmentMotion
 from .closing import Closing
 from .mapping_files import read_names

@@ -14,8 +14,8 @@ from ...body.body import Body
 from ...errors import TrajectoryError
 from ..ball_columns import ball_columns, neighbours_signs
 from ._gaps import Gaps
-from ._labels import ANGLES, SI, Label, label
-from ._recording import Recording, warn
+from .labels import ANGLES, SI, Label, label
+from .recording import Recording, warn
 
 _AXES = "xyz"
 _TURN = re.compile(r"(?P<joint>.+)(?:\.r(?P<small>[xyz])|_(?P<large>[XYZ])rotation)", re.DOTALL)

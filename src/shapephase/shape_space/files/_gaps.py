@@ -10,8 +10,8 @@ import numpy as np
 from ... import so3
 from ...arrays import Array, Integers, Mask
 from ...errors import TrajectoryError
-from ._labels import seconds
-from ._recording import Recording, Table
+from .labels import seconds
+from .recording import Recording, Table
 
 _UNRESOLVED = 2.0 * np.pi / 3.0
 """[rad] A rotation that turns by more across a gap may as well have gone the other way round."""

@@ -16,9 +16,9 @@ from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_n
 from ...letters import what_came
 from ..ball_columns import ball_columns
 from ._ball_columns import continued_balls, continued_hinges, with_quaternions
-from ._base_columns import KNOWN, BaseChoices, BaseColumns, BaseMotion
+from .base_columns import KNOWN, BaseChoices, BaseColumns, BaseMotion
 from ._gaps import Gaps
-from ._labels import (
+from .labels import (
     ANGLES,
     LENGTHS,
     NO_UNIT,
@@ -32,8 +32,8 @@ from ._labels import (
     quantity,
 )
 from ._pose_columns import HINT, base_names
-from ._recording import LONGEST_NAME, Recording, warn
-from ._times import is_clock, part_of
+from .recording import LONGEST_NAME, Recording, warn
+from .times import is_clock, part_of
 from ._unit_doubts import check_unit, warn_of_limits, warn_of_turns
 
 _STILL = 1e-9

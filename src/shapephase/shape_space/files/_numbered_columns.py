@@ -10,8 +10,8 @@ import numpy as np
 from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
-from ._nameless_joints import FREE_JOINT, nameless_joints
-from ._recording import Table, warn
+from .nameless_joints import FREE_JOINT, nameless_joints
+from .recording import Table, warn
 
 _TUM = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 """A pose as trajectories of visual odometry have it, behind the time (TUM RGB-D benchmark)."""

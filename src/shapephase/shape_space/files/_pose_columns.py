@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
 from ...errors import TrajectoryError
-from ._labels import label
+from .labels import label
 
 QUATERNION, PLACE, MRP, VECTOR, EULER = "quaternion", "place", "mrp", "vector", "euler"
 _KINDS = {

@@ -13,9 +13,9 @@ from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
 from ._joint_columns import Matched
-from ._labels import IN_A_SECOND
-from ._recording import Recording, warn
-from ._times import part_of
+from .labels import IN_A_SECOND
+from .recording import Recording, warn
+from .times import part_of
 from .smoothing import filtered, filtered_attitudes
 
 _APART = 5.0

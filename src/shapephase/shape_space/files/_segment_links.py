@@ -20,7 +20,7 @@ from ...arrays import Array
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
-from ._recording import Recording, SegmentPoses, warn
+from .recording import Recording, SegmentPoses, warn
 
 OWN_AXES = "links"
 """Instead of a calibration pose: segments have the axes of the body's links."""

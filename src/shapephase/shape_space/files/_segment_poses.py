@@ -16,9 +16,9 @@ from ...body.body import Body
 from ...body.couplings.ball_joints import RATES, coordinate_names
 from ...display import short_repr
 from ...errors import TrajectoryError, TrajectoryWarning
-from ._recording import Recording, SegmentPoses, Table
+from .recording import Recording, SegmentPoses, Table
 from ._segment_links import MOST_OFF_WAY, SHORT, Links, SegmentChoices, angle_of_ways
-from ._times import recording_of
+from .times import recording_of
 from .formats.segment_poses import pose_columns
 
 _LENGTH_TOLERANCE = 0.1

@@ -11,8 +11,8 @@ import numpy as np
 from ...arrays import Integers
 from ...errors import TrajectoryError, TrajectoryWarning
 from ._joint_columns import Matched
-from ._recording import Recording
-from ._times import part_of
+from .recording import Recording
+from .times import part_of
 
 _GAP = 5.0
 """Usual steps; what is farther from its neighbour is no more a part of the same motion."""

@@ -8,8 +8,8 @@ from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
 from ..unit_doubts import looks_like
-from ._labels import ANGLES, LENGTHS, NO_UNIT
-from ._recording import Recording, warn
+from .labels import ANGLES, LENGTHS, NO_UNIT
+from .recording import Recording, warn
 
 _WHOLE_TURN = 2.0 * np.pi
 _MANY_TURNS = 2.0 * _WHOLE_TURN

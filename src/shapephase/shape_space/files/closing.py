@@ -19,7 +19,7 @@ from ..connection import horizontal_lift
 from ..curves import CLOSED
 from ..shape_geodesic import shape_geodesic
 from ..shape_path import ShapePath
-from ._labels import amounts
+from .labels import amounts
 from .smoothing import Recorded, Smoothing, prepared_path
 
 WAYS = ("smooth", "drift", "geodesic")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...arguments import check_file_name
 from ...errors import ShapeError
-from ._recording import check_text, file_bytes
+from .recording import check_text, file_bytes
 
 
 def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:

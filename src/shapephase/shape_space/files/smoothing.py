@@ -18,7 +18,7 @@ from ..ball_columns import ball_columns, neighbours_signs
 from ..curves import CLOSED
 from ..linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, LowPass, likeliest, width_of
 from ..shape_path import ShapePath
-from ._recording import warn
+from .recording import warn
 from ._sample_origins import Prepared
 
 _FEWEST = 5

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...arguments import check_file_name, check_text
 from ...errors import TrajectoryError, unknown_name
-from ._recording import file_bytes
+from .recording import file_bytes
 from .formats.spreadsheets import read_excel, read_feather, read_parquet
 from .formats.text_tables import read_text
 

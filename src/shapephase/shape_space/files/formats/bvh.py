@@ -13,7 +13,7 @@ from ....body.body import Body
 from ....body.couplings.ball_joints import coordinate_names
 from ....body.formats.bvh_text import Bone, BvhFaultError, Skeleton, bvh_skeleton, check_base, check_lengths
 from ....errors import TrajectoryError
-from .._recording import Table
+from ..recording import Table
 
 _WHOLE_TURN = 360.0
 """[degrees] Files wrap angles; a hinge goes on by what is nearest."""

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from ....errors import MissingExtraError, TrajectoryError
-from .._labels import LENGTHS, unit_of
-from .._recording import Table
+from ..labels import LENGTHS, unit_of
+from ..recording import Table
 from .column_tables import column_table
 from .parser_process import parsed
 from .segment_poses import matrix_poses

@@ -10,7 +10,7 @@ import numpy as np
 
 from ....arrays import Array
 from ....errors import TrajectoryError
-from .._recording import Table, number
+from ..recording import Table, number
 from .table_heads import CLOCK, COMMA_NUMBER, DATE, is_value
 
 _MOST_FAULTS = 1000

@@ -9,7 +9,7 @@ import numpy as np
 
 from ....arrays import Array
 from ....errors import TrajectoryError
-from .._recording import Table
+from ..recording import Table
 
 _JOINTS = (
     *(("chest", 4), ("neck", 4), ("right_hip", 4), ("right_knee", 1), ("right_ankle", 4), ("right_shoulder", 4)),

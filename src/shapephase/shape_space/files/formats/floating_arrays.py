@@ -14,8 +14,8 @@ from ....body.body import Body
 from ....body.joint_orders import MUJOCO, OWN, simulator_order
 from ....body.virtual_base import way_names, way_poses
 from ....errors import ShapeError, TrajectoryError, unknown_name
-from .._nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
-from .._recording import Rates
+from ..nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
+from ..recording import Rates
 
 _NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot|qdot)[_\[ ]?([0-9]{1,6})\]?")
 """Labels of a table such as qpos_0, qpos[0] and qpos0."""

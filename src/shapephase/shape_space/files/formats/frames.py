@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ....errors import TrajectoryError
-from .._labels import unit_of
-from .._recording import Table
+from ..labels import unit_of
+from ..recording import Table
 from .column_tables import column_table
 from .ros_echo import echoed_columns, listed_names
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ....errors import MissingExtraError, TrajectoryError
-from .._labels import unit_of
-from .._recording import Table
+from ..labels import unit_of
+from ..recording import Table
 from .named_arrays import arrays_table
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"

@@ -9,7 +9,7 @@ import numpy as np
 
 from ....errors import MissingExtraError, TrajectoryError
 from ....warning_filters import quiet
-from .._recording import Table
+from ..recording import Table
 from .hdf5 import is_hdf5
 from .named_arrays import arrays_table
 

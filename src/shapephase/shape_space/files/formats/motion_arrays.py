@@ -14,9 +14,9 @@ from ....body.body import Body
 from ....errors import ShapeError, TrajectoryError
 from ....files import npy_array, npz_arrays
 from ....letters import what_came
-from .._labels import SI
-from .._nameless_joints import FREE_JOINT, nameless_joints, placed_joints
-from .._recording import Rates, Simulated, Table
+from ..labels import SI
+from ..nameless_joints import FREE_JOINT, nameless_joints, placed_joints
+from ..recording import Rates, Simulated, Table
 from .floating_arrays import FloatingMotion, floating_motion, numbered_columns, places_of, root_width
 from .named_arrays import arrays_table
 

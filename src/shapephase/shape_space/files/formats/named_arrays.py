@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import TrajectoryError, unknown_name
-from .._recording import Table
+from ..recording import Table
 from .column_tables import column_table
 
 _MATRICES = ("shapes", "data", "q", "values")

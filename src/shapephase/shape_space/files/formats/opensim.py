@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ....arrays import Array
 from ....errors import TrajectoryError
-from .._recording import Table
+from ..recording import Table
 from .frames import file_table
 from .segment_poses import body_kinematics
 from .text_tables import BLANKS, read_text, unix_text

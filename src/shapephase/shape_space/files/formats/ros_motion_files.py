@@ -11,7 +11,7 @@ import numpy as np
 
 from ....arrays import Array
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
-from .._recording import Table, check_text, number
+from ..recording import Table, check_text, number
 from .strict_yaml import Text, yaml_documents
 
 _STATE = "sensor_msgs/msg/JointState"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
 from ....warning_filters import quiet
-from .._labels import unit_of
+from ..labels import unit_of
 from .table_heads import head_of
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ....errors import TrajectoryError
-from .._labels import unit_of
+from ..labels import unit_of
 
 COMMENT = re.compile(r'\s*"?(#|%|//)\s*')
 """What a line of comment begins with."""

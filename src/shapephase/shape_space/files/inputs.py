@@ -14,7 +14,7 @@ from ...body.body import Body
 from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
 from ._numbered_columns import named_columns
-from ._recording import Table, digest, file_bytes
+from .recording import Table, digest, file_bytes
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
 from .formats.deepmimic import read_deepmimic

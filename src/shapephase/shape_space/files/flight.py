@@ -17,11 +17,11 @@ from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
 from ..free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, fall_number, free_fall, lasts
-from ._base_columns import ESTIMATE
+from .base_columns import ESTIMATE
 from ._fall_units import check_gravity, check_parabola, is_long, slipped_fall
 from ._joint_columns import Matched
-from ._recording import Recording
-from ._times import part_of, samples_within, trim_argument
+from .recording import Recording
+from .times import part_of, samples_within, trim_argument
 
 AUTO = "auto"
 """Instead of two times: the flight is found by the fall of the centre of mass."""

@@ -14,7 +14,7 @@ import numpy as np
 from ...arguments import check_time_steps
 from ...arrays import Array, Integers, Mask
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
-from ._nameless_joints import NamelessJoints
+from .nameless_joints import NamelessJoints
 
 if TYPE_CHECKING:
     from ._segment_poses import SegmentMotion

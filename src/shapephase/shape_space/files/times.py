@@ -12,8 +12,8 @@ from ...arguments import positive_argument
 from ...arrays import Array, Integers, Mask, finite_array
 from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
-from ._labels import IN_A_SECOND, in_square_brackets, label, time_unit_argument
-from ._recording import Recording, Table, times_from_zero
+from .labels import IN_A_SECOND, in_square_brackets, label, time_unit_argument
+from .recording import Recording, Table, times_from_zero
 
 _TIMES = ("time", "times", "t", "timestamp", "timestamps", "stamp", "datetime", "elapsed", "elapsedtime", "timetag")
 """Names of a column of times, in small letters, without its unit and marks between words."""

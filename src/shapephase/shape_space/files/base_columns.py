@@ -11,14 +11,14 @@ import numpy as np
 
 from ... import so3
 from ...arrays import FARTHEST, Array, Integers
-from ...body._link_tree import Joint
+from ...body.link_tree import Joint
 from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import what_came
 from ._gaps import Gaps
-from ._labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, label
+from .labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, label
 from ._pose_columns import CANONICAL, MRP, VECTOR
-from ._recording import Recording
+from .recording import Recording
 
 ESTIMATE = "estimate"
 """Instead of the axes of the base: they are found by a fit."""
