@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase.body import Coupling, catalog
 from shapephase.body._cross_check import check_against_file, inertia_and_momentum
-from shapephase.body.link_tree import LinkTree
 from shapephase.body.formats.urdf import urdf_tree
 from shapephase.body.formats.xml_text import xml_tree
+from shapephase.body.link_tree import LinkTree
 from shapephase.errors import ModelFileError, ShapePhaseError
 from support.bodies import BODIES, joint, link, random_shapes, urdf
 from support.independent import turn, urdf_file

@@ -16,8 +16,8 @@ from ..body.body import Body
 from ..body.joint_orders import WORDS
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
-from ..shape_space.files.recording import Rates
 from ..shape_space.files.formats.floating_arrays import MUJOCO_QPOS, PINOCCHIO_Q, FreeJoint, with_free_joint
+from ..shape_space.files.recording import Rates
 
 FRAMES = ("world", "base")
 _FEWEST = 8

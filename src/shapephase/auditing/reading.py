@@ -15,8 +15,8 @@ from ..body.body import Body
 from ..body.joint_orders import WORDS
 from ..errors import ShapeError, TrajectoryError
 from ..shape_space.files.inputs import read_input
-from ..shape_space.files.times import recording_of
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
+from ..shape_space.files.times import recording_of
 from .floating_trajectory import FloatingTrajectory, rates_by_name
 
 _CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")

@@ -10,9 +10,9 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
-from .link_tree import LinkTree
 from .body import Body
 from .couplings.ball_joints import coordinate_names
+from .link_tree import LinkTree
 
 _TOLERANCE = 1e-12
 """Difference allowed between body and file, a share of the largest terms of the sums: thousands of roundings."""

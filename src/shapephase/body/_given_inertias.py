@@ -14,8 +14,8 @@ from ..arguments import on_unphysical_argument
 from ..arrays import Array, Mask, finite_array
 from ..errors import ShapeError, UnphysicalInertiaError, UnphysicalInertiaWarning, unknown_name
 from ..inertia_tensor import second_moment
-from .link_tree import LEAST_MASS, MOST_MASS, NEGATIVE, ROUNDING, TRIANGLE
 from .joint_chain import JointChain
+from .link_tree import LEAST_MASS, MOST_MASS, NEGATIVE, ROUNDING, TRIANGLE
 
 # Entries of a tensor that mirror each other may differ by this much, relative to the largest: printed digits.
 _ASYMMETRY = 1e-9

@@ -32,12 +32,12 @@ from ._centroidal_maps import (
 )
 from ._changed_body import changed_body, coupled_body
 from ._given_inertias import Given, given_inertias
-from .link_tree import Joint
 from .couplings.coupling import Coupling
 from .couplings.joint_map import JointMap
 from .joint_chain import joint_chain
 from .joint_orders import JointOrder
 from .link_motions import link_motions
+from .link_tree import Joint
 from .moving_parts import MovingPart, moving_parts
 
 if TYPE_CHECKING:

@@ -24,7 +24,6 @@ from ..errors import (
 )
 from ..letters import what_came
 from ._cross_check import check_against_file
-from .link_tree import hollow_warnings, inertia_warnings, massless_warning
 from ._model_tree import checked_model, model_of
 from .body import Body
 from .engines.engine_tree import check_against_engine, engine_tree, expanded
@@ -34,6 +33,7 @@ from .formats.foreign import foreign_kind
 from .formats.urdf import macro_of, urdf_tree
 from .formats.xml_text import quoted, read_file, xml_tree
 from .joint_orders import joint_orders
+from .link_tree import hollow_warnings, inertia_warnings, massless_warning
 
 _EXAMPLE = "example:"
 _OF_URDF = ("packages", "root")

@@ -14,9 +14,9 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
-from .link_tree import Joint, Link
 from .couplings.ball_joints import coordinate_names
 from .couplings.coupling import Coupling
+from .link_tree import Joint, Link
 
 ANYWHERE = "floating"
 IN_A_PLANE = "planar"

@@ -14,11 +14,11 @@ import numpy as np
 from ...child_process import run_alone
 from ...errors import MissingExtraError, ModelFileError
 from .._cross_check import inertia_and_momentum
-from ..link_tree import Joint, Link, LinkTree, from_the_root, grouped
 from ..body import Body
 from ..couplings.coupling import Coupling
 from ..couplings.functions import JointFunction
 from ..formats.xml_text import Node, xml_tree
+from ..link_tree import Joint, Link, LinkTree, from_the_root, grouped
 from .formats import FORMATS, XACRO
 from .reading import BODY, MEMORY, MISSING, NO_MEMORY, REFUSED, SHAPES, TEXT
 

@@ -18,8 +18,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import ModelFileError
-from ..link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root, grouped
 from ..couplings.coupling import Coupling
+from ..link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root, grouped
 from ..virtual_base import ANYWHERE, IN_A_PLANE, free_base
 from .foreign import foreign_root
 from .xml_text import (

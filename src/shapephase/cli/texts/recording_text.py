@@ -13,8 +13,8 @@ from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
 from ...shape_space.files.base_columns import ESTIMATE
-from ...shape_space.files.labels import IN_A_SECOND
 from ...shape_space.files.closing import Closing
+from ...shape_space.files.labels import IN_A_SECOND
 from ...shape_space.files.read import RecordedMotion
 from ...shape_space.files.smoothing import Smoothing
 from ...shape_space.free_fall import GRAVITY, free_fall

@@ -1,6 +1,6 @@
-from .flight import Flight
 from ._segment_poses import SegmentMotion
 from .closing import Closing
+from .flight import Flight
 from .mapping_files import read_names
 from .read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
 from .smoothing import smoothed_path

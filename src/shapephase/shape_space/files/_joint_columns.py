@@ -16,8 +16,10 @@ from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_n
 from ...letters import what_came
 from ..ball_columns import ball_columns
 from ._ball_columns import continued_balls, continued_hinges, with_quaternions
-from .base_columns import KNOWN, BaseChoices, BaseColumns, BaseMotion
 from ._gaps import Gaps
+from ._pose_columns import HINT, base_names
+from ._unit_doubts import check_unit, warn_of_limits, warn_of_turns
+from .base_columns import KNOWN, BaseChoices, BaseColumns, BaseMotion
 from .labels import (
     ANGLES,
     LENGTHS,
@@ -31,10 +33,8 @@ from .labels import (
     other_unit,
     quantity,
 )
-from ._pose_columns import HINT, base_names
 from .recording import LONGEST_NAME, Recording, warn
 from .times import is_clock, part_of
-from ._unit_doubts import check_unit, warn_of_limits, warn_of_turns
 
 _STILL = 1e-9
 """Range of a coordinate [rad, m or degrees] below which it was locked."""

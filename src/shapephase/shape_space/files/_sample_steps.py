@@ -15,8 +15,8 @@ from ...errors import TrajectoryError
 from ._joint_columns import Matched
 from .labels import IN_A_SECOND
 from .recording import Recording, warn
-from .times import part_of
 from .smoothing import filtered, filtered_attitudes
+from .times import part_of
 
 _APART = 5.0
 """Times the largest rate of the next second: a body that moves on does not slow down so much from its first step on."""

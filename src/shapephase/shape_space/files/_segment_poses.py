@@ -16,10 +16,10 @@ from ...body.body import Body
 from ...body.couplings.ball_joints import RATES, coordinate_names
 from ...display import short_repr
 from ...errors import TrajectoryError, TrajectoryWarning
-from .recording import Recording, SegmentPoses, Table
 from ._segment_links import MOST_OFF_WAY, SHORT, Links, SegmentChoices, angle_of_ways
-from .times import recording_of
 from .formats.segment_poses import pose_columns
+from .recording import Recording, SegmentPoses, Table
+from .times import recording_of
 
 _LENGTH_TOLERANCE = 0.1
 """Share by which a distance between joints may differ from the body's: momentum is then off by a fifth."""

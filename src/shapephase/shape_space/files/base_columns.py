@@ -16,8 +16,8 @@ from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import what_came
 from ._gaps import Gaps
-from .labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, label
 from ._pose_columns import CANONICAL, MRP, VECTOR
+from .labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, label
 from .recording import Recording
 
 ESTIMATE = "estimate"

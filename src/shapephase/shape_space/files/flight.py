@@ -17,9 +17,9 @@ from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
 from ..free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, fall_number, free_fall, lasts
-from .base_columns import ESTIMATE
 from ._fall_units import check_gravity, check_parabola, is_long, slipped_fall
 from ._joint_columns import Matched
+from .base_columns import ESTIMATE
 from .recording import Recording
 from .times import part_of, samples_within, trim_argument
 

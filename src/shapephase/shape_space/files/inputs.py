@@ -14,7 +14,6 @@ from ...body.body import Body
 from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
 from ._numbered_columns import named_columns
-from .recording import Table, digest, file_bytes
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
 from .formats.deepmimic import read_deepmimic
@@ -26,6 +25,7 @@ from .formats.opensim import has_header, read_opensim
 from .formats.ros_motion_files import read_bag, read_ros_yaml
 from .formats.segment_poses import read_mvnx
 from .formats.text_tables import read_text
+from .recording import Table, digest, file_bytes
 from .tables import PACKED, TABLES, unpacked
 
 STANDARD_INPUT = "-"

@@ -26,24 +26,24 @@ from ...letters import what_came
 from ...provenance import provenance
 from ..path_series import spline_error
 from ..shape_path import ShapePath
-from .base_columns import base_choices
-from .flight import Flight, flight_choices, in_flight
 from ._gaps import fill_argument
-from .inputs import read_input
 from ._joint_columns import JointChoices, Matched, matched
-from .labels import SI, amounts, mapping_argument
-from .recording import LONGEST_NAME, Recording, Table
 from ._sample_origins import resampled
 from ._sample_steps import evenly_spaced, low_passed, warn_of_fast_turns, without_first_pose
 from ._segment_links import SegmentChoices
 from ._segment_poses import SegmentMotion, without_segments
 from ._surroundings import surrounded
 from ._swings import check_swings
-from .times import doubtful_steps, recording_of, trim_argument
 from ._unit_doubts import doubtful_turns
+from .base_columns import base_choices
 from .closing import Closing, close_argument, closed_path
+from .flight import Flight, flight_choices, in_flight
+from .inputs import read_input
+from .labels import SI, amounts, mapping_argument
 from .mapping_files import read_names
+from .recording import LONGEST_NAME, Recording, Table
 from .smoothing import Recorded, Smoothing, is_even, prepared_path
+from .times import doubtful_steps, recording_of, trim_argument
 
 _WRITTEN = (".csv", ".npz", ".tsv")
 _MOST_SHOWN = 200

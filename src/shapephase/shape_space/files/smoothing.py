@@ -18,8 +18,8 @@ from ..ball_columns import ball_columns, neighbours_signs
 from ..curves import CLOSED
 from ..linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, LowPass, likeliest, width_of
 from ..shape_path import ShapePath
-from .recording import warn
 from ._sample_origins import Prepared
+from .recording import warn
 
 _FEWEST = 5
 """Samples; of fewer, what is motion and what is noise cannot be told apart."""

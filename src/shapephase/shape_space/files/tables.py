@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from ...arguments import check_file_name, check_text
 from ...errors import TrajectoryError, unknown_name
-from .recording import file_bytes
 from .formats.spreadsheets import read_excel, read_feather, read_parquet
 from .formats.text_tables import read_text
+from .recording import file_bytes
 
 if TYPE_CHECKING:
     import pandas as pd

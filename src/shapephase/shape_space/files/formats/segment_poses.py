@@ -15,9 +15,9 @@ from ....body.body import Body
 from ....body.formats.bvh_text import BvhFaultError
 from ....body.formats.mvnx_text import read_suit
 from ....errors import TrajectoryError
+from .._segment_links import known_links
 from ..labels import LENGTHS, SI, label
 from ..recording import SegmentPoses, Table
-from .._segment_links import known_links
 
 _QUATERNION = re.compile(r"(?P<segment>.+?)(?:_q|_quat_?|\.q|[./]orientation[./])(?P<part>[xyzw])", re.DOTALL)
 _PLACE = re.compile(r"(?P<segment>.+?)(?:_p?|_pos_?|\.p?|[./]position[./])(?P<part>[xyz])", re.DOTALL)
