@@ -189,10 +189,18 @@ def joint_motion(
 
 
 def column_names(words: tuple[str, ...]) -> dict[str, str | None]:
-    """The mapping of `--names`: pairs, and files of pairs. Raises ShapeError for a column that stands twice."""
+    """The mapping of `--names`: pairs, files of pairs, or the names of all columns of a table without a header.
+
+    Raises ShapeError for a column that stands twice.
+    """
     found: dict[str, str | None] = {}
     for word in words:
-        pairs = dict([name_pair(word, "--names")]) if "=" in word else read_names(word)
+        if "=" in word:
+            pairs = dict([name_pair(word, "--names")])
+        elif "," in word and not Path(word).exists():
+            pairs = {str(number): name.strip() or None for number, name in enumerate(word.split(","), start=1)}
+        else:
+            pairs = read_names(word)
         doubled = [old for old in pairs if old in found]
         if doubled:
             raise ShapeError(f"--names: column {doubled[0]!r:.60} stands twice")

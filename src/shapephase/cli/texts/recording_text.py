@@ -160,6 +160,12 @@ def _column_lines(body: Body, record: Any) -> list[str]:
     return lines
 
 
+def _columns_of(base: Mapping[str, Any], what: str) -> list[str]:
+    """The columns that say an attitude or a place; none where an array does."""
+    found = base.get(what, [])
+    return [] if isinstance(found, str) else found
+
+
 def _base_lines(record: Any) -> list[str]:
     """What the motion of the base was read from, where its columns leave a choice, and the flight that was kept."""
     lines = []
@@ -169,6 +175,10 @@ def _base_lines(record: Any) -> list[str]:
         lines.append(
             f"{'base':24}{', '.join(base['attitude'])}, turning in the order {' '.join(base['order'])}; {said}"
         )
+    elif any(not text.startswith("base_") for text in _columns_of(base, "attitude")):
+        lines.append(f"{'attitude of the base':24}{', '.join(_columns_of(base, 'attitude'))}")
+    if any(not text.startswith("base_") for text in _columns_of(base, "position")):
+        lines.append(f"{'place of the base':24}{', '.join(_columns_of(base, 'position'))}")
     if "axes" in base and (base["axes_said"] or base["axes"] != "x y z"):
         said = "as told" if base["axes_said"] else "the usual ones of a pelvis, --base-axes says others"
         lines.append(f"{'axes of the base':24}{base['axes']} of the recorded ones; {said}")
