@@ -78,19 +78,19 @@ class Prepared:
 
     @property
     def bias(self) -> Array:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         return self._bias
 
     @cached_property
     def _bias(self) -> Array:
         values = self.joined(self.samples)
-        if self.pilot is None:
+        if self.pilot is None or not self.smoothed.any():
             return np.zeros_like(values)[self._kept]
         motion = self.pilot(values - values[0])
         return (self.smoother(motion) - motion)[self._kept]
 
     def path(self, samples: Array) -> ShapePath:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         times = self.smoother.times[self.inside]
         through = "periodic" if self.smoother.periodic else "not-a-knot"
         plain = interpolated(times, self.values(samples), through, self.joint_names)
@@ -105,13 +105,13 @@ class Prepared:
         return replace(plain, curve=curve, origin=replace(self, samples=samples))
 
     def by_samples(self, by_values: Array) -> Array:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         return self._by_recorded(self.smoother.transposed(self._of_all(by_values)))
 
     def bias_by_samples(self, by_values: Array) -> Array:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         given = self._of_all(by_values)
-        if self.pilot is None:
+        if self.pilot is None or not self.smoothed.any():
             return self._by_recorded(np.zeros_like(given))
         return self._by_recorded(self.pilot.transposed(self.smoother.transposed(given) - given))
 
@@ -157,12 +157,12 @@ class Resampled:
 
     @property
     def samples(self) -> Array:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         return path_samples(self.inner).values
 
     @property
     def bias(self) -> Array:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         samples = path_samples(self.inner)
         taken = samples.bias.reshape(-1, self.inner.n_shape)
         periodic = len(taken) < len(samples.curve.knots)
@@ -170,16 +170,16 @@ class Resampled:
         return through.shape(self.times[: self.count])
 
     def path(self, samples: Array) -> ShapePath:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         return resampled(path_samples(self.inner).path_through(samples), self.times, self.inner.joint_names)
 
     def by_samples(self, by_values: Array) -> Array:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         samples = path_samples(self.inner)
         return self._of_inner(samples.by_samples(self._by_knots(samples, by_values)), samples.count)
 
     def bias_by_samples(self, by_values: Array) -> Array:
-        """As `SampleOrigin`."""
+        """As `PathOrigin`."""
         samples = path_samples(self.inner)
         return self._of_inner(samples.bias_by_samples(self._by_knots(samples, by_values)), samples.count)
 
