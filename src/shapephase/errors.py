@@ -121,7 +121,7 @@ class InputFileNotFoundError(ShapePhaseError, FileNotFoundError):
     ...     sp.load_body("nowhere.urdf")
     ... except sp.errors.InputFileNotFoundError as error:
     ...     print(str(error)[:72])
-    nowhere.urdf: there is no such file
+    nowhere.urdf: there is no such file; look for it with: ls .
     """
 
 

@@ -64,6 +64,9 @@ READ = {
     "a namespace of xacro at another address": PLAIN.replace("<robot", '<robot xmlns:xacro="urn:any"'),
     "a prefix that is bound to nothing": PLAIN.replace("</robot>", '<gazebo><ignition:a x="1"/></gazebo></robot>'),
     "a sensor and a material": PLAIN.replace("</robot>", '<sensor name="s"/><material name="m"/></robot>'),
+    "a world that is nowhere written": PLAIN.replace(
+        "</robot>", '<joint name="base" type="floating"><parent link="world"/><child link="trunk"/></joint></robot>'
+    ),
     "Drake's spelling of a hinge": PLAIN.replace("<joint", "<drake:joint").replace("</joint", "</drake:joint"),
 }
 
@@ -313,7 +316,7 @@ def test_a_study_gives_its_bodies_their_arguments(tmp_path):
 
 def test_an_argument_that_is_missing_or_unknown_is_an_error_with_what_to_type(tmp_path):
     path = written(tmp_path, XACRO, "r.urdf.xacro")
-    with pytest.raises(ModelFileError, match=r"payload; type --xacro payload:=VALUE .*: mass:=1, payload$"):
+    with pytest.raises(ModelFileError, match=r"argument payload; .*: mass:=1, payload; type --xacro payload:=VALUE"):
         sp.load_body(path)
     with pytest.raises(ModelFileError, match=r"no argument 'payloat'; it has mass:=1, payload"):
         sp.load_body(path, xacro_args={"payload": "true", "payloat": "true"})

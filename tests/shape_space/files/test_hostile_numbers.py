@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.errors import ModelFileError, ResultFileError, TrajectoryError
+from shapephase.errors import ResultFileError, TrajectoryError
 from support.bodies import link, urdf
 
 NAMES = ("left_shoulder_abduction", "right_shoulder_abduction")
@@ -101,8 +101,7 @@ def test_yaml_that_means_something_else_than_it_seems(tmp_path, diver, text, wor
 def test_an_encoding_that_is_said_and_not_used(tmp_path, said):
     text = f"<?xml version='1.0' encoding='{said}'?>\n{urdf(link('ä', 1.0, [0.1, 0.1, 0.1]))}"
     (tmp_path / "b.urdf").write_text(text, encoding="utf-8")
-    with pytest.raises(ModelFileError, match=f"b.urdf:1: it says that it is {said}"):
-        sp.load_body(tmp_path / "b.urdf")
+    assert sp.load_body(tmp_path / "b.urdf").link_names == ("ä",)
 
 
 @pytest.mark.parametrize("said", ["UTF-8", "utf8", "ISO-8859-1", "us-ascii", "Windows-1252"])

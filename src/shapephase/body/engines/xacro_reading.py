@@ -95,6 +95,6 @@ def _arguments_to_give(undefined: str, text: str, given: Mapping[str, str]) -> s
     missing = list(dict.fromkeys([undefined, *sorted((_named_in(text) | set(declared)) - valued)]))
     typed, python = (form.join(missing) for form in (":=VALUE ", '": "VALUE", "'))
     return (
-        f'; type --xacro {typed}:=VALUE (Python: xacro_args={{"{python}": "VALUE"}}); arguments of the file: '
-        f"{_listed(text)}"
+        f"; arguments of the file: {_listed(text)}; type --xacro {typed}:=VALUE "
+        f'(Python: xacro_args={{"{python}": "VALUE"}})'
     )

@@ -37,6 +37,8 @@ from .xml_text import (
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _BALL = "spherical"
+_WORLD = "world"
+"""A link that is there without being written, as Drake and Gazebo have it."""
 _EXPRESSION = re.compile(r"\$[{(]")
 _DRAKE_JOINT = "drake:joint"
 _DRAKE_BALL = "ball"
@@ -98,6 +100,8 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
         groups = "; an SRDF file names groups of joints only: load its URDF" if root.all("group") else ""
         raise root.fault(f"robot {name!r}", f"has no links; a body needs at least one <link>{groups}")
     joints = {key: _joint(key, node, reading) for key, node in _named(root, "joint", _DRAKE_JOINT).items()}
+    if _WORLD not in links and any(joint.parent == _WORLD for joint in joints.values()):
+        links[_WORLD] = _link(_WORLD, Node("link", {}, root.file, root.line), reading)
     first, ordered = from_the_root(links, joints.values(), root.file)
     _check_mimics(reading.mimics, joints)
     couplings = {
