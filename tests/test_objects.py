@@ -30,7 +30,8 @@ MOMENTUM = (0.01, 0.02, 0.03)
 INNER = ("deformation.frames", "shape_space.body_path", "plotting.plot_style", "optimal_control.task",
          "optimal_control.symbolic", "body.appearance", "examples.slow_deformation.first_loop",
          "shape_space.connection.connection_slopes", "shape_space.closing_arc", "plotting.pages",
-         "shape_space.path_samples", "phases.split_text", "body.engines", "shape_space.unit_doubts",
+         "shape_space.path_samples", "shape_space.files.formats.floating_arrays",
+         "shape_space.files.formats.motion_arrays", "phases.split_text", "body.engines", "shape_space.unit_doubts",
          "dynamics.moving_body", "deformation.deformation.deformation_along",
          "optimal_control.extremals.hamiltonian.checked_metric",
          "optimal_control.extremals.hamiltonian.natural_scales")  # fmt: skip
