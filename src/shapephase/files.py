@@ -131,7 +131,7 @@ def npz_arrays(data: bytes) -> dict[str, Any]:
     except ValueError:
         raise
     except Exception as error:  # a damaged archive fails in the decoders in many ways
-        raise ValueError(f"no NPZ file that can be read ({error}); write it anew with numpy.savez") from None
+        raise ValueError(f"no NPZ file that can be read ({error!s:.200}); write it anew with numpy.savez") from None
     names = [name.removesuffix(".npy") for name, _ in members]
     if len(set(names)) != len(names):
         raise ValueError("an array stands twice in the file; write it anew with numpy.savez")
@@ -159,7 +159,7 @@ def npy_array(data: bytes) -> Any:
     except Exception as error:  # a damaged header fails in NumPy's parser in many ways
         if "allow_pickle" in str(error):
             error = ValueError("it holds Python objects, which can run code; save arrays of numbers and of texts")
-        raise ValueError(f"no array that can be read ({error})") from None
+        raise ValueError(f"no array that can be read ({error!s:.200})") from None
 
 
 def _followed(path: Path) -> tuple[Path, int | None]:

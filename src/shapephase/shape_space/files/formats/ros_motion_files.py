@@ -12,7 +12,7 @@ import numpy as np
 from ....arrays import Array
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
 from ..recording import Table, check_text, number
-from .strict_yaml import Text, yaml_documents
+from .strict_yaml import Word, yaml_documents
 
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
@@ -297,13 +297,13 @@ def _yaml_trajectory(document: dict[str, Any], where: Path) -> _Trajectory:
 
 
 def _yaml_names(value: Any, place: str) -> list[str]:
-    if not isinstance(value, list) or not all(isinstance(entry, Text) for entry in value):
+    if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
         raise TrajectoryError(f"{place}: a list of joint names is needed")
     return value
 
 
 def _yaml_numbers(value: Any, place: str, key: str, names: list[str]) -> list[float]:
-    if not isinstance(value, list) or not all(isinstance(entry, Text) for entry in value):
+    if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
         raise TrajectoryError(f"{place}: {key}: a list of numbers is needed")
     labels = [*names, *("without a name" for _ in value[len(names) :])]
     return [
@@ -324,7 +324,7 @@ def _yaml_stamp(document: dict[str, Any], where: Path) -> int:
 
 def _yaml_time(value: Any, place: str) -> tuple[int, float]:
     """Whole nanoseconds, and seconds: {sec, nanosec}, {secs, nsecs} or a number of seconds."""
-    if isinstance(value, Text):
+    if isinstance(value, Word):
         return 0, _bounded(number(value, place), place)
     if isinstance(value, dict) and len(value) <= 2 and set(value) <= {*_SECONDS, *_NANOSECONDS}:
         total = 0
@@ -340,7 +340,7 @@ def _yaml_time(value: Any, place: str) -> tuple[int, float]:
 
 
 def _whole(value: Any, place: str) -> int:
-    text = value if isinstance(value, Text) else ""
+    text = value if isinstance(value, Word) else ""
     digits = text.removeprefix("-")
     if not digits.isascii() or not digits.isdigit() or len(digits) > 12:
         raise TrajectoryError(f"{place}: a whole number is needed, got {text!r:.40}")

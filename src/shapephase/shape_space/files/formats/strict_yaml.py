@@ -10,14 +10,14 @@ from ....errors import MissingExtraError, TrajectoryError
 _MERGE = "<<"
 
 
-class Text(str):
+class Word(str):
     """A value as it was written, and its line: `1e-3` is a text in YAML 1.1, `on` is true and 012 is ten."""
 
     line: int
 
 
 def yaml_documents(text: str, where: str) -> list[Any]:
-    """Documents of a YAML text that are not empty: dictionaries by text, lists, and `Text`s.
+    """Documents of a YAML text that are not empty: dictionaries by text, lists, and `Word`s.
 
     Raises
     ------
@@ -35,8 +35,8 @@ def yaml_documents(text: str, where: str) -> list[Any]:
     safe = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     texts: Any = type("_TextLoader", (safe,), {"yaml_implicit_resolvers": {}})
 
-    def as_text(_: Any, node: Any) -> Text:
-        value = Text(node.value)
+    def as_text(_: Any, node: Any) -> Word:
+        value = Word(node.value)
         value.line = node.start_mark.line + 1
         return value
 
@@ -44,8 +44,8 @@ def yaml_documents(text: str, where: str) -> list[Any]:
         found: dict[str, Any] = {}
         for key_node, value_node in node.value:
             key, place = loader.construct_object(key_node, deep=True), f"line {key_node.start_mark.line + 1}"
-            if not isinstance(key, Text) or key == _MERGE or key in found:
-                fault = "a key must be a plain word" if not isinstance(key, Text) else f"{key!r:.60} stands twice"
+            if not isinstance(key, Word) or key == _MERGE or key in found:
+                fault = "a key must be a plain word" if not isinstance(key, Word) else f"{key!r:.60} stands twice"
                 fault = "merge keys (<<) are not read; write the values out" if key == _MERGE else fault
                 raise TrajectoryError(f"{where}: {place}: {fault}")
             found[key] = loader.construct_object(value_node, deep=True)
