@@ -21,6 +21,7 @@ from ..files import npz_arrays
 from ..shape_space.files._recording import MOST_BYTES, Table, file_bytes
 from ..shape_space.files.formats.text_tables import read_delimited
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
+from ._noise import estimated_noise
 from .floating_trajectory import FloatingTrajectory
 
 _NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot)[_\[ ]?([0-9]{1,6})\]?")
@@ -44,6 +45,9 @@ def read_trajectory(
     joint_order: str | None = None,
     rest_missing: bool = False,
     ignore_extra: bool = False,
+    fill: float | str | None = None,
+    lowpass: float | None = None,
+    resample: float | None = None,
     base_order: str | None = None,
     base_axes: Any = None,
 ) -> FloatingTrajectory:
@@ -63,6 +67,8 @@ def read_trajectory(
     ----------
     step : of the integrator that made it [s]; None: that between samples, or the file's array `timestep`
     joint_order : of arrays without names, as `read_recorded_motion` has it
+    fill, lowpass, resample : of recordings, as `read_recorded_motion` has them; the noise of what is filtered is that
+        before the filter: slow changes, which an audit looks for, keep theirs
 
     Raises
     ------
@@ -91,6 +97,11 @@ def read_trajectory(
         kind = None
     if joint_order is not None and kind in ("q", "Q"):
         raise TrajectoryError(f"{where}: joint_order is for MuJoCo's and Isaac's arrays; {kind} is in the body's order")
+    if kind is not None and not (fill is None and lowpass is None and resample is None):
+        raise TrajectoryError(
+            f"{where}: fill, lowpass and resample are for recordings with names; {kind} is an array of a simulator: "
+            "leave them out (--fill, --lowpass, --resample)"
+        )
     if kind is not None:
         try:
             return _of_arrays(where, arrays, kind, body, step, timestep, joint_order)
@@ -99,6 +110,9 @@ def read_trajectory(
     recorded = read_recorded_motion(
         file,
         body,
+        fill=fill,
+        lowpass=lowpass,
+        resample=resample,
         names=names,
         degrees=degrees,
         timestep=timestep,
@@ -114,7 +128,22 @@ def read_trajectory(
             f"{where}: the attitude of the base is not there; columns such as base_qx base_qy base_qz base_qw, an "
             "array base_quat_xyzw, or MuJoCo's qpos with its free joint are needed"
         )
-    order = recorded.record["joint_order"]
+    order, as_recorded = recorded.record["joint_order"], None
+    if lowpass is not None:
+        as_recorded = read_trajectory(
+            file,
+            body,
+            names=names,
+            degrees=degrees,
+            timestep=timestep,
+            topic=topic,
+            joint_order=joint_order,
+            rest_missing=rest_missing,
+            ignore_extra=ignore_extra,
+            fill=fill,
+            base_order=base_order,
+            base_axes=base_axes,
+        )
     try:
         return FloatingTrajectory(
             times=recorded.times,
@@ -126,6 +155,7 @@ def read_trajectory(
             joint_order=None if order is None else f"{order['means']}: {', '.join(order['joints'])}",
             certain=_certain(recorded, degrees),
             captured=recorded.format in _CAPTURED,
+            noise=None if as_recorded is None else estimated_noise(as_recorded),
         )
     except (ShapeError, TrajectoryError) as error:
         raise _of_file(where, error) from None
