@@ -121,3 +121,28 @@ def test_all_flights_are_listed(two_jumps, tmp_path, capfd):
         (line,) = [line for line in capfd.readouterr().out.splitlines() if line.startswith("flights ")]
         assert "1: 0.4" in line
         assert "2: 1.5" in line
+
+
+@pytest.mark.parametrize("count", [20, 101])
+def test_a_filtered_flight_keeps_the_noise_of_its_samples(count, tmp_path):
+    """With the noise that a filter leaves from sample to sample, slow noise would be taken for a drift."""
+    flight = flown(count, 100.0 if count > 24 else 30.0, 0.01, seed=3)
+    frame = pd.DataFrame(
+        np.column_stack([flight.times, flight.shapes, flight.quaternion, flight.position]),
+        columns=["time", *DIVER.joint_names, *(f"base_q{part}" for part in "xyzw"), "base_x", "base_y", "base_z"],
+    )
+    frame.loc[5, "base_qx"] = np.nan
+    frame.to_csv(tmp_path / "flight.csv", index=False)
+    with pytest.raises(TrajectoryError, match="--fill"):
+        sp.read_trajectory(tmp_path / "flight.csv", DIVER)
+    trajectory = sp.read_trajectory(tmp_path / "flight.csv", DIVER, fill="0.1s", lowpass=6)
+    (run,) = sp.audit(DIVER, trajectory, tolerance=1e-6, flight="all").runs
+    assert run.right
+    assert trajectory.noise.attitude == pytest.approx(0.01, rel=0.3)
+    assert run.momentum.mean(axis=0) == pytest.approx(MOMENTUM, abs=1.5)
+
+
+def test_options_of_recordings_are_refused_for_arrays(tmp_path):
+    np.savez(tmp_path / "q.npz", time=np.linspace(0.0, 1.0, 21), qpos=np.eye(1, 9, 3) * np.ones((21, 1)))
+    with pytest.raises(TrajectoryError, match="--lowpass"):
+        sp.read_trajectory(tmp_path / "q.npz", DIVER, lowpass=6)

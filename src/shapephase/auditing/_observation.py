@@ -127,7 +127,7 @@ def with_rates(trajectory: FloatingTrajectory) -> FloatingTrajectory:
 def observed(body: Body, trajectory: FloatingTrajectory, noise: TrajectoryNoise | None = None) -> Observation:
     """What a trajectory says; without a noise, with the one that its samples show."""
     given = trajectory.joint_rates is not None
-    level = estimated_noise(trajectory) if noise is None else noise
+    level = noise or trajectory.noise or estimated_noise(trajectory)
     moving = with_rates(trajectory)
     attitude, rate, joint_rates = moving.attitude, moving.base_rate, moving.joint_rates
     assert rate is not None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,9 @@ from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 from ..shape_space.files.formats.floating_arrays import MUJOCO_QPOS, PINOCCHIO_Q, FreeJoint, with_free_joint
 from ..shape_space.files.recording import Rates
+
+if TYPE_CHECKING:
+    from ._noise import TrajectoryNoise
 
 FRAMES = ("world", "base")
 _FEWEST = 8
@@ -48,6 +51,7 @@ class FloatingTrajectory:
     certain : what the format of its file leaves no doubt about, which is no hypothesis: "units" of the joints, "order"
         of the base's quaternion, "direction" of its attitude
     captured : whether a format says so in which people are recorded: places of such are known to a centimetre
+    noise : of the samples before they were filtered, which no longer show it; None: they show it
 
     Examples
     --------
@@ -72,6 +76,7 @@ class FloatingTrajectory:
     joint_order: str | None = None
     certain: tuple[str, ...] = ()
     captured: bool = False
+    noise: TrajectoryNoise | None = None
 
     __repr__ = short_repr
 

@@ -17,6 +17,7 @@ from ..errors import ShapeError, TrajectoryError
 from ..shape_space.files.inputs import read_input
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.files.times import recording_of
+from ._noise import estimated_noise
 from .floating_trajectory import FloatingTrajectory, rates_by_name
 
 _CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")
@@ -35,6 +36,9 @@ def read_trajectory(
     joint_order: str | None = None,
     rest_missing: bool = False,
     ignore_extra: bool = False,
+    fill: float | str | None = None,
+    lowpass: float | None = None,
+    resample: float | None = None,
     base_order: str | None = None,
     base_axes: Any = None,
     calibration: float | str | None = None,
@@ -50,6 +54,8 @@ def read_trajectory(
     ----------
     step : of the integrator that made it [s]; None: that between samples, or the file's array `timestep`
     joint_order : of arrays without names, as `read_recorded_motion` has it
+    fill, lowpass, resample : of recordings, as `read_recorded_motion` has them; the noise of what is filtered is that
+        before the filter: slow changes, which an audit looks for, keep theirs
 
     Raises
     ------
@@ -79,7 +85,8 @@ def read_trajectory(
     order = None if table.nameless is None else f"{table.nameless.title}: {', '.join(table.nameless.names)}"
     try:
         whole = table.simulated is not None and set(body.joint_names) <= set(table.columns)
-        if whole and table.simulated is not None and table.base_quat_xyzw is not None and names is None:
+        plain = fill is None and lowpass is None and resample is None and names is None
+        if whole and plain and table.simulated is not None and table.base_quat_xyzw is not None:
             times = table.times
             if times is None:
                 recording = recording_of(table, body.joint_names, {}, None, timestep, None)
@@ -104,6 +111,9 @@ def read_trajectory(
             joint_order=joint_order,
             rest_missing=rest_missing,
             ignore_extra=ignore_extra,
+            fill=fill,
+            lowpass=lowpass,
+            resample=resample,
             base_order=base_order,
             base_axes=base_axes,
             calibration=calibration,
@@ -113,6 +123,24 @@ def read_trajectory(
             raise TrajectoryError(
                 f"{where}: the attitude of the base is not there; columns such as base_qx base_qy base_qz base_qw, an "
                 "array base_quat_xyzw, or MuJoCo's qpos with its free joint are needed"
+            )
+        as_recorded = None
+        if lowpass is not None:
+            as_recorded = read_trajectory(
+                file,
+                body,
+                names=names,
+                degrees=degrees,
+                timestep=timestep,
+                topic=topic,
+                joint_order=joint_order,
+                rest_missing=rest_missing,
+                ignore_extra=ignore_extra,
+                fill=fill,
+                base_order=base_order,
+                base_axes=base_axes,
+                calibration=calibration,
+                length_tolerance=length_tolerance,
             )
         return FloatingTrajectory(
             times=recorded.times,
@@ -124,6 +152,7 @@ def read_trajectory(
             joint_order=order,
             certain=_certain(recorded, degrees),
             captured=recorded.format in _CAPTURED,
+            noise=None if as_recorded is None else estimated_noise(as_recorded),
         )
     except (ShapeError, TrajectoryError) as error:
         raise _of_file(where, error) from None

@@ -14,8 +14,11 @@ from .options import (
     BodyArgument,
     BodyOptions,
     Calibration,
+    FillOption,
     LengthTolerance,
+    LowPassOption,
     PrintOptions,
+    ResampleOption,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -99,6 +102,9 @@ class TrajectoryOptions:
             help="Columns that are no joints of the body are left out; for example `--ignore-extra`.",
         ),
     ] = False
+    fill: FillOption = None
+    lowpass: LowPassOption = None
+    resample: ResampleOption = None
     base_order: Annotated[
         str | None,
         Parameter(
@@ -144,8 +150,8 @@ def audit_command(
         without unit; without it 0.001, and of recordings with noise, or of people, what a centimetre of wander makes of
         it. For example `--tolerance 1e-6`.
     flight
-        What is in the air: auto (where the centre of mass falls), all, or its first and last time, in s; for example
-        `--flight all` or `--flight 0.4 1.2`.
+        What is in the air: auto (where the centre of mass falls longest), auto:2 (the second such flight), all, or its
+        first and last time, in s; for example `--flight all` or `--flight 0.4 1.2`.
     figure
         Write drift, error of the attitude and what the hypotheses leave over to this figure, .svg, .pdf or .png;
         without it none is written. For example `--figure audit.pdf`.
@@ -178,6 +184,9 @@ def audit_command(
                 joint_order=reading.joint_order,
                 rest_missing=reading.rest_missing,
                 ignore_extra=reading.ignore_extra,
+                fill=reading.fill,
+                lowpass=reading.lowpass,
+                resample=reading.resample,
                 base_order=reading.base_order,
                 base_axes=reading.base_axes,
                 calibration=reading.calibration,

@@ -230,6 +230,13 @@ FillOption = Annotated[
         "error. For example `--fill 0.1s` or `--fill 100ms`."
     ),
 ]
+ResampleOption = Annotated[
+    float | None,
+    _motion_option(
+        "Put the path through so many of its own values a second instead, evenly spaced, in 1/s; uneven samples are "
+        "put on such times before --lowpass. For example `--resample 100`."
+    ),
+]
 LowPassOption = Annotated[
     float | None,
     _motion_option(
@@ -316,13 +323,7 @@ class RecordingOptions:
             negative_iterable="",
         ),
     ] = None
-    resample: Annotated[
-        float | None,
-        _motion_option(
-            "Put the path through so many of its own values a second instead, evenly spaced, in 1/s; for example "
-            "`--resample 100`."
-        ),
-    ] = None
+    resample: ResampleOption = None
     fill: FillOption = None
     smooth: Annotated[
         str | None,
