@@ -539,3 +539,39 @@ def test_a_joint_that_slides_is_found_by_the_places(tmp_path, load_urdf):
     shapes = read_recorded_motion(file, body, calibration="links").path.shape(TIMES)
     np.testing.assert_allclose(shapes[:, body.joint_index("reach")], along, rtol=0, atol=ROUNDING)
     np.testing.assert_allclose(shapes[:, body.joint_index("swing")], np.cos(TIMES), rtol=0, atol=ROUNDING)
+
+
+def test_of_links_in_one_the_recorded_centre_of_mass_is_that_of_one(tmp_path, load_urdf):
+    """A foot with toes fixed to it: BodyKinematics has the foot's centre, and base, ankle and momentum are as moved."""
+    parts = {"shank": (4.0, (0.0, 0.0, -0.2)), "foot": (1.0, (0.05, 0.0, -0.02)), "toes": (0.5, (0.03, 0.0, 0.0))}
+    moments = (0.05, 0.04, 0.01)
+    body = load_urdf(
+        urdf(
+            *(link(name, mass, moments, centre) for name, (mass, centre) in parts.items()),
+            joint("ankle", "revolute", "shank", "foot", (0.0, 1.0, 0.0), (0.0, 0.0, -0.4)),
+            joint("fixed", "fixed", "foot", "toes", xyz=(0.15, 0.0, -0.03)),
+        )
+    )
+    shank = Rotation.from_rotvec(np.outer(TIMES, [1.0, 2.0, 0.5]))
+    foot = shank * Rotation.from_euler("y", np.sin(3.0 * TIMES)[:, None])
+    turns = {"shank": shank.as_matrix(), "foot": foot.as_matrix(), "toes": foot.as_matrix()}
+    places = {"shank": np.zeros((COUNT, 3)), "foot": turns["shank"] @ [0.0, 0.0, -0.4]}
+    places["toes"] = places["foot"] + turns["foot"] @ [0.15, 0.0, -0.03]
+    centres = {name: places[name] + turns[name] @ centre for name, (_, centre) in parts.items()}
+    file = tmp_path / "run_BodyKinematics_pos_global.sto"
+    file.write_text(segment_files.body_kinematics_text(turns, centres), encoding="utf-8")
+    recorded = read_recorded_motion(file, body, calibration="links")
+    np.testing.assert_allclose(recorded.path.shape(TIMES)[:, 0], np.sin(3.0 * TIMES), rtol=0, atol=ROUNDING)
+    steps = np.diff(TIMES)[:, None]
+    whole = sum(mass * centres[name] for name, (mass, _) in parts.items()) / sum(mass for mass, _ in parts.values())
+    expected = 0.0
+    for name, (mass, _) in parts.items():
+        turned, seen = Rotation.from_matrix(turns[name]), centres[name] - whole
+        step = (turned[1:] * turned[:-1].inv()).as_rotvec()
+        halfway = (Rotation.from_rotvec(0.5 * step) * turned[:-1]).as_matrix()
+        expected = expected + np.einsum("nij,j,nkj,nk->ni", halfway, moments, halfway, step / steps)
+        expected = expected + mass * np.cross(0.5 * (seen[1:] + seen[:-1]), np.diff(seen, axis=0) / steps)
+    for found in (recorded.segments.of_poses, recorded.segments.of_chain):
+        # The foot and its toes are one rigid part, whose centre goes along its own chord.
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * np.abs(expected).max())
+    np.testing.assert_allclose(recorded.segments.of_poses, recorded.segments.of_chain, rtol=0, atol=ROUNDING)

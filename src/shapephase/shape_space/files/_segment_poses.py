@@ -33,6 +33,8 @@ _ROUNDS = 8
 """Of that search, by Gauss and Newton: it doubles its digits, from two on."""
 _STEP = 1e-5
 """[rad] of its differences."""
+_FEWEST_LINKS = 2
+"""Links of a rigid part whose centre of mass is not that of the recorded one."""
 _ACROSS = 1e-6
 """Cosine of the angle between hinges at right angles."""
 
@@ -162,6 +164,7 @@ class _Conversion:
         self.record["at_zero"] = [name for name in self.body.joint_names if name not in columns]
         own = self.links.frame_poses(self._shapes(columns, len(turns))[whole])
         if places is not None:
+            places[whole] = self._with_rigid_parts(places[whole], turns[whole], own)
             self._check_ways(places[whole], turns[whole], own)
         return replace(
             table,
@@ -320,6 +323,25 @@ class _Conversion:
                 f"{np.degrees(_MOST_OFF_HINGE):.0f} deg are taken: the segment has other axes, or the body needs a "
                 "ball joint there. Give another calibration=T (--calibration T), or such a body"
             )
+
+    def _with_rigid_parts(self, places: Array, turns: Array, own: dict[int, tuple[Array, Array]]) -> Array:
+        """Places (M, k, 3) of frames, those whose segment is one of several links in one by where the chain has them.
+
+        The chain keeps the centre of mass of such links together; recorded is that of one, a constant from the frame.
+        """
+        links = [frame for frame, _ in self.chain.link_frames.values()]
+        if not self.poses.at_centres:
+            return places
+        places = places.copy()
+        for k, above in self.links.above.items():
+            frame, upper = (self.links.frames[each].frame for each in (k, above))
+            if links.count(frame) < _FEWEST_LINKS:
+                continue
+            way = so3.apply(so3.transpose(own[upper][0]), own[frame][1] - own[upper][1])
+            off = places[:, k] - places[:, above] - so3.apply(turns[:, above], way)
+            constant = np.mean(so3.apply(so3.transpose(turns[:, k]), off), axis=0)
+            places[:, k] -= so3.apply(turns[:, k], constant)
+        return places
 
     def _check_ways(self, places: Array, turns: Array, own: dict[int, tuple[Array, Array]]) -> None:
         """Raise TrajectoryError where joints are farther apart than the body's, or lie elsewhere."""
