@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -25,6 +25,16 @@ _LENGTH_TOLERANCE = 0.1
 """Share by which a distance between joints may differ from the body's: momentum is then off by a fifth."""
 _MOST_OFF_HINGE = np.radians(15.0)
 """[rad] rms of what hinges leave of a turn; a knee bends by some degrees to the side."""
+_MOST_DRIVERS = 3
+"""Coordinates that one turn can tell."""
+_TRIED = (129, 25, 11)
+"""Values of each of one, two or three coordinates between its limits, of which the nearest turn is searched from."""
+_ROUNDS = 8
+"""Of that search, by Gauss and Newton: it doubles its digits, from two on."""
+_STEP = 1e-5
+"""[rad] of its differences."""
+_FEWEST_LINKS = 2
+"""Links of a rigid part whose centre of mass is not that of the recorded one."""
 _ACROSS = 1e-6
 """Cosine of the angle between hinges at right angles."""
 
@@ -103,6 +113,14 @@ def without_segments(
     return _Conversion(recording, table.poses, body, choices).table(table), left
 
 
+class _Hinge(NamedTuple):
+    """Axis of a hinge at zero, and its angle [rad] by the coordinate q: factor * q + offset."""
+
+    axis: Array
+    factor: float
+    offset: float
+
+
 class _Conversion:
     def __init__(self, recording: Recording, poses: SegmentPoses, body: Body, choices: SegmentChoices) -> None:
         self.recording, self.poses, self.body, self.choices = recording, poses, body, choices
@@ -122,27 +140,31 @@ class _Conversion:
         columns: dict[str, Array] = {}
         for k, above in self.links.above.items():
             turn = so3.transpose(turns[:, above]) @ turns[:, k]
-            columns |= self._joints(frames[k].frame, frames[above].frame, turn)
-        for name in columns:
-            if name in table.columns:
-                raise TrajectoryError(
-                    f"{self.where}: joint {name} has a column, and segments that tell it; leave the column out with "
-                    f"names={{{name!r}: None}} (--names {name}=)"
-                )
-        self.record["at_zero"] = [name for name in self.body.joint_names if name not in columns]
-        shapes = np.tile(self.body.shape(), (len(turns), 1))
-        for name, values in columns.items():
-            shapes[:, self.body.joint_index(name)] = values
+            rows = self._rows(frames[k].frame, frames[above].frame)
+            found = self._joints(rows, turn)
+            # What a shank shows of a knee counts more than what a patella does, which only follows it.
+            own = set(found) <= {self.chain.names[row] for row in rows} or any(name.endswith(".w") for name in found)
+            columns = columns | found if own else found | columns
         whole = np.flatnonzero(np.isfinite(turns).all(axis=(1, 2, 3)))
         if len(whole) < 2:
             raise TrajectoryError(
                 f"{self.where}: {len(whole)} samples have the poses of all segments, two are needed; leave out the "
                 "segments that lack theirs, names={segment: None} (--names SEGMENT=)"
             )
-        own = self.links.frame_poses(shapes[whole])
         places = None
         if self.poses.origins is not None:
             places = self.poses.origins[:, used] - so3.apply(turns, calibration.origins)
+            columns |= self._slides(self._shapes(columns, len(turns)), turns, places, whole)
+        for name in columns:
+            if name in table.columns:
+                raise TrajectoryError(
+                    f"{self.where}: joint {name} has a column, and segments that show it; leave the column out with "
+                    f"names={{{name!r}: None}} (--names {name}=)"
+                )
+        self.record["at_zero"] = [name for name in self.body.joint_names if name not in columns]
+        own = self.links.frame_poses(self._shapes(columns, len(turns))[whole])
+        if places is not None:
+            places[whole] = self._with_rigid_parts(places[whole], turns[whole], own)
             self._check_ways(places[whole], turns[whole], own)
         return replace(
             table,
@@ -158,46 +180,85 @@ class _Conversion:
             poses=None,
         )
 
-    def _joints(self, frame: int, above: int, turn: Array) -> dict[str, Array]:
-        """Joint columns between two frames that segments show: turn (N, 3, 3), child axes to the parent's."""
-        chain, rows = self.chain, []
-        last = frame
+    def _shapes(self, columns: Mapping[str, Array], count: int) -> Array:
+        """Shapes (N, n) of joint columns, other joints at zero."""
+        shapes = np.tile(self.body.shape(), (count, 1))
+        for name, values in columns.items():
+            shapes[:, self.body.joint_index(name)] = values
+        return shapes
+
+    def _slides(self, shapes: Array, turns: Array, places: Array, whole: Integers) -> dict[str, Array]:
+        """Coordinates [m] of joints that slide one segment along another, by the places of both."""
+        found: dict[str, Array] = {}
+        for k, above in self.links.above.items():
+            ends = [self.links.frames[each].frame for each in (k, above)]
+            rows = [row for row in self._rows(*ends) if not self.chain.axes[row].any()]
+            names = [self.chain.names[row] for row in rows if self.chain.names[row] in self.body.joint_names]
+            if not names:
+                continue
+            columns = [self.body.joint_index(name) for name in names]
+
+            def apart(values: Array, columns: list[int] = columns, ends: list[int] = ends) -> Array:
+                moved = shapes[whole]
+                moved[:, columns] = values
+                poses = self.links.frame_poses(moved)
+                return so3.apply(so3.transpose(poses[ends[1]][0]), poses[ends[0]][1] - poses[ends[1]][1])
+
+            start = apart(np.zeros(len(names)))
+            ways = np.stack([apart(unit) - start for unit in np.eye(len(names))], axis=-1)
+            recorded = so3.apply(so3.transpose(turns[:, above]), places[:, k] - places[:, above])[whole]
+            values = np.full((len(names), len(turns)), np.nan)
+            values[:, whole] = so3.apply(np.asarray(np.linalg.pinv(ways), dtype=np.float64), recorded - start).T
+            found |= dict(zip(names, values, strict=True))
+        return found
+
+    def _rows(self, frame: int, above: int) -> list[int]:
+        """The joints between two frames, those near the upper one first."""
+        rows = []
         while frame != above:
             rows.insert(0, frame - 1)
-            frame = chain.parents[frame - 1]
-        before, hinges, balls = np.eye(3), {}, []
+            frame = self.chain.parents[frame - 1]
+        return rows
+
+    def _joints(self, rows: list[int], turn: Array) -> dict[str, Array]:
+        """Joint columns of some joints in a row: turn (N, 3, 3), axes of the last frame to those of the first."""
+        chain = self.chain
+        before, balls = np.eye(3), []
+        hinges: dict[str, _Hinge] = {}
         in_balls = {ball.row + k: ball for ball in chain.follows.balls for k in range(len(RATES))}
+        curved = {joint.row: joint for joint in chain.follows.curved}
+        together: set[str] = set()
         for row in rows:
             before = before @ chain.turns[row]
             if row in in_balls:
                 balls += [(in_balls[row], before)] if in_balls[row].row == row else []
+            elif row in curved and chain.axes[row].any():
+                together |= {chain.names[source] for source, _ in curved[row].terms}
             elif chain.axes[row].any():
-                drivers = np.flatnonzero(chain.matrix[row])
-                name = chain.names[row]
-                curved = any(joint.row == row for joint in chain.follows.curved)
-                if curved or (len(drivers) and self.body.joint_names[drivers[0]] != name):
-                    raise TrajectoryError(
-                        f"{self.where}: joint {name} follows another, and poses of segments do not tell which has how "
-                        "much. Give the coordinates themselves, of OpenSim the .mot file of the same motion"
-                    )
-                if len(drivers):
-                    hinges[name] = before @ chain.axes[row]
-                else:
+                drivers = [self.body.joint_names[k] for k in np.flatnonzero(chain.matrix[row])]
+                if not drivers:
                     before = before @ so3.exp(chain.offset[row] * chain.axes[row])
+                elif len(drivers) > 1 or drivers[0] in hinges:
+                    together |= {*drivers}
+                else:
+                    factor = float(chain.matrix[row, self.body.joint_index(drivers[0])])
+                    hinges[drivers[0]] = _Hinge(before @ chain.axes[row], factor, float(chain.offset[row]))
+        if together:
+            return self._followed({*together, *hinges}, rows, turn)
         if len(balls) == 1 and not hinges:
             joint, placed = balls[0]
             turned = placed.T @ turn @ before.T @ placed
             return dict(zip(coordinate_names(joint.name), _quaternions(turned).T, strict=True))
         if balls or len(hinges) > 3:
             raise TrajectoryError(
-                f"{self.where}: above {chain.names[last - 1]} there are more joints than one ball joint or three "
+                f"{self.where}: above {chain.names[rows[-1]]} there are more joints than one ball joint or three "
                 "hinges, and no segment between them; give a body with fewer, or a table of joint angles"
             )
         return self._hinges(hinges, turn @ before.T) if hinges else {}
 
-    def _hinges(self, hinges: dict[str, Array], turns: Array) -> dict[str, Array]:
-        """Angles of one to three hinges nearest to turns (N, 3, 3), and what they leave over."""
-        axes, named = np.array(list(hinges.values())), ", ".join(hinges)
+    def _hinges(self, hinges: dict[str, _Hinge], turns: Array) -> dict[str, Array]:
+        """Coordinates of one to three hinges nearest to turns (N, 3, 3), and what they leave over."""
+        axes, named = np.array([hinge.axis for hinge in hinges.values()]), ", ".join(hinges)
         if np.abs(np.sum(axes[1:] * axes[:-1], axis=1)).max(initial=0.0) > _ACROSS:
             raise TrajectoryError(
                 f"{self.where}: hinges {named} are not at right angles; give a table of joint angles, or a body with a "
@@ -212,17 +273,75 @@ class _Conversion:
             order = axes if len(axes) == 3 else np.vstack([axes, np.cross(axes[0], axes[1])])
             angles[there] = Rotation.from_matrix(turns[there]).as_davenport(order, "intrinsic")
             left = angles[there, 2] if len(axes) == 2 else left
-        if len(left):
-            rms = float(np.sqrt(np.mean(left**2)))
-            self.record.setdefault("hinges_leave_deg", {})[named] = float(np.degrees(rms))
-            if rms > _MOST_OFF_HINGE:
-                raise TrajectoryError(
-                    f"{self.where}: {named} leave {np.degrees(rms):.0f} deg rms of the recorded turn, up to "
-                    f"{np.degrees(_MOST_OFF_HINGE):.0f} deg are taken: the segment has other axes, or the body needs a "
-                    "ball joint there. Give another calibration=T (--calibration T), or such a body"
-                )
+        self._check_left(named, left)
         angles[there] = np.unwrap(angles[there], axis=0)
-        return dict(zip(hinges, angles.T.copy(), strict=False))
+        return {name: (angles[:, k] - hinge.offset) / hinge.factor for k, (name, hinge) in enumerate(hinges.items())}
+
+    def _followed(self, drivers: set[str], rows: list[int], turns: Array) -> dict[str, Array]:
+        """Up to three coordinates that turn a segment together, as of a knee, nearest to turns (N, 3, 3)."""
+        own = [name for name in self.body.joint_names if name in drivers]
+        if not own:
+            return {}
+        if len(own) > _MOST_DRIVERS:
+            raise TrajectoryError(
+                f"{self.where}: joints {', '.join(sorted(drivers))} turn one segment together, and its pose does not "
+                "say which has how much. Give the coordinates themselves, of OpenSim the .mot file of the same motion"
+            )
+        frame, above = rows[-1] + 1, self.chain.parents[rows[0]]
+        columns, there = [self.body.joint_index(name) for name in own], np.isfinite(turns).all(axis=(1, 2))
+
+        def turned(values: Array) -> Array:
+            shapes = np.tile(self.body.shape(), (len(values), 1))
+            shapes[:, columns] = values
+            poses = self.links.frame_poses(shapes)
+            return so3.transpose(poses[above][0]) @ poses[frame][0]
+
+        ends = np.clip(self.body.joint_limits[columns], -np.pi, np.pi)
+        lines = [np.linspace(first, last, _TRIED[len(own) - 1]) for first, last in ends]
+        tried = np.stack(np.meshgrid(*lines), axis=-1).reshape(-1, len(own))
+        values = tried[np.argmax(np.einsum("kij,nij->nk", turned(tried), turns[there]), axis=1)]
+        for _ in range(_ROUNDS):
+            off = so3.log(so3.transpose(turned(values)) @ turns[there])
+            steps = _STEP * np.eye(len(own))
+            sides = [so3.log(so3.transpose(turned(values - step)) @ turned(values + step)) for step in steps]
+            rates = np.stack(sides, axis=-1) / (2.0 * _STEP)
+            values = values + so3.apply(np.asarray(np.linalg.pinv(rates), dtype=np.float64), off)
+        self._check_left(", ".join(own), so3.angle(so3.transpose(turned(values)) @ turns[there]))
+        found = np.full((len(own), len(turns)), np.nan)
+        found[:, there] = values.T
+        return dict(zip(own, found, strict=True))
+
+    def _check_left(self, named: str, left: Array) -> None:
+        """Keep what hinges leave of turns [rad]. Raises TrajectoryError where it is large."""
+        if not len(left):
+            return
+        rms = float(np.sqrt(np.mean(left**2)))
+        self.record.setdefault("hinges_leave_deg", {})[named] = float(np.degrees(rms))
+        if rms > _MOST_OFF_HINGE:
+            raise TrajectoryError(
+                f"{self.where}: {named} leave {np.degrees(rms):.0f} deg rms of the recorded turn, up to "
+                f"{np.degrees(_MOST_OFF_HINGE):.0f} deg are taken: the segment has other axes, or the body needs a "
+                "ball joint there. Give another calibration=T (--calibration T), or such a body"
+            )
+
+    def _with_rigid_parts(self, places: Array, turns: Array, own: dict[int, tuple[Array, Array]]) -> Array:
+        """Places (M, k, 3) of frames, those whose segment is one of several links in one by where the chain has them.
+
+        The chain keeps the centre of mass of such links together; recorded is that of one, a constant from the frame.
+        """
+        links = [frame for frame, _ in self.chain.link_frames.values()]
+        if not self.poses.at_centres:
+            return places
+        places = places.copy()
+        for k, above in self.links.above.items():
+            frame, upper = (self.links.frames[each].frame for each in (k, above))
+            if links.count(frame) < _FEWEST_LINKS:
+                continue
+            way = so3.apply(so3.transpose(own[upper][0]), own[frame][1] - own[upper][1])
+            off = places[:, k] - places[:, above] - so3.apply(turns[:, above], way)
+            constant = np.mean(so3.apply(so3.transpose(turns[:, k]), off), axis=0)
+            places[:, k] -= so3.apply(turns[:, k], constant)
+        return places
 
     def _check_ways(self, places: Array, turns: Array, own: dict[int, tuple[Array, Array]]) -> None:
         """Raise TrajectoryError where joints are farther apart than the body's, or lie elsewhere."""
