@@ -96,7 +96,7 @@ def test_options_that_do_not_go_together(take, capsys):
         (["--base-axes", "estimate", "--momentum", "0", "0", "1"], "leave the momentum out"),
         (["--flight", "1", "x"], "--flight: auto, all or two times"),
         (["--flight", "soon"], "'auto', 'all', 'recorded' or two times"),
-        (["--flight", "0", "2.1", "--tolerance", "1e-6"], "is it a free flight of this body"),
+        (["--flight", "0", "2.1", "--tolerance", "1e-6"], "no free flight of this body"),
     ):
         with pytest.raises(SystemExit):
             main(["split", "diver", str(take), *arguments])

@@ -436,8 +436,8 @@ def _check_near(residuals: Array, times: Array) -> None:
     """Raise AccuracyNotReached where what is left of attitudes at these times is no noise."""
     if _spread(residuals) > _NO_FLIGHT:
         raise AccuracyNotReached(
-            f"{_apart(residuals)} from {times[0]:.6g} to {times[-1]:.6g} s: is it a free flight of this body, and are "
-            "the recorded axes those of its base?"
+            f"{_apart(residuals)} from {times[0]:.6g} to {times[-1]:.6g} s: no free flight of this body, or the axes "
+            "that were recorded are not those of its base"
         )
 
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.cli.main import main
-from shapephase.errors import TrajectoryError
+from shapephase.errors import TrajectoryError, TrajectoryWarning
 from support.ball_bodies import BALLS
 
 URDF = Path(__file__).parents[2] / "cases" / "boughs.urdf"
@@ -362,11 +362,41 @@ def test_frames_of_deepmimic_move_the_links_as_their_quaternions_say(tmp_path):
     np.testing.assert_allclose(body.link_pose(shapes, "left_elbow_link")[:, :3, :3], hand, atol=1e-12)
     foot = turns["right_hip"] @ turns["right_knee"] @ turns["right_ankle"]
     np.testing.assert_allclose(body.link_pose(shapes, "right_ankle_link")[:, :3, :3], foot, atol=1e-12)
+    longer = np.hstack([column * (1.1 if column.shape[1] == 4 else 1.0) for column in frames])
+    (tmp_path / "spin.txt").write_text(json.dumps({"Loop": "wrap", "Frames": longer.tolist()}))
+    with pytest.warns(TrajectoryWarning, match="divided"):
+        alike = sp.read_recorded_motion(tmp_path / "spin.txt", body)
+    np.testing.assert_allclose(alike.path.shape(alike.times), shapes, atol=1e-12)
+    np.testing.assert_allclose(alike.base_attitude, TURNS[:20].as_matrix(), atol=1e-12)
     with pytest.raises(sp.errors.UnknownColumnError, match=r"chest.*--names"):
         sp.read_recorded_motion(file, BODY)
+    file.write_text(json.dumps({"Frames": [[0.1] * 4 + [0.0] * 40] * 3}))
+    with pytest.raises(TrajectoryError, match="leave that frame out"):
+        sp.read_recorded_motion(file, body)
     file.write_text(json.dumps({"Frames": [[0.1, 1.0], [0.1, 2.0]]}))
     with pytest.raises(TrajectoryError, match=r"44 finite numbers.*as a table"):
         sp.read_recorded_motion(file, body)
+
+
+def test_a_table_without_a_header_says_no_scalar_part(tmp_path):
+    """Numbers do not show whether a quaternion is x y z w, as retargeted motions have it, or w x y z."""
+    quaternions, joints = TURNS.as_quat(), ANGLES[:, [0, 2, 1]]
+    file = tmp_path / "walk.csv"
+    np.savetxt(file, np.column_stack([PLACES, quaternions, joints]), delimiter=",")
+    with pytest.raises(TrajectoryError, match=r"--names 4=base_qx 5=base_qy 6=base_qz 7=base_qw or --names 4=base_qw"):
+        sp.read_recorded_motion(file, BODY, timestep=0.025)
+    names = dict(zip("4567", ("base_qx", "base_qy", "base_qz", "base_qw")))
+    with pytest.warns(TrajectoryWarning, match="no header"):
+        recorded = sp.read_recorded_motion(file, BODY, timestep=0.025, names=names)
+    np.testing.assert_allclose(recorded.base_attitude, TURNS.as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(recorded.base_position, PLACES, atol=1e-12)
+    np.testing.assert_allclose(recorded.path.shape(TIMES), SHAPES, atol=1e-12)
+    np.savetxt(file, np.column_stack([TIMES, PLACES, np.roll(quaternions, 1, axis=1), joints]))
+    names = dict(zip("5678", ("base_qw", "base_qx", "base_qy", "base_qz")))
+    with pytest.warns(TrajectoryWarning, match="no header"):
+        recorded = sp.read_recorded_motion(file, BODY, names=names)
+    np.testing.assert_allclose(recorded.base_attitude, TURNS.as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(recorded.path.shape(TIMES), SHAPES, atol=1e-12)
 
 
 def test_arrays_in_memory_are_read_as_a_frame_is():

@@ -117,7 +117,8 @@ def _check(measured: float, bar: float, gravity: float, rate: float, where: str)
     raise TrajectoryError(
         f"{where}: the centre of mass falls with {measured:.3g} ± {bar:.2g} m/s^2, {gravity:.4g} is expected: {named}. "
         "Correct the unit of length (of a BVH file length_unit, --length-unit) or the times; where this is right, give "
-        f"gravity={measured:.3g} (--gravity {measured:.3g}), or the momentum (--momentum)"
+        f"gravity={measured:.3g} (--gravity {measured:.3g}); where it is no flight, the times of one: flight=(first, "
+        "last) (--flight FIRST LAST), or momentum=[0, 0, 0] (--momentum 0 0 0)"
     )
 
 

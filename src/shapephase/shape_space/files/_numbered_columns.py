@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,14 +26,18 @@ def named_columns(
     """A table whose columns have names, where `names` does not number them.
 
     A first column that ascends has the times. Behind it are as many columns as joints, in an order of simulators, or
-    these behind a free joint, or a place and a quaternion x y z w; this is said.
+    these behind a free joint, or a place and a quaternion x y z w; this is said. Columns that `names` numbers keep
+    their numbers. Where the scalar part of a free joint's quaternion stands, first as MuJoCo has it or last as
+    Pinocchio has it, numbers do not show.
 
     Raises
     ------
     TrajectoryError
-        If the number of columns fits nothing, or fits two of these.
+        If the number of columns fits nothing, or fits two of these; for a free joint whose quaternion `names` does
+        not number.
     """
-    if not table.numbered or any(label in table.columns for label in names):
+    told = [label for label in table.columns if label in names]
+    if not table.numbered or len(told) == len(table.columns):
         return table
     values = list(table.columns.values())
     has_times = timestep is None and len(values[0]) > 1 and bool((np.diff(values[0]) > 0.0).all())
@@ -43,6 +47,8 @@ def named_columns(
     try:
         found = nameless_joints(body, len(rest), f"{table.where}: the table without a header", order)
     except TrajectoryError as error:
+        if told:
+            return table
         if not _is_pose(rest):
             raise TrajectoryError(_ways(body, len(values), str(error))) from None
     if _is_pose(rest):
@@ -54,11 +60,26 @@ def named_columns(
         meant = _TUM
     elif found is not None:
         meant = (*_FREE[: found.free], *found.names)
+        if found.free:
+            _check_quaternion_told([*table.columns][len(first) + 3 :][:4], names, table.where)
     assert meant is not None
-    columns = dict(zip((*first, *meant), values, strict=True))
+    labels = (old if old in names else new for old, new in zip(table.columns, (*first, *meant), strict=True))
+    columns = dict(zip(labels, values, strict=True))
     warn(f"{table.where}: no header; columns are taken for {', '.join(columns)}: a header would say so")
     faults = {new: table.faults.get(old, {}) for old, new in zip(table.columns, columns)}
     return replace(table, columns=columns, faults=faults, units={}, numbered=False, nameless=found)
+
+
+def _check_quaternion_told(labels: Sequence[str], names: Mapping[str, str | None], where: str) -> None:
+    if any(label not in names for label in labels):
+        scalar_last, scalar_first = (
+            " ".join(f"{label}=base_q{part}" for label, part in zip(labels, parts)) for parts in ("xyzw", "wxyz")
+        )
+        raise TrajectoryError(
+            f"{where}: no header, and as many columns as a free base and the joints have; columns {labels[0]} to "
+            f"{labels[3]} are a quaternion, x y z w or w x y z. Say which: --names {scalar_last} or --names "
+            f"{scalar_first} (names={{{labels[0]!r}: 'base_qx', ...}})"
+        )
 
 
 def _is_pose(values: list[Array]) -> bool:

@@ -36,7 +36,7 @@ CANONICAL = {
 """Kind -> component -> the name of its column."""
 HINT = (
     "columns of the base are base_x, base_y, base_z and base_qx, base_qy, base_qz, base_qw or base_roll, base_pitch, "
-    "base_yaw"
+    "base_yaw or base_mrp_1, base_mrp_2, base_mrp_3"
 )
 """What a message says of columns of the base."""
 

@@ -151,9 +151,11 @@ def _standard_input(body: Body, order: str | None) -> Input:
 
 
 def _table(where: Path, data: bytes, topic: str | None) -> Table:
-    """A table of any kind; a motion of OpenSim that a spreadsheet has saved is one."""
+    """A table of any kind, a motion of OpenSim that a spreadsheet has saved, or JSON: DeepMimic's files end in .txt."""
     if has_header(data):
         return read_opensim(where, data)
+    if data.lstrip().startswith(b"{"):
+        return read_deepmimic(where, data)
     return file_table(TABLES[where.suffix.lower()](where, data, topic), str(where))
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ....arrays import Array
 from ....errors import TrajectoryError
-from ..recording import Table
+from ..recording import Table, warn
 
 _JOINTS = (
     *(("chest", 4), ("neck", 4), ("right_hip", 4), ("right_knee", 1), ("right_ankle", 4), ("right_shoulder", 4)),
@@ -26,13 +26,17 @@ _JOINTS = (
 _BASE = 8
 """Numbers of a frame before them: its duration, the place of the base, its quaternion w x y z."""
 _WIDTH = _BASE + sum(count for _, count in _JOINTS)
+_OFF_UNIT = 0.01
+"""Of a length of 1: what rounding in a file does not explain."""
+_LEAST_LENGTH = 1e-6
 
 
 def read_deepmimic(where: Path, data: bytes) -> Table:
     """Motion in JSON, `{"Loop": "wrap", "Frames": [[duration, x, y, z, qw, qx, qy, qz, joints...], ...]}`, y upwards.
 
     Columns are called as DeepMimic's joints are, with `.x`, `.y`, `.z`, `.w` of spherical ones: the body has ball
-    joints of these names.
+    joints of these names. Quaternions are made as long as 1, as DeepMimic does it (`cKinTree::PostProcessPose`): its
+    own files have some of other lengths.
 
     Raises
     ------
@@ -56,6 +60,7 @@ def read_deepmimic(where: Path, data: bytes) -> Table:
     durations = frames[:-1, 0]
     if np.any(durations <= 0.0):
         raise TrajectoryError(f"{where}: frame {int(np.argmax(durations <= 0.0))} lasts {durations.min():g} s; mend it")
+    frames = _with_unit_quaternions(frames, where)
     columns: dict[str, Array] = {}
     first = _BASE
     for name, count in _JOINTS:
@@ -74,3 +79,23 @@ def read_deepmimic(where: Path, data: bytes) -> Table:
         base_position=frames[:, 1:4],
         up="y",
     )
+
+
+def _with_unit_quaternions(frames: Array, where: Path) -> Array:
+    """Frames (N, 44) whose quaternions have length 1. Warns of the farthest from it; TrajectoryError for zeros."""
+    frames, first, worst = frames.copy(), _BASE - 4, (_OFF_UNIT, "")
+    for name, count in (("the base", 4), *_JOINTS):
+        if count == 4:
+            quaternions = frames[:, first : first + count]
+            lengths = np.linalg.norm(quaternions, axis=1)
+            off = np.abs(lengths - 1.0)
+            frame = int(np.argmax(off))
+            said = f"{where}: frame {frame}: the quaternion of {name} has the length {lengths[frame]:.4g}"
+            if lengths.min() < _LEAST_LENGTH:
+                raise TrajectoryError(f"{said}, and another is zero; leave that frame out")
+            worst = max(worst, (float(off[frame]), said))
+            quaternions /= lengths[:, None]
+        first += count
+    if worst[1]:
+        warn(f"{worst[1]}; all are divided by their lengths, as DeepMimic does")
+    return frames
