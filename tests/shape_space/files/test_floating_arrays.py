@@ -94,6 +94,28 @@ def test_q_and_v_have_the_momentum_that_their_program_computes(program, axis, tm
     np.testing.assert_allclose(momentum(run), expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("axis", [0, 1])
+def test_joints_that_turn_without_end_are_cosine_and_sine_in_pinocchio(axis, tmp_path):
+    text = URDF.read_text().replace('name="right_elbow" type="revolute"', 'name="right_elbow" type="continuous"')
+    (tmp_path / "endless.urdf").write_text(text)
+    model = pin.buildModelFromUrdf(str(tmp_path / "endless.urdf"), pin.JointModelFreeFlyer())
+    body, elbow = sp.load_body(tmp_path / "endless.urdf"), 9.0 * TIMES
+    q, v = np.empty((41, model.nq)), np.random.default_rng(7).normal(size=(41, model.nv))
+    q[:, :7] = np.column_stack([PLACES, TURNS.as_quat()])
+    for name, angle in zip(JOINTS, (*ANGLES[:, :2].T, elbow), strict=True):
+        joint = model.joints[model.getJointId(name)]
+        q[:, joint.idx_q : joint.idx_q + joint.nq] = np.stack(
+            [np.cos(angle), np.sin(angle)] if joint.nq == 2 else [angle]
+        ).T
+    data = model.createData()
+    expected = [pin.computeCentroidalMomentum(model, data, *row).angular for row in zip(q, v, strict=True)]
+    np.savez(tmp_path / "m.npz", q=q.T if axis else q, v=v.T if axis else v, time=TIMES)
+    run = sp.read_trajectory(tmp_path / "m.npz", body)
+    assert body.joint_names == BODY.joint_names
+    np.testing.assert_allclose(run.shapes[:, body.joint_index("right_elbow")], elbow, atol=1e-12)
+    np.testing.assert_allclose(momentum(run), expected, atol=1e-9)
+
+
 def test_what_fits_two_orders_is_refused_with_the_names_that_say_which(tmp_path):
     """Quaternions of length one in both places."""
     q = np.column_stack([np.tile([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5], (41, 1)), ANGLES])

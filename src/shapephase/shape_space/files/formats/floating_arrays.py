@@ -104,6 +104,8 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
         return None
     values = finite_array(arrays[kind], f"{where}: {kind}", (None, None))
     names = None if "joint_names" not in arrays else tuple(map(str, np.ravel(arrays["joint_names"])))
+    if kind == "q" and names is None and order in (None, OWN):
+        values = _with_angles(values, body)
     count = np.size(arrays["time"]) if "time" in arrays else None
     layouts = {"qpos": (MUJOCO_QPOS,), "q": (PINOCCHIO_Q, DRAKE_Q), "Q": ()}[kind]
     root = None if kind == "qpos" else root_width(body, kind)
@@ -299,6 +301,23 @@ def _derivatives(motion: FloatingMotion, rates: Array, body: Body) -> Array:
         found |= dict(zip(parts, 0.5 * so3.quat_product(quaternion, turning).T, strict=True))
         column += 3
     return np.stack([found[joint] for joint in body.joint_names], axis=1) if body.n_shape else rates[:, :0]
+
+
+def _with_angles(values: Array, body: Body) -> Array:
+    """Pinocchio's coordinates with the angles of joints that turn without end, whose cosine and sine it stores."""
+    width = FREE_JOINT + body.n_shape + int(np.sum(body.continuous))
+    for rows in (values, values.T):
+        if not np.any(body.continuous) or rows.shape[1] != width or not _is_unit(rows[:, 3:FREE_JOINT]):
+            continue
+        parts, column = [rows[:, :FREE_JOINT]], FREE_JOINT
+        for turns in body.continuous:
+            pair = rows[:, column : column + 1 + turns]
+            if turns and not _is_unit(pair):
+                return values
+            parts.append(np.unwrap(np.arctan2(pair[:, 1], pair[:, 0]))[:, None] if turns else pair)
+            column += pair.shape[1]
+        return np.hstack(parts) if rows is values else np.hstack(parts).T
+    return values
 
 
 def _is_unit(quaternions: Array) -> bool:
