@@ -256,6 +256,15 @@ def test_coordinates_of_biorbd_and_bioptim_have_biorbds_momentum(names, axis, ro
     np.testing.assert_allclose(momentum(same), expected, atol=1e-9)
 
 
+def test_translations_of_a_root_stand_in_the_order_of_its_file(rooted, tmp_path):
+    _, q, *_ = rooted
+    (tmp_path / "zyx.bioMod").write_text(ROOTED.replace("translations xyz", "translations zyx"))
+    np.savez(tmp_path / "m.npz", Q=q, time=TIMES)
+    recorded = sp.read_recorded_motion(tmp_path / "m.npz", sp.load_body(tmp_path / "zyx.bioMod"))
+    np.testing.assert_allclose(recorded.base_position, PLACES[:, ::-1], atol=1e-12)
+    np.testing.assert_allclose(recorded.base_attitude, TURNS.as_matrix(), atol=1e-12)
+
+
 def test_as_many_samples_as_coordinates_are_refused(rooted, tmp_path):
     body, q, *_ = rooted
     np.savez(tmp_path / "m.npz", Q=q[:9], time=TIMES[:9])

@@ -307,7 +307,7 @@ def _name_base(chain: Chain, way: list[Any]) -> None:
         chain.base_angles = (names, letters)
     slides = {axis: segment for segment in way for axis in segment.seqT().to_string()}
     unturned = not any(segment.seqR().to_string() for segment in way[:-1])
-    if sorted(slides) == list(_AXES) and unturned and not any(frame[:3, 3].any() for frame in frames):
+    if list(slides) == list(_AXES) and unturned and not any(frame[:3, 3].any() for frame in frames):
         chain.base_slides = [f"{slides[axis].name().to_string()}_Trans{axis.upper()}" for axis in _AXES]
 
 
