@@ -241,7 +241,7 @@ LowPassOption = Annotated[
     float | None,
     _motion_option(
         "Low-pass filter joints and base, over the whole recording: cut-off of a Butterworth filter of second order "
-        "run forwards and backwards (-3 dB by both passes), in Hz, in place of --smooth; for example `--lowpass 6`."
+        "run forwards and backwards (-3 dB by both passes), in 1/s, in place of --smooth; for example `--lowpass 6`."
     ),
 ]
 
@@ -376,8 +376,7 @@ class RecordingOptions:
             "Keep the free flight only, and fit the momentum to the recorded attitude of the base: auto (the longest "
             "fall of the centre of mass), auto:2 (the second in time), all, or its first and last time, in s or the "
             "unit of the file; without it, where the base is recorded and no --momentum is given, auto, or all where "
-            "nothing falls. For example "
-            "`--flight auto` or `--flight 12.5 13.9`.",
+            "nothing falls. For example `--flight 12.5 13.9`.",
             negative_iterable="",
             consume_multiple=True,
         ),

@@ -134,16 +134,16 @@ def test_bars_hold_the_noise_that_passes():
     weights = by_scipy(np.eye(401))[200]
     paths = [
         sp.read_shape_path(frame(clean + 0.01 * rng.normal(size=clean.shape)), DIVER, lowpass=CUT_OFF)
-        for _ in range(40)
+        for _ in range(25)
     ]
     errors = sp.path_errors(paths[0], TIMES, 0.01)
     np.testing.assert_allclose(errors.shape[200], 0.01 * np.linalg.norm(weights), rtol=1e-9)
     at = np.array([0.0, 0.05, 4.0])
     expected = sp.path_errors(paths[0], at, 0.01)
     off = np.array([path.shape(at) for path in paths])
-    spread = np.sqrt(((off - off.mean(axis=0)) ** 2).sum(axis=(0, 2)) / 78.0)
-    # 78 squares know a variance to sqrt(2/78); four of these deviations.
-    np.testing.assert_allclose(spread**2, expected.shape[:, 0] ** 2, rtol=4.0 * np.sqrt(2.0 / 78.0))
+    spread = np.sqrt(((off - off.mean(axis=0)) ** 2).sum(axis=(0, 2)) / 48.0)
+    # 48 squares know a variance to sqrt(2/48); four of these deviations.
+    np.testing.assert_allclose(spread**2, expected.shape[:, 0] ** 2, rtol=4.0 * np.sqrt(2.0 / 48.0))
     assert (errors.shape[[0, -1]] > 1.5 * errors.shape[200]).all()
 
 

@@ -73,12 +73,15 @@ def load_bars(motion: Motion, loads: JointLoads, recorded: RecordedMotion | None
     if recorded.smoothing is None:
         return (
             None,
-            "± not known: the noise of the recording is not stated (--smooth 0.3deg); most of this may be noise",
+            "± not known: the noise of the recording is not stated (--smooth 0.3deg, --lowpass 6); most of this may be "
+            "noise",
         )
     try:
         found = load_errors(motion, loads)
     except WrongObjectError as error:
         return None, f"± not known: {error}"
+    if recorded.smoothing.low_pass is not None:
+        return found, "± one standard deviation, by what passes of the noise; what the filter takes off is not in it"
     return found, "± one standard deviation, by the noise that was stated and by what smoothing takes off"
 
 

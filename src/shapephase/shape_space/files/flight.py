@@ -16,8 +16,8 @@ from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...letters import what_came
+from ..fall_units import check_gravity, check_parabola, is_long, slipped_fall
 from ..free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, fall_number, free_fall, lasts
-from ._fall_units import check_gravity, check_parabola, is_long, slipped_fall
 from ._joint_columns import Matched
 from .base_columns import ESTIMATE
 from .recording import Recording

@@ -33,6 +33,8 @@ _SHORTEST = 0.5
 """Length of an averaged unit quaternion: below, attitudes within the filter's reach are over 120 deg apart."""
 _REACH_OF_FILTER = 0.7
 """Periods of the cut-off from an end: the weights of an open end are within 4 % of the largest weight inside."""
+_MEMORY_OF_FILTER = 6.0
+"""Periods of the cut-off after which a sample counts by exp(-33)."""
 _EXACT = 1e-9
 """Noise below this share of the samples' spread counts as none: the samples are interpolated."""
 
@@ -284,7 +286,8 @@ def _filtered(
     recorded: Recorded, cut_off: float, periodic: bool, turns: Array, *, drift: bool
 ) -> tuple[ShapePath, Smoothing]:
     """The path of filtered samples; its noise is estimated by what is left above twice the cut-off."""
-    samples = recorded.kept if periodic else recorded.around(len(recorded.times))
+    rate = (len(recorded.times) - 1) / float(recorded.times[-1])
+    samples = recorded.around(0 if periodic else int(np.ceil(_MEMORY_OF_FILTER * rate / cut_off)))
     columns, count = len(recorded.noise), len(samples.times)
     chosen = low_pass(samples.times, cut_off)
     smoother, wider = (each.smoother(samples.times, periodic, columns) for each in (chosen, chosen.twice))

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import Array
-from ...errors import TrajectoryError
-from ..free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
+from ..arrays import Array
+from ..errors import TrajectoryError
+from .free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
 
 _LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 """[m] Units that are mixed up."""
