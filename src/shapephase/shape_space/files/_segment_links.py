@@ -289,9 +289,10 @@ class Links:
         if 0 not in found or (lacking and free):
             segment = free[0] if free else "SEGMENT"
             raise TrajectoryError(
-                f"{self.where}: no segment is known as {', '.join(dict.fromkeys(lacking))} of {self.body.name}; "
-                f"segments left over are {', '.join(free) or 'none'}. Say which is which: names={{{segment!r}: "
-                f"{lacking[0]!r}}} (--names {segment}={lacking[0]}), or leave a segment out: --names {segment}="
+                f"{self.where}: the file has poses of {len(self.poses.names)} segments, and no segment is known as "
+                f"{', '.join(dict.fromkeys(lacking))} of {self.body.name}; segments left over are "
+                f"{', '.join(free) or 'none'}. Say which is which: names={{{segment!r}: {lacking[0]!r}}} (--names "
+                f"{segment}={lacking[0]}), or leave a segment out: --names {segment}="
             )
         return dict(sorted(found.items()))
 

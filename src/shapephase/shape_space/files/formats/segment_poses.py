@@ -20,7 +20,7 @@ from ..labels import LENGTHS, SI, label
 from ..recording import SegmentPoses, Table
 
 _QUATERNION = re.compile(r"(?P<segment>.+?)(?:_q|_quat_?|\.q|[./]orientation[./])(?P<part>[xyzw])", re.DOTALL)
-_PLACE = re.compile(r"(?P<segment>.+?)(?:_p?|_pos_?|\.p?|[./]position[./])(?P<part>[xyz])", re.DOTALL)
+_PLACE = re.compile(r"(?P<segment>.+?)(?:_[pt]?|_pos_?|\.p?|[./]position[./])(?P<part>[xyz])", re.DOTALL)
 _TPOSE = "tpose"
 """Calibration pose of a suit, arms held out."""
 _NPOSE = "npose"
