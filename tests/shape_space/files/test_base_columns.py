@@ -214,3 +214,33 @@ def test_a_part_of_the_base_is_left_out_where_that_is_allowed(tmp_path):
     assert motion.base_attitude is None
     np.testing.assert_allclose(motion.base_position, PLACES)
     assert motion.record["left_out"] == {"pelvis_tilt": "of the base, without pelvis_list, pelvis_rotation"}
+
+
+def test_joints_of_the_base_are_known_behind_the_letter_of_an_array(tmp_path):
+    """Data sets of MuJoCo's humanoids have one array for each coordinate, `q_NAME`, and its rate, `dq_NAME`."""
+    (tmp_path / "m.xml").write_text(
+        '<mujoco><compiler angle="radian"/><worldbody><body><inertial pos="0 0 0" mass="2" diaginertia="1 2 2"/>'
+        '<joint name="tx" type="slide" axis="1 0 0"/><joint name="ty" type="slide" axis="0 1 0"/>'
+        '<joint name="tz" type="slide" axis="0 0 1"/><joint name="tilt" axis="0 -1 0"/><joint name="list" axis="1 0 0"/>'
+        '<body><joint name="knee" axis="0 1 0"/><inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/></body></body>'
+        "</worldbody></mujoco>"
+    )
+    times = np.linspace(0.0, 1.0, 20)
+    arrays = {
+        "tx": 2.0 + times,
+        "ty": -times,
+        "tz": times**2,
+        "tilt": 0.3 * np.sin(times),
+        "list": 0.2 * times,
+        "knee": 0.5 * times,
+    }
+    rates = {f"dq_{name}": np.gradient(values, times) for name, values in arrays.items()}
+    np.savez(tmp_path / "m.npz", **{f"q_{name}": values for name, values in arrays.items()}, **rates)
+    body = sp.load_body(tmp_path / "m.xml", root="free")
+    recorded = sp.read_recorded_motion(tmp_path / "m.npz", body, timestep=times[1])
+    turned = Rotation.from_rotvec(np.outer(arrays["tilt"], [0.0, -1.0, 0.0]))
+    turned = turned * Rotation.from_rotvec(np.outer(arrays["list"], [1.0, 0.0, 0.0]))
+    np.testing.assert_allclose(recorded.base_attitude, turned.as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(recorded.base_position.T, [arrays["tx"], arrays["ty"], arrays["tz"]], atol=1e-12)
+    np.testing.assert_allclose(recorded.path.shape(recorded.times)[:, 0], arrays["knee"], atol=1e-12)
+    assert recorded.record["left_out"] == {label: f"dq of {label[3:]}" for label in rates}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -139,6 +139,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
     left_out = {text: f"{what}, no column" for text, what in table.unread.items()} | dict(table.left_out)
     targets = {text: target for text in table.columns if (target := choices.names.get(text, text)) is not None}
     of_base = base_names(targets, {*body.joint_names, *KNOWN, *base.own_names})
+    joints = (*body.joint_names, *base.own_names)
     companions: dict[str, str] = {}
     unexplained = False
     for text, values in table.columns.items():
@@ -150,10 +151,12 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
         if resolved is None and base.take(text, _with_unit(of_base.get(text), target)):
             continue
         if resolved is None:
-            part = joint_part(label(target).name, body.joint_names)
+            part = joint_part(label(target).name, joints)
+            if part is not None and not part[1] and base.take(text, _with_unit(part[0], target)):
+                continue
             if part is not None and part[1]:
                 companions[part[0]] = text
-            left_out[text] = _why_left_out(text, target, recording, body, choices)
+            left_out[text] = _why_left_out(text, target, recording, body, joints, choices)
             unexplained = unexplained or left_out[text] == _NO_JOINT
             continue
         joint = body.joint_names.index(resolved.name)
@@ -212,11 +215,13 @@ def _resolved(target: str, body: Body) -> Label | None:
     return Label(part[0], parts.unit) if part is not None and not part[1] else None
 
 
-def _why_left_out(text: str, target: str, recording: Recording, body: Body, choices: JointChoices) -> str:
+def _why_left_out(
+    text: str, target: str, recording: Recording, body: Body, joints: Collection[str], choices: JointChoices
+) -> str:
     """Why a column that is no joint is left out; UnknownColumnError if nobody has said that it may be."""
     table = recording.table
     if text not in choices.names:
-        said = _beside_a_motion(text, recording, body)
+        said = _beside_a_motion(text, recording, joints)
         if said is not None:
             return said
         if choices.ignore_extra:
@@ -243,10 +248,10 @@ def _why_left_out(text: str, target: str, recording: Recording, body: Body, choi
     )
 
 
-def _beside_a_motion(text: str, recording: Recording, body: Body) -> str | None:
+def _beside_a_motion(text: str, recording: Recording, joints: Collection[str]) -> str | None:
     """What a column is that says nothing of the posture: a rate, a counter, a text; None where it may say something."""
     table = recording.table
-    part = joint_part(label(text).name, body.joint_names)
+    part = joint_part(label(text).name, joints)
     if part is not None and part[1]:
         return f"{part[1]} of {part[0]}"
     unit = other_unit(text)
