@@ -594,6 +594,7 @@ def test_what_is_taken_for_granted_is_said(content, words, body, tmp_path):
         (["time", "arm", "leg", "q1", "q2", "q3", "q4"], "--names 'q1=qw'"),
         (["time", "arm", "leg", "wobble"], r"base_qx.*--names 'wobble=JOINT'"),
         (["time", "arm", "lge"], "--names 'lge=leg'"),
+        (["time", "arm", "leg", "t1", "t2", "t3"], "--names 't1="),
         (["1.0", "2.0", "3.0", "4.0"], "--names 1=time"),
     ],
 )

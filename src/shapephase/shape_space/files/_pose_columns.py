@@ -92,6 +92,9 @@ def _part(target: str) -> _Part | None:
         return None
     for k, word in enumerate(before):
         if word in _KIND_OF and all(map(_FRAME.fullmatch, before[k + 1 :])):
+            # `t1` to `t3` may be torques or temperatures; `r_BN_N_1` is a place.
+            if _KIND_OF[word] == PLACE and len(word) == 1 and last.isdigit() and not before[k + 1 :]:
+                return None
             return _Part(_KIND_OF[word], tuple(before), last) if _is_base(before[:k], rooted) else None
     return _Part(PLACE, tuple(before), last) if last in "xyz" and set(before) <= _BASE else None
 
