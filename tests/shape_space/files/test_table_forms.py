@@ -377,6 +377,7 @@ EUROC = [
     " b_w_RS_S_x [rad s^-1]",
 ]
 ALONE = {"rest_missing": True}
+W_FIRST = {"names": {"5": "base_qw", "6": "base_qx", "7": "base_qy", "8": "base_qz"}}
 
 # What it is -> (file, content, options, whether joints are there, too).
 POSES = {
@@ -485,7 +486,7 @@ POSES = {
         True,
     ),
     "ros2 topic echo --csv of a pose": ("m.csv", ros2("world", *floats(*PLACE.T, *XYZW.T)), ALONE, False),
-    "qpos without a header": ("m.csv", lines(None, floats(T, *PLACE.T, *WXYZ.T, *JOINTS.T)), {}, True),
+    "qpos without a header": ("m.csv", lines(None, floats(T, *PLACE.T, *WXYZ.T, *JOINTS.T)), W_FIRST, True),
 }
 
 
