@@ -140,9 +140,3 @@ def test_a_filtered_flight_keeps_the_noise_of_its_samples(count, tmp_path):
     assert run.right
     assert trajectory.noise.attitude == pytest.approx(0.01, rel=0.3)
     assert run.momentum.mean(axis=0) == pytest.approx(MOMENTUM, abs=1.5)
-
-
-def test_options_of_recordings_are_refused_for_arrays(tmp_path):
-    np.savez(tmp_path / "q.npz", time=np.linspace(0.0, 1.0, 21), qpos=np.eye(1, 9, 3) * np.ones((21, 1)))
-    with pytest.raises(TrajectoryError, match="--lowpass"):
-        sp.read_trajectory(tmp_path / "q.npz", DIVER, lowpass=6)

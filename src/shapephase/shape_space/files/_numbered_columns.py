@@ -36,8 +36,8 @@ def named_columns(
         If the number of columns fits nothing, or fits two of these; for a free joint whose quaternion `names` does
         not number.
     """
-    told = [label for label in table.columns if label in names]
-    if not table.numbered or len(told) == len(table.columns):
+    numbered = [label for label in table.columns if label in names]
+    if not table.numbered or len(numbered) == len(table.columns):
         return table
     values = list(table.columns.values())
     has_times = timestep is None and len(values[0]) > 1 and bool((np.diff(values[0]) > 0.0).all())
@@ -47,7 +47,7 @@ def named_columns(
     try:
         found = nameless_joints(body, len(rest), f"{table.where}: the table without a header", order)
     except TrajectoryError as error:
-        if told:
+        if numbered:
             return table
         if not _is_pose(rest):
             raise TrajectoryError(_ways(body, len(values), str(error))) from None
@@ -61,7 +61,7 @@ def named_columns(
     elif found is not None:
         meant = (*_FREE[: found.free], *found.names)
         if found.free:
-            _check_quaternion_told([*table.columns][len(first) + 3 :][:4], names, table.where)
+            _check_quaternion([*table.columns][len(first) + 3 :][:4], names, table.where)
     assert meant is not None
     labels = (old if old in names else new for old, new in zip(table.columns, (*first, *meant), strict=True))
     columns = dict(zip(labels, values, strict=True))
@@ -70,7 +70,7 @@ def named_columns(
     return replace(table, columns=columns, faults=faults, units={}, numbered=False, nameless=found)
 
 
-def _check_quaternion_told(labels: Sequence[str], names: Mapping[str, str | None], where: str) -> None:
+def _check_quaternion(labels: Sequence[str], names: Mapping[str, str | None], where: str) -> None:
     if any(label not in names for label in labels):
         scalar_last, scalar_first = (
             " ".join(f"{label}=base_q{part}" for label, part in zip(labels, parts)) for parts in ("xyzw", "wxyz")

@@ -317,4 +317,8 @@ def is_blank(text: str) -> bool:
 
 
 def _way_out(text: str) -> str:
-    return "; fill the gap or drop the row" if is_blank(text) else ""
+    if is_blank(text):
+        return "; fill the gap or drop the row"
+    if text.replace(",", "", 1).replace(",", "").lstrip("+-").isdigit():
+        return "; write it with a decimal point, as the others, and without marks of thousands"
+    return "; write a number, or leave the cell empty where nothing was recorded"

@@ -81,7 +81,8 @@ def _numbers(values: Any, comma: bool, place: str) -> tuple[Array, dict[int, str
     if array.dtype.kind in "mM":
         return _seconds(array), {}, True
     if array.dtype.kind == "i" and len(array) and np.abs(array.astype(np.float64)).max() > _WHOLE:
-        return array.astype(np.int64), {}, False
+        whole: Any = array.astype(np.int64)
+        return whole, {}, False
     if array.dtype.kind in "fiu":
         return np.ascontiguousarray(array, dtype=np.float64), {}, False
     if array.dtype.kind == "b":

@@ -25,7 +25,7 @@ _HEAD_BYTES = 2**18
 """Part of a text that is looked at before it is read."""
 _HEAD_ROWS = 12
 _SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)
-"""The first line of a table that a spreadsheet is told its separator by."""
+"""The first line of a table that a spreadsheet is delimiter its separator by."""
 _COMMA_ENTRY = rb"\s*([-+]?\d*,\d+(?:,\d+)*(?:[eE][-+]?\d+)?)\s*"
 _PLAIN = re.compile(rb'(?:^|[;\t\n"])' + _COMMA_ENTRY + rb'(?=[;\t\n"]|$)')
 _QUOTED = re.compile(rb'(?:^|[,\n])\s*"' + _COMMA_ENTRY + rb'"(?=\s*[,\n]|$)')
@@ -112,14 +112,14 @@ def unix_text(data: bytes, where: Path) -> bytes:
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
-def _layout(text: bytes, where: Path, section: str | None, start: int, told: str | None) -> _Layout:
+def _layout(text: bytes, where: Path, section: str | None, start: int, delimiter: str | None) -> _Layout:
     """Names, separator and first line, by the beginning of a text."""
     lines = text[:_HEAD_BYTES].decode(errors="replace").split("\n")
     place, comment = start, None
     while place < len(lines) and (not lines[place].strip() or COMMENT.match(lines[place]) or place == start):
         said = _SEPARATOR.fullmatch(lines[place].strip())
         if said is not None:
-            told = said[1]
+            delimiter = said[1]
         elif COMMENT.match(lines[place]):
             comment = lines[place]
         elif lines[place].strip():
@@ -131,7 +131,7 @@ def _layout(text: bytes, where: Path, section: str | None, start: int, told: str
     nexus = nexus_head(text, lines, place, section, str(where))
     if nexus is not None:
         return _Layout(nexus.names, nexus.units, nexus.first, nexus.delimiter, rate=nexus.rate)
-    delimiter = told or _delimiter(lines[place], where)
+    delimiter = delimiter or _delimiter(lines[place], where)
     rows = [split_line(lines[k], delimiter) for k in shown]
     said = None if comment is None else split_line(COMMENT.sub("", comment, count=1).rstrip('"'), delimiter)
     head = head_of(rows, said, str(where))
@@ -250,7 +250,7 @@ def _length_error(where: Path, body: bytes, layout: _Layout, line: int, count: i
     entries = body.split(b"\n")[line - layout.first - 1].decode(errors="replace").split(layout.delimiter)
     if count == 2 * len(layout.names) and all(entry.strip().lstrip("+-").isdigit() for entry in entries):
         return TrajectoryError(
-            f"{said}; decimal commas between commas cannot be told apart, separate the columns by semicolons"
+            f"{said}; decimal commas between commas cannot be delimiter apart, separate the columns by semicolons"
         )
     return TrajectoryError(f"{said}; write one entry for each name, and leave a cell empty where nothing was recorded")
 
