@@ -79,7 +79,8 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
         if len(inside) < 3 * _LEAST_WINDOW:
             raise TrajectoryError(
                 f"{trajectory.name}: {len(inside)} samples from {first:.9g} to {last:.9g} s; an audit needs "
-                f"{3 * _LEAST_WINDOW}, and the trajectory goes from {times[0]:.9g} to {times[-1]:.9g} s"
+                f"{3 * _LEAST_WINDOW}, and the trajectory goes from {times[0]:.9g} to {times[-1]:.9g} s: give "
+                "other times: flight=(first, last) (--flight FIRST LAST)"
             )
         return _part(times, centres, int(inside[0]), int(inside[-1]) + 1, "between the times given")
     if not isinstance(flight, str) or flight != "auto":
@@ -123,7 +124,10 @@ def _centres(body: Body, trajectory: FloatingTrajectory) -> Array | None:
 
 def _part(times: Array, centres: Array | None, first: int, past: int, how: str) -> AirbornePart:
     if past - first < 3 * _LEAST_WINDOW:
-        raise TrajectoryError(f"{past - first} samples are in the air; an audit needs {3 * _LEAST_WINDOW} or more")
+        raise TrajectoryError(
+            f"{past - first} samples are in the air; an audit needs {3 * _LEAST_WINDOW} or more. Give a longer flight, "
+            "or one with more samples a second; `shapephase split` fits the momentum of a short one"
+        )
     if centres is None:
         return AirbornePart(first, past, how)
     x, y, z = _acceleration(times[first:past], centres[first:past]).tolist()

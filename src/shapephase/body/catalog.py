@@ -313,10 +313,13 @@ def _check_unused(given: dict[str, Any], where: str, options: tuple[str, ...]) -
         if name in _OF_BVH and name not in options:
             kinds = "BVH and MVNX files" if name == "person_mass" else "BVH files"
             has = "metres" if "person_mass" in options else "units and masses of its own"
-            raise ShapeError(f"{name} is for {kinds}; {quoted(where)} has {has}")
+            raise ShapeError(f"{name} is for {kinds}; {quoted(where)} has {has}: leave --{name.replace('_', '-')} out")
         if name not in options:
             files = "URDF, xacro and MJCF files" if name == "root" else "MJCF, OpenSim and bioMod files"
-            raise ShapeError(f"{name} is for {files}; {quoted(where)} has one root, which floats")
+            raise ShapeError(
+                f"{name} is for {files}; {quoted(where)} has one root, which floats: leave "
+                f"--{name.replace('_', '-')} out"
+            )
 
 
 def _from_model(model: Any, on_unphysical: str) -> tuple[Body, list[tuple[type[Warning], str]]]:

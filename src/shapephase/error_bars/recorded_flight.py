@@ -139,7 +139,8 @@ def _fit(body: Body, recorded: RecordedMotion, tolerance: float, *, find_axes: b
             raise _no_flight(recorded, str(error)) from error
         raise type(error)(
             f"{error}. Give other times: flight=(first, last) (--flight FIRST LAST); or the axes of the base: "
-            "base_axes (--base-axes x,-z,y); or momentum=[0, 0, 0] (--momentum 0 0 0), if the recorded base is not to count"
+            "base_axes (--base-axes x,-z,y); or momentum=[0, 0, 0] (--momentum 0 0 0), if the recorded base is not to "
+            "count"
         ) from error
     if not fitted.conserved:
         if assumed and (flight is None or flight.by == ALL):

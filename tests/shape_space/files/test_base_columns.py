@@ -221,7 +221,8 @@ def test_joints_of_the_base_are_known_behind_the_letter_of_an_array(tmp_path):
     (tmp_path / "m.xml").write_text(
         '<mujoco><compiler angle="radian"/><worldbody><body><inertial pos="0 0 0" mass="2" diaginertia="1 2 2"/>'
         '<joint name="tx" type="slide" axis="1 0 0"/><joint name="ty" type="slide" axis="0 1 0"/>'
-        '<joint name="tz" type="slide" axis="0 0 1"/><joint name="tilt" axis="0 -1 0"/><joint name="list" axis="1 0 0"/>'
+        '<joint name="tz" type="slide" axis="0 0 1"/><joint name="tilt" axis="0 -1 0"/>'
+        '<joint name="list" axis="1 0 0"/>'
         '<body><joint name="knee" axis="0 1 0"/><inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/></body></body>'
         "</worldbody></mujoco>"
     )

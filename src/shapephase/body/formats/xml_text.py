@@ -15,6 +15,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from ...errors import InputFileNotFoundError, ModelFileError
+from ...files import no_such_file
 
 _MOST_QUOTED = 60
 """Characters of the file that a message quotes."""
@@ -69,8 +70,9 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
     try:
         if where.is_file():
             return where.read_bytes()
-        kind = "no regular file" if where.exists() else "there is no such file"
-        raise InputFileNotFoundError(f"{where}: {'is a folder, not a file' if where.is_dir() else kind}")
+        if not where.exists():
+            raise no_such_file(where)
+        raise InputFileNotFoundError(f"{where}: {'is a folder, not a file' if where.is_dir() else 'no regular file'}")
     except InputFileNotFoundError:
         raise
     except OSError as error:

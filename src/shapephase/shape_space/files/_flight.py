@@ -127,7 +127,8 @@ def in_flight(
     if base.attitude is None:
         raise TrajectoryError(
             f"{where}: a flight is fitted to the recorded attitude of the base, and there is none; columns such as "
-            "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed"
+            "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed. Or give the "
+            "momentum instead of a flight: momentum=[0, 0, 0] (--momentum 0 0 0)"
         )
     fall, by = None, "times" if isinstance(said, tuple) else ALL
     samples = samples_within(recording, said) if isinstance(said, tuple) else np.arange(len(recording.times))

@@ -14,6 +14,7 @@ import numpy as np
 from ...arguments import check_time_steps
 from ...arrays import Array, Integers, Mask
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
+from ...files import no_such_file
 from ._nameless_joints import NamelessJoints
 
 if TYPE_CHECKING:
@@ -230,8 +231,7 @@ def file_bytes(where: Path, most: int = MOST_BYTES) -> bytes:
 def check_size(where: Path, most: int = MOST_BYTES) -> None:
     """Raise what `file_bytes` raises, without reading."""
     if not where.is_file():
-        kind = "is no regular file" if where.exists() else "there is no such file"
-        raise InputFileNotFoundError(f"{where}: {kind}")
+        raise InputFileNotFoundError(f"{where}: is no regular file") if where.exists() else no_such_file(where)
     size = where.stat().st_size
     if size > most:
         raise TrajectoryError(
@@ -295,7 +295,7 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
         numbers so far from zero resolve the steps badly.
     """
     if len(times) < 2:
-        raise TrajectoryError(f"{where}: two samples or more are needed, got {len(times)}")
+        raise TrajectoryError(f"{where}: two samples or more are needed, got {len(times)}; give a longer motion")
     with np.errstate(over="ignore"):
         steps, shifted = np.diff(times), times - times[0]
     late = np.flatnonzero(steps <= 0.0)
@@ -339,4 +339,4 @@ def is_blank(text: str) -> bool:
 
 
 def _way_out(text: str) -> str:
-    return "; fill the gap or drop the row" if is_blank(text) else ""
+    return "; fill the gap or drop the row" if is_blank(text) else "; correct the cell, or leave it empty for a gap"
