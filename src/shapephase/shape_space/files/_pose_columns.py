@@ -9,7 +9,11 @@ from typing import NamedTuple
 from ...errors import TrajectoryError
 from ._labels import label
 
-QUATERNION, PLACE, MRP, VECTOR, EULER = "quaternion", "place", "mrp", "vector", "euler"
+QUATERNION = "quaternion"
+PLACE = "place"
+MRP = "mrp"
+VECTOR = "vector"
+EULER = "euler"
 _KINDS = {
     QUATERNION: ("q", "quat", "quaternion", "orientation", "rotation", "attitude", "rot", "att"),
     PLACE: ("p", "t", "r", "pos", "position", "trans", "translation", "location"),
