@@ -61,8 +61,8 @@ def check_parabola(times: Array, centres: Array, noise: float, gravity: float, w
     if off >= np.hypot(noise, _PARABOLA):
         warn(
             f"{where}: within the flight that is given the centre of mass is {off:.2g} m (rms) off every parabola: it "
-            "is no free flight, or the body is not as large as the recorded one. Give other times: flight=(first, last) "
-            "(--flight FIRST LAST)"
+            "is no free flight, or the body is not as large as the recorded one. Give other times: flight=(first, "
+            "last) (--flight FIRST LAST)"
         )
     # What is not bent has no weight, or is too short to tell.
     elif size > _BARS * bar:
