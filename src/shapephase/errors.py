@@ -120,7 +120,7 @@ class InputFileNotFoundError(ShapePhaseError, FileNotFoundError):
     >>> try:
     ...     sp.load_body("nowhere.urdf")
     ... except sp.errors.InputFileNotFoundError as error:
-    ...     print(str(error)[:72])
+    ...     print(str(error)[:35])
     nowhere.urdf: there is no such file
     """
 

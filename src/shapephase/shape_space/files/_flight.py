@@ -144,7 +144,8 @@ def in_flight(
     if len(samples) < _FEWEST:
         raise TrajectoryError(
             f"{where}: {len(samples)} samples are in the flight, three or more are needed; the recording goes from "
-            f"{recording.first:.9g} to {recording.last:.9g} {recording.time_unit}"
+            f"{recording.first:.9g} to {recording.last:.9g} {recording.time_unit}: flight=(first, last) (--flight "
+            "FIRST LAST)"
         )
     part = part_of(recording, samples)
     return part, motion.kept(samples), Flight(part.first, part.last, by, fall, said != RECORDED)
