@@ -46,7 +46,7 @@ math_numfig = True
 nitpicky = True
 nitpick_ignore_regex = [
     # Other libraries' pages are not on this site, and a build without network cannot look them up.
-    ("py:.*", r"(numpy|np|scipy|pinocchio|pin|casadi|ca|matplotlib|pandas|xarray)\..*"),
+    ("py:.*", r"(numpy|np|scipy|pinocchio|pin|casadi|ca|matplotlib|pandas|pd|xarray)\..*"),
     ("py:.*", r"(pathlib|collections|concurrent|typing|types|os)\..*"),
     # In signatures: names that stand for a union of types or a kind of function, which the docstring spells out; and
     # classes that no face exports, which results hold and nobody makes.

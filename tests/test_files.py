@@ -325,3 +325,14 @@ def test_sizes_for_people(tmp_path: Path):
     ):
         file.write_bytes(bytes(size))
         assert size_text(file) == text
+
+
+def test_a_file_that_is_not_there_is_answered_by_its_neighbours(tmp_path):
+    """Whatever reads it: the nearest names of its folder, or how to see them."""
+    (tmp_path / "walking.csv").write_text("time\n0\n1\n")
+    with pytest.raises(sp.errors.InputFileNotFoundError, match=r"type \S*/walking\.csv$"):
+        sp.read_shape_path(tmp_path / "walkin.csv", sp.load_body("cat"))
+    with pytest.raises(sp.errors.InputFileNotFoundError, match=r"type ls \S+ to see"):
+        sp.load_body(tmp_path / "robot.urdf")
+    with pytest.raises(sp.errors.InputFileNotFoundError, match="no folder"):
+        sp.load_body(tmp_path / "nowhere" / "robot.urdf")

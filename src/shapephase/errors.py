@@ -120,8 +120,8 @@ class InputFileNotFoundError(ShapePhaseError, FileNotFoundError):
     >>> try:
     ...     sp.load_body("nowhere.urdf")
     ... except sp.errors.InputFileNotFoundError as error:
-    ...     print(str(error)[:72])
-    nowhere.urdf: there is no such file; look for it with: ls .
+    ...     print(str(error)[:35])
+    nowhere.urdf: there is no such file
     """
 
 

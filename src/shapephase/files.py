@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import difflib
 import fcntl
 import io
 import os
@@ -28,6 +29,21 @@ _ENDING = ".part"
 _MOST_LINKS = 40
 # The folders whose entries are the open files of a process.
 _OPEN_FILES = re.compile(r"/dev/fd|/proc/[^/]+(/task/[0-9]+)?/fd")
+
+
+def no_such_file(path: str | os.PathLike[str]) -> InputFileNotFoundError:
+    """The error for a file that is not there, with the names in its folder that are nearest to its own."""
+    where = Path(path)
+    try:
+        near = difflib.get_close_matches(where.name, os.listdir(where.parent))
+    except OSError:
+        return InputFileNotFoundError(
+            f"{where}: there is no such file, and no folder {where.parent}; type another path"
+        )
+    found = " or ".join(str(where.with_name(name)) for name in near)
+    return InputFileNotFoundError(
+        f"{where}: there is no such file; {f'type {found}' if near else f'type ls {where.parent} to see what is there'}"
+    )
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> None:
@@ -180,7 +196,9 @@ def _regular(place: Path, given: Path) -> OutputTarget:
     """The target of a path that names no open file of this process."""
     folder = place.parent
     if not folder.is_dir():
-        raise InputFileNotFoundError(f"{given}: there is no such folder to write {given.name} to")
+        raise InputFileNotFoundError(
+            f"{given}: there is no such folder to write {given.name} to; type mkdir -p {folder}"
+        )
     try:
         status = os.stat(place)
     except FileNotFoundError:

@@ -450,5 +450,7 @@ def quat_argument(value: object, name: str) -> Array:
     length = np.linalg.norm(quat_xyzw, axis=-1)
     worst = float(np.max(np.abs(length - 1.0), initial=0.0))
     if worst > _UNIT_QUATERNION:
-        raise ShapeError(f"{name}: a quaternion x y z w of length 1 is needed, its length differs by {worst:.3g}")
+        raise ShapeError(
+            f"{name}: a quaternion x y z w of length 1 is needed, its length differs by {worst:.3g}; 0 0 0 1 is no turn"
+        )
     return matrix_from_quat(normalised(quat_xyzw))

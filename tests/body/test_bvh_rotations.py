@@ -253,6 +253,8 @@ def test_segments_are_laid_out_in_the_straightest_frame_and_in_a_t_pose(tmp_path
     poses, count = squats(9), 9
     with pytest.warns(IgnoredElementWarning, match=r"laid out in this frame, at 0.04 s, .* the person is 1.68 m tall"):
         sp.load_body(bvh_files.write(tmp_path / "squats.bvh", person({}, poses, count)), **CENTIMETRE)
+    with pytest.warns(IgnoredElementWarning, match=r"0.17 m tall: is the unit of length another \(--length-unit"):
+        sp.load_body(tmp_path / "squats.bvh", length_unit=0.001)
     # Standing with hanging arms in frames 3 to 5, in the last of which they are raised.
     upright = {bone: turn for bone, turn in poses.items() if bone.endswith("Arm")}
     for side, sign in (("Left", -1.0), ("Right", 1.0)):

@@ -82,7 +82,8 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
         if len(inside) < _FEWEST:
             raise TrajectoryError(
                 f"{trajectory.name}: {len(inside)} samples from {first:.9g} to {last:.9g} s; an audit needs "
-                f"{_FEWEST}, and the trajectory goes from {times[0]:.9g} to {times[-1]:.9g} s"
+                f"{_FEWEST}, and the trajectory goes from {times[0]:.9g} to {times[-1]:.9g} s: give other times: "
+                "flight=(first, last) (--flight FIRST LAST)"
             )
         return _part(times, centres, int(inside[0]), int(inside[-1]) + 1, "between the times given")
     number = flight_choices(flight, None, None).number if isinstance(flight, str) else None
@@ -135,7 +136,10 @@ def _centres(body: Body, trajectory: FloatingTrajectory) -> Array | None:
 
 def _part(times: Array, centres: Array | None, first: int, past: int, how: str) -> AirbornePart:
     if past - first < _FEWEST:
-        raise TrajectoryError(f"{past - first} samples are in the air; an audit needs {_FEWEST} or more")
+        raise TrajectoryError(
+            f"{past - first} samples are in the air; an audit needs {_FEWEST} or more. Give a longer flight, or one "
+            "with more samples a second; `shapephase split` fits the momentum of a short one"
+        )
     if centres is None:
         return AirbornePart(first, past, how)
     x, y, z = _acceleration(times[first:past], centres[first:past]).tolist()

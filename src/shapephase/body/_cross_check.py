@@ -31,7 +31,10 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
     """
     if not body.mass > 0.0:
         first = next(iter(tree.links.values()))
-        raise ModelFileError(f"{first.where}: link {first.name!r}: neither it nor any other link has mass")
+        raise ModelFileError(
+            f"{first.where}: link {first.name!r}: neither it nor any other link has mass; "
+            "give each that moves its <inertial> with <mass>, <origin> and <inertia>"
+        )
     expected = {name for name in tree.links if name not in tree.frames}
     moving = [joint for joint in tree.joints if joint.kind != "fixed" and joint.name not in tree.couplings]
     _compare_names(set(body.link_names), expected, "links", where)

@@ -36,6 +36,8 @@ from .joint_orders import joint_orders
 from .link_tree import hollow_warnings, inertia_warnings, massless_warning
 
 _EXAMPLE = "example:"
+_ENDINGS = (".urdf", ".xml", ".mjcf", ".xacro", ".osim", ".biomod", ".bvh", ".mvnx")
+"""Of names that are those of files, in small letters."""
 _OF_URDF = ("packages", "root")
 """Options of a URDF."""
 _OF_BVH = ("length_unit", "person_mass")
@@ -254,7 +256,7 @@ def _path_of(source: str | bytes) -> Path:
     names = robot_names()
     if text in names and not os.path.isfile(text):
         return robots_folder() / f"{text}.urdf"
-    name = bool(text) and "\0" not in text and os.sep not in text and not text.endswith((".urdf", ".xml"))
+    name = bool(text) and "\0" not in text and os.sep not in text and not text.lower().endswith(_ENDINGS)
     if name and not os.path.exists(text):
         raise unknown_name("body (no such file either)", quoted(text), (*names, "example:<name>"))
     return Path(text)

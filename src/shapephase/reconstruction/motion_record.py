@@ -15,8 +15,8 @@ from .. import __version__, so3
 from ..arrays import Array
 from ..chebyshev import nodes_on, values_to_coefficients
 from ..deformation.deformation import Deformation, sampled_deformation
-from ..errors import InputFileNotFoundError, ResultFileError
-from ..files import npz_arrays, write_whole
+from ..errors import ResultFileError
+from ..files import no_such_file, npz_arrays, write_whole
 from ..integrator.interpolant import Interpolant
 from ..integrator.many_rotations import GroupedRotations, RotationPart
 from ..integrator.samples import Perturbed
@@ -110,7 +110,7 @@ def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
     """
     where = Path(path)
     if not where.is_file():
-        raise InputFileNotFoundError(f"{where}: there is no such file")
+        raise no_such_file(where)
     try:
         arrays = npz_arrays(where.read_bytes())
         header = json.loads(str(arrays["header"]))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Array
-from ..errors import TrajectoryError
+from ..errors import TrajectoryError, TrajectoryWarning
 from .free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
 
 _LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
@@ -43,15 +44,29 @@ def check_gravity(fall: FreeFall, gravity: float, rate: float, where: str) -> No
 
 
 def check_parabola(times: Array, centres: Array, noise: float, gravity: float, where: str) -> None:
-    """The same of a stretch that is given: where it is a parabola, and bent enough for that to be seen."""
+    """The same of a stretch that is given: where it is a parabola, and bent enough for that to be seen.
+
+    Warns
+    -----
+    TrajectoryWarning
+        Where the centre of mass leaves every parabola: no free flight, or a body of another size.
+    """
     if len(times) < 4:
         return
     acceleration, bar = measured_fall(times, centres, noise)
     powers = np.vander(times - times.mean(), 3)
     left = centres - powers @ np.linalg.lstsq(powers, centres, rcond=None)[0]
-    size = float(np.linalg.norm(acceleration))
+    size, off = float(np.linalg.norm(acceleration)), float(np.sqrt((left**2).mean()))
+    if off >= np.hypot(noise, _PARABOLA):
+        warnings.warn(
+            f"{where}: within the flight that is given the centre of mass is {off:.2g} m (rms) off every parabola: it "
+            "is no free flight, or the body is not as large as the recorded one. Give other times: flight=(first, "
+            "last) (--flight FIRST LAST)",
+            TrajectoryWarning,
+            stacklevel=6,
+        )
     # What is not bent has no weight, or is too short to tell.
-    if size > _BARS * bar and np.sqrt((left**2).mean()) < np.hypot(noise, _PARABOLA):
+    elif size > _BARS * bar:
         _check(size, bar, gravity, 1.0 / float(np.median(np.diff(times))), where)
 
 

@@ -21,8 +21,9 @@ from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.catalog import load_body
 from ..display import short_repr
-from ..errors import InputFileNotFoundError, ShapeError, StudyError, WrongObjectError, unknown_name
+from ..errors import ShapeError, StudyError, WrongObjectError, unknown_name
 from ..examples.scenarios import MOTIONS
+from ..files import no_such_file
 from ..letters import what_came
 from ..shape_space.files.read import read_shape_path
 from ..shape_space.shape_path import ShapePath
@@ -120,7 +121,7 @@ def motion_function(source: MotionSource) -> Callable[..., ShapePath]:
     if name in MOTIONS:
         return MOTIONS[name].path
     if Path(name).suffix:
-        raise InputFileNotFoundError(f"{name[:_LONGEST_SHOWN]}: there is no such file")
+        raise no_such_file(name[:_LONGEST_SHOWN])
     raise unknown_name("motion (no such file either)", name[:_LONGEST_SHOWN], MOTIONS)
 
 

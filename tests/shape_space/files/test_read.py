@@ -251,3 +251,19 @@ def test_options_that_do_not_fit_the_file_are_refused(tmp_path, diver):
     (tmp_path / "m.csv").write_text(csv_text().replace(LEFT, f"{LEFT}_deg"))
     with pytest.raises(TrajectoryError, match="is in degrees by its name, and degrees=False was given"):
         read_recorded_motion(tmp_path / "m.csv", diver, degrees=False)
+
+
+def test_a_table_with_one_row_for_each_joint_is_read_as_one_with_a_column(tmp_path):
+    """Loggers of joint states write `time,name,position,velocity,effort`, the joints of a sample below each other."""
+    body, times = sp.load_body("diver"), [0.0, 0.5, 1.0, 1.5]
+    values = {name: [0.1 * k + 0.2 * place for k in range(4)] for place, name in enumerate(reversed(body.joint_names))}
+    rows = [f"{time},{name},{values[name][k]},{0.3 * k},0\n" for k, time in enumerate(times) for name in values]
+    file = tmp_path / "joint_states.csv"
+    file.write_text("time,name,position,velocity,frame_id\n" + "".join(rows).replace(",0\n", ",\n"))
+    recorded = sp.read_recorded_motion(file, body)
+    np.testing.assert_allclose(recorded.times, times)
+    expected = np.stack([values[name] for name in body.joint_names], axis=1)
+    np.testing.assert_allclose(recorded.path.shape(recorded.times), expected, atol=1e-12)
+    file.write_text("time,name,position,velocity,frame_id\n" + "".join(rows[:3] + rows[4:]))
+    with pytest.raises(TrajectoryError, match="one column for each joint"):
+        sp.read_recorded_motion(file, body)

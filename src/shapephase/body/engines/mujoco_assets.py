@@ -102,8 +102,8 @@ def _replace(written: mujoco.MjSpec, kind: str, asset: Any) -> None:
         asset.nrow, asset.ncol, asset.userdata = 2, 2, np.zeros(4)
 
 
-def _shape(mesh: Any, edges: tuple[float, float, float]) -> None:
-    mesh.uservert, mesh.userface = (_CORNERS * edges).ravel(), _FACES.ravel()
+def _shape(mesh: Any, extent: tuple[float, float, float]) -> None:
+    mesh.uservert, mesh.userface = (_CORNERS * extent).ravel(), _FACES.ravel()
     mesh.usernormal = mesh.usertexcoord = np.zeros(0)
 
 

@@ -18,6 +18,9 @@ _MASS = 70.0
 """[kg] of a person of whom nobody has said it: a usual one of reference persons."""
 _LIKELY = {"m": 1.0, "cm": 0.01, "in": 0.0254, "of the motion capture library of Carnegie Mellon": 0.056444}
 """Lengths of units [m] that are met; the last is an inch by 0.45."""
+_HEIGHTS = (0.5, 2.5)
+"""[m] Between which people are tall, of whatever age; puppets and giants are made by another unit."""
+_WRONG_SIZE = ": is the unit of length another (--length-unit)?"
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
 
 
@@ -71,10 +74,11 @@ def _notes(skeleton: Skeleton, person: Person, where: str, person_mass: float | 
     if person_mass is None:
         notes.append(f"{where}:1: the person is taken to have {_MASS:g} kg; person_mass (--person-mass) says another")
     if person.frame is not None:
+        low, high = _HEIGHTS
         notes.append(
             f"{where}:{skeleton.lines[person.frame]}: segments are laid out in this frame, at "
             f"{person.frame * skeleton.step:.4g} s, in which trunk and legs are straightest; the person is "
-            f"{person.height:.2f} m tall"
+            f"{person.height:.2f} m tall{'' if low < person.height < high else _WRONG_SIZE}"
         )
     return notes
 

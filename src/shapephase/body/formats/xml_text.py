@@ -14,6 +14,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from ...errors import InputFileNotFoundError, ModelFileError
+from ...files import no_such_file
 
 _MOST_QUOTED = 60
 """Characters of the file that a message quotes."""
@@ -68,9 +69,10 @@ def read_file(path: str | os.PathLike[str]) -> bytes:
     try:
         if where.is_file():
             return where.read_bytes()
-        kind = "no regular file" if where.exists() else f"there is no such file; look for it with: ls {where.parent}"
+        if not where.exists():
+            raise no_such_file(where)
         folder = "is a folder, not a file; name the file in it"
-        raise InputFileNotFoundError(f"{where}: {folder if where.is_dir() else kind}")
+        raise InputFileNotFoundError(f"{where}: {folder if where.is_dir() else 'no regular file'}")
     except InputFileNotFoundError:
         raise
     except OSError as error:

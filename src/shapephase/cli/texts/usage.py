@@ -34,7 +34,12 @@ def usage_message(error: CycloptsError, app: App) -> str:
         return f"{_name(error)}: {kind} is needed, got {came!r}{_such_as(error)}"
     if isinstance(error, MissingArgumentError) and not isinstance(error, ConsumeMultipleError):
         return _missing(error, command)
-    return one_line(error)
+    return _with_help(error)
+
+
+def _with_help(error: CycloptsError) -> str:
+    command = " ".join(("shapephase", *(error.command_chain or ())))
+    return f"{one_line(error)} Type {command} --help for its options"
 
 
 def _missing(error: MissingArgumentError, command: str) -> str:
@@ -58,7 +63,7 @@ def _unknown_option(error: UnknownOptionError) -> str:
         near = _near("-" + word.split("=", 1)[0], options)
         hint = f"; did you mean {near}?" if near else ""
         return f"there is no option {word[:_LONGEST_SHOWN]}: options of more than a letter begin with two hyphens{hint}"
-    return one_line(error)
+    return _with_help(error)
 
 
 def _unknown_command(word: str, app: App) -> str:

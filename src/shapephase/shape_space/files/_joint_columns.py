@@ -241,7 +241,7 @@ def _why_left_out(
     kind = f"column in {table.where}; joint of {body.name}"
     error = unknown_name(kind, target, body.joint_names, UnknownColumnError)
     near = difflib.get_close_matches(target, body.joint_names, n=1)
-    joint = near[0] if near else "JOINT"
+    joint = near[0] if near else "JOINT" if body.n_shape else "base_x"
     raise UnknownColumnError(
         f"{error}; {HINT}. Say which it is: --names '{text}={joint}' (names={{{text!r}: {joint!r}}}); or leave it out: "
         f"--names '{text}=', or --ignore-extra for all that are no joints (ignore_extra=True)"

@@ -36,8 +36,8 @@ def named_columns(
         If the number of columns fits nothing, or fits two of these; for a free joint whose quaternion `names` does
         not number.
     """
-    numbered = [label for label in table.columns if label in names]
-    if not table.numbered or len(numbered) == len(table.columns):
+    given = [label for label in table.columns if label in names]
+    if not table.numbered or len(given) == len(table.columns):
         return table
     values = list(table.columns.values())
     has_times = timestep is None and len(values[0]) > 1 and bool((np.diff(values[0]) > 0.0).all())
@@ -47,7 +47,7 @@ def named_columns(
     try:
         found = nameless_joints(body, len(rest), f"{table.where}: the table without a header", order)
     except TrajectoryError as error:
-        if numbered:
+        if given:
             return table
         if not _is_pose(rest):
             raise TrajectoryError(_ways(body, len(values), str(error))) from None

@@ -140,7 +140,8 @@ def in_flight(
     if base.attitude is None:
         raise TrajectoryError(
             f"{where}: a flight is fitted to the recorded attitude of the base, and there is none; columns such as "
-            "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed"
+            "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed. Or give the "
+            "momentum instead of a flight: momentum=[0, 0, 0] (--momentum 0 0 0)"
         )
     fall, flights, by = None, (), "times" if isinstance(said, tuple) else ALL
     samples = samples_within(recording, said) if isinstance(said, tuple) else np.arange(len(recording.times))
@@ -158,7 +159,8 @@ def in_flight(
     if len(samples) < _FEWEST:
         raise TrajectoryError(
             f"{where}: {len(samples)} samples are in the flight, three or more are needed; the recording goes from "
-            f"{recording.first:.9g} to {recording.last:.9g} {recording.time_unit}"
+            f"{recording.first:.9g} to {recording.last:.9g} {recording.time_unit}: flight=(first, last) (--flight "
+            "FIRST LAST)"
         )
     part = part_of(recording, samples)
     return part, motion.kept(samples), Flight(part.first, part.last, by, fall, said != RECORDED, flights)

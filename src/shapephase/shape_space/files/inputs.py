@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 from ...arguments import check_file_name, positive_argument
 from ...body.body import Body
-from ...errors import InputFileNotFoundError, ShapeError, TrajectoryError, unknown_name
+from ...errors import ShapeError, TrajectoryError, unknown_name
+from ...files import no_such_file
 from ...letters import what_came
 from ._numbered_columns import named_columns
 from .formats.bvh import read_bvh
@@ -161,7 +162,7 @@ def _table(where: Path, data: bytes, topic: str | None) -> Table:
 
 def _check_exists(where: Path) -> None:
     if not os.path.exists(where):
-        raise InputFileNotFoundError(f"{where}: there is no such file")
+        raise no_such_file(where)
 
 
 def _no_topic(topic: str | None, what: str) -> None:

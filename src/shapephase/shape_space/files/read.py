@@ -270,7 +270,16 @@ def read_recorded_motion(
     segments = SegmentChoices(names=said or {}, calibration=calibration, length_tolerance=length_tolerance)
     table, said = without_segments(given.table, body, segments, time_unit, step)
     if joint_order is not None and table.nameless is None:
-        raise TrajectoryError(f"{table.where}: joint_order is for arrays without names; columns here have names")
+        raise TrajectoryError(
+            f"{table.where}: joint_order is for arrays without names; columns here have names: leave it "
+            "out (--joint-order)"
+        )
+    if isinstance(names, Sequence) and not isinstance(names, str) and said and not set(said) & set(table.columns):
+        listed = ", ".join(list(table.columns)[:_MOST_SHOWN])
+        raise TrajectoryError(
+            f"{table.where}: a list of names is for a table without a header, and this one reads {listed}; give a "
+            "mapping: names={column: joint} (--names COLUMN=JOINT)"
+        )
     mapping = _mapping(said, table)
     recording = recording_of(table, body.joint_names, mapping, time_unit, step, kept)
     choices = JointChoices(

@@ -14,6 +14,7 @@ import numpy as np
 from ...arguments import check_time_steps
 from ...arrays import Array, Integers, Mask
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
+from ...files import no_such_file
 from .nameless_joints import NamelessJoints
 
 if TYPE_CHECKING:
@@ -209,8 +210,7 @@ def warn(message: str) -> None:
 def file_bytes(where: Path) -> bytes:
     """Content of a regular file. Raises InputFileNotFoundError if it is not there, no file, or not to be opened."""
     if not where.is_file():
-        kind = "is no regular file" if where.exists() else "there is no such file"
-        raise InputFileNotFoundError(f"{where}: {kind}")
+        raise InputFileNotFoundError(f"{where}: is no regular file") if where.exists() else no_such_file(where)
     try:
         return where.read_bytes()
     except OSError as error:
@@ -273,7 +273,7 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
         numbers so far from zero resolve the steps badly.
     """
     if len(times) < 2:
-        raise TrajectoryError(f"{where}: two samples or more are needed, got {len(times)}")
+        raise TrajectoryError(f"{where}: two samples or more are needed, got {len(times)}; give a longer motion")
     with np.errstate(over="ignore"):
         steps, shifted = np.diff(times), times - times[0]
     late = np.flatnonzero(steps <= 0.0)

@@ -183,7 +183,8 @@ def _trimmed(table: Table, clock: Array, trim: tuple[float, float]) -> Table:
     if len(samples) < 2:
         raise TrajectoryError(
             f"{table.where}: {len(samples)} samples from {trim[0]:.9g} to {trim[1]:.9g}, two or more are needed; the "
-            f"file's own times go from {clock.min():.9g} to {clock.max():.9g}"
+            f"file's own times go from {clock.min():.9g} to {clock.max():.9g}: trim=({clock.min():.9g}, "
+            f"{clock.max():.9g}) (--trim {clock.min():.9g} {clock.max():.9g}) keeps all of it"
             if len(clock)
             else f"{table.where}: two samples or more are needed, got 0"
         )
@@ -194,8 +195,12 @@ def trim_argument(trim: tuple[float, float] | None, name: str = "trim") -> tuple
     """A user's two times, the first before the last. Raises ShapeError."""
     if trim is None:
         return None
+    if np.shape(trim) != (2,):
+        raise ShapeError(
+            f"{name}: two times are needed, as {name}=(0.5, 2.0) (--{name} 0.5 2.0), got {what_came(trim)}"
+        )
     ends = finite_array(trim, name, (2,))
-    if ends.ndim != 1 or not ends[0] < ends[1]:
+    if not ends[0] < ends[1]:
         raise ShapeError(f"{name}: two times, the first before the last, are needed, got {what_came(trim)}")
     return float(ends[0]), float(ends[1])
 

@@ -68,7 +68,7 @@ def column_table(
     counts = {len(values) for values in found.values()}
     if len(counts) > 1:
         listed = ", ".join(f"{name} {len(values)}" for name, values in list(found.items())[:12])
-        raise TrajectoryError(f"{where}: the columns have different lengths: {listed}")
+        raise TrajectoryError(f"{where}: the columns have different lengths: {listed}; give each one number a sample")
     labels = range(max(counts, default=0)) if rows is None else rows
     return Table(where=where, format=kind, columns=found, rows=labels, row=row, units=said, faults=faults)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import TrajectoryError
-from ..labels import unit_of
+from ..labels import joint_part, unit_of
 from ..recording import Table
 from .column_tables import column_table
 from .ros_echo import echoed_columns, listed_names
@@ -19,6 +19,10 @@ _STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))
 """What the two parts of a stamp of ROS are called."""
 _NANO = 1_000_000_000
 _COUNTER = "counts the rows"
+_NAMES = ("name", "joint", "joint_name", "jointname")
+"""Columns of tables with one row for each joint, in small letters: which joint it is."""
+_VALUES = ("position", "pos", "angle", "joint_position")
+"""Columns of such tables: where it is."""
 
 
 def is_frame(value: object) -> bool:
@@ -58,6 +62,7 @@ def file_table(frame: Any, where: str) -> Table:
     Raises TrajectoryError for faults.
     """
     said = frame.attrs
+    frame, of_joints = _one_row_a_sample(frame, where)
     columns, dropped = _with_names([(str(label), frame.iloc[:, k].to_numpy()) for k, label in enumerate(frame)], where)
     columns, left_out = echoed_columns(columns) if said.get("numbered") else listed_names(columns)
     numbered = bool(said.get("numbered")) and not left_out
@@ -71,7 +76,43 @@ def file_table(frame: Any, where: str) -> Table:
         row=said.get("row", "row"),
         comma=said.get("comma", False),
     )
-    return replace(table, numbered=numbered, left_out=dropped | left_out)
+    return replace(table, numbered=numbered, left_out=of_joints | dropped | left_out)
+
+
+def _one_row_a_sample(frame: Any, where: str) -> tuple[Any, dict[str, str]]:
+    """A table that has one row for each joint and sample, `time,name,position`, with one column for each joint.
+
+    Returns the columns left out, too: what else is recorded of each joint.
+
+    Raises TrajectoryError where the joints of a sample are others than those of the first.
+    """
+    called = {str(label).strip().lower(): label for label in frame}
+    name = next((called[word] for word in _NAMES if word in called), None)
+    value = next((called[word] for word in _VALUES if word in called), None)
+    if name is None or value is None or frame[name].dtype.kind in "fiu":
+        return frame, {}
+    joints = frame[name].astype(str).to_numpy()
+    count = len(set(joints.tolist()))
+    if count < 2:
+        return frame, {}
+    ordered = np.resize(joints[:count], len(joints))
+    wrong = np.flatnonzero(joints != ordered)
+    if len(wrong) or len(joints) % count or len(set(joints[:count].tolist())) < count:
+        row = int(frame.index[wrong[0] if len(wrong) else -1])
+        raise TrajectoryError(
+            f"{where}: column {name!r} names a joint in each row, and row {row} does not go on as the first {count} "
+            "rows begin: write the rows of each sample in one order, or a table with one column for each joint"
+        )
+    of_joints = {}
+    for label in frame.columns.drop([name, value]):
+        texts = frame[label].astype(str).to_numpy().reshape(-1, count)
+        beside = joint_part(f"joint/{label}", ("joint",))
+        if (beside is not None and beside[1]) or (texts != texts[:, :1]).any():
+            of_joints[str(label)] = "of each joint, no position"
+    wide = frame.iloc[::count].drop(columns=[name, value, *of_joints])
+    for place, joint in enumerate(joints[:count].tolist()):
+        wide[joint] = frame[value].to_numpy()[place::count]
+    return wide, of_joints
 
 
 def _is(value: object, package: str, kinds: tuple[str, ...]) -> bool:

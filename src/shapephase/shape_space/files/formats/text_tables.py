@@ -112,14 +112,14 @@ def unix_text(data: bytes, where: Path) -> bytes:
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
-def _layout(text: bytes, where: Path, section: str | None, start: int, delimiter: str | None) -> _Layout:
+def _layout(text: bytes, where: Path, section: str | None, start: int, stated: str | None) -> _Layout:
     """Names, separator and first line, by the beginning of a text."""
     lines = text[:_HEAD_BYTES].decode(errors="replace").split("\n")
     place, comment = start, None
     while place < len(lines) and (not lines[place].strip() or COMMENT.match(lines[place]) or place == start):
         said = _SEPARATOR.fullmatch(lines[place].strip())
         if said is not None:
-            delimiter = said[1]
+            stated = said[1]
         elif COMMENT.match(lines[place]):
             comment = lines[place]
         elif lines[place].strip():
@@ -131,7 +131,7 @@ def _layout(text: bytes, where: Path, section: str | None, start: int, delimiter
     nexus = nexus_head(text, lines, place, section, str(where))
     if nexus is not None:
         return _Layout(nexus.names, nexus.units, nexus.first, nexus.delimiter, rate=nexus.rate)
-    delimiter = delimiter or _delimiter(lines[place], where)
+    delimiter = stated or _delimiter(lines[place], where)
     rows = [split_line(lines[k], delimiter) for k in shown]
     said = None if comment is None else split_line(COMMENT.sub("", comment, count=1).rstrip('"'), delimiter)
     head = head_of(rows, said, str(where))
