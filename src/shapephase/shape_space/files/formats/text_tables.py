@@ -250,7 +250,7 @@ def _length_error(where: Path, body: bytes, layout: _Layout, line: int, count: i
     entries = body.split(b"\n")[line - layout.first - 1].decode(errors="replace").split(layout.delimiter)
     if count == 2 * len(layout.names) and all(entry.strip().lstrip("+-").isdigit() for entry in entries):
         return TrajectoryError(
-            f"{said}; decimal commas between commas cannot be delimiter apart, separate the columns by semicolons"
+            f"{said}; decimal commas between commas cannot be told apart, separate the columns by semicolons"
         )
     return TrajectoryError(f"{said}; write one entry for each name, and leave a cell empty where nothing was recorded")
 
