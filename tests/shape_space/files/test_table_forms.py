@@ -101,6 +101,12 @@ def r_csv(mark=",", comma=False):
     return mark.join(['""', '"time"', '"arm"', '"leg"']) + "\n" + "\n".join(map(mark.join, rows)) + "\n"
 
 
+def r_table():
+    """`write.table` of R: row names have no name above them."""
+    rows = [" ".join([f'"{k + 1}"', *map(repr, row)]) for k, row in enumerate(ROWS.tolist())]
+    return "\n".join(['"time" "arm" "leg"', *rows]) + "\n"
+
+
 def nexus(mark):
     """The export of model outputs of Vicon Nexus: kind, rate, names, axes, units."""
     head = ["Model Outputs", "50", mark.join(["", "", "Bob:Arm", "", "", "Bob:Leg", "", ""])]
@@ -200,6 +206,8 @@ TABLES = {
         {},
         EXACT,
     ),
+    "R write.table": ("m.txt", text(r_table()), {}, EXACT),
+    "pandas to_string": ("m.txt", text(FRAME.to_string(float_format=lambda value: repr(float(value)))), {}, EXACT),
     "MATLAB writematrix": ("m.csv", text(lines(None, floats(*ROWS.T))), {}, EXACT),
     "MATLAB save -ascii": ("m.txt", text(lines(None, floats(*ROWS.T), "   ", "   {:.16e}".format)), {}, EXACT),
     "a header behind %": ("m.txt", text("% " + table(NAMES, *ROWS.T, mark="\t")), {}, EXACT),

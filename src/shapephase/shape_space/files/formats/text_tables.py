@@ -205,10 +205,18 @@ def _checked_rows(body: bytes, layout: _Layout, where: Path) -> tuple[tuple[str,
         last = body.rstrip(b"\n").rsplit(b"\n", 1)[-1].rstrip()
         if last.endswith(layout.delimiter.encode()):
             names, width = (*names, ""), width + 1
+    if len(counts) > 1 and (counts == width + 1).all() and _counts_rows(body, layout.delimiter):
+        names, width = ("", *names), width + 1
     wrong = np.flatnonzero(counts != width)
     if len(wrong):
         raise _length_error(where, body, layout, int(lines[wrong[0]]), int(counts[wrong[0]]))
     return names, lines
+
+
+def _counts_rows(body: bytes, delimiter: str) -> bool:
+    """Whether the first two rows begin with 0 and 1, or 1 and 2: R's row names and pandas' index, without a name."""
+    rows = (split_line(line.decode(), delimiter) for line in body.split(b"\n", 4)[:4] if line.strip())
+    return [row[0].strip('"') for row in rows][:2] in (["0", "1"], ["1", "2"])
 
 
 def _counts(body: bytes, delimiter: str) -> Integers:
