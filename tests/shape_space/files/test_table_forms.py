@@ -211,6 +211,7 @@ TABLES = {
     "MATLAB writematrix": ("m.csv", text(lines(None, floats(*ROWS.T))), {}, EXACT),
     "MATLAB save -ascii": ("m.txt", text(lines(None, floats(*ROWS.T), "   ", "   {:.16e}".format)), {}, EXACT),
     "a header behind %": ("m.txt", text("% " + table(NAMES, *ROWS.T, mark="\t")), {}, EXACT),
+    "bars": ("m.csv", text(table(NAMES, *ROWS.T, mark="|")), {}, EXACT),
     "comments above": ("m.csv", text("# made by us\n# at noon, with a pen\n" + table(NAMES, *ROWS.T)), {}, EXACT),
     "a comment, then no header": ("m.csv", text("# 50 Hz\n" + lines(None, floats(*ROWS.T))), {}, EXACT),
     "a separator that is said": ("m.csv", text("sep=;\n" + table(NAMES, *ROWS.T, mark=";")), {}, EXACT),

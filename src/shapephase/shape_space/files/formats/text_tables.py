@@ -18,7 +18,7 @@ from .table_heads import COMMA_NUMBER, COMMENT, head_of, is_value, numbers
 if TYPE_CHECKING:
     import pandas as pd
 
-_DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons"}
+_DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
 BLANKS = " "
 """The delimiter of columns with any number of blanks between them."""
 _HEAD_BYTES = 2**18
