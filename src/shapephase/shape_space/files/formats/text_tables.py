@@ -85,8 +85,9 @@ def read_text(
     names, lines = _checked_rows(body, layout, where)
     frame = _parsed(body, names, layout.delimiter, comma=comma)
     frame.index = lines
-    empty = frame.isna().all(axis=1).to_numpy()
-    frame = frame.loc[~empty] if empty.any() else frame
+    # Rows of separators alone are none.
+    if frame.iloc[:, 0].isna().any():
+        frame = frame.loc[frame.notna().any(axis=1)]
     kind = "TSV" if where.suffix.lower() == ".tsv" else "CSV"
     frame.attrs = {"format": kind, "units": layout.units, "comma": comma, "numbered": layout.numbered}
     if layout.rate is not None:
