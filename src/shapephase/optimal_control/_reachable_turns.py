@@ -65,7 +65,7 @@ class _ReachableTurns:
     counted: Array | None = None
     slack: float = 0.0
 
-    def miss(self, task: Reorientation) -> float:
+    def goal_error(self, task: Reorientation) -> float:
         """Least distance of a goal from all these attitudes [rad]: a lower bound."""
         counted = 0.0
         if task.windings is not None:
@@ -119,9 +119,9 @@ def check_reachable(tasks: Sequence[Reorientation]) -> None:
         return
     if turns is None:
         return
-    misses = [turns.miss(task) for task in tasks]
-    nearest = int(np.argmin(misses))
-    if misses[nearest] <= _LEAST_MISS:
+    errors = [turns.goal_error(task) for task in tasks]
+    nearest = int(np.argmin(errors))
+    if errors[nearest] <= _LEAST_MISS:
         return
     turn = turns.nearest_turn(tasks[nearest])
     instead = ""
@@ -133,7 +133,7 @@ def check_reachable(tasks: Sequence[Reorientation]) -> None:
         )
     raise UnreachableGoalError(
         f"no motion of the joints of {tasks[0].body.name} reaches the goal: {turns.reason}; it is missed by "
-        f"{np.degrees(misses[nearest]):.4g} degrees or more; {turns.remedy}{instead}"
+        f"{np.degrees(errors[nearest]):.4g} degrees or more; {turns.remedy}{instead}"
     )
 
 

@@ -310,6 +310,7 @@ def _carried_curvature(field: _Field) -> Array:
 
 def carried_curvature(body: Body | ParticleBody, start: Array, ends: Array) -> Array:
     """Curvature on straight paths from a shape to others, carried back along them: (n,), (N, n) -> (4 N, n, n, 3)."""
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     parts = []
     for end in ends:
         path = ShapePath.waypoints([0.0, 1.0], [start, end])
