@@ -415,6 +415,24 @@ class PlanNotFound(ShapePhaseError, ArithmeticError):
         self.best = best
 
 
+class UnreachableGoalError(PlanNotFound):
+    """A goal that no motion of the joints can reach, however long it takes: nothing was searched for.
+
+    Causes: joints whose loops turn the body not at all or about one axis alone, a planar motion, a momentum that turns
+    the body too far or not far enough. Remedy: the message says what can be reached, and the goal nearest to the wanted
+    one; let other joints move, or choose another goal, end or momentum.
+
+    Examples
+    --------
+    >>> cat, goal = sp.load_body("cat_two_halves"), sp.so3.exp(np.array([1.0, 0.0, 0.0]))
+    >>> try:
+    ...     sp.plan_reorientation(cat, goal, joints=["waist_pitch"])
+    ... except sp.errors.UnreachableGoalError as error:
+    ...     print(str(error)[:72])
+    no motion of the joints of cat_two_halves reaches the goal: only waist_p
+    """
+
+
 class UnphysicalInertiaWarning(UserWarning):
     """Links whose inertia is doubtful, accepted because the caller allows it or because it does no harm.
 

@@ -180,3 +180,47 @@ def test_check_says_so_and_shows_the_parts(capsys, tmp_path):
     out = capsys.readouterr().out
     assert re.search(r"^torso +60000 +0 +0 +0 +1250 +2250 +2600$", out, re.M)
     assert re.search(r"^jtorso +revolute +-1 +1 rad +2$", out, re.M)
+
+
+@pytest.mark.parametrize("rpy", ["90 0 0", "0 -180 0", "0.5 0 7"])
+def test_a_turn_in_degrees_is_named_with_its_radians(rpy, load_urdf):
+    turned = joint("b").replace("<origin ", f"<origin rpy='{rpy}' ")
+    radians = " ".join(f"{math.radians(float(word)):.6g}" for word in rpy.split())
+    with pytest.warns(sp.IgnoredElementWarning, match="degrees") as said:
+        load_urdf(f"<robot name='r'>{box('a')}{box('b')}{turned}</robot>")
+    assert f'rpy="{radians}"' in str(said[0].message)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("rpy", ["6.2832 0 0", "0 -3.1416 1.5708"])
+def test_a_whole_turn_in_radians_is_none(rpy, load_urdf):
+    turned = joint("b").replace("<origin ", f"<origin rpy='{rpy}' ")
+    assert load_urdf(f"<robot name='r'>{box('a')}{box('b')}{turned}</robot>").n_shape == 1
+
+
+@pytest.mark.parametrize("key", ["effort", "velocity"])
+def test_a_negative_limit_is_named(key, load_urdf):
+    limited = joint("b").replace(f"{key}='1'", f"{key}='-5'")
+    with pytest.warns(sp.IgnoredElementWarning, match=f"the {key} limit is negative"):
+        body = load_urdf(f"<robot name='r'>{box('a')}{box('b')}{limited}</robot>")
+    assert {"effort": body.effort_limits, "velocity": body.rate_limits}[key].tolist() == [5.0]
+
+
+def test_the_smallest_moment_there_is_makes_matter_too_dense(load_urdf):
+    small = re.sub(r"(ixx|iyy|izz)='[^']*'", r"\1='5e-324'", box("b"))
+    (said,) = said_of(load_urdf, box("a"), small, joint("b"))
+    assert "'b'" in said
+    assert "denser than any matter" in said
+
+
+@pytest.mark.parametrize("geom", ['mass="nan"', 'density="NaN"', 'mass="1" pos="0 nan 0"'])
+def test_a_number_that_is_none_in_an_mjcf(geom, tmp_path):
+    """MuJoCo alone takes the density of water, and says nothing."""
+    file = tmp_path / "nan.xml"
+    ball = '<geom type="sphere" size="0.1"'
+    other = f'<body name="b"><joint name="j"/>{ball}/></body>'
+    file.write_text(
+        f'<mujoco><worldbody><body name="nan"><freejoint/>{ball} {geom}/>{other}</body></worldbody></mujoco>'
+    )
+    with pytest.raises(sp.errors.ModelFileError, match="is not a number"):
+        sp.load_body(file)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -70,6 +71,9 @@ def implausible(body: Body) -> tuple[str, ...]:
     for frame in np.flatnonzero(masses > 0.0).tolist():
         mass = float(masses[frame])
         edges = np.sort(inertia_box(mass, chain.inertias[frame])[0])
+        if chain.inertias[frame].any():
+            # Moments near the smallest number have no roots; those of a point mass are zero.
+            edges = np.maximum(edges, sys.float_info.min)
         _judge_density(links, frame, mass, edges, widths.get(frame), shapes.get(frame, ()))
     _judge_neighbours(links, chain.parents, masses)
     _judge_lengths(links, chain.places, chain.centres)
@@ -143,7 +147,7 @@ def _judge_density(
     links: _Links, frame: int, mass: float, edges: Array, width: float | None, shapes: Sequence[Visual]
 ) -> None:
     longest, volume = float(edges[-1]), float(np.prod(edges))
-    dense = mass / longest**3 if longest else 0.0
+    dense = min(mass / max(longest**3, sys.float_info.min), sys.float_info.max) if longest else 0.0
     light = mass / volume if volume else math.inf
     if width:
         dense = max(dense, mass / width**3)

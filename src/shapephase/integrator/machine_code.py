@@ -7,6 +7,7 @@ bits: products and sums are neither reordered nor contracted, and a division by 
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
@@ -198,7 +199,7 @@ def _import_fault() -> str:
     """Import Numba; why that fails, warned of once, or an empty text."""
     try:
         # Ctrl-C interrupts the main thread alone: in another, Numba is imported wholly or not at all.
-        with ThreadPoolExecutor(1) as importing:
+        with _lock, ThreadPoolExecutor(1) as importing:
             importing.submit(_import_numba).result()
     except _NUMBA_DOES_NOT_WORK as error:
         why = f"Numba does not work ({error})"
@@ -213,3 +214,29 @@ def _import_numba() -> None:
 
     context: Any = cpu_target.target_context
     context.refresh()
+
+
+def _compiler_locks() -> list[Any]:
+    """What a thread holds while it imports Numba or compiles: ours, and Numba's own once it is imported."""
+    numba = sys.modules.get("numba.core.compiler_lock")
+    return [_lock] if numba is None else [_lock, numba.global_compiler_lock]
+
+
+def _acquire_before_fork() -> None:
+    """Wait until no other thread imports or compiles: a child would wait for that thread, which it does not have."""
+    _lock.acquire()
+    _held_at_fork.append(_compiler_locks())
+    for lock in _held_at_fork[-1][1:]:
+        lock.acquire()
+
+
+def _release_after_fork() -> None:
+    for lock in reversed(_held_at_fork.pop()):
+        lock.release()
+
+
+_held_at_fork: list[list[Any]] = []
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(
+        before=_acquire_before_fork, after_in_parent=_release_after_fork, after_in_child=_release_after_fork
+    )

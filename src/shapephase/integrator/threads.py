@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from threading import RLock
 
 _LEAST_FOR_A_THREAD = 64  # rows: some tenths of a millisecond of work
 _MOST_AT_ONCE = 8192  # rows in one call: some tenths of a second, after which a run that is watched reports progress
@@ -33,9 +35,22 @@ def _pool(workers: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(workers)
 
 
+def _free_after_fork() -> None:
+    """Drop the threads that a child of this process does not have, and the locks that they held."""
+    _pool.cache_clear()
+    if sys.version_info >= (3, 12):
+        return
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] == __name__.partition(".")[0]:
+            for kind in list(vars(module).values()):
+                for attribute in list(vars(kind).values()) if isinstance(kind, type) else ():
+                    if isinstance(attribute, cached_property):
+                        # Held while a value is computed, for all objects of the class (bpo-43468).
+                        vars(attribute)["lock"] = RLock()
+
+
 if hasattr(os, "register_at_fork"):
-    # A child of this process has none of its threads.
-    os.register_at_fork(after_in_child=_pool.cache_clear)
+    os.register_at_fork(after_in_child=_free_after_fork)
 
 
 @lru_cache(maxsize=1)

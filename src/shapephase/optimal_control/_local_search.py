@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,6 +29,8 @@ from .task import Reorientation
 _HALVINGS = 2
 # How often efforts are given less room where they exceed their limits between the nodes.
 _TIGHTENINGS = 6
+# Share of a limit that counts as being at it, where no plan was found.
+_NEARLY = 0.9
 # Windings of the same attitude differ by half a turn or more: far less than that tells them apart [rad].
 _WINDING_TOLERANCE = 0.1
 # Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
@@ -230,3 +232,43 @@ def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPa
 
 def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
     return CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
+
+
+def failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Attempt | None, stopped: str) -> str:
+    """Why no plan is returned, start by start, and what the best attempt reached."""
+    name = task.body.name
+    summary = "; ".join(
+        f"start {number + 1}: {attempt.report.status}, off by {attempt.report.goal_error:.3g} rad, KKT residual "
+        f"{attempt.report.kkt_residual:.2g}"
+        for number, attempt in enumerate(attempts)
+    )
+    if best is None or best.polished is None:
+        outcome = "no attempt gave a path"
+    elif best.reaches_goal:
+        outcome = f"the best attempt, in `best`, reaches the goal at cost {best.cost:.6g}; there may be cheaper ones"
+    else:
+        length = best.polished.path.duration
+        outcome = f"the best attempt, in `best`, misses the goal by {best.goal_error:.3g} rad in {length:.6g} s"
+    if stopped:
+        how = "stopped on request" if stopped == "stopped" else "ended by its time limit"
+        return f"the search for a motion of the joints of {name} was {how} ({summary}); {outcome}"
+    near: list[str] = []
+    if best is not None and best.polished is not None:
+        shares = limit_shares(best.task, best.basis, best.polished.control, best.polished.motion)
+        near = [name for name, share in shares.items() if share > _NEARLY]
+    more = "more iterations or starts (Search(starts=8), --starts 8)"
+    if task.cost == "time":
+        way_out = f"it may take longer than {task.duration:.6g} s: give a longer duration (--duration), or {more}"
+    elif near:
+        way_out = (
+            f"joints are at their {' and '.join(near)} limits: give more than {task.duration:.6g} s (cost='time' with "
+            "a longer duration, --cost time, finds the least)"
+        )
+    elif np.isfinite(task.rate_limit).all():
+        way_out = (
+            f"{task.duration:.6g} s may be too short: cost='time' with a longer duration (--cost time --duration) "
+            f"finds the least; or give {more}"
+        )
+    else:
+        way_out = f"loosen the limits, or give more time or {more}"
+    return f"no motion of the joints of {name} was found that turns it to the goal ({summary}); {outcome}; {way_out}"

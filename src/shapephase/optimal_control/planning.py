@@ -20,8 +20,9 @@ from ..arguments import check_executor, check_object
 from ..body.body import Body
 from ..errors import PlanNotFound
 from ._certificates import hamiltonian_spread
-from ._local_search import Attempt, LocalSearch, corrected_attempt, guessed_attitudes, polished_path
+from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes, polished_path
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
+from ._reachable_turns import check_reachable
 from ._reduced import check_reducible
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
@@ -48,8 +49,6 @@ _PIECES_OF_MANY = 20
 # Pieces of the coarse search that ranks the guesses, for few joints and for more: enough for a loop to bend.
 _COARSE_PIECES = 10
 _COARSE_PIECES_OF_MORE = 20
-# Of a rate limit: what counts as being at it, where no plan was found.
-_NEARLY = 0.9
 # Guesses that it ranks for each start, and at most unless there are more starts; for few joints, where they are cheap,
 # not fewer than eight.
 _RANKED = 4
@@ -131,6 +130,8 @@ def plan_reorientation(
     ------
     ShapeError, TrajectoryError, UnknownNameError
         For arguments of the wrong shape, ends beyond the limits, unknown names.
+    UnreachableGoalError
+        If no motion can reach the goal, as the holonomy algebra (`reachable`) or a plane of symmetry shows at once.
     PlanNotFound
         If no start came to a local optimum that reaches the goal, or `iteration_callback` or its time limit stopped
         the search before; it carries the best attempt.
@@ -176,6 +177,7 @@ def plan_reorientation(
     ]
     if chosen.method == "reduced":
         check_reducible(tasks[0])
+    check_reachable(tasks)
     warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
     reporter = _ProgressReporter(iteration_callback, chosen.time_limit)
@@ -196,7 +198,7 @@ def plan_reorientation(
         else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, chosen.method, seconds, reporter.stopped)
     )
     if best is None or plan is None or not best.report.converged:
-        raise PlanNotFound(_failure_message(tasks[0], attempts, best, reporter.stopped), plan)
+        raise PlanNotFound(failure_message(tasks[0], attempts, best, reporter.stopped), plan)
     return plan
 
 
@@ -422,34 +424,3 @@ def _plan(
         limit_shares=position_share(task, best.basis, best.polished.control)
         | limit_shares(task, best.basis, best.polished.control, best.polished.motion),
     )
-
-
-def _failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Attempt | None, stopped: str) -> str:
-    """Why no plan is returned, start by start, and what the best attempt reached."""
-    name = task.body.name
-    summary = "; ".join(
-        f"start {number + 1}: {attempt.report.status}, off by {attempt.report.goal_error:.3g} rad, KKT residual "
-        f"{attempt.report.kkt_residual:.2g}"
-        for number, attempt in enumerate(attempts)
-    )
-    if best is None or best.polished is None:
-        outcome = "no attempt gave a path"
-    elif best.reaches_goal:
-        outcome = f"the best attempt, in `best`, reaches the goal at cost {best.cost:.6g}; there may be cheaper ones"
-    else:
-        length = best.polished.path.duration
-        outcome = f"the best attempt, in `best`, misses the goal by {best.goal_error:.3g} rad in {length:.6g} s"
-    if stopped:
-        how = "stopped on request" if stopped == "stopped" else "ended by its time limit"
-        return f"the search for a motion of the joints of {name} was {how} ({summary}); {outcome}"
-    near: list[str] = []
-    if best is not None and best.polished is not None:
-        shares = limit_shares(best.task, best.basis, best.polished.control, best.polished.motion)
-        near = [name for name, share in shares.items() if share > _NEARLY]
-    way_out = (
-        f"joints are at their {' and '.join(near)} limits: give more than {task.duration:.6g} s (cost='time' finds the "
-        "least)"
-        if near and task.cost != "time"
-        else "loosen the limits, or give more time, iterations or starts"
-    )
-    return f"no motion of the joints of {name} was found that turns it to the goal ({summary}); {outcome}; {way_out}"

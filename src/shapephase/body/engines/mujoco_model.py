@@ -32,6 +32,11 @@ _PASSED_OVER = {
     "replicate": ("count", "sep", "offset", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
 }
 """The attributes of elements whose other attributes MuJoCo passes over in silence."""
+_NUMBERS = {
+    *("mass", "density", "diaginertia", "fullinertia", "size", "fromto", "axis", "range", "ref", "polycoef"),
+    *("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
+}
+"""Attributes from which masses and places follow; MuJoCo takes its default where one is NaN."""
 _MEMORY = 64 * 2**20
 """[bytes] for what MuJoCo computes with, the squares of two thousand coordinates."""
 _MOST_SAID = 20
@@ -111,8 +116,15 @@ def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
 
 
 def _check_passed_over(content: bytes, path: str) -> None:
-    """Raise UnusableModelError for an attribute that nothing would read: a misspelt place is a wrong place."""
+    """Raise UnusableModelError for what MuJoCo would not read: misspelt places, masses that are NaN."""
     for node in xml_tree(content, path).walk():
+        for name in _NUMBERS & set(node.attributes):
+            if any(word.lower().lstrip("+-") == "nan" for word in node.attributes[name].split()):
+                raise UnusableModelError(
+                    f"<{node.tag}>: {name}={node.attributes[name][:60]!r} is not a number, and MuJoCo would take its "
+                    f"default; give a number, or leave {name} out",
+                    node.line,
+                )
         for name in set(node.attributes) - set(_PASSED_OVER.get(node.tag, node.attributes)):
             near = difflib.get_close_matches(name, _PASSED_OVER[node.tag], 1)
             meant = f"; did you mean {near[0]}=?" if near else ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from xml.sax.saxutils import quoteattr
@@ -37,6 +37,8 @@ from .xml_text import (
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _BALL = "spherical"
+_WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)
+"""[rad] as rounded in a file; no angle of a frame needs more, and 10 degrees do."""
 _WORLD = "world"
 """A link that is there without being written, as Drake and Gazebo have it."""
 _EXPRESSION = re.compile(r"\$[{(]")
@@ -215,7 +217,7 @@ def _link(name: str, node: Node, reading: _Reading) -> Link:
     written = needed_child(inertial, "inertia", owner)
     known_attributes(written, _INERTIA, owner)
     xx, xy, xz, yy, yz, zz = values = [number(written, key, owner, most=MOST_MASS) for key in _INERTIA]
-    place, turn, origin = _origin(inertial, owner)
+    place, turn, origin = _origin(inertial, owner, reading)
     entries = " ".join(f'{key}="{value!r}"' for key, value in zip(_INERTIA, values, strict=True))
     reading.text["link", name] = (
         f'<link name={quoteattr(name)}><inertial>{origin}<mass value="{mass!r}"/><inertia {entries}/></inertial></link>'
@@ -239,7 +241,7 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     for end in ends.values():
         known_attributes(end, ("link",), owner)
     parent, child = (name_of(end, "link") for end in ends.values())
-    place, turn, parts = _origin(node, owner)
+    place, turn, parts = _origin(node, owner, reading)
     parts += f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
     axis, limits = [1.0, 0.0, 0.0], (-math.inf, math.inf)
     if kind in (*_AXIS_JOINTS, IN_A_PLANE):
@@ -254,6 +256,10 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     if kind != "fixed" and (limit := child_of(node, "limit", owner)) is not None:
         fastest = abs(number(limit, "velocity", owner, default="0", most=math.inf))
         effort = _effort(limit)
+        for key in ("velocity", "effort"):
+            if (limit.get(key) or "").strip().startswith("-"):
+                said = f"the {key} limit is negative, read as its size; write it without the sign"
+                reading.notes.append((f"{limit.file}:{limit.line}", "joint", repr(name), said))
     if kind in ("revolute", "prismatic"):
         limits = _limits(node, kind, owner)
         parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="{effort!r}" velocity="{fastest!r}"/>'
@@ -287,7 +293,7 @@ def _limits(node: Node, kind: str, owner: str) -> tuple[float, float]:
     return lower, upper
 
 
-def _origin(node: Node, owner: str) -> tuple[Array, Array, str]:
+def _origin(node: Node, owner: str, reading: _Reading) -> tuple[Array, Array, str]:
     """Place, rotation and the element written anew."""
     origin = child_of(node, "origin", owner)
     if origin is None:
@@ -296,8 +302,17 @@ def _origin(node: Node, owner: str) -> tuple[Array, Array, str]:
     parts = {key: vector(origin, key, owner) for key in ("xyz", "rpy") if origin.get(key) is not None}
     written = " ".join(f'{key}="{_text(values)}"' for key, values in parts.items())
     rpy = parts.get("rpy")
+    if rpy is not None and max(map(abs, rpy)) > _WHOLE_TURN:
+        kind, _, name = owner.partition(" ")
+        radians = _brief(np.radians(rpy).tolist())
+        said = f'rpy="{_brief(rpy)}" goes beyond a whole turn; is it in degrees? Give radians: rpy="{radians}"'
+        reading.notes.append((f"{origin.file}:{origin.line}", kind, name, said))
     turn = np.eye(3) if rpy is None or not any(rpy) else rpy_matrix(np.array(rpy))
     return np.array(parts.get("xyz", _NO_OFFSET)), turn, f"<origin {written}/>"
+
+
+def _brief(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.6g}" for value in values)
 
 
 def _text(values: list[float]) -> str:

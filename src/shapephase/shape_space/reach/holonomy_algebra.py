@@ -303,14 +303,20 @@ def _carried_curvature(field: _Field) -> Array:
     if body.n_shape < 2:
         return np.zeros((3, 1))
     random = np.random.default_rng(_SEED)
-    parts = [_pairs_of(field.here)]
-    for _ in range(_FAR_SHAPES):
-        end = start + _FAR * field.strokes * random.uniform(-1.0, 1.0, body.n_shape)
+    ends = start + _FAR * field.strokes * random.uniform(-1.0, 1.0, (_FAR_SHAPES, body.n_shape))
+    carried = carried_curvature(body, start, ends) * np.outer(field.strokes, field.strokes)[..., None]
+    return np.concatenate([_pairs_of(field.here), *map(_pairs_of, carried)], axis=1)
+
+
+def carried_curvature(body: Body | ParticleBody, start: Array, ends: Array) -> Array:
+    """Curvature on straight paths from a shape to others, carried back along them: (n,), (N, n) -> (4 N, n, n, 3)."""
+    check_object(body, "Body", "body", or_kind="ParticleBody")
+    parts = []
+    for end in ends:
         path = ShapePath.waypoints([0.0, 1.0], [start, end])
-        lift = horizontal_lift(body, path, _LIFT_TOLERANCE)
-        turned, values = lift.attitude(_LOOKS), field.at(path.shape(_LOOKS))
-        parts.append(_pairs_of(np.einsum("pab,pijb->pija", turned, values)))
-    return np.concatenate(parts, axis=1)
+        turned = horizontal_lift(body, path, _LIFT_TOLERANCE).attitude(_LOOKS)
+        parts.append(np.einsum("pab,pijb->pija", turned, curvature(body, path.shape(_LOOKS))))
+    return np.concatenate(parts)
 
 
 def _orders(field: _Field, rank: int, highest: int, noise: float) -> tuple[OrderReach, ...]:
