@@ -13,6 +13,8 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
+from ..errors import StudyError
+
 # [s] Between looks at whether the process that started this one is still there.
 _LOOK = 1.0
 
@@ -36,6 +38,10 @@ def _answer(connection: Connection) -> None:
     from ._evaluate import Evaluator
 
     study, inputs = pickle.loads(connection.recv_bytes())
+    for name, digest in study.function_inputs.items():
+        if inputs.get(name, digest) != digest:
+            connection.send(StudyError(f"{name} is another where it is computed than where the study was begun"))
+            return
     evaluator = Evaluator(study, inputs)
     connection.send("ready")
     while True:

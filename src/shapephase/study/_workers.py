@@ -15,6 +15,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from multiprocessing.connection import Connection
+from typing import Any
 
 import numpy as np
 
@@ -96,7 +97,8 @@ class CaseWorker:
                 return
             try:
                 self._start()
-                self._answer(_BEGINNING)
+                if isinstance(refusal := self._answer(_BEGINNING), StudyError):
+                    raise refusal
             except _Over:
                 self._check_open()
         if self._process is None or self._process.poll() is not None:
@@ -125,7 +127,7 @@ class CaseWorker:
         with self._lost():
             self._connected.send((way, first, stop))
 
-    def _answer(self, seconds: float | None) -> Results:
+    def _answer(self, seconds: float | None) -> Any:
         with self._lost():
             if self._connected.poll(seconds):
                 return self._connected.recv()

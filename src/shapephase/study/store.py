@@ -251,7 +251,8 @@ def check_same(store: StudyStore, study: Study) -> None:
     """Raise StudyStoreError for a store that another study began, or this one with other versions."""
     if store.attributes["study_hash"] != study.hash:
         mine, theirs = study.description, store.attributes["study"]
-        changed = [name for name in mine if json.dumps(mine[name]) != json.dumps(theirs.get(name))]
+        changed = [name for name in _differences(mine, theirs) if name != "inputs"]
+        changed += _differences(mine["inputs"], theirs["inputs"])
         raise StudyStoreError(
             f"{store.path}: this is the store of another study, of seed {store.attributes['seed']} and "
             f"{store.cases} cases; different: {', '.join(changed)}"
@@ -263,6 +264,12 @@ def check_same(store: StudyStore, study: Study) -> None:
                 f"{store.path}: it was begun with {name} {then.get(name)}, here it is {said}: the cases would not be "
                 "the same; use those versions, or begin a new store"
             )
+
+
+def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
+    """Names of what is not the same in both."""
+    names = dict.fromkeys((*mine, *theirs))
+    return [name for name in names if json.dumps(mine.get(name)) != json.dumps(theirs.get(name))]
 
 
 def _versions() -> dict[str, Any]:

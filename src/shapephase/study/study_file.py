@@ -22,6 +22,7 @@ from .study import Study
 
 _PLAIN = (
     *("outputs", "draws", "seed", "chunk", "momentum", "attitude", "tolerance", "gauge", "parameters", "time_limit"),
+    "version",
     *("root", "root_body", "packages", "xacro_args", "on_unphysical", "length_unit", "person_mass"),
 )
 _ENTRIES = ("body", "motion", "rigid", "over", "functions", *_PLAIN)
