@@ -125,9 +125,7 @@ def test_what_cannot_be_compared_is_refused_unless_a_version_is_given(tmp_path):
         second.run(tmp_path / "out.zarr", workers=0, resume=True)
 
 
-LINK = (
-    '<body name="{name}" pos="0 0 0.3"><joint name="{name}_hinge" axis="1 0 0"/><geom size="0.1" mass="{mass}"/></body>'
-)
+ARM = '<body name="arm" pos="0 0 0.3"><joint name="arm_hinge" axis="1 0 0"/><geom size="0.1" mass="{}"/></body>'
 MJCF = """<mujoco><worldbody><body name="torso"><freejoint/><geom size="0.2" mass="3"/><include file="arm.xml"/></body>
 </worldbody></mujoco>"""
 TENSOR = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'

@@ -24,7 +24,7 @@ from ._evaluate import DONE, Evaluator, Results
 from ._processor import processor_text
 from ._workers import CaseWorker
 from .progress import StudyProgress
-from .store import StudyStore, check_same, new_store, open_study
+from .store import StudyStore, new_store, open_study, store_to_resume
 from .study import Study
 
 # [s] Ctrl-C is heard at least as often.
@@ -93,9 +93,7 @@ def _target(study: Study, store: str | os.PathLike[str], resume: bool) -> StudyS
             open_study(store)
             raise StudyStoreError(f"{store}: there is a store already; go on with it by resume, or name another place")
         return new_store(store, study)
-    target = open_study(store)
-    check_same(target, study)
-    return target
+    return store_to_resume(store, study)
 
 
 class _Tally:

@@ -52,7 +52,7 @@ MOST_CASES = 1_000_000_000
 """Their statuses alone are a gigabyte."""
 MOST_OF_A_CHUNK = 100_000
 """Cases that are in memory at once, with room for some kB each."""
-_TAKEN = ("status", "error_name", "error_text", "processor", "case", "chunk")
+_TAKEN = ("seal", "status", "error_name", "error_text", "processor", "case", "chunk")
 
 
 @dataclass(frozen=True, eq=False)
