@@ -10,6 +10,7 @@ import contextlib
 import errno
 import fcntl
 import hashlib
+import itertools
 import json
 import os
 import secrets
@@ -28,13 +29,12 @@ from ..arrays import Integers
 from ..display import short_repr
 from ..errors import MissingExtraError, OutputFileError, StudyStoreError
 from ..files import write_whole
-from ..integrator.machine_code import is_used
 from ..letters import printable
 from ..provenance import provenance
 from ..warning_filters import quiet
 from ._axes import OF_PARTS
 from ._evaluate import DIED, DONE, NAME_LENGTH, RAISED, TEXT_LENGTH, TIMED_OUT, Results
-from ._processor import processor_text
+from ._processor import computing_versions, other_versions, processor_text
 
 if TYPE_CHECKING:
     from .study import Study
@@ -53,8 +53,6 @@ _OF_EVERY_STUDY = ("status", "error_name", "error_text", "processor")
 """Names of arrays."""
 _PROCESSOR_LENGTH = 96
 """Of what a chunk was computed by [bytes]."""
-_PINNED = ("shapephase", "numpy", "scipy", "pin", "python")
-"""Versions on which the bits of results depend."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,12 +134,30 @@ class StudyStore:
 
     def errors(self, most: int = 20) -> list[tuple[int, str, str]]:
         """The first cases without results: index, name of the error, what it said."""
-        found = []
-        for index in np.flatnonzero(self.statuses() > DONE)[:most].tolist():
-            said = [np.asarray(self._array(name)[index]) for name in ("error_name", "error_text")]
-            kind, text = (bytes(letters).rstrip(b"\0").decode(errors="ignore") for letters in said)
-            found.append((index, kind, text))
-        return found
+        return list(itertools.islice(self._failures(), most))
+
+    def complaints(self) -> list[tuple[int, int, str, str]]:
+        """What failed cases say, the most frequent first: how many cases, the first of them, the error, its processor.
+
+        Examples
+        --------
+        >>> study = sp.study.Study("cat", "cat_righting", {"momentum_z": [0.0, 0.1, 0.2]}, outputs=("turn",))
+        >>> study.run("well.zarr", workers=0).complaints()
+        []
+        """
+        found: dict[tuple[str, str], list[int]] = {}
+        for index, name, text in self._failures():
+            where = _text(self._array("processor")[index // int(self.attributes["chunk"])])
+            found.setdefault((f"{name}: {text}", where), []).append(index)
+        listed = [(len(cases), cases[0], text, where) for (text, where), cases in found.items()]
+        return sorted(listed, key=lambda one: -one[0])
+
+    def _failures(self) -> Iterator[tuple[int, str, str]]:
+        for number in self.failed_chunks().tolist():
+            part = self._part(number)
+            status, names, texts = (self._array(name)[part] for name in ("status", "error_name", "error_text"))
+            for row in np.flatnonzero(status > DONE).tolist():
+                yield part.start + row, _text(names[row]), _text(texts[row])
 
     def dataset(self) -> Any:
         """All of it as an `xarray.Dataset`, along the dimensions of the grids, and of the draws where there are more.
@@ -373,25 +389,17 @@ def check_same(store: StudyStore, study: Study) -> None:
             f"{store.path}: this is the store of another study, of seed {store.attributes['seed']} and "
             f"{store.cases} cases; different: {', '.join(changed)}"
         )
-    then, now = store.attributes["versions"], _versions()
-    for name, said in now.items():
-        if then.get(name) != said:
-            raise StudyStoreError(
-                f"{store.path}: it was begun with {name} {then.get(name)}, here it is {said}: the cases would not be "
-                "the same; use those versions, or begin a new store"
-            )
+    if differing := other_versions(store.attributes["versions"], computing_versions()):
+        raise StudyStoreError(
+            f"{store.path}: {differing}: the cases would not be the same; install those versions with pip, or "
+            "begin a new store"
+        )
 
 
 def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
     """Names of what is not the same in both."""
     names = dict.fromkeys((*mine, *theirs))
     return [name for name in names if json.dumps(mine.get(name)) != json.dumps(theirs.get(name))]
-
-
-def _versions() -> dict[str, Any]:
-    said = provenance()["versions"]
-    # Interpreted motions sample with Pinocchio, which rounds differently.
-    return {**{name: said[name] for name in _PINNED}, "machine code": is_used()}
 
 
 def _make(place: Path, study: Study) -> None:
@@ -411,7 +419,7 @@ def _make(place: Path, study: Study) -> None:
         "grids": grids,
         "seed": study.seed,
         "inputs": study.inputs,
-        "versions": _versions(),
+        "versions": computing_versions(),
         "command": said["command"],
         "date": said["date"],
         "processor": processor_text(),
@@ -528,6 +536,10 @@ def _create(
         attributes=dict(about),
         compressors=[_zarr().codecs.ZstdCodec(), _zarr().codecs.Crc32cCodec()],
     )
+
+
+def _text(letters: Any) -> str:
+    return np.asarray(letters).tobytes().rstrip(b"\0").decode(errors="ignore")
 
 
 def _letters(text: str, length: int) -> Any:

@@ -316,6 +316,7 @@ class Study:
         *,
         workers: int | None = None,
         resume: bool = False,
+        retry: str | None = None,
         progress: Callable[[StudyProgress], Any] | None = None,
     ) -> StudyStore:
         """Compute what is missing, and store it.
@@ -327,6 +328,7 @@ class Study:
         workers : how many processes; None: one for each processor; 0: in this process, without time limits, and where
             a case that ends its process ends this one. A cluster has its own
         resume : go on with a store that is there already, which must be this study's
+        retry : "failed": go on with a store, and compute its chunks with failed cases again
         progress : called with a `StudyProgress` after each chunk; if it returns something true, the run stops, as by
             Ctrl-C: what is stored is kept
 
@@ -347,7 +349,7 @@ class Study:
 
         if progress is not None:
             check_function(progress, "progress", "a function that takes a StudyProgress")
-        return run_study(self, store, client, workers=workers, resume=resume, progress=progress)
+        return run_study(self, store, client, workers=workers, resume=resume, retry=retry, progress=progress)
 
     @property
     def _bodies(self) -> tuple[BodySource, ...]:
