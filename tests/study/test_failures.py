@@ -176,10 +176,10 @@ def test_a_worker_whose_functions_are_others_is_refused(tmp_path, monkeypatch):
     """The module is changed on the disk after the study was made."""
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    (tmp_path / "study_late.py").write_text("def value(motion):\n    return 1.0\n")
+    (tmp_path / "study_late").with_suffix(".py").write_text("def value(motion):\n    return 1.0\n")
     import study_late  # pyright: ignore[reportMissingImports]
 
     study = room.Study(RIGID, outputs=(room.Output("value", study_late.value),))
-    (tmp_path / "study_late.py").write_text("def value(motion):\n    return 2.0\n")
+    (tmp_path / "study_late").with_suffix(".py").write_text("def value(motion):\n    return 2.0\n")
     with pytest.raises(StudyError, match="study_late"):
         study.run(tmp_path / "out.zarr", workers=1)

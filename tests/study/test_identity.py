@@ -106,10 +106,10 @@ HOW = {
 def test_a_module_of_the_user_that_changed_is_another_study(tmp_path, monkeypatch, text):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    (tmp_path / "study_outputs.py").write_text(text)
-    (tmp_path / "study_helper.py").write_text("def factor():\n    return 1.0\n")
+    (tmp_path / "study_outputs").with_suffix(".py").write_text(text)
+    (tmp_path / "study_helper").with_suffix(".py").write_text("def factor():\n    return 1.0\n")
     half(tmp_path / "out.zarr", spun(imported("study_outputs").value))
-    (tmp_path / "study_helper.py").write_text("def factor():\n    return 100.0\n")
+    (tmp_path / "study_helper").with_suffix(".py").write_text("def factor():\n    return 100.0\n")
     with pytest.raises(StudyStoreError, match="module study_helper"):
         spun(imported("study_outputs").value).run(tmp_path / "out.zarr", workers=0, resume=True)
 

@@ -89,7 +89,8 @@ def _check_workers(client: Client) -> None:
     """Raise StudyError for a worker with other versions; those that come later refuse their first chunk."""
     here = provenance()["versions"]
     with contextlib.suppress(OSError, TimeoutError):
-        for address, there in client.run(provenance, on_error="return").items():
+        reported: Any = client.run(provenance, on_error="return")
+        for address, there in reported.items():
             if isinstance(there, Mapping) and (differing := other_versions(here, there["versions"])):
                 raise _other_worker(address, differing)
 

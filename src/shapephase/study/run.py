@@ -23,10 +23,11 @@ from ..errors import MissingExtraError, RunStopped, StudyError, StudyStoreError
 from ..letters import what_came
 from ..warning_filters import quiet
 from ._evaluate import DONE, Evaluator, Results
+from ._new_stores import new_store, store_to_resume
 from ._processor import computing_versions, processor_text
 from ._workers import CaseWorker
 from .progress import StudyProgress
-from .store import StudyStore, new_store, open_study, store_to_resume
+from .store import StudyStore, open_study
 from .study import Study
 
 # [s] Ctrl-C is heard at least as often.
