@@ -52,3 +52,20 @@ def slow(motion: sp.Motion) -> float:
 def logged(path: Path) -> list[str]:
     """What `counted` wrote."""
     return path.read_text().splitlines() if path.exists() else []
+
+
+def orphaning(motion: sp.Motion) -> float:
+    """Ends its process where the momentum is POISON, and leaves a child that lives on and has its files open."""
+    if round(float(motion.momentum[0]) / POISON) == 1:
+        if os.fork() == 0:
+            time.sleep(20.0)
+            os._exit(0)
+        os._exit(3)
+    return 1.0
+
+
+def lacking(motion: sp.Motion) -> float:
+    """Needs a file, which $STUDY_FILE names, where there is momentum along x."""
+    if motion.momentum[0] > 0.0 and not Path(os.environ["STUDY_FILE"]).exists():
+        raise FileNotFoundError("needed.csv: no such file")
+    return float(sp.so3.angle(motion.final_attitude))

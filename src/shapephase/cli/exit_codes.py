@@ -30,6 +30,7 @@ class ExitCode(enum.IntEnum):
     STUDY = 8
     CLUSTER = 9
     WRONG = 10
+    FAILED_CASES = 11
     OUT_OF_TIME = 124
     """As the command `timeout` ends."""
     STOPPED = 130
@@ -50,6 +51,7 @@ MEANINGS = {
     ExitCode.STUDY: "a study's file, or the store of another study",
     ExitCode.CLUSTER: "a cluster that cannot be reached, or not any more; what is stored is kept",
     ExitCode.WRONG: "an audit that found a trajectory wrong; what explains it is written",
+    ExitCode.FAILED_CASES: "a study with failed cases; the others are stored",
     ExitCode.OUT_OF_TIME: "a search that its time limit ended; the best so far is written",
     ExitCode.STOPPED: "stopped by Ctrl-C; of plan, the best so far is written",
     ExitCode.BROKEN_PIPE: "what reads the output wants no more of it",

@@ -6,13 +6,14 @@ import math
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter
 
 from ..errors import ShapeError
 from ..files import write_whole
 from ..run_progress import RunProgress
+from .exit_codes import ExitCode
 from .options import AS_TEXT, AS_WRITTEN, BodyOptions, FigureFile, PrintOptions
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -26,6 +27,7 @@ sweep_app = App(name="sweep", help_format="markdown")
 # [s] From there on remaining time is said in minutes, and in hours.
 _MINUTES = 120.0
 _HOURS = 7200.0
+_MOST = 20  # complaints shown
 # [in] Of a figure of a study.
 _HEIGHT = 2.8
 
@@ -57,12 +59,19 @@ def sweep_command(
     resume: Annotated[
         bool, Parameter(negative="", help="Go on with a store that is there; for example `--resume`.")
     ] = False,
+    retry: Annotated[
+        Literal["failed"] | None,
+        Parameter(
+            show_default=False,
+            help="Go on with a store that is there, and compute cases that failed again; for example `--retry failed`.",
+        ),
+    ] = None,
     floating: BodyOptions = AS_WRITTEN,
     printing: PrintOptions = AS_TEXT,  # noqa: ARG001
 ) -> Outcome:
     """Compute the cases of a study in a TOML file, on all processors or on a cluster, into a Zarr store.
 
-    Ctrl-C leaves a store that goes on with --resume.
+    After Ctrl-C, continue with --resume. Exit code 11: cases failed; the others are stored.
 
     Parameters
     ----------
@@ -89,14 +98,15 @@ def sweep_command(
                 say(f"shapephase: {said}", Verbosity.VERBOSE)
                 work.watch(RunProgress(now.done / now.cases, said))
 
-            filled = read.run(store, client, workers=workers, resume=resume, progress=watch)
+            filled = read.run(store, client, workers=workers, resume=resume, retry=retry, progress=watch)
     except KeyboardInterrupt:
         if Path(store).exists():
             kept = open_study(store)
             done = kept.cases - kept.counts()["missing"]
             say(f"shapephase: {done} of {kept.cases} cases are stored; --resume goes on")
         raise
-    return _report(filled)
+    outcome = _report(filled)
+    return replace(outcome, code=ExitCode.FAILED_CASES) if outcome.data["failed"] else outcome
 
 
 @sweep_app.command(name="status")
@@ -200,15 +210,29 @@ def _time(seconds: float) -> str:
 
 
 def _report(store: StudyStore) -> Outcome:
-    counts, errors = store.counts(), store.errors()
-    lines = [f"{store.path}: {store.cases} cases"]
+    counts, complaints, damaged = store.counts(), store.complaints(), store.damaged_chunks()
+    failed = sum(number for number, *_ in complaints)
+    lines = []
+    if failed:
+        lines.append(f"{failed} of {store.cases} cases failed; compute them again with --retry failed:")
+        lines += [
+            f"  {many} from case {first} on: {text} (on {where})" for many, first, text, where in complaints[:_MOST]
+        ]
+    if len(damaged):
+        lines.append(f"damaged: {store.chunk_texts(damaged)}; compute it again with --resume")
+    lines.append(f"{store.path}: {store.cases} cases")
     lines += [f"  {name.replace('_', ' '):<10} {count}" for name, count in counts.items() if count]
-    lines += [f"  case {index}: {name}: {text}" for index, name, text in errors]
     data: dict[str, Any] = {
         "store": str(store.path),
         "cases": store.cases,
+        "failed": failed,
         "counts": counts,
+        "damaged_chunks": damaged.tolist(),
         "study_hash": store.attributes["study_hash"],
-        "errors": [{"case": index, "name": name, "text": text} for index, name, text in errors],
+        "complaints": [
+            {"cases": many, "first": first, "text": text, "processor": where}
+            for many, first, text, where in complaints[:_MOST]
+        ],
+        "errors": [{"case": index, "name": name, "text": text} for index, name, text in store.errors()],
     }
     return Outcome("\n".join(lines), data)

@@ -19,6 +19,8 @@ from .distributions import Distribution, Normal, drawn_values
 COMPONENTS = ("momentum_x", "momentum_y", "momentum_z")
 LABELS = ("body", "motion", "gauge")
 """Axes of names, not of numbers."""
+LONGEST_NAME = 200
+"""Characters of what is varied or known: folders of the store have these names."""
 OF_PARTS: Mapping[str, tuple[int, ...]] = {"masses": (), "centres": (3,), "inertias": ()}
 UNITS = {
     "momentum": "kg m^2/s",
@@ -84,6 +86,8 @@ def checked_axis(name: str, given: Any, parts: int, parameters: Sequence[str]) -
     UnknownNameError, StudyError, ShapeError
     """
     lead, _, _ = name.partition(".")
+    if len(name) > LONGEST_NAME:
+        raise StudyError(f"over: a name of {len(name)} characters, {name[:20]!r}...; use {LONGEST_NAME} at most")
     if lead not in (*UNITS, *LABELS) and name not in parameters:
         raise unknown_name("axis in over", name, (*UNITS, *LABELS, *parameters))
     if name in LABELS:

@@ -8,18 +8,19 @@ import pickle
 import queue
 import threading
 import time
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from concurrent.futures import CancelledError
 from hashlib import sha256
 from typing import Any
 
 from distributed import CancelledError as TaskCancelled
-from distributed import Client, Future
+from distributed import Client, Future, get_worker
 
 from ..arrays import Integers
 from ..errors import SchedulerLostError, StudyError
+from ..provenance import provenance
 from ._evaluate import Results
-from ._processor import processor_text
+from ._processor import computing_versions, other_versions, processor_text
 from ._workers import CaseWorker
 from .study import Study
 
@@ -57,6 +58,7 @@ def chunks_on_cluster(missing: Integers, client: Client, recipe: bytes) -> Gener
         future.add_done_callback(done.put)
 
     watch = _SchedulerWatch(client)
+    _check_workers(client)
     try:
         for _ in range(len(missing)):
             while len(futures) < _ahead(client) and (number := next(left, None)) is not None:
@@ -81,6 +83,23 @@ def chunks_on_cluster(missing: Integers, client: Client, recipe: bytes) -> Gener
         if not watch.is_lost and client.status == "running":
             with contextlib.suppress(Exception):
                 client.cancel(list(futures.values()), force=True)
+
+
+def _check_workers(client: Client) -> None:
+    """Raise StudyError for a worker with other versions; those that come later refuse their first chunk."""
+    here = provenance()["versions"]
+    with contextlib.suppress(OSError, TimeoutError):
+        reported: Any = client.run(provenance, on_error="return")
+        for address, there in reported.items():
+            if isinstance(there, Mapping) and (differing := other_versions(here, there["versions"])):
+                raise _other_worker(address, differing)
+
+
+def _other_worker(address: str, differing: str) -> StudyError:
+    return StudyError(
+        f"worker {address}: {differing}: its cases would not be the same; install the study's versions there with "
+        "pip, and go on with resume=True (--resume)"
+    )
 
 
 class _SchedulerWatch:
@@ -147,7 +166,10 @@ def compute_chunk(recipe: bytes, number: int) -> _Found:
         _FREE[:] = [entry for entry in _FREE if entry[0] == key]
         worker = _FREE.pop()[1] if _FREE else None
     if worker is None:
-        study, _ = pickle.loads(recipe)
+        versions, content = pickle.loads(recipe)
+        if differing := other_versions(versions, computing_versions()):
+            raise _other_worker(get_worker().address, differing)
+        study, _ = pickle.loads(content)
         assert isinstance(study, Study)
         worker = CaseWorker(study, recipe)
     results = worker.chunk(number)

@@ -29,7 +29,7 @@ from ..shape_space.body_path import in_joint_order
 from ..shape_space.many_paths import final_attitudes
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
-from ._recipes import RigidBody, inertia_factors, made_path
+from ._recipes import RigidBody, described, digests_of_body, inertia_factors, made_path
 from .case import Case
 from .distributions import generators
 from .outputs import Output, ends_suffice, final_turn, needs_split
@@ -232,7 +232,8 @@ class Evaluator:
         name = str(case.body)
         if name not in self._bodies:
             body = load_body(case.body, **self.study.loading)
-            self._check("body", name, body.sha256)
+            for part, digest in digests_of_body(f"body {described(case.body)}", body).items():
+                self._check(part, digest)
             self._bodies[name] = body
         return self._bodies[name]
 
@@ -242,7 +243,7 @@ class Evaluator:
             self._paths.clear()
             path = in_joint_order(body, made_path(case.motion, body, case.parameters))
             if path.sha256 is not None:
-                self._check("motion", str(case.motion), path.sha256)
+                self._check(f"motion {described(case.motion)}", path.sha256)
             self._paths[key] = path
         path = self._paths[key]
         if case.joint_noise is None:
@@ -251,11 +252,10 @@ class Evaluator:
         (rng,) = generators(self.study.seed, "joint_noise samples", np.array([case.index]))
         return samples.path_through(samples.values + case.joint_noise * rng.standard_normal(samples.values.shape))
 
-    def _check(self, kind: str, name: str, digest: str | None) -> None:
+    def _check(self, name: str, digest: str) -> None:
         """Raise StudyError for a file that is not the one of the study."""
-        said = self.inputs.get(f"{kind} {name}")
-        if said is not None and digest is not None and said != digest:
-            raise StudyError(f"{kind} {name}: the file here is another than the study was begun with")
+        if self.inputs.get(name, digest) != digest:
+            raise StudyError(f"{name}: the file here is another than the study was begun with")
 
     def _put_ends(self, rows: list[int], starts: Array, ends: Array, estimates: Array, found: Results) -> None:
         first = np.broadcast_to(starts, ends.shape)

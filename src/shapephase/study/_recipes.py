@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import inspect
 import os
@@ -21,12 +20,13 @@ from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.catalog import load_body
 from ..display import short_repr
-from ..errors import ShapeError, StudyError, WrongObjectError, unknown_name
+from ..errors import ShapePhaseError, StudyError, WrongObjectError, unknown_name
 from ..examples.scenarios import MOTIONS
 from ..files import no_such_file
 from ..letters import what_came
 from ..shape_space.files.read import read_shape_path
 from ..shape_space.shape_path import ShapePath
+from ._identity import body_digest, file_digest, path_digest
 
 _LONGEST_SHOWN = 80
 _NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
@@ -153,32 +153,46 @@ def unset_parameters(source: MotionSource, given: Iterable[str]) -> list[str]:
     return [name for name in needed if name not in set(given)]
 
 
-def fingerprint(source: Any) -> str | None:
-    """SHA-256 of what a recipe is made of: a file, a body of the library, the text of a function; None: only a name."""
+def body_digests(source: BodySource, loading: Mapping[str, Any]) -> dict[str, str]:
+    """SHA-256 of a body's file and of the numbers of its links. Raises what `load_body` raises for a name."""
     if isinstance(source, RigidBody):
-        return None
-    if callable(source):
-        return hashlib.sha256(_code(source)).hexdigest()
+        return {}
+    name, found = f"body {described(source)}", {}
     if os.path.isfile(source):
-        return hashlib.sha256(Path(source).read_bytes()).hexdigest()
-    if ":" in os.fspath(source) and not os.fspath(source).startswith("example:"):
-        return hashlib.sha256(_code(imported(os.fspath(source), "function"))).hexdigest()
-    return None
+        found[name] = file_digest(source)
+    try:
+        body = load_body(source, **loading)
+    except ShapePhaseError:
+        if not found:
+            raise
+        # A file that cannot be read is a status of its cases.
+        return found
+    return digests_of_body(name, body)
 
 
-def body_fingerprint(source: BodySource, loading: Mapping[str, Any]) -> str | None:
-    """The same of a body, which is looked for. Raises what `load_body` raises for a name."""
-    if isinstance(source, RigidBody) or os.path.isfile(source):
-        return fingerprint(source)
-    return load_body(source, **loading).sha256
+def digests_of_body(name: str, body: Body) -> dict[str, str]:
+    """SHA-256 of the file and of the links of a body that is loaded."""
+    return {name: body.sha256 or "", f"links of {name}": body_digest(body)}
+
+
+def motion_digests(source: MotionSource, parameters: Mapping[str, float]) -> dict[str, str]:
+    """SHA-256 of a motion's file, or of samples of a path that its function makes. Raises StudyError."""
+    name = f"motion {described(source)}"
+    if is_file(source):
+        return {name: file_digest(source)}  # type: ignore[arg-type]
+    try:
+        return {f"samples of {name}": path_digest(motion_function(source)(**parameters))}
+    except Exception:
+        # A function that raises is a status of its cases.
+        return {}
 
 
 def described(source: Any) -> Any:
     """A recipe as JSON can hold it."""
     if isinstance(source, RigidBody):
         return {"inertia": np.asarray(source.inertia).tolist(), "duration": source.duration}
-    if isinstance(source, partial):
-        return {"function": described(source.func), "args": list(source.args), "keywords": source.keywords}
+    while isinstance(source, partial):
+        source = source.func
     if callable(source):
         return f"{source.__module__}:{getattr(source, '__qualname__', type(source).__name__)}"
     return os.fspath(source)
@@ -200,16 +214,3 @@ def part_number(body: Body, link: str) -> int:
     if link not in leads:
         raise unknown_name(f"moving part of {body.name}", link, leads)
     return leads.index(link)
-
-
-def _code(function: Any) -> bytes:
-    """The text of a function, or what stands for it."""
-    while isinstance(function, partial):
-        function = function.func
-    try:
-        return inspect.getsource(function).encode()
-    except (OSError, TypeError):
-        code = getattr(function, "__code__", None)
-        if code is None:
-            raise ShapeError(f"{function!r}: a function with a text of its own is needed") from None
-        return code.co_code

@@ -1,70 +1,81 @@
-"""What a store must say to be one: its attributes agree with each other, and every array can be read."""
+"""Files of a store: read, written and synced, and the checksum of what the store says of itself."""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import json
-import math
-from collections.abc import Iterator, Mapping
+import os
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import ShapePhaseError, StudyStoreError
-from .study import MOST_CASES, MOST_OF_A_CHUNK
-
-_MOST_OF_A_CASE = 1_000_000
-"""Numbers of one array; an output has up to a thousand for each axis of its shape."""
-_LONGEST_SAID = 120
-"""Letters of what Zarr says of a fault."""
+from ..errors import MissingExtraError, OutputFileError, StudyStoreError
+from ..files import write_whole
+from ..warning_filters import quiet
 
 
-def check_attributes(path: Path, attributes: Mapping[str, Any]) -> None:
-    """Raise StudyStoreError where a store does not say what it was written with."""
-    study, grids = attributes.get("study"), attributes.get("grids")
-    whole = {"cases": MOST_CASES, "chunk": MOST_OF_A_CHUNK, "draws": MOST_CASES}
-    for name, most in whole.items():
-        value = attributes.get(name)
-        if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= most:
-            raise damaged(path, f"{name} is {value!r:.60}, a whole number from 1 to {most} is needed")
-    digest = hashlib.sha256(json.dumps(study, sort_keys=True).encode()).hexdigest()
-    if not isinstance(study, Mapping) or digest != attributes.get("study_hash"):
-        raise damaged(path, "its study is not the one with its hash")
-    if any(attributes.get(name) != study.get(name) for name in ("chunk", "draws", "seed")):
-        raise damaged(path, "chunk, draws or seed are not those of its study")
-    if not isinstance(grids, Mapping) or not all(isinstance(values, list) for values in grids.values()):
-        raise damaged(path, "its grids are no lists by name")
-    if math.prod(map(len, grids.values())) * attributes["draws"] != attributes["cases"]:
-        raise damaged(path, f"its grids and draws do not give {attributes['cases']} cases")
-    names = {*study["over"], *(output[0] for output in study["outputs"])}
-    units, versions = attributes.get("units"), attributes.get("versions")
-    if not isinstance(units, Mapping) or set(units) != names or not isinstance(versions, Mapping):
-        raise damaged(path, "its units or versions are not those of its study")
+def metadata_of(place: Path) -> dict[str, Any]:
+    """What a group or an array says of itself; nothing where that cannot be read."""
+    with contextlib.suppress(OSError, ValueError, RecursionError):
+        whole = json.loads((place / "zarr.json").read_bytes())
+        if isinstance(whole, dict) and isinstance(whole.get("attributes"), dict):
+            return whole
+    return {}
 
 
-def array_of(path: Path, group: Any, name: str, first: int) -> Any:
-    """An array of Zarr whose first axis is so long. Raises StudyStoreError where there is none."""
-    with faults_of(path, f"array {name!r}"):
-        array = group[name]
-        shape = tuple(array.shape)
-    if shape[:1] != (first,) or math.prod(shape[1:]) > _MOST_OF_A_CASE:
-        raise damaged(path, f"array {name!r} has the shape {shape}, where the first axis has {first}")
-    return array
+def metadata_digest(whole: Mapping[str, Any]) -> str:
+    """SHA-256 of the metadata of a store."""
+    own = {name: value for name, value in whole.get("attributes", {}).items() if name != "digest"}
+    return hashlib.sha256(json.dumps({**whole, "attributes": own}, sort_keys=True).encode()).hexdigest()
+
+
+def content_of(file: Path) -> bytes | None:
+    """The bytes of a file; None where it cannot be read."""
+    try:
+        return file.read_bytes()
+    except OSError:
+        return None
+
+
+def write_file(file: Path, content: bytes) -> None:
+    file.parent.mkdir(exist_ok=True)
+    write_whole(file, lambda stream: stream.write(content))
+
+
+def sync_files(root: Path, files: Collection[Path]) -> None:
+    """Wait until files, and the folders that they are in, are on the disk."""
+    folders = {root}
+    for file in files:
+        folders.update(folder for folder in file.parents if folder.is_relative_to(root))
+    for place in (*files, *folders):
+        handle = os.open(place, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 @contextlib.contextmanager
-def faults_of(path: Path, what: str) -> Iterator[None]:
-    """Whatever goes wrong with what is stored, as an error of ours."""
+def disk_faults(path: Path) -> Iterator[None]:
+    """What the system says of files, as an error of ours."""
     try:
         yield
-    except (ShapePhaseError, OSError):
+    except (OutputFileError, StudyStoreError):
         raise
-    except Exception as error:
-        # Zarr and its codecs raise what they like.
-        said = " ".join(str(error).split())[:_LONGEST_SAID]
-        raise damaged(path, f"{what} cannot be used ({type(error).__name__}: {said})") from None
+    except OSError as error:
+        raise OutputFileError(f"cannot write {path}: {error.strerror or error}") from None
 
 
 def damaged(path: Path, what: str) -> StudyStoreError:
-    """The error for a store that says what cannot be."""
-    return StudyStoreError(f"{path}: the store is damaged: {what}; the study fills a new one")
+    """The error for a store that is not what was written."""
+    return StudyStoreError(f"{path}: the store is damaged: {what}; compute it again with resume=True (--resume)")
+
+
+def zarr_module() -> Any:
+    try:
+        with quiet():
+            import zarr
+    except ImportError:
+        raise MissingExtraError("a study needs Zarr; install it with: pip install 'shapephase[study]'") from None
+    return zarr

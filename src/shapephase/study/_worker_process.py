@@ -13,6 +13,8 @@ from multiprocessing.connection import Connection
 
 import numpy as np
 
+from ..errors import StudyError
+
 # [s] Between looks at whether the process that started this one is still there.
 _LOOK = 1.0
 
@@ -26,6 +28,9 @@ def serve(descriptor: int, parent: int) -> None:
     sys.stdout = sys.stderr
     warnings.simplefilter("ignore")
     connection = Connection(descriptor)
+    # A child of a case would keep the connection open when this process is gone.
+    os.set_inheritable(descriptor, False)
+    os.register_at_fork(after_in_child=connection.close)
     try:
         _answer(connection)
     except (EOFError, BrokenPipeError, ConnectionResetError):
@@ -35,7 +40,12 @@ def serve(descriptor: int, parent: int) -> None:
 def _answer(connection: Connection) -> None:
     from ._evaluate import Evaluator
 
-    study, inputs = pickle.loads(connection.recv_bytes())
+    _, recipe = pickle.loads(connection.recv_bytes())
+    study, inputs = pickle.loads(recipe)
+    for name, digest in study.function_inputs.items():
+        if inputs.get(name, digest) != digest:
+            connection.send(StudyError(f"{name} is another where it is computed than where the study was begun"))
+            return
     evaluator = Evaluator(study, inputs)
     connection.send("ready")
     while True:

@@ -7,14 +7,17 @@ the case at which that one ends has a status, and the others their results, with
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import signal
 import socket
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from multiprocessing.connection import Connection
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +27,8 @@ from .study import Study
 
 # [s] A process that has not begun by then will not.
 _BEGINNING = 300.0
+# [s] Between looks at whether a process is still there.
+_LOOK = 0.5
 # Processes in a row that end before they begin.
 _MOST_STARTS = 3
 # Of the time limit of a case: what each case of a chunk adds to the time of the chunk.
@@ -96,7 +101,8 @@ class CaseWorker:
                 return
             try:
                 self._start()
-                self._answer(_BEGINNING)
+                if isinstance(refusal := self._answer(_BEGINNING), StudyError):
+                    raise refusal
             except _Over:
                 self._check_open()
         if self._process is None or self._process.poll() is not None:
@@ -125,10 +131,16 @@ class CaseWorker:
         with self._lost():
             self._connected.send((way, first, stop))
 
-    def _answer(self, seconds: float | None) -> Results:
+    def _answer(self, seconds: float | None) -> Any:
+        end = math.inf if seconds is None else time.monotonic() + seconds
         with self._lost():
-            if self._connected.poll(seconds):
-                return self._connected.recv()
+            # The process is watched too: a child of it may keep the connection open.
+            while (left := end - time.monotonic()) > 0.0:
+                is_gone = self._process is None or self._process.poll() is not None
+                if self._connected.poll(0.0 if is_gone else min(left, _LOOK)):
+                    return self._connected.recv()
+                if is_gone:
+                    raise EOFError
         self._stop()
         raise _Over(TIMED_OUT, f"not done after {seconds:g} s")
 

@@ -13,7 +13,6 @@ import numpy as np
 from ..arguments import check_file_name, check_object
 from ..errors import MissingExtraError, UnknownNameError
 from ..files import write_whole
-from ._stored import faults_of
 from .store import STATUS, StudyStore
 
 _LETTERS = ("error_name", "error_text")
@@ -74,8 +73,7 @@ def study_table(store: StudyStore) -> Any:
         values = store.values(name)
         labels = grids.get(name, [])
         if labels and isinstance(labels[0], str):
-            with faults_of(store.path, f"array {name!r}"):
-                columns[name] = [labels[int(one)] if np.isfinite(one) else "" for one in values]
+            columns[name] = [labels[int(one)] if np.isfinite(one) else "" for one in values]
             continue
         for entry in itertools.product(*map(range, values.shape[1:])):
             columns["_".join([name, *map(str, entry)])] = values[(slice(None), *entry)]

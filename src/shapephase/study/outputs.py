@@ -17,6 +17,7 @@ from ..letters import what_came
 from ..phases.phase_split import PhaseSplit
 from ..phases.return_map import fixed_points
 from ..reconstruction.reconstruction import Motion
+from ._axes import LONGEST_NAME
 
 _ROTATION = (3, 3)
 MOST_FIXED_POINTS = 12
@@ -151,6 +152,8 @@ def outputs_argument(given: Sequence[str | Output], taken: Sequence[str]) -> tup
     if not found:
         raise StudyError("outputs: at least one is needed")
     for name in names:
+        if len(name) > LONGEST_NAME:
+            raise StudyError(f"outputs: a name of {len(name)} characters, {name[:20]!r}...; use {LONGEST_NAME} at most")
         if names.count(name) > 1 or name in taken or not name.isidentifier():
             raise StudyError(f"outputs: {name!r} stands twice, is no plain name, or has another meaning already")
     return tuple(found)

@@ -7,24 +7,27 @@ import math
 import os
 import pickle
 import queue
+import signal
 import threading
 import time
-from collections.abc import Callable, Generator
-from contextlib import closing
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, contextmanager
+from types import FrameType
 from typing import Any
 
 import numpy as np
 
-from ..arguments import check_file_name, check_flag, check_object
+from ..arguments import check_choice, check_file_name, check_flag, check_object
 from ..arrays import Integers
 from ..errors import MissingExtraError, RunStopped, StudyError, StudyStoreError
 from ..letters import what_came
 from ..warning_filters import quiet
 from ._evaluate import DONE, Evaluator, Results
-from ._processor import processor_text
+from ._new_stores import new_store, store_to_resume
+from ._processor import computing_versions, processor_text
 from ._workers import CaseWorker
 from .progress import StudyProgress
-from .store import StudyStore, check_same, new_store, open_study
+from .store import StudyStore, open_study
 from .study import Study
 
 # [s] Ctrl-C is heard at least as often.
@@ -44,21 +47,26 @@ def run_study(
     *,
     workers: int | None,
     resume: bool,
+    retry: str | None,
     progress: Callable[[StudyProgress], Any] | None,
 ) -> StudyStore:
     """As `Study.run`."""
     check_file_name(store, "store")
     check_flag(resume, "resume")
+    if retry is not None:
+        check_choice(retry, "retry", ("failed",))
     if client is not None:
         check_object(client, "Client", "client")
     if workers is not None and (client is not None or not isinstance(workers, int) or workers < 0):
         raise StudyError(f"workers: a whole number, 0 or more, is needed, without a client; got {what_came(workers)}")
     if workers == 0 and study.time_limit is not None:
         raise StudyError("time_limit: only a process of its own can be stopped; give one worker or more")
-    target = _target(study, store, resume)
+    target = store_to_resume(store, study) if retry else _target(study, store, resume)
     with target.locked():
         missing = target.missing_chunks()
-        watch = _Tally(study, target, progress)
+        if retry:
+            missing = np.union1d(missing, target.failed_chunks())
+        watch = _Tally(study, target, missing, progress)
         if not len(missing):
             return target
         if client is not None:
@@ -81,7 +89,8 @@ def recipe_of(study: Study) -> bytes:
     except ImportError:
         cloudpickle = pickle  # type: ignore[assignment]
     try:
-        return cloudpickle.dumps((study, study.inputs))
+        # Versions come first: of others the study may not even be readable.
+        return pickle.dumps((computing_versions(), cloudpickle.dumps((study, study.inputs))))
     except Exception as error:
         raise StudyError(f"the study cannot be sent to another process: {error}") from None
 
@@ -91,18 +100,22 @@ def _target(study: Study, store: str | os.PathLike[str], resume: bool) -> StudyS
         if os.path.exists(store):
             # What is there is looked at first: a store says so.
             open_study(store)
-            raise StudyStoreError(f"{store}: there is a store already; go on with it by resume, or name another place")
+            raise StudyStoreError(
+                f"{store}: there is a store already; go on with resume=True (--resume), or name another place"
+            )
         return new_store(store, study)
-    target = open_study(store)
-    check_same(target, study)
-    return target
+    return store_to_resume(store, study)
 
 
 class _Tally:
     """Counts, and tells whoever asked."""
 
-    def __init__(self, study: Study, store: StudyStore, tell: Callable[[StudyProgress], Any] | None) -> None:
+    def __init__(
+        self, study: Study, store: StudyStore, missing: Integers, tell: Callable[[StudyProgress], Any] | None
+    ) -> None:
         statuses = store.statuses()
+        for number in missing.tolist():
+            statuses[slice(*study.chunk_range(number))] = 0
         self._cases, self._tell = study.cases, tell
         self._done, self._failed = int(np.count_nonzero(statuses)), int(np.count_nonzero(statuses > DONE))
         self._begun, self._at_first = time.monotonic(), self._done
@@ -123,10 +136,33 @@ class _Tally:
 
 def _in_this_process(study: Study, missing: Integers) -> Chunks:
     evaluator = Evaluator(study, study.inputs)
-    for number in missing.tolist():
-        with quiet():
-            results = evaluator.together(np.arange(*study.chunk_range(number)))
-        yield number, results, processor_text()
+    with _noted_interrupts() as pressed:
+        for number in missing.tolist():
+            with quiet():
+                results = evaluator.together(np.arange(*study.chunk_range(number)))
+            if pressed:
+                raise KeyboardInterrupt
+            yield number, results, processor_text()
+
+
+@contextmanager
+def _noted_interrupts() -> Iterator[list[int]]:
+    """Ctrl-C as a list that fills up: compiled code and functions of the user may lose its KeyboardInterrupt."""
+    pressed: list[int] = []
+
+    def note(number: int, _: FrameType | None) -> None:
+        pressed.append(number)
+        raise KeyboardInterrupt
+
+    in_main = threading.current_thread() is threading.main_thread()
+    is_default = in_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if is_default:
+        signal.signal(signal.SIGINT, note)
+    try:
+        yield pressed
+    finally:
+        if is_default:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def _on_this_machine(study: Study, missing: Integers, workers: int | None) -> Chunks:

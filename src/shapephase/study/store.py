@@ -1,14 +1,18 @@
-"""The store of a study: one array for each result, in which a chunk of cases is one file, and the status comes last."""
+"""The store of a study: one array for each result, in which a chunk of cases is one file, and its seal comes last.
+
+The seal of a chunk is the SHA-256 of its files, its number, the study and the versions. A chunk whose seal is missing
+or does not fit is not done: a flipped bit, a lost, exchanged or older file is never read as a value.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import errno
 import fcntl
+import hashlib
+import itertools
 import json
 import os
-import secrets
-import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,20 +24,16 @@ import numpy as np
 from ..arguments import check_choice, check_file_name
 from ..arrays import Integers
 from ..display import short_repr
-from ..errors import MissingExtraError, OutputFileError, StudyStoreError
-from ..integrator.machine_code import is_used
+from ..errors import MissingExtraError, StudyStoreError
 from ..letters import printable
-from ..provenance import provenance
-from ..warning_filters import quiet
-from ._axes import OF_PARTS
-from ._evaluate import DIED, DONE, NAME_LENGTH, RAISED, TEXT_LENGTH, TIMED_OUT, Results
-from ._processor import processor_text
-from ._stored import array_of, check_attributes, damaged, faults_of
+from ._evaluate import DIED, DONE, RAISED, TIMED_OUT, Results
+from ._stored import content_of, damaged, disk_faults, metadata_digest, metadata_of, sync_files, zarr_module
 
 if TYPE_CHECKING:
-    from .study import Study
+    pass
 
-FORMAT = "shapephase study 1"
+FORMAT = "shapephase study 2"
+_WITHOUT_SEALS = "shapephase study 1"
 STATUS: Mapping[str, int] = {"missing": 0, "done": DONE, "raised": RAISED, "timed_out": TIMED_OUT, "died": DIED}
 """What the numbers of `status` say: not computed yet, done, an error was raised, its time was over, its process died.
 
@@ -44,10 +44,8 @@ Examples
 """
 _OF_EVERY_STUDY = ("status", "error_name", "error_text", "processor")
 """Names of arrays."""
-_PROCESSOR_LENGTH = 96
+PROCESSOR_LENGTH = 96
 """Of what a chunk was computed by [bytes]."""
-_PINNED = ("shapephase", "numpy", "scipy", "pin", "python")
-"""Versions on which the bits of results depend."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,24 +76,21 @@ class StudyStore:
         return int(self.attributes["cases"])
 
     def values(self, name: str) -> Any:
-        """An array of the store, of all cases, in memory.
+        """An array of the store, of all cases, in memory; NaN or 0 where a chunk is missing.
 
         Raises
         ------
         UnknownNameError
             If it has none of this name.
         StudyStoreError
-            If it is damaged.
+            If a chunk is damaged, which is named.
         """
-        with faults_of(self.path, f"array {name!r}"):
-            return self._array(name)[...]
+        array = self._array(name)
+        return self._sealed(array, self._unfinished_chunks())
 
     def statuses(self) -> Any:
-        """(cases,) whole numbers as in `STATUS`."""
-        found = self.values("status")
-        if found.ndim != 1 or found.dtype != np.uint8 or found.max() > max(STATUS.values()):
-            raise damaged(self.path, "status has other numbers than there are")
-        return found
+        """(cases,) whole numbers as in `STATUS`; a chunk that is damaged is missing."""
+        return self._sealed(self._array("status"), self.missing_chunks())
 
     def counts(self) -> dict[str, int]:
         """How many cases have which status."""
@@ -103,20 +98,59 @@ class StudyStore:
         return {name: int(counted[number]) for name, number in STATUS.items()}
 
     def missing_chunks(self) -> Integers:
-        """Numbers of the chunks that are not stored, or only in part."""
-        chunk = int(self.attributes["chunk"])
-        starts = np.arange(0, self.cases, chunk)
-        return np.flatnonzero(np.minimum.reduceat(self.statuses(), starts) == 0)
+        """Numbers of the chunks that are not stored, or only in part, or damaged."""
+        return np.array([number for number in range(self._chunks) if not self._is_whole(number)], dtype=np.int64)
+
+    def damaged_chunks(self) -> Integers:
+        """Numbers of the chunks that were stored and are not what they were; a run with `resume` computes them again.
+
+        Examples
+        --------
+        >>> study = sp.study.Study("cat", "cat_righting", {"momentum_z": [0.0, 0.1, 0.2]}, outputs=("turn",), chunk=1)
+        >>> store = study.run("flipped.zarr", workers=0)
+        >>> _ = (store.path / "turn" / "c" / "1").write_bytes(b"")
+        >>> store.damaged_chunks().tolist(), store.counts()["missing"]
+        ([1], 1)
+        """
+        return self._with_seal(self.missing_chunks())
+
+    def failed_chunks(self) -> Integers:
+        """Numbers of the chunks with cases that have no results."""
+        return np.unique(np.flatnonzero(self.statuses() > DONE) // int(self.attributes["chunk"]))
+
+    def chunk_texts(self, numbers: Integers) -> str:
+        """For example "chunk 3 (cases 15 to 19) and 2 more"."""
+        first = int(numbers[0])
+        part = self._part(first)
+        more = f" and {len(numbers) - 1} more" if len(numbers) > 1 else ""
+        return f"chunk {first} (cases {part.start} to {part.stop - 1}){more}"
 
     def errors(self, most: int = 20) -> list[tuple[int, str, str]]:
         """The first cases without results: index, name of the error, what it said."""
-        found = []
-        for index in np.flatnonzero(self.statuses() > DONE)[:most].tolist():
-            with faults_of(self.path, f"the error of case {index}"):
-                said = [np.asarray(self._array(name)[index]) for name in ("error_name", "error_text")]
-            kind, text = (bytes(letters).rstrip(b"\0").decode(errors="ignore") for letters in said)
-            found.append((index, kind, text))
-        return found
+        return list(itertools.islice(self._failures(), most))
+
+    def complaints(self) -> list[tuple[int, int, str, str]]:
+        """What failed cases say, the most frequent first: how many cases, the first of them, the error, its processor.
+
+        Examples
+        --------
+        >>> study = sp.study.Study("cat", "cat_righting", {"momentum_z": [0.0, 0.1, 0.2]}, outputs=("turn",))
+        >>> study.run("well.zarr", workers=0).complaints()
+        []
+        """
+        found: dict[tuple[str, str], list[int]] = {}
+        for index, name, text in self._failures():
+            where = _text(self._array("processor")[index // int(self.attributes["chunk"])])
+            found.setdefault((f"{name}: {text}", where), []).append(index)
+        listed = [(len(cases), cases[0], text, where) for (text, where), cases in found.items()]
+        return sorted(listed, key=lambda one: -one[0])
+
+    def _failures(self) -> Iterator[tuple[int, str, str]]:
+        for number in self.failed_chunks().tolist():
+            part = self._part(number)
+            status, names, texts = (self._array(name)[part] for name in ("status", "error_name", "error_text"))
+            for row in np.flatnonzero(status > DONE).tolist():
+                yield part.start + row, _text(names[row]), _text(texts[row])
 
     def dataset(self) -> Any:
         """All of it as an `xarray.Dataset`, along the dimensions of the grids, and of the draws where there are more.
@@ -132,60 +166,121 @@ class StudyStore:
             raise MissingExtraError(
                 "a data set needs xarray; install it with: pip install 'shapephase[study]'"
             ) from None
-        with faults_of(self.path, "it"):
-            return self._dataset(xarray)
-
-    def _dataset(self, xarray: Any) -> Any:
-        flat = xarray.open_zarr(self.path).load()
         grids = {name: list(values) for name, values in self.attributes["grids"].items()}
         draws = int(self.attributes["draws"])
         dims = {**{name: len(values) for name, values in grids.items()}, "draw": draws}
         if draws == 1 and len(dims) > 1:
             del dims["draw"]
-        found = {}
-        for name, array in flat.data_vars.items():
-            if name in grids or array.dims[:1] != ("case",):
-                continue
-            values = array.values.reshape(*dims.values(), *array.shape[1:])
-            found[name] = ((*dims, *array.dims[1:]), values, array.attrs)
+        found, missing = {}, self._unfinished_chunks()
+        for name in (*self.attributes["units"], "status", "error_name", "error_text"):
+            if name not in grids:
+                array = self._array(name)
+                values = self._sealed(array, missing)
+                named = (*dims, *array.metadata.dimension_names[1:])
+                found[name] = (named, values.reshape(*dims.values(), *values.shape[1:]), dict(array.attrs))
         coordinates = {
             name: (name, values, {"units": self.attributes["units"].get(name, "")})
             for name, values in grids.items()
             if np.ndim(values) == 1
         }
-        return xarray.Dataset(found, coordinates, flat.attrs)
+        return xarray.Dataset(found, coordinates, self.attributes)
 
     def write(self, number: int, results: Results, processor: str) -> None:
-        """Store a chunk; the status comes last. Raises OutputFileError."""
-        first = number * int(self.attributes["chunk"])
-        part = slice(first, first + len(results.status))
-        with _disk_faults(self.path), faults_of(self.path, f"chunk {number}"):
-            for name, values in {**results.values, **results.axes}.items():
+        """Store a chunk; its seal comes when all else is on the disk. Raises OutputFileError."""
+        part = self._part(number)
+        rows: dict[str, Any] = {**results.values, **results.axes, "status": results.status}
+        if np.any(results.status > DONE):
+            rows |= {"error_name": results.error_name, "error_text": results.error_text}
+        with disk_faults(self.path):
+            for name in self._names:
+                # What is there may be damaged: Zarr reads a chunk that it fills only in part.
+                self._file(name, number).unlink(missing_ok=True)
+            for name, values in rows.items():
                 self._array(name)[part] = values
-            if np.any(results.status > DONE):
-                self._array("error_name")[part] = results.error_name
-                self._array("error_text")[part] = results.error_text
-            self._array("processor")[number] = _letters(processor, _PROCESSOR_LENGTH)
-            self._array("status")[part] = results.status
+            self._array("processor")[number] = _letters(processor, PROCESSOR_LENGTH)
+            # Zarr writes no file for a chunk of fill values alone.
+            files = [self._file(name, number) for name in (*rows, "processor")]
+            sync_files(self.path, [file for file in files if file.exists()])
+            self._array("seal")[number] = np.frombuffer(self._seal(number), dtype=np.uint8)
+            sync_files(self.path, [self._file("seal", number)])
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
         """Nobody else writes. Raises StudyStoreError where somebody does."""
-        with open(self.path / "zarr.json", "rb") as handle:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                if error.errno in (errno.EAGAIN, errno.EACCES):
-                    raise StudyStoreError(f"{self.path}: another run is writing to this store") from None
+        handle = os.open(self.path, os.O_RDONLY)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
             yield
+        except OSError as error:
+            if error.errno in (errno.EAGAIN, errno.EACCES):
+                raise StudyStoreError(
+                    f"{self.path}: another run is writing to this store; wait for it, or name another place"
+                ) from None
+            raise
+        finally:
+            os.close(handle)
 
     def _array(self, name: str) -> Any:
         """One array of the store, opened once."""
         if not isinstance(name, str) or name not in self._arrays:
-            check_choice(name, "array of the store", (*self.attributes["units"], *_OF_EVERY_STUDY))
-            first = -(-self.cases // int(self.attributes["chunk"])) if name == "processor" else self.cases
-            self._arrays[name] = array_of(self.path, self._group, name, first)
+            if name != "seal":
+                check_choice(name, "array of the store", (*self.attributes["units"], *_OF_EVERY_STUDY))
+            self._arrays[name] = self._group[name]
         return self._arrays[name]
+
+    def _sealed(self, array: Any, missing: Integers) -> Any:
+        """The numbers of an array where its chunks are whole, elsewhere its fill value."""
+        if not len(missing):
+            return array[...]
+        found = np.full(array.shape, array.fill_value, dtype=array.dtype)
+        for number in np.setdiff1d(np.arange(self._chunks), missing).tolist():
+            part = self._part(number) if array.shape[0] == self.cases else slice(number, number + 1)
+            found[part] = array[part]
+        return found
+
+    def _unfinished_chunks(self) -> Integers:
+        """As `missing_chunks`. Raises StudyStoreError where some of them are damaged."""
+        missing = self.missing_chunks()
+        if len(bad := self._with_seal(missing)):
+            raise damaged(self.path, self.chunk_texts(bad))
+        return missing
+
+    def _with_seal(self, numbers: Integers) -> Integers:
+        return np.array([one for one in numbers.tolist() if self._file("seal", one).exists()], dtype=np.int64)
+
+    @property
+    def _chunks(self) -> int:
+        return -(-self.cases // int(self.attributes["chunk"]))
+
+    def _part(self, number: int) -> slice:
+        """The cases of a chunk."""
+        chunk = int(self.attributes["chunk"])
+        return slice(number * chunk, min((number + 1) * chunk, self.cases))
+
+    @property
+    def _names(self) -> tuple[str, ...]:
+        """Arrays that a seal is of."""
+        return (*sorted(self.attributes["units"]), *_OF_EVERY_STUDY)
+
+    def _file(self, name: str, number: int) -> Path:
+        """The file of a chunk of an array."""
+        return (
+            self.path
+            / name
+            / self._array(name).metadata.encode_chunk_key((number,) + (0,) * (self._array(name).ndim - 1))
+        )
+
+    def _seal(self, number: int) -> bytes:
+        """SHA-256 of the files of a chunk, its number, the study and the versions."""
+        identity = [self.attributes["study_hash"], self.attributes["versions"], number]
+        seal = hashlib.sha256(json.dumps(identity, sort_keys=True).encode())
+        for name in self._names:
+            content = content_of(self._file(name, number))
+            seal.update(f"\n{name} {None if content is None else len(content)}\n".encode() + (content or b""))
+        return seal.digest()
+
+    def _is_whole(self, number: int) -> bool:
+        return content_of(self._file("seal", number)) == self._seal(number)
 
     @cached_property
     def _arrays(self) -> dict[str, Any]:
@@ -193,7 +288,7 @@ class StudyStore:
 
     @cached_property
     def _group(self) -> Any:
-        return _zarr().open_group(self.path, mode="r+", zarr_format=3)
+        return zarr_module().open_group(self.path, mode="r+", zarr_format=3)
 
 
 def open_study(path: str | os.PathLike[str]) -> StudyStore:
@@ -217,146 +312,22 @@ def open_study(path: str | os.PathLike[str]) -> StudyStore:
     place = Path(path)
     if not os.path.exists(place):
         raise StudyStoreError(f"{place}: there is no store of a study")
-    try:
-        attributes = dict(_zarr().open_group(place, mode="r", zarr_format=3).attrs)
-    except MissingExtraError:
-        raise
-    except Exception:
-        attributes = {}
-    if attributes.get("format") != FORMAT:
-        raise StudyStoreError(f"{place}: what is there is no store of a study")
-    check_attributes(place, attributes)
+    whole = metadata_of(place)
+    attributes = whole.get("attributes", {})
+    if attributes.get("format") == _WITHOUT_SEALS:
+        raise StudyStoreError(
+            f"{place}: an earlier version wrote this store, without checksums; read it with xarray.open_zarr, or "
+            "compute the study into a new store"
+        )
+    if attributes.get("digest") != metadata_digest(whole):
+        if not (place / "seal").is_dir():
+            raise StudyStoreError(f"{place}: what is there is no store of a study")
+        raise damaged(place, "its zarr.json is not what was written")
     return StudyStore(place, attributes)
 
 
-def new_store(path: str | os.PathLike[str], study: Study) -> StudyStore:
-    """Make an empty store, whole or not at all. Raises StudyStoreError where something is already, OutputFileError."""
-    place = Path(path)
-    if os.path.exists(place):
-        raise StudyStoreError(f"{place}: there is something already; go on with it by resume, or name another place")
-    if not place.parent.is_dir():
-        raise OutputFileError(f"cannot write {place}: there is no such folder {place.parent}")
-    temporary = place.with_name(f".{place.name}.{secrets.token_hex(4)}.part")
-    try:
-        with _disk_faults(place):
-            _make(temporary, study)
-            os.rename(temporary, place)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
-    return open_study(place)
-
-
-def check_same(store: StudyStore, study: Study) -> None:
-    """Raise StudyStoreError for a store that another study began, or this one with other versions."""
-    if store.attributes["study_hash"] != study.hash:
-        mine, theirs = study.description, store.attributes["study"]
-        changed = [name for name in mine if json.dumps(mine[name]) != json.dumps(theirs.get(name))]
-        raise StudyStoreError(
-            f"{store.path}: this is the store of another study, of seed {store.attributes['seed']} and "
-            f"{store.cases} cases; different: {', '.join(changed)}"
-        )
-    then, now = store.attributes["versions"], _versions()
-    for name, said in now.items():
-        if then.get(name) != said:
-            raise StudyStoreError(
-                f"{store.path}: it was begun with {name} {then.get(name)}, here it is {said}: the cases would not be "
-                "the same; use those versions, or begin a new store"
-            )
-
-
-def _versions() -> dict[str, Any]:
-    said = provenance()["versions"]
-    # Interpreted motions sample with Pinocchio, which rounds differently.
-    return {**{name: said[name] for name in _PINNED}, "machine code": is_used()}
-
-
-def _make(place: Path, study: Study) -> None:
-    said = provenance()
-    grids = {
-        axis.name: [str(one) for one in axis.grid] if isinstance(axis.grid, tuple) else np.asarray(axis.grid).tolist()
-        for axis in study.axes
-        if axis.grid is not None
-    }
-    attributes = {
-        "format": FORMAT,
-        "study": study.description,
-        "study_hash": study.hash,
-        "cases": study.cases,
-        "chunk": study.chunk,
-        "draws": study.draws,
-        "grids": grids,
-        "seed": study.seed,
-        "inputs": study.inputs,
-        "versions": _versions(),
-        "command": said["command"],
-        "date": said["date"],
-        "processor": processor_text(),
-        "units": {
-            **{axis.name: axis.unit for axis in study.axes},
-            **{output.name: output.unit for output in study.resolved_outputs},
-        },
-    }
-    group = _zarr().create_group(place, zarr_format=3, attributes=attributes)
-    meanings = {"flag_values": list(STATUS.values()), "flag_meanings": " ".join(STATUS)}
-    letters = {"about": "letters in UTF-8"}
-    _create(group, study, "status", np.uint8, 0, {}, meanings)
-    for name, length in (("error_name", NAME_LENGTH), ("error_text", TEXT_LENGTH)):
-        _create(group, study, name, np.uint8, 0, {f"{name}_letter": length}, letters)
-    group.create_array(
-        "processor",
-        shape=(study.chunks, _PROCESSOR_LENGTH),
-        chunks=(1, _PROCESSOR_LENGTH),
-        dtype=np.uint8,
-        fill_value=0,
-        dimension_names=("chunk", "processor_letter"),
-        attributes=letters,
-    )
-    for axis in study.axes:
-        about: dict[str, Any] = {"units": axis.unit, "role": "varied"}
-        if isinstance(axis.grid, tuple):
-            about["labels"] = grids[axis.name]
-        _create(group, study, axis.name, np.float64, np.nan, _dimensions(axis.name, axis.shape), about)
-    for output in study.resolved_outputs:
-        about = {"units": output.unit, "role": "result", "about": output.about}
-        _create(group, study, output.name, np.float64, np.nan, _dimensions(output.name, output.shape), about)
-    # Zarr's specification does not have it yet, and xarray complains where it is missing.
-    with quiet():
-        _zarr().consolidate_metadata(place)
-
-
-def _dimensions(name: str, shape: tuple[int, ...]) -> dict[str, int]:
-    """The axes of one value, by name."""
-    if shape == (3, 3):
-        return {"row": 3, "column": 3}
-    names = [f"{name}_{place}" for place in range(len(shape))]
-    if name in OF_PARTS:
-        names[0] = "part"
-    if shape and shape[-1] == 3:
-        names[-1] = "xyz"
-    return dict(zip(names, shape, strict=True))
-
-
-def _create(
-    group: Any,
-    study: Study,
-    name: str,
-    kind: type[Any],
-    fill: float,
-    of_one: Mapping[str, int],
-    about: Mapping[str, Any],
-) -> None:
-    group.create_array(
-        name,
-        shape=(study.cases, *of_one.values()),
-        chunks=(min(study.chunk, study.cases), *of_one.values()),
-        dtype=kind,
-        fill_value=fill,
-        dimension_names=("case", *of_one),
-        attributes=dict(about),
-        # A chunk of fill values would else not be written, as if it were not done.
-        config={"write_empty_chunks": True},
-    )
+def _text(letters: Any) -> str:
+    return np.asarray(letters).tobytes().rstrip(b"\0").decode(errors="ignore")
 
 
 def _letters(text: str, length: int) -> Any:
@@ -364,23 +335,3 @@ def _letters(text: str, length: int) -> Any:
     encoded = printable(text).encode()[:length]
     found[: len(encoded)] = np.frombuffer(encoded, dtype=np.uint8)
     return found
-
-
-@contextlib.contextmanager
-def _disk_faults(path: Path) -> Iterator[None]:
-    """What the system says of files, as an error of ours."""
-    try:
-        yield
-    except (OutputFileError, StudyStoreError):
-        raise
-    except OSError as error:
-        raise OutputFileError(f"cannot write {path}: {error.strerror or error}") from None
-
-
-def _zarr() -> Any:
-    try:
-        with quiet():
-            import zarr
-    except ImportError:
-        raise MissingExtraError("a study needs Zarr; install it with: pip install 'shapephase[study]'") from None
-    return zarr

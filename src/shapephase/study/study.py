@@ -20,21 +20,23 @@ from ..arrays import Array, Integers
 from ..body.catalog import load_body, loading_options
 from ..deformation.frames import gauge_link
 from ..display import short_repr
-from ..errors import ShapePhaseError, StudyError
+from ..errors import ShapePhaseError, StudyError, WrongObjectError
 from ..letters import what_came
 from ._axes import COMPONENTS, LABELS, OF_PARTS, UNITS, Axis, check_labels, checked_axis, start_attitudes
+from ._identity import function_digests
 from ._recipes import (
     BodySource,
     MotionSource,
     RigidBody,
-    body_fingerprint,
+    body_digests,
     check_body,
     check_motion,
     check_parameters,
     described,
-    fingerprint,
     inertia_factors,
     is_file,
+    motion_digests,
+    motion_function,
     parameter_names,
     part_number,
     unset_parameters,
@@ -50,7 +52,7 @@ MOST_CASES = 1_000_000_000
 """Their statuses alone are a gigabyte."""
 MOST_OF_A_CHUNK = 100_000
 """Cases that are in memory at once, with room for some kB each."""
-_TAKEN = ("status", "error_name", "error_text", "processor", "case", "chunk")
+_TAKEN = ("seal", "status", "error_name", "error_text", "processor", "case", "chunk")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,8 @@ class Study:
     momentum, attitude, tolerance, gauge, parameters : of what is not varied; the attitude a quaternion x y z w,
         None: the identity, also along motions of the library that commands begin otherwise
     time_limit : of one case [s]; None: none
+    version : of the functions of the motion and the outputs, a text that changes when their results do; None: they are
+        compared by their code and all that it refers to when the study is resumed
     root, root_body, packages, xacro_args, on_unphysical : how the bodies' files are read, as for `load_body`
     length_unit, person_mass : of the bodies' BVH files, as for `load_body` [m, kg]
 
@@ -110,6 +114,7 @@ class Study:
     gauge: str = field(default="horizontal", kw_only=True)
     parameters: Mapping[str, float] = field(default_factory=dict, kw_only=True)
     time_limit: float | None = field(default=None, kw_only=True)
+    version: str | None = field(default=None, kw_only=True)
     root: str | None = field(default=None, kw_only=True)
     root_body: str | None = field(default=None, kw_only=True)
     packages: Sequence[str | os.PathLike[str]] = field(default=(), kw_only=True)
@@ -132,6 +137,8 @@ class Study:
         gauge_link(self.gauge)
         if self.time_limit is not None and not number_argument(self.time_limit, "time_limit", "s") > 0.0:
             raise StudyError(f"time_limit: seconds above 0 are needed, got {what_came(self.time_limit)}")
+        if self.version is not None and not isinstance(self.version, str):
+            raise WrongObjectError(f"version: a text is needed, got {what_came(self.version)}")
         if isinstance(self.body, RigidBody) and self.loading:
             raise StudyError(f"{next(iter(self.loading))}: a rigid body is not read from a file")
         if self.cases > MOST_CASES:
@@ -205,16 +212,24 @@ class Study:
 
     @cached_property
     def inputs(self) -> dict[str, str]:
-        """SHA-256 of the files, functions and bodies of the library that it is made of."""
+        """SHA-256 by name of all that its values depend on beside its numbers: bodies, motions, functions."""
         found = {}
         for source in self._bodies:
-            found[f"body {described(source)}"] = body_fingerprint(source, self.loading)
+            found |= body_digests(source, self.loading)
+        parameters = dict(self.some_cases(np.array([0]))[0].parameters) if self._motions else {}
         for source in self._motions:
-            found[f"motion {described(source)}"] = fingerprint(source)
-        for output in self.outputs:
-            if isinstance(output, Output):
-                found[f"output {output.name}"] = fingerprint(output.function)
-        return {name: digest for name, digest in found.items() if digest is not None}
+            found |= motion_digests(source, parameters)
+        return found | self.function_inputs
+
+    @cached_property
+    def function_inputs(self) -> dict[str, str]:
+        """SHA-256 of the functions of the user and all that they refer to; nothing where a version is given."""
+        named = {f"output {one.name}": one.function for one in self.outputs if isinstance(one, Output)}
+        for source in self._motions:
+            if not is_file(source):
+                named[f"motion {described(source)}"] = motion_function(source)
+        functions = {} if self.version is not None else named
+        return {part: digest for name, one in functions.items() for part, digest in function_digests(name, one).items()}
 
     @cached_property
     def description(self) -> dict[str, Any]:
@@ -234,7 +249,7 @@ class Study:
             "parameters": _plain(self.parameters),
             "time_limit": self.time_limit,
             "inputs": self.inputs,
-            # Only where they are given: stores from before they could be go on.
+            "version": self.version,
             **self.loading,
         }
 
@@ -301,6 +316,7 @@ class Study:
         *,
         workers: int | None = None,
         resume: bool = False,
+        retry: str | None = None,
         progress: Callable[[StudyProgress], Any] | None = None,
     ) -> StudyStore:
         """Compute what is missing, and store it.
@@ -312,6 +328,7 @@ class Study:
         workers : how many processes; None: one for each processor; 0: in this process, without time limits, and where
             a case that ends its process ends this one. A cluster has its own
         resume : go on with a store that is there already, which must be this study's
+        retry : "failed": go on with a store, and compute its chunks with failed cases again
         progress : called with a `StudyProgress` after each chunk; if it returns something true, the run stops, as by
             Ctrl-C: what is stored is kept
 
@@ -332,7 +349,7 @@ class Study:
 
         if progress is not None:
             check_function(progress, "progress", "a function that takes a StudyProgress")
-        return run_study(self, store, client, workers=workers, resume=resume, progress=progress)
+        return run_study(self, store, client, workers=workers, resume=resume, retry=retry, progress=progress)
 
     @property
     def _bodies(self) -> tuple[BodySource, ...]:

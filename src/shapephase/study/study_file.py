@@ -14,7 +14,7 @@ import numpy as np
 from ..arguments import check_file_name
 from ..arrays import Array, finite_array
 from ..errors import InputFileNotFoundError, ShapePhaseError, StudyError, unknown_name
-from ._axes import LABELS, UNITS, unit_of
+from ._axes import LABELS, LONGEST_NAME, UNITS, unit_of
 from ._recipes import RigidBody, imported
 from .distributions import DISTRIBUTIONS, Choice, LogNormal
 from .outputs import Output
@@ -22,6 +22,7 @@ from .study import Study
 
 _PLAIN = (
     *("outputs", "draws", "seed", "chunk", "momentum", "attitude", "tolerance", "gauge", "parameters", "time_limit"),
+    "version",
     *("root", "root_body", "packages", "xacro_args", "on_unphysical", "length_unit", "person_mass"),
 )
 _ENTRIES = ("body", "motion", "rigid", "over", "functions", *_PLAIN)
@@ -39,8 +40,6 @@ _FACTORS = {
 _BASE = {"deg": "rad", "mm": "m", "ms": "s"}
 # A file that is longer is no study.
 _MOST_BYTES = 50_000_000
-_LONGEST_NAME = 300
-"""Characters of what is varied: an error shows it."""
 
 
 def read_study(path: str | os.PathLike[str]) -> Study:
@@ -112,8 +111,8 @@ def _made(said: Mapping[str, Any], folder: Path) -> Study:
 
 
 def _axis(name: str, said: Any, folder: Path) -> Any:
-    if len(name) > _LONGEST_NAME:
-        raise StudyError(f"over: a name of {len(name)} characters, {name[:20]!r}...; {_LONGEST_NAME} are enough")
+    if len(name) > LONGEST_NAME:
+        raise StudyError(f"over: a name of {len(name)} characters, {name[:20]!r}...; {LONGEST_NAME} are enough")
     where = f"over.{name}"
     if not isinstance(said, Mapping):
         raise StudyError(f"{where}: a table is needed, with values, with from, to and count, or with a distribution")
@@ -180,13 +179,13 @@ def _file(name: Any, folder: Path, where: str) -> str:
     """A file beside the study's, if there is one, or the name as it is."""
     if not isinstance(name, str) or not name:
         raise StudyError(f"{where}: a name or a file is needed, got {name!r}")
-    beside = folder / name
-    return str(beside) if beside.is_file() else name
+    beside = str(folder / name)
+    return beside if os.path.isfile(beside) else name
 
 
 def _folder(name: Any, folder: Path) -> Any:
     """A folder beside the study's file, if there is one, or the name as it is."""
-    return str(folder / name) if isinstance(name, str) and name and (folder / name).is_dir() else name
+    return str(folder / name) if isinstance(name, str) and name and os.path.isdir(folder / name) else name
 
 
 def _table(said: Mapping[str, Any], name: str) -> Mapping[str, Any]:
