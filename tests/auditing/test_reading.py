@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
+from shapephase.errors import TrajectoryError
 from support.flown_bodies import Flown, body_of, flown
 
 NAME = "diver"
@@ -101,3 +102,18 @@ def test_faults_of_files_are_named(motion: Flown, tmp_path: Path):
     np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=header, comments="")
     with pytest.raises(sp.errors.TrajectoryError, match="attitude of the base"):
         sp.read_trajectory(tmp_path / "run.csv", body)
+
+
+@pytest.mark.parametrize("field", ["shapes", "joint_rates"])
+def test_joints_that_are_in_no_unit_of_ours_are_asked_for_theirs(field):
+    count = 9
+    given = {
+        "times": np.linspace(0.0, 1.0, count),
+        "quaternion": np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)),
+        "shapes": np.zeros((count, 1)),
+        "rate": np.zeros((count, 3)),
+        "joint_rates": np.zeros((count, 1)),
+    }
+    given[field] = np.linspace(0.0, 2e6, count)[:, None]
+    with pytest.raises(TrajectoryError, match=rf"{field}: sample 8 has 2e\+06; .*which unit.*millimetres"):
+        sp.FloatingTrajectory(**given)

@@ -27,6 +27,8 @@ _FEWEST = 8
 """Samples: a flight of 0.3 s at 30 frames a second; fewer say nothing of noise."""
 _LARGEST = 1e12
 """Of places, rates and times: no recorder has a clock or a place beyond it."""
+_OF_JOINTS = ("shapes", "joint_rates")
+"""What is read up to `FARTHEST`, as by a body."""
 _OFF_UNIT = 0.1
 """What is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong."""
 
@@ -100,7 +102,7 @@ class FloatingTrajectory:
             if value is not None:
                 put(self, name, finite_array(value, f"{where}: {name}", (len(times), count)))
         for name in ("times", *trailing, "shapes"):
-            _check_size(getattr(self, name), f"{where}: {name}", FARTHEST if name == "shapes" else _LARGEST)
+            _check_size(getattr(self, name), f"{where}: {name}", FARTHEST if name in _OF_JOINTS else _LARGEST)
         check_choice(self.rate_axes, "rate_axes", FRAMES)
         check_choice(self.velocity_axes, "velocity_axes", FRAMES)
         if self.step is not None:
@@ -234,7 +236,10 @@ def _check_size(values: Array | None, what: str, most: float) -> None:
     """Raise TrajectoryError for numbers whose squares are none, or that have no digits left."""
     if values is not None and np.abs(values).max(initial=0.0) > most:
         sample = int(np.argmax(np.abs(values).reshape(len(values), -1).max(axis=1)))
-        raise TrajectoryError(f"{what}: sample {sample} has {np.abs(values[sample]).max():.6g}; up to {most:g} is read")
+        raise TrajectoryError(
+            f"{what}: sample {sample} has {np.abs(values[sample]).max():.6g}; up to {most:g} is read; in which "
+            "unit is it? Lengths are in m, angles in rad, times in s: convert millimetres, feet or degrees"
+        )
 
 
 def rates_by_name(rates: Rates | None) -> dict[str, Any]:
