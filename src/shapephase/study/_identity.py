@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import dis
 import hashlib
 import importlib
@@ -74,13 +75,16 @@ class _Contents:
         # Also keeps the objects alive: their ids stay theirs.
         self._open: dict[int, Any] = {}
 
-    def digest(self, value: Any) -> str:
+    def digest(self, value: Any, part: str = "it") -> str:
         """SHA-256 of a value."""
-        return hashlib.sha256(repr(self._plain(value, "it")).encode()).hexdigest()
+        return hashlib.sha256(repr(self._plain(value, part)).encode()).hexdigest()
 
     def _put(self, part: str, value: Any) -> None:
-        digest = hashlib.sha256(repr(self._plain(value, part)).encode()).hexdigest()
-        self.parts[f"{self._name}, {part}"] = digest
+        name, digest = f"{self._name}, {part}", self.digest(value, part)
+        if self.parts.get(name, digest) != digest:
+            # Two objects of one name, such as two partials of a function.
+            digest = self.digest((self.parts[name], digest))
+        self.parts[name] = digest
 
     def _plain(self, value: Any, part: str) -> Any:
         """Literals in tuples, equal for equal contents. `part` is what holds the value, for messages."""
@@ -111,7 +115,7 @@ class _Contents:
             for name, argument in (*enumerate(value.args), *value.keywords.items()):
                 self._put(f"argument {name} of partial {_label(value.func)}", argument)
             return ("partial", inner, len(value.args), sorted(value.keywords))
-        if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        if type(value) is np.ndarray and not value.dtype.hasobject:
             return (value.dtype.str, value.shape, hashlib.sha256(np.ascontiguousarray(value).tobytes()).hexdigest())
         if isinstance(value, Mapping) and type(value).__module__ in ("builtins", "types"):
             return [(self._plain(key, part), self._plain(one, part)) for key, one in value.items()]
@@ -137,7 +141,8 @@ class _Contents:
     def _reduced(self, value: Any, part: str) -> Any:
         """Any other object, by what a copy would be made of."""
         try:
-            reduced = value.__reduce_ex__(4)
+            registered = copyreg.dispatch_table.get(type(value))
+            reduced = registered(value) if registered else value.__reduce_ex__(4)
             if isinstance(reduced, str):
                 return (type(value).__qualname__, reduced)
             items = [list(one) if isinstance(one, Iterator) else one for one in reduced]
@@ -213,7 +218,7 @@ class _Contents:
         self._module(kind.__module__)
         for name, value in vars(kind).items():
             inner = getattr(value, "__func__", getattr(value, "fget", getattr(value, "func", value)))
-            if isinstance(inner, FunctionType | _LITERAL | tuple | list | dict | np.ndarray):
+            if isinstance(inner, FunctionType) or not name.startswith(("__", "_abc_")):
                 self._put(f"{name} of {label}", inner)
         return label
 

@@ -120,7 +120,11 @@ class CaseWorker:
                 theirs.close()
                 raise _Over(DIED, "closed")
             self._process = subprocess.Popen(
-                [sys.executable, "-c", source], pass_fds=[theirs.fileno()], env=environment, stdin=subprocess.DEVNULL
+                [sys.executable, "-c", source],
+                pass_fds=[theirs.fileno()],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                process_group=0,
             )
             self._connection = Connection(ours.detach())
         theirs.close()
@@ -177,7 +181,9 @@ class CaseWorker:
             # A connection ends a moment before its process does.
             with contextlib.suppress(subprocess.TimeoutExpired):
                 code = process.wait(0.2 if connection is not None and not self._closed else 0.0)
-        process.kill()
+        # With the children that its cases have left.
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         return code
 

@@ -192,7 +192,7 @@ class StudyStore:
         if np.any(results.status > DONE):
             rows |= {"error_name": results.error_name, "error_text": results.error_text}
         with disk_faults(self.path):
-            for name in self._names:
+            for name in ("seal", *self._names):
                 # What is there may be damaged: Zarr reads a chunk that it fills only in part.
                 self._file(name, number).unlink(missing_ok=True)
             for name, values in rows.items():
