@@ -55,7 +55,7 @@ def logged(path: Path) -> list[str]:
 
 
 def orphaning(motion: sp.Motion) -> float:
-    """Ends its process where the momentum is POISON, and leaves a child with its files open, which writes $STUDY_LOG."""
+    """Ends its process where the momentum is POISON, and leaves a child with open files that writes $STUDY_LOG."""
     if round(float(motion.momentum[0]) / POISON) == 1:
         if os.fork() == 0:
             time.sleep(5.0)
