@@ -55,10 +55,11 @@ def logged(path: Path) -> list[str]:
 
 
 def orphaning(motion: sp.Motion) -> float:
-    """Ends its process where the momentum is POISON, and leaves a child that lives on and has its files open."""
+    """Ends its process where the momentum is POISON, and leaves a child with open files that writes $STUDY_LOG."""
     if round(float(motion.momentum[0]) / POISON) == 1:
         if os.fork() == 0:
-            time.sleep(20.0)
+            time.sleep(5.0)
+            Path(os.environ["STUDY_LOG"]).touch()
             os._exit(0)
         os._exit(3)
     return 1.0
