@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.errors import ShapeError, WrongObjectError
+from shapephase.errors import IgnoredElementWarning, ShapeError, WrongObjectError
 from support.bodies import joint, link, urdf
 from support.independent import FourierLoop, random_rotation, random_vector
 from support.random_chains import random_chain
@@ -199,7 +199,6 @@ def test_the_table_has_units_in_its_names(tmp_path):
         ('effort="7" velocity="1"', 7.0),
         ('effort="0" velocity="1"', np.inf),
         ('velocity="1"', np.inf),
-        ('effort="-7" velocity="1"', 7.0),
         ('effort="inf" velocity="1"', np.inf),
         ('effort="nan" velocity="1"', np.inf),
         ('effort="much" velocity="1"', np.inf),
@@ -209,3 +208,10 @@ def test_the_effort_of_a_file_is_a_limit_where_it_is_one(load, limit, effort):
     element = joint("turn", "continuous", "a", "b", extra=f"<limit {limit}/>")
     body = load(urdf(link("a", 1.0, (1.0, 1.0, 1.0)), link("b", 1.0, (1.0, 1.0, 1.0)), element))
     assert body.effort_limits.tolist() == [effort]
+
+
+def test_a_negative_effort_is_read_as_its_size_with_a_warning(load):
+    element = joint("turn", "continuous", "a", "b", extra='<limit effort="-7" velocity="1"/>')
+    with pytest.warns(IgnoredElementWarning, match="effort"):
+        body = load(urdf(link("a", 1.0, (1.0, 1.0, 1.0)), link("b", 1.0, (1.0, 1.0, 1.0)), element))
+    assert body.effort_limits.tolist() == [7.0]

@@ -642,8 +642,9 @@ def _mjcfs() -> Iterator[Case]:
     yield refused("limited misspelt", 'axis="1 0 0"', 'axis="1 0 0" limited="yes"', "<joint>: invalid keyword: 'yes'")
     yield refused("attribute misspelt", 'mass="1"', 'mas="1"', "<inertial>: unrecognized attribute: 'mas'")
     yield refused("diagonal with a capital", "diaginertia", "diagInertia", "<inertial>: unrecognized attribute: 'diagI")
+    said = "<inertial>: mass='nan' is not a number"
+    yield _mjcf("mass nan", 'mass="1"', 'mass="nan"', said, line=17)
     for value, said in (
-        ("nan", "body 'arm': mass and inertia of moving bodies"),
         ("-1", "body 'arm': mass and inertia of moving bodies"),
         ("1e400", "<inertial>: number is too large in attribute 'mass'"),
         ("1kg", "<inertial>: bad format in attribute 'mass'"),
