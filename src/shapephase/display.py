@@ -19,8 +19,6 @@ from .letters import printable, shortened
 
 MOST_LINES = 9
 """Of a `repr`."""
-MOST_LETTERS = 1000
-"""Of a `repr`, less than which it has."""
 # Of a line.
 _WIDTH = 100
 # Letters of a value, a name, a title.

@@ -14,7 +14,7 @@ from .chebyshev import inside, nodes_on
 Result = TypeVar("Result")
 # Chebyshev points of a piece, less one: far more than the swings of a shape motion between two breaks.
 _NODES = 64
-# Of more pieces than these each has fewer points, so that their number stays bounded.
+# Each of more pieces than these has fewer points, so that their number stays bounded.
 _MOST_PIECES_FINE = 32
 # Minima around which the search continues.
 _LOWEST = 16

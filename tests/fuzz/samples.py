@@ -43,7 +43,7 @@ def _parquet(file: Path) -> None:
 def _matlab(file: Path) -> None:
     import scipy.io
 
-    # As MATLAB packs it, with a checksum: on damaged headers of plain files SciPy crashes Python (1 of 60 bytes).
+    # Packed with a checksum: on damaged headers of plain files SciPy crashes Python (1 of 60 bytes).
     scipy.io.savemat(file, COLUMNS, do_compression=True)
 
 

@@ -19,7 +19,7 @@ TENSOR, DURATION = np.diag([1.0, 2.0, 2.5]), 3.0
 MOMENTA = np.linspace([0.1, 0.2, 0.3], [0.5, -0.2, 0.9], 11)
 NAMES = ("final_attitude", "turn", "momentum")
 FAULTS = int(os.environ.get("STUDY_FAULTS", "12"))
-"""Of each kind of store; the suite has few."""
+"""Faults of each kind of store; the suite has few."""
 
 
 def study():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -102,60 +103,49 @@ def read_trajectory(
                 joint_order=order,
                 **rates_by_name(table.simulated.rates),
             )
-        recorded = read_recorded_motion(
-            given,
-            body,
-            names=names,
-            degrees=degrees,
-            timestep=timestep,
-            joint_order=joint_order,
-            rest_missing=rest_missing,
-            ignore_extra=ignore_extra,
-            fill=fill,
-            lowpass=lowpass,
-            resample=resample,
-            base_order=base_order,
-            base_axes=base_axes,
-            calibration=calibration,
-            length_tolerance=length_tolerance,
-        )
-        if recorded.base_attitude is None:
-            raise TrajectoryError(
-                f"{where}: the attitude of the base is not there; columns such as base_qx base_qy base_qz base_qw, an "
-                "array base_quat_xyzw, or MuJoCo's qpos with its free joint are needed"
-            )
-        as_recorded = None
-        if lowpass is not None:
-            as_recorded = read_trajectory(
-                file,
-                body,
-                names=names,
-                degrees=degrees,
-                timestep=timestep,
-                topic=topic,
-                joint_order=joint_order,
-                rest_missing=rest_missing,
-                ignore_extra=ignore_extra,
-                fill=fill,
-                base_order=base_order,
-                base_axes=base_axes,
-                calibration=calibration,
-                length_tolerance=length_tolerance,
-            )
-        return FloatingTrajectory(
-            times=recorded.times,
-            quaternion=so3.quat_from_matrix(recorded.base_attitude),
-            shapes=recorded.path.shape(recorded.times),
-            position=recorded.base_position,
-            step=step,
-            name=where.name,
-            joint_order=order,
-            certain=_certain(recorded, degrees),
-            captured=recorded.format in _CAPTURED,
-            noise=None if as_recorded is None else estimated_noise(as_recorded),
-        )
+        options: dict[str, Any] = {
+            "names": names,
+            "degrees": degrees,
+            "timestep": timestep,
+            "joint_order": joint_order,
+            "rest_missing": rest_missing,
+            "ignore_extra": ignore_extra,
+            "fill": fill,
+            "base_order": base_order,
+            "base_axes": base_axes,
+            "calibration": calibration,
+            "length_tolerance": length_tolerance,
+        }
+        recorded = read_recorded_motion(given, body, lowpass=lowpass, resample=resample, **options)
+        found = _of_recording(recorded, where, step, order, degrees)
+        if lowpass is None:
+            return found
+        # What the filter has taken away is in the recording before it alone.
+        unfiltered = _of_recording(read_recorded_motion(given, body, **options), where, step, order, degrees)
+        return replace(found, noise=estimated_noise(unfiltered))
     except (ShapeError, TrajectoryError) as error:
         raise _of_file(where, error) from None
+
+
+def _of_recording(
+    recorded: RecordedMotion, where: Path, step: float | None, order: str | None, degrees: bool | None
+) -> FloatingTrajectory:
+    if recorded.base_attitude is None:
+        raise TrajectoryError(
+            f"{where}: the attitude of the base is not there; columns such as base_qx base_qy base_qz base_qw, an "
+            "array base_quat_xyzw, or MuJoCo's qpos with its free joint are needed"
+        )
+    return FloatingTrajectory(
+        times=recorded.times,
+        quaternion=so3.quat_from_matrix(recorded.base_attitude),
+        shapes=recorded.path.shape(recorded.times),
+        position=recorded.base_position,
+        step=step,
+        name=where.name,
+        joint_order=order,
+        certain=_certain(recorded, degrees),
+        captured=recorded.format in _CAPTURED,
+    )
 
 
 def _certain(recorded: RecordedMotion, degrees: bool | None) -> tuple[str, ...]:

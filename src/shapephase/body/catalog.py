@@ -37,7 +37,7 @@ from .link_tree import hollow_warnings, inertia_warnings, massless_warning
 
 _EXAMPLE = "example:"
 _ENDINGS = (".urdf", ".xml", ".mjcf", ".xacro", ".osim", ".biomod", ".bvh", ".mvnx")
-"""Of names that are those of files, in small letters."""
+"""Endings of names that are names of files, in small letters."""
 _OF_URDF = ("packages", "root")
 """Options of a URDF."""
 _OF_BVH = ("length_unit", "person_mass")

@@ -363,7 +363,7 @@ def _strokes(task: Reorientation) -> Array:
 
 
 def _link_attitudes(task: Reorientation, shapes: Array) -> Array:
-    """Of the link that is pointed, base axes: (N, n) -> (N, 3, 3); of the base the identity."""
+    """Attitude of the link that is pointed, base axes: (N, n) -> (N, 3, 3); the identity where that is the base."""
     if task.link is None:
         return np.broadcast_to(np.eye(3), (len(shapes), 3, 3))
     return task.body.link_pose(shapes, task.link)[:, :3, :3]

@@ -1,17 +1,14 @@
-"""Small formulas run as CasADi functions: a fraction of what NumPy takes for arrays of a few entries."""
+"""CasADi functions called on arrays, from several threads at the same time."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array
 
-Formula = Callable[[list[Any]], list[Any]]
 # Functions of one thread; a buffer holds a few kilobytes, and a computation uses a few dozen.
 _MOST_BUFFERS = 128
 
@@ -42,41 +39,12 @@ def call_casadi(function: Any, rows: int, *arguments: Array) -> list[Array]:
 
     Arguments hold numbers in the order of the function's inputs (column-major); each result is (rows, entries / rows).
     """
-    known = _buffers.for_function(function)
-    results = [np.empty((rows, length // rows)) for length in known[2]]
-    _evaluate(known, [np.ascontiguousarray(argument) for argument in arguments], results)
-    return results
-
-
-def call_casadi_into(function: Any, arguments: Sequence[Array], results: Sequence[Array]) -> None:
-    """The same, all arrays being contiguous, with results where there is room for them."""
-    _evaluate(_buffers.for_function(function), arguments, results)
-
-
-def _evaluate(known: tuple[Any, Any, list[int]], arguments: Sequence[Array], results: Sequence[Array]) -> None:
-    buffer, evaluate, _ = known
-    for place, argument in enumerate(arguments):
+    buffer, evaluate, lengths = _buffers.for_function(function)
+    inputs = [np.ascontiguousarray(argument) for argument in arguments]
+    results = [np.empty((rows, length // rows)) for length in lengths]
+    for place, argument in enumerate(inputs):
         buffer.set_arg(place, argument.data)
     for place, result in enumerate(results):
         buffer.set_res(place, result.data)
     evaluate()
-
-
-def map_rows(formula: Formula, entries: int, values: Array) -> Array:
-    """A formula of numbers applied to every row: (N, entries) -> (N, results)."""
-    count = len(values)
-    return call_casadi(_mapped(formula, entries, count), count, values)[0] if count else np.empty((0, 0))
-
-
-@lru_cache(maxsize=512)
-def _mapped(formula: Formula, entries: int, count: int) -> Any:
-    return row_function(formula, entries).map(count)
-
-
-@lru_cache(maxsize=32)
-def row_function(formula: Formula, entries: int) -> Any:
-    """A formula of numbers as a CasADi function of one row."""
-    import casadi
-
-    row = casadi.SX.sym("row", entries)
-    return casadi.Function(formula.__name__, [row], [casadi.vertcat(*formula(casadi.vertsplit(row)))])
+    return results

@@ -108,7 +108,7 @@ class Fourier:
 
     @property
     def swings(self) -> Swings:
-        """As often as the highest harmonic."""
+        """Swings as often as the highest harmonic."""
         return Swings(float(self.occupied.max(initial=0)), smooth_loop=True)
 
     @cached_property

@@ -44,7 +44,7 @@ def check_gravity(fall: FreeFall, gravity: float, rate: float, where: str) -> No
 
 
 def check_parabola(times: Array, centres: Array, noise: float, gravity: float, where: str) -> None:
-    """The same of a stretch that is given: where it is a parabola, and bent enough for that to be seen.
+    """Check a stretch that is given in the same way: where it is a parabola, and bent enough for that to be seen.
 
     Warns
     -----

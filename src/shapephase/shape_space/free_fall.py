@@ -74,7 +74,7 @@ class FreeFall:
         return self.first, self.last
 
     def every(self, stride: int) -> FreeFall:
-        """The same by samples of a recording of which every so many-th was searched."""
+        """Return the flight by the samples of a recording of which every so many-th was searched."""
         ends = tuple((stride * first, stride * last) for first, last in self.all_ends)
         return replace(self, first=stride * self.first, last=stride * self.last, all_ends=ends)
 

@@ -18,7 +18,7 @@ PILOT_ORDER = 5
 BUTTERWORTH = 2
 """Order of a Butterworth filter that is run forwards and backwards."""
 _HALF_POWER = np.sqrt(2.0) - 1.0
-"""Of both passes together at the cut-off, in place of 1 for each: 1/(1 + (sqrt(2) - 1)) = 1/sqrt(2), or -3 dB."""
+"""At the cut-off, in place of 1 for each pass: both together then give 1/(1 + (sqrt(2) - 1)) = 1/sqrt(2), or -3 dB."""
 _NARROWEST = 10.0**-0.5
 """Width that is tried, in steps of time: next to nothing is smoothed."""
 _WIDEST = 10.0**2.5

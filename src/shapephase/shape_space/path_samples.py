@@ -23,7 +23,7 @@ class SampleOrigin(PathOrigin, Protocol):
 
     @property
     def samples(self) -> Array:
-        """As recorded: (N, n) [rad or m]."""
+        """Samples as they were recorded: (N, n) [rad or m]."""
         ...
 
     @property

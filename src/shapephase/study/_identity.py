@@ -26,7 +26,6 @@ from ..shape_space.shape_path import ShapePath
 _SAMPLES = 33
 """Times at which a path that a function makes is compared."""
 _LIBRARY_FOLDERS = tuple(sysconfig.get_paths()[name] for name in ("stdlib", "platstdlib", "purelib", "platlib"))
-_PACKAGE_FOLDERS = {"site-packages", "dist-packages"}
 _LITERAL = str | bytes | bool | int | float | complex | type(None) | type(Ellipsis)
 
 

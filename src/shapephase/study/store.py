@@ -239,7 +239,7 @@ class StudyStore:
         return found
 
     def _unfinished_chunks(self) -> Integers:
-        """As `missing_chunks`. Raises StudyStoreError where some of them are damaged."""
+        """Chunks without results, by `missing_chunks`. Raises StudyStoreError where some of them are damaged."""
         missing = self.missing_chunks()
         if len(bad := self._with_seal(missing)):
             raise damaged(self.path, self.chunk_texts(bad))

@@ -22,13 +22,13 @@ QUATERNION = ["base_qx", "base_qy", "base_qz", "base_qw"]
 
 
 def response(frequency, cut_off=CUT_OFF, rate=RATE):
-    """Of both passes of a digital Butterworth filter of second order, 1/sqrt(2) at the cut-off."""
+    """Response of both passes of a digital Butterworth filter of second order, 1/sqrt(2) at the cut-off."""
     ratio = np.tan(np.pi * frequency / rate) / np.tan(np.pi * cut_off / rate)
     return 1.0 / (1.0 + (np.sqrt(2.0) - 1.0) * ratio**4)
 
 
 def by_scipy(values, cut_off=CUT_OFF, rate=RATE):
-    """The same filter by SciPy, each pass with Winter's cut-off."""
+    """That filter by SciPy, each pass with Winter's cut-off."""
     each = rate / np.pi * np.arctan(np.tan(np.pi * cut_off / rate) / (np.sqrt(2.0) - 1.0) ** 0.25)
     return sosfiltfilt(butter(2, each, fs=rate, output="sos"), values, axis=0, padlen=len(values) - 1)
 

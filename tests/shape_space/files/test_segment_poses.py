@@ -114,7 +114,7 @@ def test_without_places_the_base_has_the_axes_of_the_room_at_the_calibration(tmp
 
 
 def test_a_calibration_pose_by_its_name_and_by_the_better_fit(tmp_path, body):
-    """Of a T-pose with the legs apart and an N-pose the body's zero pose is taken."""
+    """Where a T-pose has its legs apart, the N-pose is the body's zero pose."""
     motion = moved()
     turns, places = renamed(own_axes(motion)), renamed(motion.places)
     text = segment_files.mvnx_text(turns, places, poses=("npose", "tpose"))

@@ -15,7 +15,7 @@ from .chain import UnusableModelError
 
 _CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 _FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-"""Of the tetrahedron that stands for a mesh."""
+"""Faces of the tetrahedron that stands for a mesh, each by three corners."""
 _EDGES = ((0.01, 0.01, 0.01), (0.3, 0.2, 0.1))
 """[m] Two tetrahedra: a body whose mass or inertia they share in has it from the mesh."""
 _OF_MASS = ("body_mass", "body_inertia", "body_ipos", "body_iquat")

@@ -78,7 +78,7 @@ class Prepared:
 
     @property
     def bias(self) -> Array:
-        """As `PathOrigin`."""
+        """What the steps take off the motion itself at the knots: (knots, n), by the pilot."""
         return self._bias
 
     @cached_property
@@ -90,7 +90,7 @@ class Prepared:
         return (self.smoother(motion) - motion)[self._kept]
 
     def path(self, samples: Array) -> ShapePath:
-        """As `PathOrigin`."""
+        """Return the path that the steps make of other samples (N, n)."""
         times = self.smoother.times[self.inside]
         through = "periodic" if self.smoother.periodic else "not-a-knot"
         plain = interpolated(times, self.values(samples), through, self.joint_names)
@@ -105,11 +105,11 @@ class Prepared:
         return replace(plain, curve=curve, origin=replace(self, samples=samples))
 
     def by_samples(self, by_values: Array) -> Array:
-        """As `PathOrigin`."""
+        """Return derivatives by the samples from those by the values at the knots."""
         return self._by_recorded(self.smoother.transposed(self._of_all(by_values)))
 
     def bias_by_samples(self, by_values: Array) -> Array:
-        """As `PathOrigin`."""
+        """Return derivatives of the bias by the samples from those by the bias."""
         given = self._of_all(by_values)
         if self.pilot is None or not self.smoothed.any():
             return self._by_recorded(np.zeros_like(given))
@@ -157,12 +157,12 @@ class Resampled:
 
     @property
     def samples(self) -> Array:
-        """As `PathOrigin`."""
+        """Samples as they were recorded: (N, n) [rad or m]."""
         return path_samples(self.inner).values
 
     @property
     def bias(self) -> Array:
-        """As `PathOrigin`."""
+        """What the steps take off the motion itself at the knots: (knots, n), by the pilot."""
         samples = path_samples(self.inner)
         taken = samples.bias.reshape(-1, self.inner.n_shape)
         periodic = len(taken) < len(samples.curve.knots)
@@ -170,16 +170,16 @@ class Resampled:
         return through.shape(self.times[: self.count])
 
     def path(self, samples: Array) -> ShapePath:
-        """As `PathOrigin`."""
+        """Return the path that the steps make of other samples (N, n)."""
         return resampled(path_samples(self.inner).path_through(samples), self.times, self.inner.joint_names)
 
     def by_samples(self, by_values: Array) -> Array:
-        """As `PathOrigin`."""
+        """Return derivatives by the samples from those by the values at the knots."""
         samples = path_samples(self.inner)
         return self._of_inner(samples.by_samples(self._by_knots(samples, by_values)), samples.count)
 
     def bias_by_samples(self, by_values: Array) -> Array:
-        """As `PathOrigin`."""
+        """Return derivatives of the bias by the samples from those by the bias."""
         samples = path_samples(self.inner)
         return self._of_inner(samples.bias_by_samples(self._by_knots(samples, by_values)), samples.count)
 

@@ -27,7 +27,7 @@ _FEWEST = 4
 _NO_POSE = 0.02
 """[rad or m] A smaller first step is noise, or a body that moves very little."""
 _DENSER = 1.1
-"""Of the usual rate: splines through uneven samples make that many even ones of them."""
+"""Factor to the usual rate: splines through uneven samples make that many even ones of them."""
 _ROUNDING = 1e-9
 """Steps of time."""
 _UNRESOLVED = 2.0 * np.pi / 3.0

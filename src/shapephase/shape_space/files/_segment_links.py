@@ -51,7 +51,7 @@ _SIDED = re.compile(r"(?P<before>left|right|[lr](?=_))?_?(?P<part>.+?)_?(?P<behi
 _ROOM = ("worldbody", "world", "ground")
 """What files call the room among the segments."""
 _MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}
-"""Of what files' bodies the segments are links -> how these files end."""
+"""Kind of model whose links the segments are -> how its files end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -212,7 +212,7 @@ class Links:
         return fit.calibration
 
     def _origins(self) -> Array:
-        """Of the segments in their frames: centres of mass, or the origins of links."""
+        """Places in the frames of the segments: centres of mass, or the origins of links."""
         return np.stack([self.chain.centres[f.frame] if self.poses.at_centres else f.place for f in self.frames])
 
     def _at(self, time: float, recording: Recording) -> tuple[Array, Array | None]:
@@ -281,7 +281,7 @@ class Links:
                 )
             shown[link] = segment
             frame, pose = links[link]
-            # Of several links of one rigid part, that whose axes are the part's.
+            # Among several links of one rigid part, that whose axes are the part's.
             if frame not in found or np.array_equal(pose, np.eye(4)):
                 found[frame] = Frame(frame, number, link, pose[:3, :3], pose[:3, 3])
         first = {frame: link for link, (frame, _) in reversed(list(links.items()))}

@@ -30,7 +30,7 @@ _MOST_DRIVERS = 3
 _TRIED = (129, 25, 11)
 """Values of each of one, two or three coordinates between its limits, of which the nearest turn is searched from."""
 _ROUNDS = 8
-"""Of that search, by Gauss and Newton: it doubles its digits, from two on."""
+"""Steps of that search, by Gauss and Newton: it doubles its digits, from two on."""
 _STEP = 1e-5
 """[rad] of its differences."""
 _FEWEST_LINKS = 2

@@ -17,7 +17,7 @@ _MANY_TURNS = 2.0 * _WHOLE_TURN
 _HALF_TURN = np.pi
 """From one sample to the next [rad]: a recording that is so coarse tells nothing about the way between."""
 _SLACK = 1e-6
-"""Of a limit, or of 1 rad or m where that is larger: optimisers and printed digits go beyond by less."""
+"""Share of a limit, or of 1 rad or m where that is larger: optimisers and printed digits go beyond by less."""
 _MOST_SHOWN = 8
 """Joints that a warning lists."""
 

@@ -29,7 +29,7 @@ _ALIKE = 5.0
 _AT_REST = 1e-6
 """[rad/s] Bodies that turn no faster do not show how they turn."""
 _CONTRADICTS = 0.5
-"""Of the rates themselves, rms: turns between samples that are off by more are others."""
+"""Share of the rates themselves, rms: turns between samples that are off by more are others."""
 
 
 @dataclass(frozen=True)

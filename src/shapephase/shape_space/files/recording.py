@@ -146,8 +146,8 @@ class Table:
         """Samples without an entry in a column: (N,). Raises TrajectoryError for a word or an infinite number."""
         values = self.columns[label]
         found = np.isnan(values)
-        wrong = [k for k, text in self.faults.get(label, {}).items() if not is_blank(text)]
-        if len(wrong) or np.isinf(values).any():
+        wrong = list(self.faults.get(label, {}))
+        if wrong or np.isinf(values).any():
             raise self._no_number(label, min([*wrong, *np.flatnonzero(np.isinf(values)).tolist()]))
         return found
 
@@ -313,7 +313,7 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
 
 def is_blank(text: str) -> bool:
     """Whether an entry says that there is no number."""
-    return text.strip().lower() in ("", "nan", ".nan", "na", "n/a", "<na>", "nat", "null", "none", "~")
+    return text.strip().lower() in ("", "nan", "-nan", ".nan", "na", "n/a", "<na>", "nat", "null", "none", "~")
 
 
 def _way_out(text: str) -> str:

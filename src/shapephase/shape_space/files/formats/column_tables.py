@@ -10,14 +10,13 @@ import numpy as np
 
 from ....arrays import Array
 from ....errors import TrajectoryError
-from ..recording import Table, number
+from ..recording import Table, is_blank, number
 from .table_heads import CLOCK, COMMA_NUMBER, DATE, is_value
 
 _MOST_FAULTS = 1000
 """Entries of a column that are no numbers whose text is kept for messages."""
 _WHOLE = 2**53
 """Beyond it doubles do not have all whole numbers: times in nanoseconds stay integers until their start is off."""
-_GAPS = ("", "nan", "-nan", "nat")
 
 
 def column_table(
@@ -110,7 +109,7 @@ def _number(entry: object, comma: bool) -> float | None:
         except (TypeError, ValueError, OverflowError):  # Python's whole numbers may be larger than any double
             return None
     text = entry.strip()
-    if text.lower() in _GAPS:
+    if is_blank(text):
         return np.nan
     if comma and "," in text:
         text = text.replace(",", ".") if COMMA_NUMBER.fullmatch(text) and text.count(",") == 1 else "no number"

@@ -27,7 +27,7 @@ _BASE = 8
 """Numbers of a frame before them: its duration, the place of the base, its quaternion w x y z."""
 _WIDTH = _BASE + sum(count for _, count in _JOINTS)
 _OFF_UNIT = 0.01
-"""Of a length of 1: what rounding in a file does not explain."""
+"""Distance from a length of 1: what rounding in a file does not explain."""
 _LEAST_LENGTH = 1e-6
 
 

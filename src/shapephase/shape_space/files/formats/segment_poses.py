@@ -24,14 +24,14 @@ _PLACE = re.compile(r"(?P<segment>.+?)(?:_[pt]?|_pos_?|\.p?|[./]position[./])(?P
 _TPOSE = "tpose"
 """Calibration pose of a suit, arms held out."""
 _NPOSE = "npose"
-"""The same, arms hanging."""
+"""Name of the calibration pose with hanging arms."""
 _ARM = ("UpperArm", "ForeArm", "Hand")
 """Segments of a suit's arm behind their side, from the shoulder on."""
 _KINEMATICS = ("X", "Y", "Z", "Ox", "Oy", "Oz")
 """Columns of a body in OpenSim's BodyKinematics, behind its name: centre of mass, and angles about x, y, z as each
 turn before has left them."""
 _OFF_ROTATION = 1e-3
-"""Of S^T S - 1: files have single precision."""
+"""Largest entry of S^T S - 1: files have single precision."""
 _OFF_UNIT = 0.1
 """A quaternion's length may be off one by so much: what interpolates them leaves that."""
 _FEWEST = 2
