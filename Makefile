@@ -8,6 +8,7 @@ check: lint types imports test deaths goals published docs
 lint:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python tests/support/house.py
 
 types:
 	$(BIN)/pyright --pythonpath $(BIN)/python
