@@ -1,7 +1,6 @@
-"""Draws the pictures of the gallery: `python docs/gallery/draw.py`, or with the names of some of them.
+"""Draw the pictures of the gallery: `python docs/gallery/draw.py`, or with the names of some of them.
 
-They are written beside this file, in 128 colours. Those named `before_...` stay as they are: they were drawn by a
-version of the library that is gone.
+They are written beside this file, in 128 colours.
 """
 
 from __future__ import annotations
