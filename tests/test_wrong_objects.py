@@ -85,7 +85,7 @@ def test_a_wrong_first_object_is_named_before_what_is_missing(call):
 
 
 def test_a_momentum_that_is_left_out_is_asked_for():
-    with pytest.raises(TypeError, match=r"^momentum: three numbers \[kg m\^2/s\] are needed, nothing came"):
+    with pytest.raises(TypeError, match=r"^momentum: three numbers \[kg m\^2/s\] are needed, none were given"):
         sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0))  # type: ignore[call-overload]
 
 

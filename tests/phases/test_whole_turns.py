@@ -27,7 +27,7 @@ def test_a_dive_is_counted_in_somersaults_and_twists():
     said = str(found)
     for words in ("but for whole turns", "1.5000 somersaults", "horizontal part of the momentum", "least inertia"):
         assert words in said
-    assert numbers["somersault_axes"]["up"]["by"] == "z, as nothing else was said"
+    assert numbers["somersault_axes"]["up"]["by"] == "z, by default"
 
 
 def test_a_rigid_body_is_counted_about_its_momentum_only():

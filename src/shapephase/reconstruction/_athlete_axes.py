@@ -1,4 +1,4 @@
-"""The axes by which somersaults, tilt and twists of an athlete are counted: his own, whatever the laboratory's are."""
+"""Axes by which somersaults, tilt and twists of an athlete are counted; they do not depend on the laboratory's."""
 
 from __future__ import annotations
 
@@ -26,29 +26,24 @@ if TYPE_CHECKING:
 NAMED = {
     sign + axis: factor * np.eye(3)[k] for sign, factor in (("", 1.0), ("-", -1.0)) for k, axis in enumerate("xyz")
 }
-"""Axes by their names."""
-_NO_DIRECTION = 1e-6
-"""Of a unit vector: a shorter part of it has no direction."""
+"""Unit vectors by name."""
+_NO_DIRECTION = 1e-6  # component of a unit vector below which its direction is rounding of measured data
 _SIDES = re.compile(
     r"(?<![A-Za-z])([Ll]eft|[Rr]ight|LEFT|RIGHT)(?![a-z])|(?<![A-Za-z])([lrLR])(?![A-Za-z])|(Left|Right)|^([lr])(?=[A-Z])"
 )
-"""What tells sides in the name of a link: left_arm, LeftArm, l_hip, hip_r, rThigh."""
-_ABOVE = re.compile(r"(?i)head|skull|neck")
-"""Links at the upper end of a body."""
-_BELOW = re.compile(r"(?i)foot|feet|toe|shank|calf|tibia|ankle")
-"""Links at its lower end."""
-
-
-_BY_LINKS = "as the links called right and left lie"
+"""Left or right in the name of a link: left_arm, LeftArm, l_hip, hip_r, rThigh."""
+_UPPER_LINKS = re.compile(r"(?i)head|skull|neck")
+_LOWER_LINKS = re.compile(r"(?i)foot|feet|toe|shank|calf|tibia|ankle")
+_BY_LINKS = "links named right and left"
 _NO_SIDES = (
-    "{}: which axis goes from right to left is not known, as no two links of one trunk are called left and right; give "
-    "it: lateral='y', or three numbers in axes of the base"
+    "{}: the axis from right to left is unknown, since no two links of one trunk are named left and right; give it: "
+    "lateral='y', or three numbers in base axes"
 )
 
 
 @dataclass(frozen=True, eq=False)
 class AthleteAxes:
-    """The axes by which somersaults, tilt and twists are counted, and where they come from.
+    """Axes by which somersaults, tilt and twists are counted, with the source of each.
 
     Attributes
     ----------
@@ -56,7 +51,7 @@ class AthleteAxes:
     longitudinal : (3,) from the feet to the head, base axes
     somersault : batch + (3,) horizontal, inertial axes; where the body begins it points to the left rather than right
     up : (3,) inertial axes
-    reasons : what each of the four is, in words
+    reasons : source of each of the four, in words
 
     Examples
     --------
@@ -77,7 +72,7 @@ class AthleteAxes:
     __repr__ = short_repr
 
     def __str__(self) -> str:
-        """All four in words, with their directions."""
+        """Return the four sources in words, with the directions."""
         return (
             f"somersaults about {self.reasons['somersault']}{_shown(self.somersault, 'inertial')}, twists about "
             f"{self.reasons['longitudinal']}{_shown(self.longitudinal, 'base')}, from right to left: "
@@ -86,12 +81,12 @@ class AthleteAxes:
 
     @property
     def by_links(self) -> bool:
-        """Whether the sides are those of links called left and right, as people and animals have them."""
+        """True where the lateral axis follows from links named left and right."""
         return self.reasons["lateral"] == _BY_LINKS
 
     @property
     def frontal(self) -> Array:
-        """The axis of the tilt, from back to front, base axes: (3,) or batch + (3,)."""
+        """Axis of the tilt, from back to front, base axes: (3,) or batch + (3,)."""
         return so3.cross(self.lateral, self.longitudinal)
 
 
@@ -102,7 +97,7 @@ def athlete_axes(
     somersault: str | ArrayLike | None,
     up: str | ArrayLike | None,
 ) -> AthleteAxes:
-    """As `Motion.athlete_axes`."""
+    """Return the axes of `Motion.athlete_axes`."""
     reasons: dict[str, str] = {}
     upward = _upward(motion, up, reasons)
     trunk = _Trunk.of(motion)
@@ -116,8 +111,8 @@ def athlete_axes(
         side = _across(_axis(lateral, "lateral axis", reasons), long)
         if side is None:
             raise unknown_name("longitudinal axis", "along the lateral one", ["another axis"])
-    elif trunk.body is not None and (found := _from_right_to_left(trunk.body, trunk.shape)) is not None:
-        side = _across(found, long)
+    elif trunk.body is not None and (leftward := _from_right_to_left(trunk.body, trunk.shape)) is not None:
+        side = _across(leftward, long)
         reasons["lateral"] = _BY_LINKS
     start = motion.initial_attitude
     about = _somersault(motion, somersault, upward, start, side, reasons)
@@ -128,13 +123,13 @@ def athlete_axes(
         if np.any(length < _NO_DIRECTION):
             raise WrongObjectError(_NO_SIDES.format(motion.deformation.label))
         side = across / length
-        reasons["lateral"] = "as the axis of the somersault lies in the body at the start"
+        reasons["lateral"] = "the axis of the somersault in the body at the start"
     return AthleteAxes(lateral=side, longitudinal=long, somersault=about, up=upward, reasons=reasons)
 
 
 @dataclass(frozen=True, eq=False)
 class _Trunk:
-    """A body at its straightest: locked inertia (3, 3), and of one with joints the body and its shape (n,)."""
+    """Body at its straightest: locked inertia (3, 3); with joints also the body and its shape (n,)."""
 
     inertia: Array
     body: Body | None
@@ -161,7 +156,7 @@ class _Trunk:
         return cls(description.sample(when)[0][0], None, np.zeros(0))
 
     def long_axis(self) -> Array:
-        """The axis of least inertia, towards the head; without one away from the feet, else along the base's z."""
+        """Axis of least inertia, towards the head, else away from the feet, else along the base's z: (3,)."""
         moments, axes = principal_axes(self.inertia)
         if moments[1] - moments[0] <= _NO_DIRECTION * moments[1]:
             raise WrongObjectError(
@@ -171,15 +166,15 @@ class _Trunk:
         axis = axes[:, 0]
         heights = axis if self.body is None else _upwards(self.body, self.shape, axis)
         sizes = np.abs(heights)
-        # Of the base's own axes z counts before y and x.
+        # Without head and feet, z decides before y and x.
         leading = heights[-1] if sizes[-1] > _NO_DIRECTION * sizes.max() else heights[int(np.argmax(sizes))]
         return axis * (1.0 if leading >= 0.0 else -1.0)
 
 
 def _upwards(body: Body, shape: Array, axis: Array) -> Array:
-    """How far along an axis the head is, or the feet are behind; without either the axis itself, in base axes."""
+    """Coordinate of the head along an axis, or minus that of the feet; without either the axis itself, base axes."""
     motions = link_motions(body.chain, shape[None], np.zeros_like(shape)[None])
-    for pattern, sign in ((_ABOVE, 1.0), (_BELOW, -1.0)):
+    for pattern, sign in ((_UPPER_LINKS, 1.0), (_LOWER_LINKS, -1.0)):
         frames = [frame for link, (frame, _) in body.chain.link_frames.items() if pattern.search(link)]
         if frames:
             return sign * motions.places[0, frames].mean(axis=0)[None] @ axis
@@ -187,7 +182,7 @@ def _upwards(body: Body, shape: Array, axis: Array) -> Array:
 
 
 def _from_right_to_left(body: Body, shape: Array) -> Array | None:
-    """Along the sum of the ways between joints of one trunk whose links differ by their side only: (3,), base axes."""
+    """Unit vector of the sum of the vectors from right to left joints of one trunk: (3,), base axes; None: no pairs."""
     chain = body.chain
     sides: dict[tuple[int, str], dict[str, int]] = {}
     for link, (frame, _) in chain.link_frames.items():
@@ -198,14 +193,15 @@ def _from_right_to_left(body: Body, shape: Array) -> Array | None:
         rest = link[: match.start()] + "*" + link[match.end() :]
         sides.setdefault((chain.parents[frame - 1], rest.lower()), {}).setdefault(which, frame - 1)
     turns = link_motions(chain, shape[None], np.zeros_like(shape)[None]).turns[0]
-    ways = [
+    leftward = [
         turns[parent] @ (chain.places[pair["l"]] - chain.places[pair["r"]])
         for (parent, _), pair in sides.items()
         if len(pair) == 2
     ]
-    whole = np.sum(ways, axis=0) if ways else np.zeros(3)
-    length = float(np.linalg.norm(whole))
-    return whole / length if length > _NO_DIRECTION * float(sum(np.linalg.norm(way) for way in ways) or 1.0) else None
+    total = np.sum(leftward, axis=0) if leftward else np.zeros(3)
+    length = float(np.linalg.norm(total))
+    scale = sum(float(np.linalg.norm(vector)) for vector in leftward) or 1.0
+    return total / length if length > _NO_DIRECTION * scale else None
 
 
 def _somersault(
@@ -216,7 +212,7 @@ def _somersault(
     side: Array | None,
     reasons: dict[str, str],
 ) -> Array:
-    """The axis of the somersault: batch + (3,), inertial axes."""
+    """Axis of the somersault: batch + (3,), inertial axes."""
     momentum = motion.momentum
     batch = momentum.shape
     left = None if side is None else np.broadcast_to(so3.apply(start, side), batch)
@@ -230,14 +226,13 @@ def _somersault(
     by_side = "the axis from right to left at the start, made horizontal"
     if not tumbles.all() and left is None:
         raise WrongObjectError(_NO_SIDES.format(motion.deformation.label))
-    said = [by_momentum] * bool(tumbles.any()) + [by_side] * (not tumbles.all())
-    reasons["somersault"] = ", or ".join(said)
+    reasons["somersault"] = ", or ".join([by_momentum] * bool(tumbles.any()) + [by_side] * (not tumbles.all()))
     about = flat if left is None else np.where(tumbles[..., None], flat, left)
     axis = _horizontal(
         about,
         up,
-        "the axis from right to left is upright at the start, and the momentum is none or upright, so no horizontal "
-        "axis is that of a somersault; give it: somersault='x', or three numbers in inertial axes",
+        "the axis from right to left is vertical at the start, and the momentum is zero or vertical, so the axis of "
+        "the somersault is not defined; give it: somersault='x', or three numbers in inertial axes",
     )
     if left is None:
         return axis
@@ -259,12 +254,12 @@ def _upward(motion: Motion, given: str | ArrayLike | None, reasons: dict[str, st
     recording = motion.deformation.made_from.get("recording") or {}
     recorded = str((recording.get("flight") or {}).get("up", "")).removeprefix("+")
     name = recorded if recorded in NAMED else "z"
-    reasons["up"] = f"{name}, as the recording falls" if recorded in NAMED else f"{name}, as nothing else was said"
+    reasons["up"] = f"{name}, against the fall of the recording" if recorded in NAMED else f"{name}, by default"
     return NAMED[name].copy()
 
 
 def _axis(given: str | ArrayLike, what: str, reasons: dict[str, str]) -> Array:
-    """A unit vector by its name, or of three numbers. Raises UnknownNameError, ShapeError."""
+    """Return a unit vector from its name or from three numbers. Raises UnknownNameError, ShapeError."""
     if isinstance(given, str):
         if given not in NAMED:
             raise unknown_name(what, given, list(NAMED))
@@ -279,7 +274,7 @@ def _axis(given: str | ArrayLike, what: str, reasons: dict[str, str]) -> Array:
 
 
 def _across(axis: Array, other: Array) -> Array | None:
-    """The part of a unit vector across another, of length one; None where there is none."""
+    """Unit vector of the part of one unit vector across another; None where they are parallel."""
     across = axis - (axis @ other) * other
     length = float(np.linalg.norm(across))
     return across / length if length > _NO_DIRECTION else None

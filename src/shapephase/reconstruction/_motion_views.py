@@ -1,4 +1,4 @@
-"""How a motion is looked at: as angles, as a table, as a figure, in three dimensions, as a card."""
+"""Presentation of a motion: angles, table, figure, page in three dimensions, card."""
 
 from __future__ import annotations
 
@@ -23,35 +23,32 @@ _COLUMNS = (
     "time", "qx", "qy", "qz", "qw", "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s",
     "base_x_m", "base_y_m", "base_z_m",
 )  # fmt: skip
-# Rows of a table.
-_ROWS = 201
-# Parts of a step between which angles are continued at least: no turn of a step is missed.
-_PARTS = 8
+_ROWS = 201  # of a table, by default
+_PARTS = 8  # of a step, at which angles are continued: a step turns by less than a radian or so
 
 
 class MotionViews:
-    """What a `Motion` shows of itself; the motion is `self`, whose class is further down the line."""
+    """Mixin with the presentation methods of `Motion`."""
 
     __repr__, _repr_html_ = card_text, card_html
 
     def rotation_vector(self: Any, t: ArrayLike) -> Array:
-        """The attitude as a rotation vector, continued past half turns: times (...) -> batch + (..., 3) [rad].
+        """Attitude as a rotation vector, continued past half turns: times (...) -> batch + (..., 3) [rad].
 
-        It begins within a half turn, and may become longer than that. It is continued along the motion itself, so what
-        it is at a time does not depend on the other times. Where the attitude comes back to the identity after whole
-        turns, to 1e-10 rad or its error estimate, every axis will do, and it goes straight on.
+        It begins within a half turn. It is continued along the motion itself, so its value at a time does not depend on
+        the other times. Where the attitude returns to the identity after whole turns, to 1e-10 rad or its error
+        estimate, the axis is kept.
         """
         return self._continued(t, RotationVectors())
 
     def euler_angles(self: Any, t: ArrayLike, sequence: str = "ZYX") -> Array:
-        """The attitude as Euler angles of any sequence, continuous in time: times (...) -> batch + (..., 3) [rad].
+        """Attitude as Euler angles of any sequence, continuous in time: times (...) -> batch + (..., 3) [rad].
 
-        R is the product of turns about the axes of `sequence` in their order: capitals are axes of the body as it has
-        turned so far (intrinsic), small letters inertial ones (extrinsic). The outer angles begin in (-pi, pi]. All are
-        continued along the motion itself, as finely as it needs near the ends of the middle one, where the gimbals lock
-        and the outer ones turn fast: what they are at a time does not depend on the other times. A motion that goes
-        through such an end, to 1e-10 rad or the attitude's error estimate, goes straight through: the middle angle goes
-        on beyond it.
+        R is the product of turns about the axes of `sequence` in their order: capitals are body axes (intrinsic), small
+        letters inertial ones (extrinsic). The outer angles begin in (-pi, pi]. All are continued along the motion
+        itself, with finer steps near gimbal lock, so their values at a time do not depend on the other times. A motion
+        that passes through gimbal lock, to 1e-10 rad or the attitude's error estimate, continues straight: the middle
+        angle goes on beyond its end.
 
         Parameters
         ----------
@@ -72,22 +69,22 @@ class MotionViews:
         somersault: str | ArrayLike | None = None,
         up: str | ArrayLike | None = None,
     ) -> AthleteAxes:
-        """The axes by which `somersault_tilt_twist` counts, and where each comes from; `print` says it in words.
+        """Axes by which `somersault_tilt_twist` counts, with the source of each; `print` shows them in words.
 
-        Each may be given, by its name ("x" to "-z") or as three numbers. The athlete's own are found otherwise,
-        whatever way the laboratory's axes point.
+        Each may be given, by its name ("x" to "-z") or as three numbers. The others are found from the body, whatever
+        way the laboratory's axes point.
 
         Parameters
         ----------
-        lateral : from the right side to the left, base axes; of what is given the part across the longitudinal one.
-            None: by the places of links called left and right; of a body without such links as the axis of the
-            somersault lies in it at the start, so that tilt and twist begin with 0
+        lateral : from the right side to the left, base axes; its part across the longitudinal axis is used. None: by
+            the places of links named left and right; for a body without such links the axis of the somersault as it
+            lies in the body at the start, so that tilt and twist begin with 0
         longitudinal : from the feet to the head, base axes. None: the axis of least inertia of the whole body at its
             straightest in this motion, where the least moment is the smallest part of the next one
-        somersault : inertial axes; of what is given the horizontal part. None: that of the momentum; where it is
-            smaller than the upright part, or without momentum, of the lateral axis at the start. It points to the left
+        somersault : inertial axes; its horizontal part is used. None: the horizontal part of the momentum; where that
+            is smaller than the vertical part, or without momentum, the lateral axis at the start. It points to the left
             of the body at the start, so a forward somersault counts up, a backward one down
-        up : inertial axes. None: as the recording fell from which the motion is, else "z"
+        up : inertial axes. None: against the fall of the recording, else "z"
 
         Raises
         ------
@@ -113,20 +110,20 @@ class MotionViews:
         somersault: str | ArrayLike | None = None,
         up: str | ArrayLike | None = None,
     ) -> tuple[Array, Array, Array]:
-        """Somersault, tilt and twist as biomechanists count them: times (...) -> batch + (...) each [rad].
+        """Somersault, tilt and twist of an athlete: times (...) -> batch + (...) each [rad].
 
         The somersault is a turn about a horizontal axis in space, the twist about the longitudinal axis of the body,
-        and the tilt about the axis to its front between them. Somersault and twist begin within half a turn, and all go
-        on without a jump, as `euler_angles`; in revolutions they are divided by 2 pi.
+        and the tilt about the frontal axis between them. Somersault and twist begin within half a turn, and all are
+        continuous in time; divided by 2 pi they are revolutions.
 
         Parameters
         ----------
-        lateral, longitudinal, somersault, up : as for `athlete_axes`, which says what they are where they are not given
+        lateral, longitudinal, somersault, up : as for `athlete_axes`
 
         Raises
         ------
         UnknownNameError, ShapeError, WrongObjectError
-            As `athlete_axes`.
+            For the axes that `athlete_axes` refuses.
 
         Notes
         -----
@@ -165,7 +162,7 @@ class MotionViews:
         write_table(path, self._columns(times, fall))
 
     def to_dataframe(self: Any, times: ArrayLike | None = None, **fall: ArrayLike) -> Any:
-        """The time series of `write_csv` as a table of pandas.
+        """Time series of `write_csv` as a pandas DataFrame.
 
         Parameters
         ----------
@@ -186,7 +183,7 @@ class MotionViews:
         return DataFrame(self._columns(times, fall))
 
     def to_xarray(self: Any, times: ArrayLike | None = None, **fall: ArrayLike) -> Any:
-        """Base, joints and their rates in time as a data set of xarray, as `exports.motion_dataset` makes it.
+        """Base, joints and their rates in time as an xarray Dataset (`exports.motion_dataset`).
 
         Parameters
         ----------
@@ -222,7 +219,7 @@ class MotionViews:
         return offered("Motion.plot")(self, kind, ax=ax, gauge=gauge)
 
     def view(self: Any, **options: Any) -> Any:
-        """Show the motion in three dimensions, as `shapephase.view` does.
+        """Show the motion in three dimensions (`shapephase.view`).
 
         Parameters
         ----------
@@ -252,7 +249,7 @@ class MotionViews:
         return Card(title, rows, curves_picture(vectors, "rotation vector in time"))
 
     def _columns(self: Any, times: ArrayLike | None, fall: dict[str, ArrayLike]) -> dict[str, Array]:
-        """The columns of a table by their names."""
+        """Columns of the table by name."""
         if self.batch:
             raise ShapeError(f"a table holds one motion, this is a batch of {self.batch}; reconstruct one of them")
         t = np.linspace(0.0, self.duration, _ROWS) if times is None else finite_array(times, "times", (None,), unit="s")
@@ -263,22 +260,22 @@ class MotionViews:
         return dict(zip(_COLUMNS, columns, strict=True))
 
     def _continued(self: Any, t: ArrayLike, chart: Chart, seen: tuple[Array, Array] | None = None) -> Array:
-        """Three numbers of each attitude, continued from the start: times (...) -> batch + (..., 3).
+        """Chart coordinates of each attitude, continued from the start: times (...) -> batch + (..., 3).
 
-        `seen`: quaternions of axes in space and in the body, by which the attitude is seen.
+        `seen`: quaternions of the axes in space and in the body to which the coordinates refer.
         """
         times = times_argument(t, self.duration)
         ends = self.solution.times
         between = ends[:-1, None] + np.diff(ends)[:, None] * np.arange(_PARTS) / _PARTS
 
-        def quaternions(some: Array) -> Array:
-            found = self.quat_xyzw(some)
+        def quaternions(sampled: Array) -> Array:
+            attitude = self.quat_xyzw(sampled)
             if seen is not None:
-                there, here = (one[..., None, :] for one in seen)
-                found = so3.quat_product(so3.quat_product(so3.quat_inverse(there), found), here)
-            return found.reshape(-1, len(some), 4)
+                space, body = (axes[..., None, :] for axes in seen)
+                attitude = so3.quat_product(so3.quat_product(so3.quat_inverse(space), attitude), body)
+            return attitude.reshape(-1, len(sampled), 4)
 
-        every = np.append(between.ravel(), ends[-1])
+        known = np.append(between.ravel(), ends[-1])
         error = float(np.max(self.error_estimate, initial=0.0))
-        found = continued_angles(quaternions, every, times.ravel(), chart, error)
-        return found.reshape(*self.batch, *times.shape, 3)
+        angles = continued_angles(quaternions, known, times.ravel(), chart, error)
+        return angles.reshape(*self.batch, *times.shape, 3)

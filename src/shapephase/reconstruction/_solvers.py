@@ -1,4 +1,4 @@
-"""The ways to the attitude: steps on a spectral interpolant, the closed form of a rigid body, and SciPy's DOP853."""
+"""Methods of reconstruction: steps on a spectral interpolant, the closed form of a rigid body, and SciPy's DOP853."""
 
 from __future__ import annotations
 
@@ -18,18 +18,14 @@ from ..integrator.driven_attitude import DrivenAttitude
 from ..integrator.many_rotations import rotations_of_each
 from ..rigid_body.euler_top import EulerTop
 
-_ROUNDING = 8.0 * float(np.finfo(float).eps)
-"""[rad] of one radian turned: the few operations that an angle goes through."""
-_TURN_OF_A_STEP = 0.3
-"""[rad]; quadrature by the step is exact to rounding for turns this short."""
-_MOST_STEPS = 10_000_000
-"""More would fill the memory of a workstation."""
-_MOST_PIECES = 400_000
-"""Stretches between the breaks of a motion: some five gigabytes of memory where each of them bends."""
+_ROUNDING = 8.0 * float(np.finfo(float).eps)  # rad for each radian turned: eight operations on an angle
+_TURN_OF_A_STEP = 0.3  # rad: quadrature by the step is exact to rounding for turns this short
+_MOST_STEPS = 10_000_000  # 3 GB of matrices
+_MOST_PIECES = 400_000  # intervals between breaks: some five gigabytes of samples
 
 
 class Solution(Protocol):
-    """S(t), the attitude relative to the start, for a batch.
+    """Attitude relative to the start, S(t), for a batch.
 
     Examples
     --------
@@ -55,14 +51,14 @@ class Solution(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RigidRotation:
-    """S(t), the attitude relative to the start, of a batch of free rigid bodies.
+    """Attitude relative to the start, S(t), of a batch of free rigid bodies.
 
     Attributes
     ----------
     tops : one for each motion of the batch
     duration : [s]
-    turn : the most that a body may turn in it [rad]
-    error_estimate : (B,) rounding, and what it grows to near a separatrix [rad]
+    turn : upper bound of the angle that a body turns in it [rad]
+    error_estimate : (B,) rounding, magnified near a separatrix [rad]
     """
 
     tops: tuple[EulerTop, ...]
@@ -77,7 +73,7 @@ class RigidRotation:
         """(K + 1,) between which no body turns by more than 0.3 rad [s]. Raises AccuracyNotReached for 1e7 or more."""
         if self.turn > _MOST_STEPS * _TURN_OF_A_STEP:
             raise AccuracyNotReached(
-                f"{self.turn:.3g} rad in one motion are too many to be followed step by step; shorten the motion"
+                f"a motion of {self.turn:.3g} rad needs more than {_MOST_STEPS} steps; shorten the motion"
             )
         return np.linspace(0.0, self.duration, 2 + int(self.turn / _TURN_OF_A_STEP))
 
@@ -87,7 +83,7 @@ class RigidRotation:
 
 
 def rigid_rotation(inertia: Array, momentum: Array, duration: float, tolerance: float) -> RigidRotation:
-    """The rotations of a rigid body from these body momenta at the start, (B, 3).
+    """Return the rotations of a rigid body from the body momenta at the start, (B, 3).
 
     Raises
     ------
@@ -108,7 +104,7 @@ def rigid_rotation(inertia: Array, momentum: Array, duration: float, tolerance: 
 
 
 def _rounding(top: EulerTop, duration: float) -> float:
-    """Rounding of the angles turned and, unless moments and momentum came as they are, as each half turn magnifies."""
+    """Rounding of the angles turned; magnified each half period unless axes were exact [rad]."""
     angles = 1.0 + (top.magnitude / top.moments[0] + top.rate) * duration
     exact = np.count_nonzero(top.axes) == 3
     half_periods = 1.0 + 2.0 * duration / top.period
@@ -117,7 +113,7 @@ def _rounding(top: EulerTop, duration: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Dop853Rotation:
-    """S(t) by SciPy's integrator, of a batch.
+    """Attitude relative to the start by SciPy's integrator, for a batch.
 
     Attributes
     ----------
@@ -137,7 +133,7 @@ class Dop853Rotation:
 
     @property
     def evaluations(self) -> int:
-        """Of I and L_o, in all runs."""
+        """Number of evaluations of I and L_o in all runs."""
         return sum(turn.evaluations for turn in self.turns)
 
     def rotation(self, t: Array) -> Array:
@@ -146,7 +142,7 @@ class Dop853Rotation:
 
 
 def dop853_solution(deformation: Deformation, at_start: Array, tolerance: float) -> Dop853Rotation:
-    """The rotations from these body momenta at the start, (B, 3). Raises AccuracyNotReached as `driven_attitude`."""
+    """Return the rotations from the body momenta at the start, (B, 3). Raises AccuracyNotReached."""
     sample, breaks, limits = deformation.description.sample, deformation.breaks, deformation.step_limits()
     turns = tuple(dop853_attitude(sample, breaks, start, tolerance, limits) for start in at_start)
     return Dop853Rotation(turns, np.unique(np.concatenate([breaks, *(turn.times for turn in turns)])))
@@ -183,9 +179,8 @@ def _by_dop853(
     return solution, solution.evaluations
 
 
-# Deformation, body momenta at the start (B, 3), tolerance [rad] and number of threads to the solution and its number of
-# evaluations.
 Solver = Callable[[Deformation, Array, float, int | None], tuple[Solution, int]]
+"""Deformation, body momenta at the start (B, 3), tolerance [rad], threads -> solution, number of evaluations."""
 SOLVERS: dict[str, Solver] = {
     "auto": _by_interpolant,
     "spectral": _by_interpolant,
@@ -200,13 +195,14 @@ def check_pieces(deformation: Deformation) -> None:
     pieces = (len(deformation.declared_breaks) - 1) // deformation.loops
     if pieces > _MOST_PIECES:
         raise TrajectoryError(
-            f"a motion in {pieces} pieces, as a recording of as many samples has; up to {_MOST_PIECES} are integrated "
-            f"at once: read the recording with resample={_rounded_down(_MOST_PIECES / deformation.duration):g} or less "
-            "(--resample), or a part of it with trim= (--trim)"
+            f"the motion has {pieces} intervals between breaks (a recording has one between samples), the limit is "
+            f"{_MOST_PIECES}: read the recording with "
+            f"resample={_rounded_down(_MOST_PIECES / deformation.duration):g} or less (--resample), or a part of it "
+            "with trim= (--trim)"
         )
 
 
 def _rounded_down(number: float) -> float:
-    """To two digits."""
+    """Largest number of two digits that is not above `number`."""
     unit = 10.0 ** (math.floor(math.log10(number)) - 1)
     return math.floor(number / unit) * unit

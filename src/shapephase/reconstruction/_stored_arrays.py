@@ -1,4 +1,4 @@
-"""The arrays of a stored motion, checked before anything is made of them: whoever wrote the file is not believed."""
+"""Checks of the arrays of a stored motion before they are used."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Integers, finite_array
 
-_CHANNELS = 9
-"""Of the interpolant: six of the inverse inertia, three of the drift."""
-_UNIT = 1e-6
-"""How far a stored rotation may be from one: what `so3.orthonormalised` still mends."""
+_CHANNELS = 9  # of the interpolant: six of the inverse inertia, three of the drift
+_UNIT = 1e-6  # distance of a stored rotation from an orthonormal one that `so3.orthonormalised` accepts
 
 
 def check_deformation(arrays: Mapping[str, Any], loops: int) -> None:
@@ -32,7 +30,7 @@ def check_deformation(arrays: Mapping[str, Any], loops: int) -> None:
 
 
 def check_start(arrays: Mapping[str, Any]) -> int:
-    """How many motions there are. Raises ValueError where momenta and attitudes do not go together."""
+    """Number of motions. Raises ValueError where momenta and attitudes have different shapes."""
     momentum = finite_array(arrays["spatial_momentum"], "spatial_momentum", (3,))
     attitude = _numbers(arrays, "initial_attitude", *momentum.shape, 3)
     _check_rotations(attitude, "initial_attitude")
@@ -67,11 +65,11 @@ def check_rotation(arrays: Mapping[str, Any], loops: int, count: int) -> None:
 
 
 def _check_directions(directions: Array, quaternions: Array) -> None:
-    """Raise ValueError where directions of the momentum are not those that the attitudes give it."""
+    """Raise ValueError where directions of the momentum contradict the attitudes."""
     turned = so3.apply(so3.transpose(so3.matrix_from_quat(quaternions)), directions[:, :1])
-    # Compared before anything is squared: numbers of a damaged file may be as large as there are.
+    # Compared before squares, which overflow for the numbers of a damaged file.
     if np.any(np.abs(directions) > 2.0) or np.any(np.abs(turned - directions) > _UNIT):
-        raise ValueError("step_directions: not those of a momentum that rests in space")
+        raise ValueError("step_directions: the momentum is not constant in space")
     if np.any(np.abs((directions[:, :1] ** 2).sum(axis=-1) - 1.0) > _UNIT):
         raise ValueError("step_directions: not of length 1")
 
@@ -112,4 +110,4 @@ def _integers(arrays: Mapping[str, Any], name: str, length: int | None) -> Integ
 def _check_rotations(matrices: Array, name: str) -> None:
     excess = matrices.swapaxes(-1, -2) @ matrices - np.eye(3)
     if np.any(np.abs(excess) > _UNIT) or np.any(np.linalg.det(matrices) < 0.0):
-        raise ValueError(f"{name}: no rotation")
+        raise ValueError(f"{name}: not a rotation")

@@ -1,8 +1,8 @@
-"""Attitudes in time as three numbers that go on without a jump: rotation vectors and Euler angles.
+"""Attitudes in time as three continuous numbers: rotation vectors and Euler angles.
 
-Each chart has poles: a rotation vector where the attitude comes back after whole turns, Euler angles where the middle
-one reaches its end. A few vectors, linear in the quaternion, lose their direction there and nowhere else. So directions
-are followed along the motion, ever finer towards a pole.
+Each chart has poles: a rotation vector where the attitude returns to the identity after whole turns, Euler angles at
+gimbal lock. Some vectors that are linear in the quaternion vanish there and nowhere else, so their directions are
+followed along the motion, with finer steps towards a pole.
 """
 
 from __future__ import annotations
@@ -19,50 +19,47 @@ from ..errors import unknown_name
 
 _AXES = ("x", "y", "z")
 _TURN = 2.0 * np.pi
-# Of the distance from a pole: how far a vector may move between two times; its direction turns by 30 degrees at most.
-_NEAR = 0.5
-# Length of such a vector at a pole, where the attitude is not more uncertain: about half the angle from the pole.
-_AT_POLE = 1e-10
-# Of the duration: what halving leaves of an interval is no shorter.
-_SHORTEST = 1e-14
+_NEAR = 0.5  # change of a vector between two times over its length: the direction then turns by 30 degrees at most
+_AT_POLE = 1e-10  # rad, about twice the length of such a vector at a pole: the default tolerance of attitudes over ten
+_SHORTEST = 1e-14  # of the duration: halved intervals are not shorter, or times would coincide
 
 
 class Chart(Protocol):
-    """Three numbers of an attitude, by the directions of vectors that are zero at the poles."""
+    """Three coordinates of an attitude, from the directions of vectors that vanish at the poles."""
 
     def vectors(self, quaternions: Array, /) -> list[Array]:
-        """The vectors, linear in the quaternion: (..., 4) -> (..., d) each."""
+        """Return the vectors, linear in the quaternion: (..., 4) -> (..., d) each."""
         ...
 
     def numbers(self, quaternions: Array, at_pole: float, /) -> Array:
-        """The numbers along a continuous curve: (N, 4) -> (N, 3) [rad]."""
+        """Return the coordinates along a continuous curve: (N, 4) -> (N, 3) [rad]."""
         ...
 
 
 def continued_angles(
     quaternions_at: Callable[[Array], Array], known: Array, times: Array, chart: Chart, uncertainty: float
 ) -> Array:
-    """Three numbers of attitudes, continued along their motion: times (N,) -> (B, N, 3) [rad].
+    """Return chart coordinates of attitudes, continued along their motion: times (N,) -> (B, N, 3) [rad].
 
-    The motion is followed from its start at times of its own: numbers do not depend on which times are asked for. What
-    goes through a pole, to 1e-10 rad or the attitude's uncertainty, goes straight through.
+    The motion is followed from its start at times of its own, so the coordinates do not depend on the requested times.
+    A motion that passes through a pole, to 1e-10 rad or the attitude's uncertainty, continues straight.
 
     Parameters
     ----------
     quaternions_at : times (M,) -> (B, M, 4), of any sign
     known : (K,) times between which attitudes move smoothly and by far less than a turn, first 0, last the end [s]
-    uncertainty : of the attitudes [rad]
+    uncertainty : estimated error of the attitudes [rad]
     """
     at_pole = max(_AT_POLE, uncertainty)
     own = _followed(quaternions_at, known, chart, at_pole)
-    every = np.union1d(own, times)
-    curves = [_continuous(curve) for curve in quaternions_at(every)]
-    found = np.array([chart.numbers(curve, at_pole) for curve in curves]).reshape(len(curves), len(every), 3)
-    return found[:, np.searchsorted(every, times)]
+    sampled = np.union1d(own, times)
+    curves = [_continuous(curve) for curve in quaternions_at(sampled)]
+    angles = np.array([chart.numbers(curve, at_pole) for curve in curves]).reshape(len(curves), len(sampled), 3)
+    return angles[:, np.searchsorted(sampled, times)]
 
 
 def _followed(quaternions_at: Callable[[Array], Array], known: Array, chart: Chart, at_pole: float) -> Array:
-    """Times between which no vector of a chart turns far."""
+    """Times between which no vector of the chart turns by more than 30 degrees: (M,) [s]."""
     times, quaternions = known, quaternions_at(known)
     while True:
         signs = np.where(np.sum(quaternions[:, 1:] * quaternions[:, :-1], axis=-1) < 0.0, -1.0, 1.0)[..., None]
@@ -81,21 +78,21 @@ def _followed(quaternions_at: Callable[[Array], Array], known: Array, chart: Cha
 
 
 def _continuous(quaternions: Array) -> Array:
-    """Quaternions in their order, each with the sign that is nearer to the one before: (N, 4) -> (N, 4)."""
+    """Quaternions, each with the sign that is nearer to its predecessor: (N, 4) -> (N, 4)."""
     flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0)
     return quaternions * np.cumprod(np.append(1.0, flips))[:, None]
 
 
 @dataclass(frozen=True)
 class RotationVectors:
-    """The rotation vector, whose axis may point either way: those of one rotation are whole turns apart on it."""
+    """Chart of rotation vectors; those of one rotation differ by whole turns along their axis."""
 
     def vectors(self, quaternions: Array) -> list[Array]:
-        """The sine part, as `Chart` has it."""
+        """Return the vector part of the quaternion."""
         return [quaternions[..., :3]]
 
     def numbers(self, quaternions: Array, at_pole: float) -> Array:
-        """As `Chart` has them; the first is within a half turn."""
+        """Return rotation vectors along the curve; the first is within a half turn."""
         curve = quaternions if quaternions[0, 3] >= 0.0 else -quaternions
         axes = _directions(curve[:, :3], at_pole)
         flips = np.where(np.sum(axes[1:] * axes[:-1], axis=1) < 0.0, -1.0, 1.0)
@@ -106,9 +103,9 @@ class RotationVectors:
 
 @dataclass(frozen=True)
 class EulerAngles:
-    """Euler angles by two complex numbers, whose phases are the half sum and half difference of the outer angles.
+    """Euler angles from two complex numbers, whose phases are the half sum and half difference of the outer angles.
 
-    Their sizes are cosine and sine of half the middle angle, or of half of it and a right angle where all axes differ.
+    Their moduli are cosine and sine of half the middle angle, increased by a right angle where all axes differ.
     Source: Bernardes and Viollet 2022, PLoS ONE 17, e0276302.
 
     Attributes
@@ -119,7 +116,7 @@ class EulerAngles:
     sequence: str
 
     def vectors(self, quaternions: Array) -> list[Array]:
-        """The complex numbers, as `Chart` has them."""
+        """Return the two complex numbers as real pairs."""
         i, j, k = self._extrinsic
         w, x, y, z = quaternions[..., 3], *(quaternions[..., axis] for axis in (i, j, 3 - i - j))
         z = self._handedness * z
@@ -128,11 +125,11 @@ class EulerAngles:
         return [np.stack([w - y, x + z], axis=-1) / np.sqrt(2.0), np.stack([w + y, z - x], axis=-1) / np.sqrt(2.0)]
 
     def numbers(self, quaternions: Array, at_pole: float) -> Array:
-        """As `Chart` has them; the outer ones begin within a half turn. All along at a pole, the last one is zero."""
+        """Return the angles; the outer ones begin within a half turn. Where all are at a pole, the last is zero."""
         parts = self.vectors(quaternions)
-        found = [_directions(part, at_pole) for part in parts]
-        phases = [np.unwrap(np.arctan2(part[:, 1], part[:, 0]), period=np.pi) for part in found]
-        turning = [part.any() for part in found]
+        directions = [_directions(part, at_pole) for part in parts]
+        phases = [np.unwrap(np.arctan2(part[:, 1], part[:, 0]), period=np.pi) for part in directions]
+        turning = [part.any() for part in directions]
         if not all(turning):
             other = phases[int(np.argmax(turning))]
             phases = [other, other if self.sequence.isupper() else -other]
@@ -151,7 +148,7 @@ class EulerAngles:
 
     @property
     def _extrinsic(self) -> tuple[int, int, int]:
-        """The axes of turns about fixed axes; those about axes that are carried along are the same in reverse."""
+        """Axes of the equivalent extrinsic sequence: an intrinsic one in reverse."""
         i, j, k = (_AXES.index(axis) for axis in self.sequence.lower())
         return (k, j, i) if self.sequence.isupper() else (i, j, k)
 
@@ -162,7 +159,7 @@ class EulerAngles:
 
 
 def _directions(vectors: Array, at_pole: float) -> Array:
-    """Of unit length: (N, d); at a pole that of the one before, of the one behind at the start; zero without any."""
+    """Unit vectors (N, d); at a pole the preceding one, at the start the next one; zero where all are at a pole."""
     length = np.linalg.norm(vectors, axis=-1)
     away = np.flatnonzero(length > at_pole)
     if not len(away):
@@ -172,7 +169,7 @@ def _directions(vectors: Array, at_pole: float) -> Array:
 
 
 def euler_angles(attitudes: Array, sequence: str) -> Array:
-    """Euler angles of attitudes in their order, each the nearest to those before: (N, 3, 3) -> (N, 3) [rad].
+    """Return Euler angles of consecutive attitudes, continuous in time: (N, 3, 3) -> (N, 3) [rad].
 
     Parameters
     ----------
@@ -182,7 +179,7 @@ def euler_angles(attitudes: Array, sequence: str) -> Array:
 
 
 def euler_chart(sequence: str) -> EulerAngles:
-    """The chart of a sequence. Raises UnknownNameError for what is no sequence of Euler angles."""
+    """Return the chart of a sequence. Raises UnknownNameError for an invalid sequence."""
     axes = sequence.lower() if isinstance(sequence, str) else ""
     cased = isinstance(sequence, str) and sequence in (sequence.lower(), sequence.upper())
     valid = cased and len(axes) == 3 and {*axes} <= {*_AXES} and axes[0] != axes[1] != axes[2]

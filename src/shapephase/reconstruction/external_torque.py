@@ -1,4 +1,4 @@
-"""Torques from outside: what a body feels that is not free."""
+"""External torques about the centre of mass."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ AXES = ("body", "space")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TorqueState:
-    """What a torque may depend on, at one time.
+    """State of the body at one time, the argument of a torque function.
 
     Attributes
     ----------
@@ -51,14 +51,14 @@ class TorqueState:
 
 @dataclass(frozen=True, eq=False)
 class ExternalTorque:
-    """A torque from outside about the centre of mass, which acts on the base.
+    """External torque about the centre of mass.
 
     Attributes
     ----------
     function : `TorqueState` -> (3,) [N m], smooth between the breaks
     axes : "body", those of the base, or "space", inertial ones
-    breaks : interior times where it jumps, as a thruster's pulse begins and ends [s]. The torque is sampled along the
-        motion, at times 1/4,000 of the duration apart: what is narrower than 1/2,000 needs its ends given here
+    breaks : interior times where it jumps, such as the ends of a thruster's pulse [s]. The torque is sampled along the
+        motion at times 1/4,000 of the duration apart: a pulse narrower than 1/2,000 needs its ends given here
 
     Examples
     --------
@@ -80,11 +80,11 @@ class ExternalTorque:
         check_choice(self.axes, "axes", AXES)
 
     def edges(self, duration: float) -> Array:
-        """The breaks with both ends: (M,) [s]. Raises TrajectoryError for one that is outside."""
+        """Return the breaks with both ends: (M,) [s]. Raises TrajectoryError for one outside the interval."""
         return breaks_argument(self.breaks, duration)
 
     def in_base_axes(self, state: TorqueState) -> Array:
-        """(3,) [N m]. Raises ShapeError where the function returns something else."""
+        """Return the torque in base axes: (3,) [N m]. Raises ShapeError where the function returns anything else."""
         given = np.asarray(self.function(state), dtype=np.float64)
         if given.shape != (3,) or not np.isfinite(given).all():
             raise ShapeError(
@@ -94,5 +94,5 @@ class ExternalTorque:
 
 
 def torque_argument(torque: ExternalTorque | Callable[[TorqueState], ArrayLike]) -> ExternalTorque:
-    """A torque as it is given: a function alone is one in base axes, without breaks."""
+    """Return an `ExternalTorque`; a function alone is one in base axes without breaks."""
     return torque if isinstance(torque, ExternalTorque) else ExternalTorque(torque)

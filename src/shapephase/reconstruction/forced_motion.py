@@ -1,4 +1,4 @@
-"""The motion of a body with a torque from outside: attitude and momentum are integrated together."""
+"""Motion of a body under an external torque: attitude and momentum are integrated together."""
 
 from __future__ import annotations
 
@@ -23,8 +23,7 @@ from .external_torque import ExternalTorque, TorqueState, torque_argument
 from .motion_record import write_table
 
 METHODS = ("auto", "dop853")
-# Rows of a table.
-_ROWS = 201
+_ROWS = 201  # of a table, by default
 _COLUMNS = (
     "time", "qx", "qy", "qz", "qw", "omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s", "momentum_x_kg_m2_s",
     "momentum_y_kg_m2_s", "momentum_z_kg_m2_s", "torque_x_N_m", "torque_y_N_m", "torque_z_N_m", "work_J",
@@ -33,14 +32,12 @@ _COLUMNS = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ForcedMotion:
-    """How a body turns under a torque from outside; its momentum is a function of time, too.
-
-    Made by `reconstruct(..., torque=)`.
+    """Motion of a body under an external torque; made by `reconstruct(..., torque=)`.
 
     Attributes
     ----------
     deformation : what moved
-    torque_law : the torque as it was given
+    torque_law : the given torque
     initial_momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
     initial_attitude : (3, 3), base axes to inertial axes
     tolerance : the one requested [rad]
@@ -68,17 +65,17 @@ class ForcedMotion:
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Length T of the interval [s]."""
         return self.deformation.duration
 
     @property
     def batch(self) -> tuple[int, ...]:
-        """It is always one motion."""
+        """Leading axes: none, it is always one motion."""
         return ()
 
     @cached_property
     def breaks(self) -> Array:
-        """Those of the deformation and of the torque: (M,), first 0, last `duration` [s]."""
+        """Breaks of the deformation and of the torque: (M,), first 0, last `duration` [s]."""
         return np.union1d(self.deformation.breaks, self.torque_law.edges(self.duration))
 
     @property
@@ -96,7 +93,7 @@ class ForcedMotion:
         return so3.quat_from_matrix(self.attitude(t))
 
     def momentum(self, t: ArrayLike) -> Array:
-        """About the centre of mass, inertial axes: times (...) -> (..., 3) [kg m^2/s]."""
+        """Angular momentum about the centre of mass, inertial axes: times (...) -> (..., 3) [kg m^2/s]."""
         times = times_argument(t, self.duration)
         return self.solution.states(times.ravel())[:, :3].reshape(*times.shape, 3)
 
@@ -112,18 +109,17 @@ class ForcedMotion:
         return so3.apply(inverse_inertia(inertia, times.ravel()), pi - internal).reshape(*times.shape, 3)
 
     def torque(self, t: ArrayLike) -> Array:
-        """From outside: times (...) -> (..., 3), base axes [N m]."""
+        """External torque: times (...) -> (..., 3), base axes [N m]."""
         times = times_argument(t, self.duration)
         flat = times.ravel()
         inertia, internal = self.deformation.description.sample(flat)
         attitudes, momenta = self.attitude(flat), self.body_momentum(flat)
         rates = so3.apply(inverse_inertia(inertia, flat), momenta - internal)
         shapes = _shapes(self.deformation)(flat)
-        found = _pushes(self.torque_law, flat, attitudes, rates, shapes, inertia, momenta)
-        return found.reshape(*times.shape, 3)
+        return _torques(self.torque_law, flat, attitudes, rates, shapes, inertia, momenta).reshape(*times.shape, 3)
 
     def work(self, t: ArrayLike) -> Array:
-        """Of the torque since the start, the integral of torque . omega: times (...) -> (...) [J]."""
+        """Work of the torque since the start, the integral of torque . omega: times (...) -> (...) [J]."""
         times = times_argument(t, self.duration)
         return self.solution.states(times.ravel())[:, 3].reshape(times.shape)[()]
 
@@ -134,24 +130,21 @@ class ForcedMotion:
 
     @property
     def final_momentum(self) -> Array:
-        """At the end, inertial axes: (3,) [kg m^2/s]."""
+        """Angular momentum at the end, inertial axes: (3,) [kg m^2/s]."""
         return self.momentum(self.duration)
 
     @property
     def error_estimate(self) -> float:
-        """Of the attitude over [0, T], measured: how far two integrations are apart [rad]."""
+        """Estimate of the attitude error over [0, T], the difference of two integrations [rad]."""
         return float(self.solution.attitude_errors[-1])
 
     @property
     def momentum_error(self) -> float:
-        """The same of the momentum [kg m^2/s]."""
+        """Estimate of the momentum error over [0, T] [kg m^2/s]."""
         return float(np.linalg.norm(self.solution.state_errors[-1, :3]))
 
     def error_in_time(self, t: ArrayLike) -> Array:
-        """The estimate of the attitude's error from the start to each time: (...) -> (...) [rad].
-
-        A motion that magnifies its errors shows it here: the estimate grows as they do.
-        """
+        """Estimate of the attitude error from the start to each time: (...) -> (...) [rad]."""
         times = times_argument(t, self.duration)
         place = np.searchsorted(self.solution.error_times, times)
         return self.solution.attitude_errors[np.minimum(place, len(self.solution.error_times) - 1)]
@@ -190,7 +183,7 @@ def reconstruct_forced(
     tolerance: float,
     method: str,
 ) -> ForcedMotion:
-    """The motion under a torque. Arguments and errors as for `reconstruct`."""
+    """Return the motion under a torque, with the arguments and errors of `reconstruct`."""
     check_object(deformation, "Deformation", "deformation")
     if not isinstance(method, str) or method not in METHODS:
         raise unknown_name("method with a torque", method, METHODS)
@@ -205,21 +198,21 @@ def reconstruct_forced(
         inertia, internal = sample(times)
         pi = so3.apply(so3.transpose(turned), states[:, :3])
         omega = so3.apply(inverse_inertia(inertia, times), pi - internal)
-        push = _pushes(law, times, turned, omega, shapes(times), inertia, pi)
-        return omega, np.column_stack([so3.apply(turned, push), np.sum(push * omega, axis=-1)])
+        torques = _torques(law, times, turned, omega, shapes(times), inertia, pi)
+        return omega, np.column_stack([so3.apply(turned, torques), np.sum(torques * omega, axis=-1)])
 
     tensor = sample(np.zeros(1))[0][0]
     least = float(np.linalg.eigvalsh(inverse_inertia(tensor))[0])
-    # What turns the body by a radian in all of the time, beside what it has.
+    # Its own momentum, and one that turns it by a radian in the whole time.
     size = float(np.linalg.norm(spatial)) + 1.0 / (least * deformation.duration)
     scales = np.array([size, size, size, size**2 * least])
     limits = deformation.step_limits()
-    found = driven_attitude(rates, breaks, start, np.append(spatial, 0.0), scales, tolerance, limits)
-    return ForcedMotion(deformation, law, spatial, start, tolerance, found)
+    solution = driven_attitude(rates, breaks, start, np.append(spatial, 0.0), scales, tolerance, limits)
+    return ForcedMotion(deformation, law, spatial, start, tolerance, solution)
 
 
-def _pushes(law: ExternalTorque, *states: Array) -> Array:
-    """The torque, base axes, in states given by their times, attitudes, rates, shapes, inertias, momenta: (N, 3)."""
+def _torques(law: ExternalTorque, *states: Array) -> Array:
+    """Torques (N, 3), base axes, at given times, attitudes, rates, shapes, inertias and momenta."""
     return np.array(
         [
             law.in_base_axes(
@@ -231,7 +224,7 @@ def _pushes(law: ExternalTorque, *states: Array) -> Array:
 
 
 def _shapes(deformation: Deformation) -> Callable[[Array], Array]:
-    """The joints at times (N,) -> (N, n); without joints (N, 0)."""
+    """Return the function from times (N,) to shapes (N, n); without joints (N, 0)."""
     description: Any = deformation.description
     while hasattr(description, "original"):
         description = description.original

@@ -23,7 +23,7 @@ _METHODS = ("auto", "spectral")
 
 @dataclass(frozen=True, eq=False)
 class MotionFamily(Sequence[Motion]):
-    """How N bodies turn: a sequence of motions, made by `reconstruct` of a family.
+    """Motions of N bodies of a family, a sequence made by `reconstruct`.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class MotionFamily(Sequence[Motion]):
     __repr__ = short_repr
 
     def __len__(self) -> int:
-        """N."""
+        """Number of motions, N."""
         return len(self.momentum)
 
     @overload
@@ -62,7 +62,7 @@ class MotionFamily(Sequence[Motion]):
     def __getitem__(self, index: slice) -> tuple[Motion, ...]: ...
 
     def __getitem__(self, index: int | slice) -> Motion | tuple[Motion, ...]:
-        """One of the motions, put together when it is asked for, or those of a slice."""
+        """Return one of the motions, or a tuple of those of a slice."""
         numbers = range(len(self))[index]
         if isinstance(numbers, range):
             return tuple(self[number] for number in numbers)
@@ -79,7 +79,7 @@ class MotionFamily(Sequence[Motion]):
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Length T of the interval [s]."""
         return self.deformations.duration
 
     @property
@@ -113,7 +113,7 @@ def reconstruct_family(
     tolerance: float,
     method: str,
 ) -> MotionFamily:
-    """As `reconstruct`, with the tolerance already checked."""
+    """Return the motions of a family of deformations; the tolerance has been checked."""
     if not isinstance(method, str) or method not in _METHODS:
         raise unknown_name("method for a family of bodies", method, _METHODS)
     count = len(deformations)

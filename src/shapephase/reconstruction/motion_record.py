@@ -1,4 +1,4 @@
-"""Motions in files: a whole motion as NPZ, a time series as CSV."""
+"""Files of motions: a whole motion as NPZ, a time series as CSV."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ _VECTOR_DEGREE = 24
 
 @dataclass(frozen=True, eq=False)
 class MotionRecord:
-    """What is kept of a motion; its fields are those of `reconstruction.Motion`.
+    """Stored fields of a `reconstruction.Motion`.
 
-    When read, the deformation is one made of the samples: it needs neither body nor path.
+    When read, the deformation is made of the samples: it needs neither body nor path.
     """
 
     deformation: Deformation
@@ -58,7 +58,7 @@ class MotionRecord:
 
 
 def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> None:
-    """Write a motion whole, with versions and units."""
+    """Write a motion with versions and units."""
     interpolant, deformation = record.solution.interpolant, record.deformation
     header = {
         "format": _FORMAT,
@@ -99,14 +99,14 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
 
 
 def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
-    """Read what `write_motion_record` wrote.
+    """Read a file of `write_motion_record`.
 
     Raises
     ------
     InputFileNotFoundError
         If there is no such file.
     ResultFileError
-        If the file is no motion, is damaged, or was written by a version with another format.
+        If the file is not a motion, is damaged, or was written by a version with another format.
     """
     where = Path(path)
     if not where.is_file():
@@ -115,9 +115,9 @@ def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
         arrays = npz_arrays(where.read_bytes())
         header = json.loads(str(arrays["header"]))
     except (OSError, ValueError, KeyError, RecursionError) as error:
-        raise ResultFileError(f"{where}: no motion that can be read ({error})") from None
+        raise ResultFileError(f"{where}: not a readable motion ({error})") from None
     if not isinstance(header, dict) or "format" not in header:
-        raise ResultFileError(f"{where}: no motion; its header says {str(header)[:80]!r}")
+        raise ResultFileError(f"{where}: not a motion; its header is {str(header)[:80]!r}")
     if header["format"] != _FORMAT:
         raise ResultFileError(
             f"{where}: holds {header['format']!r}, this version reads {_FORMAT!r}; compute the motion anew"
@@ -148,7 +148,7 @@ def _steps(rotation: SteppedRotation) -> dict[str, Array]:
 
 
 def _of_part(number: int, name: str) -> str:
-    """The name of an array of one part of a batch whose samples differ."""
+    """Name of an array of one part of a batch whose samples differ."""
     return f"part_{number}_{name}"
 
 
@@ -172,15 +172,14 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecor
         arrays["spatial_momentum"],
         so3.orthonormalised(arrays["initial_attitude"]),
         _positive(header, "tolerance"),
-        # The name in files of earlier versions.
-        "spectral" if header["method"] == "collocation" else str(header["method"]),
+        str(header["method"]),
         int(header["evaluations"]),
         _solution(header, arrays, interpolant),
     )
 
 
 def _positive(header: Mapping[str, Any], name: str) -> float:
-    """A number of the header, zero or above."""
+    """Return a number of the header that is not negative."""
     value = float(header[name])
     if not 0.0 <= value < np.inf:
         raise ValueError(f"{name} is {value}")
@@ -188,10 +187,10 @@ def _positive(header: Mapping[str, Any], name: str) -> float:
 
 
 def _made_from(header: Mapping[str, Any]) -> dict[str, Any]:
-    """What a stored motion was made from, and when and how it was stored; nothing of files older than that."""
+    """Return the provenance of a stored motion, with date, command and versions under "computed"."""
     stored = header.get("provenance", {})
     if not isinstance(stored, dict):
-        raise TypeError("its provenance is no object")
+        raise TypeError("its provenance is not an object")
     how = {name: stored[name] for name in ("date", "command", "versions") if name in stored}
     return {name: value for name, value in stored.items() if name not in how} | ({"computed": how} if how else {})
 

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """How the attitude at the end of a motion answers to small changes, to first order.
+    """Derivatives of the final attitude by the momentum and the initial attitude.
 
     A change dmu of the momentum and a turn of the start to R(0) exp(hat(delta)) turn the end to R(T) exp(hat(e)) with
     e = by_momentum dmu + by_attitude delta: the derivative of the steps, not a difference.
@@ -70,7 +70,7 @@ class Sensitivity:
 @copied_when_read("initial_attitude")
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion(MotionViews):
-    """How a free body turns: attitude, body angular momentum and angular velocity at any time of [0, T].
+    """Motion of a free body: attitude, body angular momentum and angular velocity at any time of [0, T].
 
     Results have the shape batch + t.shape + item, where batch are the leading axes of momentum and attitude.
 
@@ -105,12 +105,12 @@ class Motion(MotionViews):
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Length T of the interval [s]."""
         return self.deformation.duration
 
     @property
     def batch(self) -> tuple[int, ...]:
-        """The leading axes."""
+        """Leading axes of momentum and initial attitude."""
         return self.momentum.shape[:-1]
 
     def attitude(self, t: ArrayLike) -> Array:
@@ -152,7 +152,7 @@ class Motion(MotionViews):
         velocity: ArrayLike = (0.0, 0.0, 0.0),
         gravity: ArrayLike = (0.0, 0.0, 0.0),
     ) -> Array:
-        """Where the base origin is, inertial axes: times (...) -> batch + (..., 3) [m].
+        """Position of the base origin, inertial axes: times (...) -> batch + (..., 3) [m].
 
         The centre of mass moves as start + velocity t + gravity t^2 / 2; by default it rests at the origin.
 
@@ -182,7 +182,7 @@ class Motion(MotionViews):
     def equation_residual(self) -> Array:
         """Largest defect of I omega + L_o = R^T momentum, omega by differentiating R(t): batch [relative].
 
-        At 20 times; the deformation is evaluated anew, so a fault of sampling or stepping shows here.
+        The deformation is evaluated again at 20 times, so an error of sampling or stepping shows here.
         """
         if len(self.parts) > 1:
             each = [(rows, np.atleast_1d(part.equation_residual)) for rows, part in self.parts]
@@ -220,22 +220,18 @@ class Motion(MotionViews):
 
     @property
     def horizontal_lift(self) -> SteppedRotation:
-        """How the shape motion alone would turn the base, on the samples that the motion already has.
-
-        Its steps end where those of the motion do. Integrated once, when it is first needed; every split and every
-        gauge shares it.
-        """
+        """Rotation of the base by the shape motion alone, on the samples and steps of the motion."""
         return self.lift_with_errors.rotation
 
     @cached_property
     def lift_with_errors(self) -> Lift:
-        """The same, with how far it may be off."""
+        """Horizontal lift with its error estimates; integrated once, when first needed."""
         deformation = self.deformation
         return lift_along(self._finest, deformation.stored_momentum if deformation.has_wheels else None)
 
     @cached_property
     def lift_without_momentum(self) -> Lift:
-        """How the body would turn without total momentum: by its shape, and by the momentum that wheels store."""
+        """Rotation without total momentum: by the shape, and by the momentum that wheels store."""
         return lift_along(self._finest) if self.deformation.has_wheels else self.lift_with_errors
 
     @property
@@ -244,23 +240,23 @@ class Motion(MotionViews):
 
     @cached_property
     def error_turns(self) -> Array:
-        """How far attitudes probably are off at the ends of steps, as of `integrator.lift.error_turns`."""
-        assert isinstance(self.stepped, SteppedRotation), "a batch has them part by part"
+        """Estimated attitude errors at the ends of steps (`integrator.lift.error_turns`)."""
+        assert isinstance(self.stepped, SteppedRotation), "a batch has one array for each part"
         return read_only(error_turns(self.stepped, self.lift_without_momentum))
 
     @property
     def interpolant(self) -> Interpolant:
-        """I^-1 and I^-1 L_o as the integrator saw them; in a batch as for the largest momentum."""
+        """Series of I^-1 and I^-1 L_o that were integrated; in a batch those of the largest momentum."""
         return self.stepped.interpolant
 
     @property
     def amplification(self) -> Array:
-        """The largest growth of a small error of the attitude from one time to a later one: batch."""
+        """Largest factor by which an attitude error grows from one time to a later one: batch."""
         return self.stepped.amplification.reshape(self.batch)[()]
 
     @cached_property
     def sensitivity(self) -> Sensitivity:
-        """How the attitude at the end answers to changes of momentum and initial attitude, to first order."""
+        """Derivatives of the final attitude by momentum and initial attitude."""
         stepped = self.stepped
         slope = stepped.momentum_slope
         start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
@@ -272,7 +268,7 @@ class Motion(MotionViews):
         )
 
     def dynamic_phase(self, t: ArrayLike) -> Array:
-        """The integral of omega . Pi/|Pi| from 0 to t: times (...) -> batch + (...) [rad]; zero without momentum.
+        """Integral of omega . Pi/|Pi| from 0 to t: times (...) -> batch + (...) [rad]; zero without momentum.
 
         Equation :eq:`montgomery-phase` of the documentation.
         Source: Cabrera 2006, equation (12); theory.md B9.
@@ -281,7 +277,7 @@ class Motion(MotionViews):
         return self.stepped.dynamic_phase(times.ravel()).reshape((*self.batch, *times.shape))[()]
 
     def solid_angle(self, t: ArrayLike) -> Array:
-        """The signed area that Pi has gone round from 0 to t, closed by the great circle, seen from the base frame.
+        """Signed area enclosed by the direction of Pi from 0 to t and the great circle that closes it, base axes.
 
         Times (...) -> batch + (...) [sr]; zero without momentum. It grows continuously from zero as long as Pi keeps
         away from the point opposite its start, where it jumps by 4 pi: at the end of the motion it is that of
@@ -312,7 +308,7 @@ class Motion(MotionViews):
         return self.initial_attitude.reshape(-1, 3, 3)
 
     def _differentiated(self, times: Array) -> Array:
-        """omega from the attitude alone, by differences of order eight within a step: (N,) -> (B, N, 3)."""
+        """Angular velocity by differences of order eight of the attitude within a step: (N,) -> (B, N, 3)."""
         ends = self.solution.times
         index = np.clip(np.searchsorted(ends, times, side="right") - 1, 0, len(ends) - 2)
         reach = np.minimum(times - ends[index], ends[index + 1] - times)
@@ -377,25 +373,25 @@ def reconstruct(
     progress: Callable[[RunProgress], Any] | None = None,
     torque: ExternalTorque | Callable[[TorqueState], ArrayLike] | None = None,
 ) -> Motion | MotionFamily | ForcedMotion:
-    """The motion of a free body with a known change of shape and a given angular momentum.
+    """Return the motion of a free body with a known change of shape and a given angular momentum.
 
-    Solves R' = R hat(I^-1 (R^T momentum - L_o)); with a torque from outside the momentum changes by R torque, too.
+    Solves R' = R hat(I^-1 (R^T momentum - L_o)); with an external torque the momentum changes by R torque, too.
 
     Parameters
     ----------
-    deformation : or those of a family of N bodies, each of which then moves as if it were alone
-    momentum : (..., 3) about the centre of mass, inertial axes [kg m^2/s]; zero is allowed. Of a family (3,) or (N, 3)
+    deformation : one, or those of a family of N bodies, each computed as if it were alone
+    momentum : (..., 3) about the centre of mass, inertial axes [kg m^2/s]; zero is allowed. For a family (3,) or (N, 3)
     attitude : (..., 3, 3) of the deformation's frame at t = 0, to inertial axes; None: the identity. Leading
         axes of both broadcast.
-    tolerance : of the attitude, over the whole interval, between 1e-13 and 1e-4 [rad]
+    tolerance : largest attitude error over the whole interval, between 1e-13 and 1e-4 [rad]
     method : "auto" or "spectral" (the deformation sampled at Chebyshev points, the attitude stepped on the interpolant
-        by a Runge-Kutta method of order 8), "closed_form" (of a rigid body, by elliptic functions:
+        by a Runge-Kutta method of order 8), "closed_form" (a rigid body by elliptic functions:
         `rigid_body.EulerTop`), or "dop853" (SciPy's integrator on the deformation itself, an independent check)
-    threads : at most, for many momenta; None: one for each processor. Results do not depend on it
+    threads : largest number of threads for many momenta; None: one for each processor. Results do not depend on it
     progress : called with a `RunProgress` some two hundred times in a long run: the share that is done, which never
         falls, and what is being done; if it returns something true, the run stops
-    torque : from outside, an `ExternalTorque` or a function of a `TorqueState` in base axes [N m]; None: none. With
-        one, attitude and momentum are integrated together, by SciPy's DOP853, to a `ForcedMotion`
+    torque : external torque, an `ExternalTorque` or a function of a `TorqueState` in base axes [N m]; None: no torque.
+        With one, attitude and momentum are integrated together, by SciPy's DOP853, to a `ForcedMotion`
 
     Raises
     ------
@@ -406,7 +402,7 @@ def reconstruct(
     AccuracyNotReached
         If the tolerance cannot be met.
     TrajectoryError
-        For more than 400,000 pieces between breaks in one loop, as a recording of as many samples has.
+        For more than 400,000 intervals between breaks in one loop (a recording has one between samples).
     RunStopped
         If `progress` stopped the run.
 
@@ -422,15 +418,16 @@ def reconstruct(
     -2.283185 = 4 - 2 pi
     """
     goal, workers = tolerance_argument(tolerance), threads_argument(threads)
-    # The class that takes less time to ask for comes first.
+    # The class whose check takes less time comes first.
     if not isinstance(deformation, Deformation) and (
         torque is not None or not isinstance(deformation, DeformationFamily)
     ):
         check_object(deformation, "Deformation", "deformation")
     if momentum is None:
-        # It may be left out for this: what is no deformation is named first.
+        # Optional in the signature, so that a wrong deformation is reported first.
         raise WrongObjectError(
-            "momentum: three numbers [kg m^2/s] are needed, nothing came; of a body at rest they are [0.0, 0.0, 0.0]"
+            "momentum: three numbers [kg m^2/s] are needed, none were given; for a body at rest they are "
+            "[0.0, 0.0, 0.0]"
         )
     if torque is not None:
         from .forced_motion import reconstruct_forced
@@ -468,7 +465,7 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
     InputFileNotFoundError
         If there is no such file.
     ResultFileError
-        If the file is no motion, is damaged, or was written by a version with another format.
+        If the file is not a motion, is damaged, or was written by a version with another format.
 
     Examples
     --------
@@ -485,11 +482,11 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
 def momentum_from_rate(
     deformation: Deformation | DeformationFamily, angular_velocity: ArrayLike, attitude: ArrayLike | None = None
 ) -> Array:
-    """The angular momentum of a body that starts with this rate while its shape motion starts too.
+    """Return the angular momentum of a body that starts with this angular velocity while its shape moves.
 
     Parameters
     ----------
-    deformation : or those of a family of N bodies, where leading axes are () or (N,)
+    deformation : one, or those of a family of N bodies, where leading axes are () or (N,)
     angular_velocity : (..., 3) of the base at t = 0, base axes [rad/s]
     attitude : (..., 3, 3) at t = 0; None: the identity
 

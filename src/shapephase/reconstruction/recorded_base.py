@@ -1,4 +1,4 @@
-"""The base as somebody recorded it, against the base as it was reconstructed."""
+"""Comparison of a recorded base with the reconstructed one."""
 
 from __future__ import annotations
 
@@ -16,22 +16,20 @@ from ..errors import ShapeError, TrajectoryWarning
 from .reconstruction import Motion
 
 W_FIRST = "read as w x y z instead of x y z w, its quaternions agree: were they written with w first?"
-"""What is said of a recorded base that contradicts the motion, and no longer does so then."""
-_APART = 0.3
-"""[rad] A recorded base that comes so far from the motion's is asked about the order of its quaternions."""
-_NEARER = 0.1
-"""Of that: how near it has to be in the other order, for this to be the reason."""
+"""Hint for a recorded base that agrees with the motion in the other order of its quaternions."""
+_APART = 0.3  # rad: below, an order of quaternions cannot be told from noise
+_NEARER = 0.1  # of the difference, left over in the other order of quaternions, where that order is the reason
 
 
 @dataclass(frozen=True, eq=False)
 class BaseDifference:
-    """How far a recorded base is from a reconstructed one, both turned to agree at the first sample.
+    """Difference between a recorded base and a reconstructed one, both turned to agree at the first sample.
 
     Attributes
     ----------
     times : (N,) [s]
-    rotation : (N, 3, 3) what takes the reconstructed attitude to the recorded one, base axes
-    angle : (N,) of it [rad]
+    rotation : (N, 3, 3) from the reconstructed attitude to the recorded one, base axes
+    angle : (N,) rotation angle [rad]
 
     Examples
     --------
@@ -52,8 +50,8 @@ class BaseDifference:
 def base_difference(motion: Motion, times: ArrayLike, attitudes: ArrayLike) -> BaseDifference:
     """Compare a reconstructed motion with recorded attitudes of the base.
 
-    Nobody knows how the recorder's axes stand to the inertial ones of the motion, so the two are made to agree at the
-    first sample: what is compared is how the base has turned since, seen from itself.
+    The recorder's axes are unknown in the inertial axes of the motion, so both are turned to agree at the first sample:
+    the turns since then are compared, in base axes.
 
     Parameters
     ----------
@@ -69,7 +67,7 @@ def base_difference(motion: Motion, times: ArrayLike, attitudes: ArrayLike) -> B
     Warns
     -----
     TrajectoryWarning
-        Where the two are far apart, and near once the quaternions of the recording are read with w first.
+        Where the two are far apart, but near once the quaternions of the recording are read with w first.
 
     Examples
     --------
@@ -104,5 +102,5 @@ def base_difference(motion: Motion, times: ArrayLike, attitudes: ArrayLike) -> B
 
 
 def read_w_first(attitudes: Array) -> Array:
-    """The attitudes whose quaternions w x y z are, number by number, those of these as x y z w: (..., 3, 3) twice."""
+    """Return the attitudes that result when x y z w of these are read as w x y z: (..., 3, 3) -> (..., 3, 3)."""
     return so3.matrix_from_quat(np.roll(so3.quat_from_matrix(attitudes), -1, axis=-1))
