@@ -45,7 +45,7 @@ def test_the_command_says_turns_beside_the_angle(capsys):
     command = ["split", "diver", "diver_twist", "--momentum", "0", "61.558831", "0"]
     main(command)
     table = " ".join(capsys.readouterr().out.split())
-    assert "The angle of a rotation is said but for whole turns" in table
+    assert "The angle of a rotation does not count whole turns" in table
     assert "1.5000 somersaults and -1.0000 twists" in table
     main([*command, "--json"])
     data = json.loads(capsys.readouterr().out)

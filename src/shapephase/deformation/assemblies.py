@@ -80,21 +80,21 @@ class AssemblyDescription(UngaugedDescription):
         return self.about_centre(times).second
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """As `Description`."""
+        """See `Description`."""
         total = self.about_centre(times)
         return inertia_of(total.second), so3.vee(np.swapaxes(total.flow, -1, -2) - total.flow)
 
     def inertia_rate(self, times: Array) -> Array:
-        """As `Description`."""
+        """See `Description`."""
         flow = self.about_centre(times).flow
         return inertia_of(flow + np.swapaxes(flow, -1, -2))
 
     def centre_of_mass(self, times: Array) -> Array:
-        """As `Description`."""
+        """See `Description`."""
         return self.origin + self.about_centre(times).first / self.mass
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
-        """As `Description`."""
+        """See `Description`."""
         pairs = [part.correlation(times, reference, self.origin) for part in self.parts]
         total = self.about_centre(times)
         there = self.about_centre(np.array([reference])).first[0] / self.mass
@@ -103,14 +103,14 @@ class AssemblyDescription(UngaugedDescription):
         return value, rate
 
     def kinetic_energy(self, times: Array, turning: Array) -> Array:
-        """As `Description`."""
+        """See `Description`."""
         inertia, momentum = self.sample(times)
         turned = 0.5 * so3.apply(inertia, turning) + momentum
         return np.sum(turning * turned, axis=-1) + 0.5 * self.about_centre(times).vis_viva
 
     @property
     def scan(self) -> FunctionScan | None:
-        """As `Description`."""
+        """See `Description`."""
         return self._scan
 
     @cached_property
@@ -121,7 +121,7 @@ class AssemblyDescription(UngaugedDescription):
         return scanned(self.depends_on(), self.breaks[self.breaks <= period * (1.0 + 1e-12)])
 
     def depends_on(self) -> ScannedFunction:
-        """As `Description`: the paths of all parts, judged by the angular momentum that their rates are worth."""
+        """See `Description`: the paths of all parts, judged by the angular momentum that their rates are worth."""
         return side_by_side([self._moved(k) for k, part in enumerate(self.parts) if part.path is not None], _SUBJECT)
 
     def _moved(self, number: int) -> ScannedFunction:
@@ -142,7 +142,7 @@ class AssemblyDescription(UngaugedDescription):
         return replace(moved, judge=judge, angles=angles, columns=columns, quantities=quantities, words=_PART_WORDS)
 
     def smoothness(self, breaks: Array) -> Smoothness:
-        """As `Description`."""
+        """See `Description`."""
         scan = self.scan
         return Smoothness(
             breaks=breaks,

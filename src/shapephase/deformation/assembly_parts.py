@@ -92,7 +92,7 @@ class RigidPart:
     __repr__ = short_repr
 
     def moments(self, times: Array, origin: Array) -> Moments:
-        """As `Part`."""
+        """See `Part`."""
         arm = self.centre - origin
         still = np.zeros((len(times), 3))
         second = self.moment + self.mass * np.outer(arm, arm)
@@ -100,12 +100,12 @@ class RigidPart:
         return Moments(still + self.mass * arm, still, matrix + second, matrix, np.zeros(len(times)))
 
     def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """As `Part`."""
+        """See `Part`."""
         of_all = self.moments(times, origin)
         return of_all.second, of_all.flow
 
     def lever(self, columns: Array, origin: Array) -> float:  # noqa: ARG002
-        """As `Part`."""
+        """See `Part`."""
         return 0.0
 
 
@@ -131,20 +131,20 @@ class MovingMass:
     __repr__ = short_repr
 
     def moments(self, times: Array, origin: Array) -> Moments:
-        """As `Part`."""
+        """See `Part`."""
         at, speed = self.path.curve(times)
         arm = at - origin
         second, flow = (self.mass * arm[:, :, None] * other[:, None] for other in (arm, speed))
         return Moments(self.mass * arm, self.mass * speed, second, flow, self.mass * np.sum(speed**2, axis=-1))
 
     def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:
-        """As `Part`."""
+        """See `Part`."""
         at, speed = self.path.curve(times)
         there = self.mass * (self.path.curve(np.array([reference]))[0][0] - origin)
         return (at - origin)[:, :, None] * there, speed[:, :, None] * there
 
     def lever(self, columns: Array, origin: Array) -> float:
-        """As `Part`: its mass at the farthest."""
+        """See `Part`: its mass at the farthest."""
         return self.mass * float(np.linalg.norm(columns - origin, axis=1).max())
 
 
@@ -179,7 +179,7 @@ class Boom:
     __repr__ = short_repr
 
     def moments(self, times: Array, origin: Array) -> Moments:
-        """As `Part`."""
+        """See `Part`."""
         out, speed = (column[:, 0] for column in self.path.curve(times))
         density, arm, axis = self.mass / self.full_length, self.root - origin, self.direction
         half, third = 0.5 * density * out**2, density * out**3 / 3.0
@@ -193,7 +193,7 @@ class Boom:
         return Moments(first, momentum, second, flow, density * out * speed**2)
 
     def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:
-        """As `Part`: a bit of boom that ends s behind the tip is max(length - s, 0) along the axis from the root."""
+        """See `Part`: a bit of boom that ends s behind the tip is max(length - s, 0) along the axis from the root."""
         out, speed = (column[:, 0] for column in self.path.curve(times))
         then = self.path.curve(np.array([reference]))[0][0, 0]
         density, arm, axis = self.mass / self.full_length, self.root - origin, self.direction
@@ -208,6 +208,6 @@ class Boom:
         return value, rate
 
     def lever(self, columns: Array, origin: Array) -> float:
-        """As `Part`: all that is out moves, the tip at the farthest."""
+        """See `Part`: all that is out moves, the tip at the farthest."""
         out = float(np.abs(columns).max())
         return self.mass / self.full_length * out * (float(np.linalg.norm(self.root - origin)) + out)

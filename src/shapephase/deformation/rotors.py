@@ -73,7 +73,7 @@ class RotorDescription(UngaugedDescription):
     __repr__ = short_repr
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """As `Description`."""
+        """See `Description`."""
         shapes, rates = self.route.curve(times)
         inertia, internal = self.platform.sample(shapes, rates)
         for rotor in self.rotors:
@@ -87,7 +87,7 @@ class RotorDescription(UngaugedDescription):
         return inertia, internal
 
     def inertia_rate(self, times: Array) -> Array:
-        """As `Description`."""
+        """See `Description`."""
         shapes, rates = self.route.curve(times)
         found = self.platform.inertia_rate(shapes, rates)
         for rotor in self.rotors:
@@ -98,7 +98,7 @@ class RotorDescription(UngaugedDescription):
         return found
 
     def stored_momentum(self, times: Array) -> Array | None:
-        """As `Description`: p a of each wheel that keeps its momentum, J s a at a held speed."""
+        """See `Description`: p a of each wheel that keeps its momentum, J s a at a held speed."""
         held = [
             rotor.value * (1.0 if rotor.is_momentum else rotor.inertia) * self._axle(rotor, *self.route.curve(times))[0]
             for rotor in self.rotors
@@ -117,16 +117,16 @@ class RotorDescription(UngaugedDescription):
         return np.stack(found, axis=-1)
 
     def centre_of_mass(self, times: Array) -> Array:
-        """As `Description`."""
+        """See `Description`."""
         return self.platform.centre_of_mass(self.route.curve(times)[0])
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
-        """As `Description`."""
+        """See `Description`."""
         still = self.route.curve(np.array([reference]))[0][0]
         return self.platform.mass_correlation(*self.route.curve(times), still)
 
     def kinetic_energy(self, times: Array, turning: Array) -> Array:
-        """As `Description`, that of the wheels included."""
+        """See `Description`, that of the wheels included."""
         shapes, rates = self.route.curve(times)
         whole = np.broadcast_to(rates, (*turning.shape[:-1], rates.shape[-1])).copy()
         columns = [self.platform.joint_index(rotor.joint) for rotor in self.rotors]
@@ -135,22 +135,22 @@ class RotorDescription(UngaugedDescription):
 
     @property
     def scan(self) -> FunctionScan | None:
-        """As `Description`."""
+        """See `Description`."""
         return self.route.scan
 
     def depends_on(self) -> ScannedFunction:
-        """As `Description`."""
+        """See `Description`."""
         return path_function(self.route.curve, self.route.n_shape, self.route.joint_names)
 
     def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:
-        """As `Description`."""
+        """See `Description`."""
         shapes, rates = self.route.curve(times)
         return self.platform.link_pose(shapes, link)[:, :3, :3], self.platform.link_angular_velocity(
             shapes, rates, link
         )
 
     def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
-        """As `Description`."""
+        """See `Description`."""
         return self.route.smoothness
 
     def _axle(self, rotor: Rotor, shapes: Array, rates: Array) -> tuple[Array, Array]:

@@ -109,7 +109,7 @@ def _factors(along: AlongMotion) -> Array:
     whole = np.concatenate([*vectors, np.cos(along.shapes), np.sin(along.shapes)], axis=1)
     at_nodes = whole.reshape(-1, _NODES, whole.shape[1])
     squares = (_last_polynomials() @ at_nodes) ** 2
-    # Of each vector its length, of cosine and sine one.
+    # Vectors by their length; cosine and sine by one.
     starts, joints = np.cumsum([0, *(one.shape[1] for one in vectors)]), along.shapes.shape[1]
     sizes = np.add.reduceat(at_nodes[..., : starts[-1]] ** 2, starts[:-1], axis=2).max(axis=1)[:, None]
     last = np.add.reduceat(squares[..., : starts[-1]], starts[:-1], axis=2)
@@ -164,7 +164,7 @@ def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
         reached = across[piece] @ reached
         reached[:, 3:] += added[piece]
         found[piece + 1] = reached
-    # Of edges that differ from a time by rounding one was kept.
+    # Times that differ from an edge by rounding are that edge.
     return found[np.searchsorted(0.5 * (edges[1:] + edges[:-1]), times)]
 
 

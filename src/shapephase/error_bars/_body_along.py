@@ -58,7 +58,7 @@ class BodyAlong:
         return found
 
     def by_inertias(self, spins: Array, rows: Array) -> Array:
-        """The same by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
+        """Derivatives by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
         chain = self.body.chain
         if not self._has_kernels:
             each = [by_link_parameters(self._links, rows[:, k], spins[:, k]) for k in range(rows.shape[1])]

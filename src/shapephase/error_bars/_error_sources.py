@@ -25,8 +25,7 @@ from .result_derivatives import described_by
 _NEGATIVE = 1e-9
 # Relative errors of a link: of its mass, of its centre (3), of its inertia.
 _OF_A_LINK = 5
-# Of its own mass and inertia, what a link keeps in a draw at least.
-_LEAST_SHARE = 1e-3
+_LEAST_SHARE = 1e-3  # of its own mass and inertia that a link keeps in every draw
 
 
 class Inputs(NamedTuple):

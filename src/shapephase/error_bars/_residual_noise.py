@@ -20,8 +20,7 @@ _EXPONENTIAL = np.sin((np.arange(36) + 0.5) / 36.0 * np.pi - 0.5 * np.pi)
 """Correlations of neighbours, even in their arcsines: there the reference prior is flat. The last is 0.999."""
 _LENGTHS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0, 32.0])
 """Samples of a mean, or until a bell is 1/e: shorter is nearly white, longer hardly noise."""
-_OWN = 0.01
-"""Of the variance of a mean or a bell is white: no recording is so smooth, and digits are rounded."""
+_OWN = 0.01  # white share of the variance of smoothed noise: digits of recordings are rounded
 _BLOCK = 128
 """Samples that are weighed together, four times the longest mean; blocks count as independent."""
 _CHANCE = 0.02
@@ -54,7 +53,7 @@ class ResidualNoise:
 
     @property
     def correlation(self) -> float:
-        """Of neighbouring residuals, on average."""
+        """Mean correlation of neighbouring residuals."""
         return float(self.weights @ _correlations(2)[:, 1])
 
     def covariance(self, slopes: Array) -> Array:
@@ -118,7 +117,7 @@ def _by_correlation(slopes: Array) -> Array:
 
 
 def _correlations(count: int) -> Array:
-    """Of residuals so many samples apart, for each kind and length: (F, count)."""
+    """Correlations of residuals at lags below `count`, for each kind and length: (F, count)."""
     lags = np.arange(count, dtype=np.float64)
     means = np.maximum(1.0 - lags / _LENGTHS[:, None], 0.0)
     bells = np.exp(-((lags / _LENGTHS[:, None]) ** 2))

@@ -100,9 +100,9 @@ def uncertainty(
     motion : of an articulated body
     joints : of the samples that the path is made of: the standard deviation of white noise, one or one for each
         joint (n,) [rad or m], or a text such as "0.3deg" or "0.3deg,1mm"; or the covariance (N n, N n) of all samples,
-        row by row; of a periodic path without the last, which is the first. Of a recording that was closed, smoothed
-        or resampled all samples as recorded, those before and after a flight that were smoothed with it among them; one
-        number is not for joints that rest without a column. What smoothing takes off the motion widens the bars, too
+        row by row; for a periodic path without the last, which is the first. For a recording that was closed, smoothed
+        or resampled, all samples as recorded, with those before and after a flight that were smoothed with it; joints
+        that rest without a column have no noise. The bias of smoothing widens the bars, too
     inertias : of the body's links
     momentum : the covariance (3, 3) [(kg m^2/s)^2], inertial axes, or one standard deviation of all components
     attitude : of the start, turned to R(0) exp(hat(delta)): the covariance (3, 3) of delta [rad^2], or one standard
@@ -164,10 +164,9 @@ def sampled_uncertainty(
     seed: int = 0,
     executor: Executor | None = None,
 ) -> Uncertainty:
-    """The same as `uncertainty` by drawing errors and reconstructing each motion anew: a check of the first order.
+    """Return the error bars of `uncertainty` by drawing errors and reconstructing each motion: a check of first order.
 
-    Of 400 draws a standard deviation is known to 4 %. What smoothing takes off the motion is alike in all of them, and
-    is not in the bars.
+    400 draws give a standard deviation to 4 %. The bias of smoothing is alike in all of them, and is not in the bars.
 
     Parameters
     ----------
@@ -283,7 +282,7 @@ def _fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
 
 
 def _fit_by_links(motion: Motion, inputs: Inputs) -> Array:
-    """The same by the relative errors of links."""
+    """Derivatives of the fit by the relative errors of links."""
     assert inputs.links is not None
     if inputs.fit is None:
         return np.zeros((UNKNOWNS, len(inputs.links)))

@@ -26,14 +26,12 @@ from ._residual_noise import drift_modes, held, most_modes, residual_noise
 _MOST_ROUNDS = 40
 # After so many, one that is no flight of the body is known to be none.
 _ENOUGH_ROUNDS = 12
-# Of the deviations that the fit itself leaves open: a smaller step is the last.
-_SMALL_STEP = 1e-3
+_SMALL_STEP = 1e-3  # of the standard deviations of the fit: a smaller step is the last
 # [rad] and of the momentum: where there is no noise.
 _NO_STEP = 1e-11
 # A step is halved so many times, at most, to come nearer to the recording.
 _MOST_HALVINGS = 12
-# Of a turn of the start and a momentum.
-UNKNOWNS = 6
+UNKNOWNS = 6  # turn of the start and momentum
 # [rad] Ways on that differ by less are one; and how many are tried.
 _SAME_AXES = 0.2
 _MOST_LIKELY = 4
@@ -44,10 +42,8 @@ _VAGUE_AXES = 0.3
 _FIRST_TIMES = 6
 # [rad] A recording that stays so far from every motion of the body is none of its flights.
 _NO_FLIGHT = 0.5
-# Of the tolerance of the reconstruction: residuals below are rounding.
-_ROUNDED = 10.0
-# Of the momentum and of what the joints carry: a change that is smaller is no news.
-_CONSTANT = 0.01
+_ROUNDED = 10.0  # tolerances of the reconstruction: smaller residuals are rounding
+_CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller change is not reported
 
 
 @copied_when_read("initial_attitude", "base_axes")

@@ -112,8 +112,7 @@ class Derivatives:
     def by_samples(self) -> ResultDerivative:
         """By the samples that the path was put through: m = N n, row by row of the (N, n) samples [per rad or m].
 
-        Of a recording that was closed, smoothed or resampled, by all of its samples as they were recorded, at the
-        penalty of the smoothing as it is.
+        For a recording that was closed, smoothed or resampled, by all recorded samples at a fixed smoothing penalty.
 
         Raises
         ------
@@ -124,7 +123,7 @@ class Derivatives:
 
     @cached_property
     def by_knots(self) -> ResultDerivative:
-        """The same by the values of the path at its knots, of a periodic path without the last."""
+        """Derivatives by the values of the path at its knots, for a periodic path without the last."""
         momenta = np.zeros((len(self._along.times), 2, 3))
         momenta[:, 0] = self.motion.momentum @ self._along.attitudes
         return self._results(_changes(self._body.by_knots(self._samples, *self._weights, momenta)))
@@ -140,8 +139,8 @@ class Derivatives:
     def by_inertias(self) -> ResultDerivative:
         """By masses, first moments and inertias of the frames of `body.chain`: m = 10 (k + 1).
 
-        Of each frame: mass [kg], first moment (3) [kg m] and inertia xx yy zz yz xz xy [kg m^2], both about the point
-        where its centre of mass is, axes of the frame.
+        For each frame: mass [kg], first moment (3) [kg m] and inertia xx yy zz yz xz xy [kg m^2], both about its centre
+        of mass, axes of the frame.
         """
         return self._results(_changes(self._body.by_inertias(*self._weights)))
 
@@ -171,7 +170,7 @@ class Derivatives:
     def _results(
         self, changes: _Changes, *, by_momentum: bool = False, turned_start: Array | None = None
     ) -> ResultDerivative:
-        """Of all results, from the turns of both ends.
+        """Derivatives of all results, from the turns of both ends.
 
         by_momentum: whether the numbers are the components of the momentum
         turned_start: (3, m) turns of the start, inertial axes
@@ -207,8 +206,10 @@ class Derivatives:
 
     @cached_property
     def _twist_slopes(self) -> tuple[Array, Array]:
-        """Of the angle about the momentum that is left of the dynamical rotation when the shortest tilt of its axis is
-        taken off: (3,) each, by a turn of the rotation, exp(hat(turn)) rotation, and by the axis."""
+        """Derivatives of the twist of the dynamical rotation about the momentum (its swing taken off): (3,) each.
+
+        By a turn of the rotation, exp(hat(turn)) rotation, and by the axis.
+        """
         momentum, quaternion = self.motion.momentum, so3.quat_from_matrix(self._rotations[2])
         axis, vector, scalar = momentum / np.linalg.norm(momentum), quaternion[:3], quaternion[3]
         along = vector @ axis

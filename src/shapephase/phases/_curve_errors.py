@@ -20,25 +20,18 @@ from ..reconstruction.reconstruction import Motion
 from .error_estimates import ArcErrors, RunningErrors, SplitErrors
 from .momentum_curve import MomentumCurve
 
-# Of what finer steps show, which is the error of steps but for a part in two hundred, and of what the perturbed series
-# shows, which is larger than what is missing.
+# The difference to finer steps is their error to 0.5 %; the perturbed series bounds the error of samples.
 _FACTORS = np.array([2.0, 1.0])
-# Of what an error has been at its largest so far: its last value may be small by chance.
-_OF_LARGEST = 0.03
-# Of the turns themselves, for each radian along the curve up to one: what integrals of them are uncertain by, even
-# where they cancel; of steps and of samples.
+_OF_LARGEST = 0.03  # of the largest error so far, added: the last value may be small by chance
+# Uncertainty of integrals of the turns (steps, samples), for each radian along the curve up to one, where they cancel.
 _LEAST = np.array([0.05, 0.01])
-# Of what happens at unknown times, for each radian of the curve: most of it cancels as the curve goes round.
-_AT_ANY_TIME = 0.1
-# Of what an error grows by in one step: in it the error grows as the ninth power of the part that is taken, and is held
-# to be linear; x - x^9 is 0.68 at most.
-_NOT_LINEAR = 0.68
+_AT_ANY_TIME = 0.1  # of errors at unknown times, for each radian of the curve: most cancels as the curve goes round
+_NOT_LINEAR = 0.68  # of the growth in a step: max of x - x^9, since errors grow as the ninth power of the part taken
 # Units of rounding: of any sum of angles; and of each radian that is summed up.
 _ROUNDING = 32.0
 _ROUNDING_OF_RADIANS = 8.0
 _EPS = float(np.finfo(float).eps)
-# Of the linear estimate: up to half the distance from the opposite point the sine is within this of its tangent.
-_BEYOND_LINEAR = 1.05
+_BEYOND_LINEAR = 1.05  # tangent over sine up to half the distance from the opposite point
 # What the area beside the closing great circles adds to the dynamic phase, to the area, and to the phase.
 _CLOSING_SIGNS = np.array([0.0, 1.0, -1.0, -1.0])
 # Keeps quotients defined where there are no errors, and at the point opposite the start.
@@ -73,7 +66,7 @@ class Stretches(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Of what is found along stretches of a curve that great circles close: (B, N) each [rad]."""
+    """Errors of phases along stretches of a curve, closed by great circles: (B, N) each [rad]."""
 
     dynamic: Array
     area: Array
@@ -98,18 +91,18 @@ class CurveErrors:
 
     @property
     def attitude(self) -> Array:
-        """Of the deformation's own frame, at its end: (B,) [rad]."""
+        """Error of the attitude of the deformation's own frame at the end: (B,) [rad]."""
         found = _at_end(self._of_attitude) + self._unseen
         return np.minimum(found, self.motion.solution.error_estimate)
 
     @property
     def lift(self) -> Array:
-        """Of the horizontal lift at its end: (1,) or (B,) [rad]."""
+        """Error of the horizontal lift at the end: (1,) or (B,) [rad]."""
         return self._of_end(self.motion.lift_with_errors)
 
     @property
     def wheels(self) -> Array:
-        """Of the turn by the momentum that wheels store, at its end: (1,) or (B,) [rad]."""
+        """Error of the rotation by the momentum that wheels store, at the end: (1,) or (B,) [rad]."""
         if not self.motion.deformation.has_wheels:
             return np.zeros(1)
         return self.lift + self._of_end(self.motion.lift_without_momentum)
@@ -119,12 +112,12 @@ class CurveErrors:
 
     @property
     def between(self) -> Array:
-        """Of the turn from the lift to the attitude, at the end: (B,) [rad]."""
+        """Error of the rotation from the lift to the attitude, at the end: (B,) [rad]."""
         found = _at_end(self._of_attitude - self._of_lift) + self._unseen + self._unseen_of_lift
         return np.minimum(found, self.motion.solution.error_estimate + self.motion.horizontal_lift.error_estimate)
 
     def of(self, stretches: Stretches, residual: Array, targets: Array) -> Errors:
-        """Of stretches of the curve that great circles close, from their ends to targets (B, N, 3), gauge axes.
+        """Errors of stretches of the curve, closed by great circles from their ends to targets (B, N, 3), gauge axes.
 
         Targets are the starts of the stretches, or fixed where all begin with the curve. The residuals (B, N) are those
         between two ways to their phases.
@@ -181,7 +174,7 @@ class CurveErrors:
 
     @cached_property
     def _stepped(self) -> SteppedRotation:
-        """Of a motion that is no batch of several parts."""
+        """Steps of a motion whose batch has one part."""
         stepped = self.motion.stepped
         assert isinstance(stepped, SteppedRotation)
         return stepped
@@ -206,7 +199,7 @@ class CurveErrors:
 
     @cached_property
     def _unseen(self) -> Array:
-        """Of the attitude, what neither finer steps nor the perturbed series show: (B,) [rad]."""
+        """Attitude error that neither finer steps nor the perturbed series show: (B,) [rad]."""
         stepped = self._stepped
         hidden = stepped.amplification * stepped.perturbed.hidden
         if stepped is self.motion.solution:
@@ -267,13 +260,13 @@ def _seen_so_far(sizes: Array) -> Array:
 
 
 def _at_end(turns: Array) -> Array:
-    """The same at the end alone, from the turns: (2, B, N, 3) -> (B,) [rad]."""
+    """Error at the end from turns at all times: (2, B, N, 3) -> (B,) [rad]."""
     sizes = _norms(turns)
     return np.tensordot(_FACTORS, sizes[..., -1] + _OF_LARGEST * sizes.max(axis=-1), axes=1)
 
 
 def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> SplitErrors:
-    """Of a split with its `residual` (B,)."""
+    """Errors of a split with its `residual` (B,)."""
     errors, batch, edges = CurveErrors(motion, curve), motion.batch, curve.edges
     whole = errors.of(Stretches.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.corners[:, :1])
     # What the momentum sweeps itself is joined to the reference; the closing is the rest.
@@ -307,7 +300,7 @@ def running_errors(
     references: Array,
     shape: tuple[int, ...],
 ) -> RunningErrors:
-    """Of phases up to times (N,) that are edges of the curve, which great circles join to references (B, 3).
+    """Errors of phases up to times (N,), edges of the curve, joined to references (B, 3) by great circles.
 
     `residual` (B, N) is that of the phases at each time; results have the `shape`.
     """
@@ -327,7 +320,7 @@ def running_errors(
 
 
 def arc_errors(motion: Motion, curve: MomentumCurve, cuts: Array, residuals: tuple[Array, Array]) -> ArcErrors:
-    """Of the arcs between edges of the curve (K + 1,), and of all as one; `residuals` are (B, K) and (B, 1)."""
+    """Errors of the arcs between edges of the curve (K + 1,), and of all as one; `residuals`: (B, K) and (B, 1)."""
     errors, batch = CurveErrors(motion, curve), motion.batch
     parts, whole = (
         errors.of(Stretches.of(curve.edges, starts, ends), residual, curve.directions(starts))

@@ -23,8 +23,7 @@ from ..integrator.stepped import SteppedRotation
 # Directions that are run through the loop together, for memory: more are taken in parts, each with samples of its own,
 # so that it does not matter who computes them.
 _ROWS_AT_ONCE = 2048
-# The same with derivatives, which cost some milliseconds a direction.
-_SLOPES_AT_ONCE = 128
+_SLOPES_AT_ONCE = 128  # directions with derivatives, some milliseconds each
 
 _Found = TypeVar("_Found")
 
@@ -46,7 +45,7 @@ class MomentumLoop:
 
     @classmethod
     def of(cls, deformation: Deformation, tolerance: float, executor: Executor | None = None) -> MomentumLoop:
-        """Of a deformation whose shape closes. Raises OpenPathError, ShapeError."""
+        """Return the loop of a deformation whose shape closes. Raises OpenPathError, ShapeError."""
         if deformation.closure is None:
             raise OpenPathError(f"closed orbits need a loop of shapes; this one ends {deformation.shape_gap:.3g} off")
         return cls(deformation, deformation.sampler(), tolerance_argument(tolerance), executor)
@@ -61,7 +60,7 @@ class MomentumLoop:
         return stepped_rotation(self.sampler, magnitude * points, tolerance or self.goal)
 
     def run_all(self, magnitude: float, points: Array) -> SteppedRotation | GroupedRotations:
-        """The same of any number of directions."""
+        """Return the motions from any number of directions, some thousand at a time."""
         if len(points) <= _ROWS_AT_ONCE:
             return self.run(magnitude, points)
         found = self._in_parts(MomentumLoop.run, _ROWS_AT_ONCE, magnitude, points, None)

@@ -42,7 +42,7 @@ def _joined(motion: Motion, parts: list[Any], shared: tuple[str, ...] = ()) -> A
 
 
 def array_by_parts(motion: Motion, compute: Callable[[Motion], Array]) -> Array:
-    """The same of a function whose result is an array."""
+    """Apply a function with an array as result to the parts of a motion and join the rows."""
     return _whole(motion, [(rows, compute(part)) for rows, part in motion.parts])
 
 

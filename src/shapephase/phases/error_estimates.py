@@ -1,4 +1,4 @@
-"""What is said of the errors of phases."""
+"""Error estimates of phases."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from ..display import short_repr
 
 @dataclass(frozen=True, eq=False)
 class SplitErrors:
-    """Estimates of the errors of a `PhaseSplit`, each of what its name says; fields have the motion's batch axes.
+    """Error estimates of a `PhaseSplit`, under the names of its fields, with the motion's batch axes.
 
-    Near the point opposite its start, the end of the momentum's curve turns the closing great circle round by any
-    small displacement, and what depends on that circle may be off by any angle: up to pi for the tilt of the closing,
-    2 pi for phases.
+    Near the point opposite its start, a small displacement of the end of the momentum's curve turns the closing great
+    circle by any angle, so the tilt of the closing may be wrong by up to pi and phases by up to 2 pi.
 
     Attributes
     ----------
@@ -50,7 +49,7 @@ class SplitErrors:
 
 @dataclass(frozen=True, eq=False)
 class RunningErrors:
-    """Estimates of the errors of `RunningPhases`, modulo 4 pi; fields are batch + t.shape [rad].
+    """Error estimates of `RunningPhases`, modulo 4 pi; fields are batch + t.shape [rad].
 
     Examples
     --------
@@ -70,7 +69,7 @@ class RunningErrors:
 
 @dataclass(frozen=True, eq=False)
 class ArcErrors:
-    """Estimates of the errors of `ArcPhases`, named and shaped as there, modulo 4 pi; angles of rotations [rad].
+    """Error estimates of `ArcPhases`, with its names and shapes, modulo 4 pi; angles of rotations [rad].
 
     Examples
     --------

@@ -19,14 +19,13 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..refinement import halved, settled
 from .momentum_curve import Gauge
 
-# Of the largest momentum: below, or where its error is this share of it, it has no direction.
+# Share of the largest momentum below which it has no direction; relative error from which it has none.
 _NO_MOMENTUM = 1e-9
 _DOUBT = 1e-3
 # [sr], [rad] Below the error of any motion.
 _SETTLED = 1e-12
 _ROUNDING = 1e-14  # [rad] of a direction, where the motion is as good as exact
-# Of all steps, for a momentum that is small for a short time only.
-_HALVINGS = 10
+_HALVINGS = 10  # of all steps, for a momentum that is small for a short time only
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

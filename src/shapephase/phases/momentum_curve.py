@@ -25,14 +25,11 @@ from ..reconstruction.reconstruction import Motion
 _MOST_STEPS = 20_000
 # Halvings of a step that passes by the point opposite the reference: then it is as short as times can tell apart.
 _HALVINGS = 30
-# Of the motion's error estimate [rad]: what the integrals over its steps may add to phases, whose errors count it.
-_SHARE = 0.2
-# The same for phases in time, which are looked at from many sides.
-_SHARE_AT_TIMES = 5e-3
+_SHARE = 0.2  # of the motion's error estimate: error allowed for integrals over its steps, which estimates include
+_SHARE_AT_TIMES = 5e-3  # of it, for phases in time
 # [rad] the same where the motion is as good as exact.
 _ROUNDING = 1e-14
-# The same of one that passes by the point opposite the start: what jumps there is an area that swings anyway.
-_HALVINGS_AT_START = 8
+_HALVINGS_AT_START = 8  # of pieces near the point opposite the start, where the area swings by nature
 # Halvings of steps whose integrals add more; each divides what they add by four thousand.
 _MOST_HALVINGS = 3
 # [rad] Longer pieces of a curve are halved: their area is taken between arc and chord, which may hide whole turns.
@@ -133,7 +130,7 @@ class MomentumCurve(CurvePieces):
         return self.corners[:, np.searchsorted(self.edges, times)]
 
     def attitudes(self, times: Array) -> Array:
-        """Of the gauge's frame: (N,) -> (B, N, 3, 3)."""
+        """Attitudes of the gauge's frame: (N,) -> (B, N, 3, 3)."""
         own, frame = self._own_attitudes(times), self.frame(times)
         return own if frame is None else own @ so3.transpose(frame)
 
@@ -144,7 +141,7 @@ class MomentumCurve(CurvePieces):
         return None if self.frames is None else self.frames(times)[0]
 
     def frame_at(self, place: Integers) -> Array | None:
-        """The same at edges: (N,) -> (N, 3, 3)."""
+        """Frames at edges with these indices: (N,) -> (N, 3, 3)."""
         if self.lift is not None and len(self.edges) == len(self.lift.ends):
             return self.lift.at_ends(place)
         return self.frame(self.edges[place])
@@ -161,7 +158,7 @@ class MomentumCurve(CurvePieces):
 
     @property
     def end_attitudes(self) -> tuple[Array, Array, Array]:
-        """Of the deformation's own frame at the end, and of the gauge's at the start and at the end: (B, 3, 3) each."""
+        """Attitudes of the own frame at the end, and of the gauge's at the start and at the end: (B, 3, 3) each."""
         start, solution = self.motion.initial_attitude.reshape(-1, 3, 3), self.motion.solution
         stepped = isinstance(solution, SteppedRotation)
         end = start @ (solution.end if stepped else solution.rotation(self.edges[-1:])[:, 0])
@@ -369,9 +366,9 @@ def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> CurvePieces:
 def _by_piece(
     curve: _Curve, left: Array, right: Array, ends: Array
 ) -> tuple[Array, Array, Array, Array, Array, tuple[Array, ...]]:
-    """Of pieces (B, K) dynamic phase, area, errors of both and length, and what is in body axes at `ends`.
+    """Integrals over pieces (B, K) and values at `ends`.
 
-    In this order: dynamic phase, area, directions at `ends`, errors, lengths, what is in body axes.
+    In this order: dynamic phase, area, directions at `ends`, errors, lengths, vectors in body axes at `ends`.
     """
     nodes, weights = sphere.gauss_nodes(left, right)
     # One evaluation for both: the ends are but an eighth as many as the nodes.

@@ -1,4 +1,4 @@
-"""A split rotation: the numbers of `split`, what they are of, and how they are shown."""
+"""Result of `split`, with its table and card."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from .split_text import split_lines
 
 @dataclass(frozen=True, eq=False)
 class SplitMotion:
-    """What is told of a motion beside its split.
+    """Properties of the motion that was split.
 
     Attributes
     ----------
-    label : what moved, for people
+    label : name of the body and path
     duration : [s]
     momentum : batch + (3,), inertial axes [kg m^2/s]
     error_estimate : of the attitude at all times: batch [rad]
@@ -44,7 +44,7 @@ class SplitMotion:
 
 @dataclass(frozen=True, eq=False)
 class PhaseSplit:
-    """What turned a free body: its shape, its angular momentum, and what its wheels store of that.
+    """Rotation of a free body, split into the part of its shape, of its angular momentum and of its wheels.
 
     All rotations are in inertial axes; fields have the motion's batch axes in front. With mu the unit vector of
     the momentum (where there is some), seen from the gauge's frame,
@@ -57,28 +57,27 @@ class PhaseSplit:
     ----------
     gauge : the frame from which the momentum curve was seen
     total_rotation : (3, 3) Delta R, from the start to the end of the motion, the same in every gauge
-    holonomy : (3, 3) R_G, what the loop of shapes alone does, whatever its pace; for an open path the endpoint of its
-        lift
-    dynamical_rotation : (3, 3) R_D, what the momentum adds, that which wheels store included
-    wheel_rotation : (3, 3) R_W, what wheels that store momentum add where there is no total momentum: R_D is R_W then,
-        and otherwise R_D R_W^T is what the total momentum adds to it; the identity without such wheels
+    holonomy : (3, 3) R_G, rotation by the loop of shapes alone, at any pace; for an open path the end of its lift
+    dynamical_rotation : (3, 3) R_D, rotation by the momentum, that of wheels included
+    wheel_rotation : (3, 3) R_W, rotation by the momentum that wheels store, without total momentum: R_D is R_W then,
+        and otherwise the total momentum adds R_D R_W^T to it; the identity without such wheels
     montgomery_phase : theta_M = dynamic_phase + geometric_phase, unwrapped [rad]
-    montgomery_angle : the same in (-pi, pi] [rad]
+    montgomery_angle : theta_M in (-pi, pi] [rad]
     dynamic_phase : theta_D = integral of omega . Pi dt over the momentum's magnitude [rad]
     geometric_phase : minus the solid angle [rad]
     solid_angle : signed, of the momentum curve in this gauge, closed by the great circle; counted from the
         region of the sphere farthest from the curve [sr]
     closing_tilt : (3, 3) transport along the closing great circle; the identity when the momentum closes in this gauge.
-        No tilt of an athlete, which is an angle of the attitude (`Motion.somersault_tilt_twist`)
+        The tilt of an athlete is another angle (`Motion.somersault_tilt_twist`)
     momentum_gap : angle between the ends of the momentum curve in this gauge [rad]
-    closing_phase : what the closing great circle adds to the geometric phase; the rest is swept by the momentum
-        itself, about the direction opposite the region that is not counted [rad]
-    shape_gap : how far the end shape is from the start shape
+    closing_phase : part of the geometric phase by the closing great circle; the momentum itself sweeps the rest, about
+        the direction opposite the excluded region [rad]
+    shape_gap : distance of the end shape from the start shape
     residual : |theta_M - the same angle read off the attitude|, modulo 2 pi: two independent computations [rad]
     is_loop : whether the shape closes
     has_phase : whether there is angular momentum; without it all phases are 0 and R_D is R_W
     has_wheels : whether wheels store momentum (`articulated(..., rotors=, rotor_speeds=)`)
-    about : what was split
+    about : the motion that was split
 
     Notes
     -----
@@ -117,14 +116,14 @@ class PhaseSplit:
     _card = split_card
 
     def __str__(self) -> str:
-        """The table that the command line prints; of a batch, how far each number spreads."""
+        """Return the table that the command line prints; for a batch the spread of each number."""
         return "\n".join(split_lines(self))
 
     def to_dict(self) -> dict[str, Any]:
-        """Every number under its name, with the error estimates, as JSON can hold it; angles in rad."""
+        """Return every number under its name, with the error estimates, for JSON; angles in rad."""
         return plain(self) | {"error_estimates": plain(self.error_estimates)}
 
     @property
     def error_estimates(self) -> SplitErrors:
-        """Of each of these numbers; computed when first looked at, which takes once or twice as long as the split."""
+        """Error estimates of these numbers; computed on first use, in one or two times the time of the split."""
         return self._errors.value

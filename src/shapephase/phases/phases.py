@@ -32,7 +32,7 @@ from .momentum_curve import Gauge, momentum_curve
 from .phase_split import PhaseSplit, SplitMotion
 
 CLOSINGS = ("start", "reference")
-"""What closes the momentum's curve so far, for `running_phases`."""
+"""Ends of the great circle that closes the momentum's curve so far, for `running_phases`."""
 
 
 @overload
@@ -57,8 +57,8 @@ def split(
 
     Parameters
     ----------
-    gauge : "horizontal", the frame that the shape motion alone would carry along (the split people want);
-        "base", the deformation's own frame, whose phase already holds the shape's part; "principal", the
+    gauge : "horizontal", the frame that the shape motion alone would carry along (shape apart from momentum);
+        "base", the deformation's own frame, whose phase already contains the shape's part; "principal", the
         principal axes of inertia; "mean_body", the frame nearest to the start shape; "link:NAME", a link of an
         articulated body; or U(t) itself, a function as for `in_gauge`
     progress : as for `reconstruct`
@@ -68,14 +68,14 @@ def split(
     UnknownNameError
         For another gauge.
     GaugeError
-        If the gauge's frame does not exist, or is not continuous; with a torque from outside, if the momentum passes
+        If the gauge's frame does not exist or is not continuous; with an external torque, if the momentum passes
         through zero, where it has no direction.
     RunStopped
         If `progress` stopped it.
 
     Notes
     -----
-    Of a `ForcedMotion` it is a `ForcedSplit`, which has the solid angle of the momentum in space, too.
+    For a `ForcedMotion` the result is a `ForcedSplit`, which also has the solid angle of the momentum in space.
     Equations :eq:`split`, :eq:`closed-split` and :eq:`tilt` of the documentation.
     Source: Cabrera 2006, section 3.1 and equations (11) to (13), with a signed solid angle; theory.md B7, B9, D.
 
@@ -148,7 +148,7 @@ def split(
 
 @dataclass(frozen=True, eq=False)
 class RunningPhases:
-    """The phases of a motion in time, starting from zero; fields are batch + t.shape.
+    """Phases of a motion in time, starting from zero; fields are batch + t.shape.
 
     Directions of the momentum are joined to `reference` by great circles: with B(u) the shortest turn from there to
     u, and R the attitude of the gauge's frame,
@@ -170,8 +170,8 @@ class RunningPhases:
     montgomery_angle : the last in (-pi, pi] [rad]
     solid_angle : of the curve so far, closed; minus the geometric phase [sr]
     momentum_gap : angle between the momentum and its start, in this gauge [rad]
-    closing_phase : what the great circle back to the start adds to the geometric phase; closed to a "reference" 0 [rad]
-    jumps : how many times 4 pi the solid angle has jumped so far; solid_angle - 4 pi jumps is continuous
+    closing_phase : part of the geometric phase by the great circle back to the start; 0 closed to a "reference" [rad]
+    jumps : number of jumps of the solid angle by 4 pi so far; solid_angle - 4 pi jumps is continuous
     reference : batch + (3,), in the gauge's frame; closed to the start, that direction
     residual : batch, the largest |phase - the same angle read off the attitude| modulo 2 pi [rad]
     error_estimates : of the phases at each time
@@ -204,7 +204,7 @@ class RunningPhases:
     def write_csv(self, path: str | os.PathLike[str]) -> None:
         """Write a time series: each phase in degrees, then in radians, the solid angle, and the jumps so far.
 
-        The geometric phase holds what closing the curve adds, the closing phase, which is beside the momentum's gap.
+        The geometric phase includes the closing phase, whose column is beside the momentum's gap.
 
         Raises ShapeError for the phases of a batch, or of a single time.
         """
@@ -219,19 +219,19 @@ class RunningPhases:
 def running_phases(
     motion: Motion, t: ArrayLike, gauge: Gauge = "horizontal", *, closing: str = "start"
 ) -> RunningPhases:
-    """Every phase in time, ending in that of `split`.
+    """Return all phases in time, ending in those of `split`.
 
     Parameters
     ----------
     t : times (...) [s]
     gauge : as for `split`
-    closing : what the momentum's curve so far is closed by: "start", the great circle back to its start, as `split`
-        closes the whole; "reference", great circles to one fixed direction, by which nothing jumps
+    closing : how the momentum's curve so far is closed: "start", by the great circle back to its start, which ends in
+        the closing of `split`; "reference", by great circles to one fixed direction, without jumps
 
     Notes
     -----
-    Raises as `split`, and UnknownNameError for another closing. Source: Cabrera 2006, equation (12); theory.md D5, D9;
-    numerics.md section 3 (branch).
+    Raises the errors of `split`, and UnknownNameError for another closing. Source: Cabrera 2006, equation (12);
+    theory.md D5, D9; numerics.md section 3 (branch).
 
     Examples
     --------
@@ -329,15 +329,14 @@ class ArcPhases:
 
 
 def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") -> ArcPhases:
-    """The phases of the arcs of a motion between given times, and how they add up.
+    """Return the phases of the arcs of a motion between given times, and their sum.
 
     Parameters
     ----------
     times : (K + 1,) increasing [s]; for the loops of a repeated path, the multiples of its period
     gauge : as for `split`
 
-    All areas are counted from one region, which no arc enters: the sum of the arcs is that of the whole, not only
-    modulo 4 pi.
+    All areas are counted from one region that no arc enters, so the arcs add up to the whole, not only modulo 4 pi.
 
     Raises
     ------
@@ -346,7 +345,7 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
 
     Notes
     -----
-    Raises also as `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
+    Raises also the errors of `split`. Source: Cabrera 2006, section 4.1; theory.md D9, D10.
 
     Examples
     --------
@@ -385,7 +384,7 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     )
 
     def apart(phases: Array, starts: Array, stops: Array, transports: Array) -> Array:
-        """Phases against the same angles read off the attitudes."""
+        """Differences between phases and the angles read off the attitudes."""
         turns = stops @ so3.transpose(starts) @ so3.transpose(transports)
         return np.abs(so3.wrap(phases - so3.angle_about(turns, curve.axis[:, None]))) * moving
 
@@ -413,7 +412,7 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
 
 
 def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> Array:
-    """Par(R(0)) along the momentum's curve: attitudes that roll with Pi without a turn about the momentum.
+    """Return Par(R(0)) along the momentum's curve: attitudes that roll with Pi without a turn about the momentum.
 
     R(t) = exp(dynamic_phase(t) hat(mu)) Par(t): it turns at omega_h = Pi' x Pi / |Pi|^2 (gauge axes).
 
@@ -429,7 +428,7 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
     Notes
     -----
     Equation :eq:`open-arc` of the documentation.
-    Raises as `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
+    Raises the errors of `split`. Source: Cabrera 2006, section 4.1; theory.md D4, D9.
 
     Examples
     --------
@@ -451,7 +450,7 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
 
 
 def dynamic_phase_from_energy(motion: Motion) -> Array:
-    """The dynamic phase of a motion in the base gauge, from kinetic energies: batch [rad].
+    """Return the dynamic phase of a motion in the base gauge, from kinetic energies: batch [rad].
 
     The integral of 2 T - 2 T_0 + L_o . I^-1 L_o - I^-1 L_o . Pi over |Pi|, T the whole kinetic energy about the centre
     of mass and T_0 that of the shape motion alone: a check of `dynamic_phase` that sums over the links.

@@ -88,7 +88,7 @@ class ReturnMap:
 
     @cached_property
     def trace(self) -> Array:
-        """Of the derivative: (...); it does not depend on the basis at the start."""
+        """Trace of the derivative: (...); it does not depend on the basis at the start."""
         return np.trace(self.derivative, axis1=-2, axis2=-1)[()]
 
 

@@ -19,9 +19,8 @@ CLOSED_GAP = math.radians(1.0)
 DEGREE_DIGITS = 6
 """After the point of an angle in degrees, or fewer: no more than its error leaves."""
 RADIAN_DIGITS = 9
-"""The same of one in radians."""
-# Digits after the point of an axis.
-_AXIS_DIGITS = 6
+"""Digits after the point of an angle in radians."""
+_AXIS_DIGITS = 6  # after the point
 # [rad] A smaller turn has no axis worth showing.
 _NO_TURN = 1e-12
 # Letters of a line of words, as wide as the table.
@@ -113,7 +112,7 @@ def degrees_text(angle: float, *, sign: bool = False) -> str:
 def digits_left(error: float, most: int) -> int:
     """Digits after the point that an error leaves to a number, `most` at most: the last is below its half.
 
-    Of an error of 3e-4 there are four, and none of one above one.
+    An error of 3e-4 gives four, an error above one none.
     """
     if not error > 0.0:
         return most
@@ -150,7 +149,7 @@ def _phase_line(name: str, phase: Array, error: Array) -> str:
 
 
 def _batch_lines(result: PhaseSplit, heading: str) -> list[str]:
-    """Of a batch, the least, the middle and the largest of each number."""
+    """Return lines with the least, the median and the largest of each number of a batch."""
     about = result.about
     shape = about.momentum.shape[:-1]
     rows = {

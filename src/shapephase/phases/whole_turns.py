@@ -1,4 +1,4 @@
-"""How often a body turned, whole turns counted: about its momentum, and of an athlete in somersaults and twists."""
+"""Turns of a body, whole ones counted: about its momentum, and somersaults and twists of an athlete."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from ..reconstruction.reconstruction import Motion
 from .phase_split import PhaseSplit
 
 _TURN = 2.0 * np.pi
-# Parts of a step between which the largest tilt is looked for: a step turns the body by a fraction of a radian.
-_PARTS = 8
+_PARTS = 8  # of a step, between which the largest tilt is searched: a step turns the body by a fraction of a radian
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +26,10 @@ class TurnCounts:
     Attributes
     ----------
     about_momentum : the Montgomery phase in revolutions, in the gauge of the split; 0 without momentum
-    somersaults, twists : of an athlete, in revolutions; None of another body
-    largest_tilt : of the athlete, size [rad]; None of another body
-    axes : by which these three are counted
-    error : estimate of that of each count [revolutions]
+    somersaults, twists : of an athlete, in revolutions; None for another body
+    largest_tilt : size of the athlete's largest tilt [rad]; None for another body
+    axes : axes of these three
+    error : error estimate of each count [revolutions]
 
     Examples
     --------
@@ -51,27 +50,27 @@ class TurnCounts:
     __repr__ = short_repr
 
     def __str__(self) -> str:
-        """In a sentence or two, "" where nothing turned about a momentum and nobody is an athlete."""
-        said = ""
+        """Return the counts in a sentence or two; "" without momentum and athlete."""
+        text = ""
         if self.about_momentum:
-            said = (
-                "The angle of a rotation is said but for whole turns: about its momentum the body turned "
+            text = (
+                "The angle of a rotation does not count whole turns: about its momentum the body turned "
                 f"{_count(self.about_momentum)} times (± {self.error:.0e}; the Montgomery phase)."
             )
         if self.axes is not None and self.somersaults is not None and self.twists is not None:
             tilt = math.degrees(self.largest_tilt or 0.0)
-            said += (
-                f" Counted as those of an athlete: {_count(self.somersaults)} somersaults and "
+            text += (
+                f" As an athlete: {_count(self.somersaults)} somersaults and "
                 f"{_count(self.twists)} twists, tilt at most {tilt:.1f} degrees (± {self.error:.0e} turns); "
                 f"{self.axes}."
             )
-        return said.strip()
+        return text.strip()
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON: numbers, and the axes with what each is; nothing of an athlete for another body."""
-        found: dict[str, Any] = {"turns_about_momentum": self.about_momentum, "turns_error": self.error}
+        """Return the counts for JSON, with the axes and their sources where the body is an athlete."""
+        counts: dict[str, Any] = {"turns_about_momentum": self.about_momentum, "turns_error": self.error}
         if self.axes is not None:
-            found |= {
+            counts |= {
                 "somersaults": self.somersaults,
                 "twists": self.twists,
                 "largest_tilt_rad": self.largest_tilt,
@@ -80,16 +79,16 @@ class TurnCounts:
                     for name, reason in sorted(self.axes.reasons.items())
                 },
             }
-        return found
+        return counts
 
 
 def _count(turns: float) -> str:
-    """With four digits after the point; a zero has no sign."""
+    """Return a number with four digits after the point; zero has no sign."""
     return f"{round(turns, 4) + 0.0:.4f}"
 
 
 def turn_counts(motion: Motion, split: PhaseSplit) -> TurnCounts:
-    """Turns of one motion, about its momentum and, where links are called left and right, as an athlete's.
+    """Return the turns of one motion about its momentum and, where links are named left and right, an athlete's counts.
 
     Parameters
     ----------
