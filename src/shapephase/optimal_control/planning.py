@@ -31,7 +31,7 @@ from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
 from .plan import Plan, Progress
 from .plan_options import Goal, Limits, Search, goal_argument
-from .solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
+from .solver_callback import STOP_REQUESTED, IterationCallback
 from .task import Reorientation, reorientation
 from .waypoints import Waypoint
 
@@ -182,14 +182,13 @@ def plan_reorientation(
     began = time.perf_counter()
     reporter = _ProgressReporter(iteration_callback, chosen.time_limit)
     attempts: list[Attempt] = []
-    with heard_interrupts():
-        for searched in _searches(tasks, chosen, reporter, executor):
-            for attempt in searched:
-                attempts.append(attempt)
-                if reporter.stopped:
-                    break
-            if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+    for searched in _searches(tasks, chosen, reporter, executor):
+        for attempt in searched:
+            attempts.append(attempt)
+            if reporter.stopped:
                 break
+        if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+            break
     seconds = time.perf_counter() - began
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=Attempt.rank, default=None)
     plan = (
@@ -306,13 +305,12 @@ _KEPT = threading.local()
 
 
 def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> Attempt:
-    """One of them, in another process or thread, until Ctrl-C there or the time `end` [s since 1970]."""
-    with stopping_interrupts() as stopped:
-        if getattr(_KEPT, "recipe", None) != recipe:
-            task, pieces, search = pickle.loads(recipe)
-            _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
-            _KEPT.recipe = recipe
-        return _KEPT.local.attempt(guess, lambda *_: stopped() or time.time() > end)
+    """A local search in another process or thread, until `STOP_REQUESTED` is set there or the time `end` [s, Unix]."""
+    if getattr(_KEPT, "recipe", None) != recipe:
+        task, pieces, search = pickle.loads(recipe)
+        _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
+        _KEPT.recipe = recipe
+    return _KEPT.local.attempt(guess, lambda *_: STOP_REQUESTED.is_set() or time.time() > end)
 
 
 class _ProgressReporter:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 from cyclopts import Parameter
 
 from ...errors import PlanNotFound, ShapeError
+from ..ctrl_c import stop_searches_on_ctrl_c
 from ..exit_codes import ExitCode
 from ..options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, GivenMomentum, PrintOptions, ReportFile
 from ..outcome import Outcome, check_writable
@@ -299,11 +300,9 @@ def _executor(workers: int | None, search: _InterruptibleSearch) -> Iterator[Exe
     if workers is None:
         yield None
         return
-    from ...optimal_control.solver_callback import keep_interrupts
-
     # A process that was forked beside threads of the solver may hang.
     spawned = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=keep_interrupts) as processes:
+    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=stop_searches_on_ctrl_c) as processes:
         # They begin deaf to Ctrl-C, until they can take note of it.
         with _deaf():
             processes.submit(int)
