@@ -48,13 +48,13 @@ def test_an_iterate_is_reported_with_its_largest_violation():
 def test_ctrl_c_in_an_iteration_is_raised_by_the_plan_and_handlers_stay_as_they_are(iteration):
     handlers = []
 
-    def pressed(now):
+    def pressed(_, text):
         handlers.append(signal.getsignal(signal.SIGINT))
-        if now.iteration == iteration:
+        if f": iteration {iteration}," in text:
             signal.raise_signal(signal.SIGINT)
 
     goal = sp.so3.exp(np.array([1.0, 0.0, 0.0]))
     with pytest.raises(KeyboardInterrupt):
-        sp.plan_reorientation(sp.load_body("cat_two_halves"), goal, search=Search(pieces=8), iteration_callback=pressed)
+        sp.plan_reorientation(sp.load_body("cat_two_halves"), goal, search=Search(pieces=8), progress=pressed)
     assert len(handlers) == iteration + 1
     assert set(handlers) == {signal.default_int_handler}

@@ -29,7 +29,7 @@ from .postures import mirrored, moving_joints, posture, waypoint
 
 if TYPE_CHECKING:
     from ...body.body import Body
-    from ...optimal_control.plan import Plan, Progress
+    from ...optimal_control.plan import Plan
     from ...optimal_control.plan_options import Limits
 
 # What stands for the limits that a body's file states.
@@ -211,7 +211,7 @@ def plan_command(
                     search=Search(
                         starts=starts, seed=seed, pieces=pieces, iterations=iterations, time_limit=time_limit
                     ),
-                    iteration_callback=search.report,
+                    progress=search.report,
                     executor=executor,
                 )
             except PlanNotFound as failure:
@@ -386,14 +386,10 @@ class _InterruptibleSearch:
         self.reported, self.stopped = beside, False
         self.beside: list[int] = []
 
-    def report(self, now: Progress) -> bool:
-        """Show the progress of the search; returns whether to stop it."""
-        which = f" {now.start} of {now.starts}" if now.starts > 1 else ""
+    def report(self, share: float, text: str) -> bool:
+        """Show the progress of the search; return whether to stop it."""
         left = "" if self._end == math.inf else f", {max(self._end - time.monotonic(), 0.0):.0f} s left"
-        self._work.say(
-            f"{now.stage}{which}: iteration {now.iteration}, off the goal by {now.goal_error:.1e} rad, "
-            f"cost {now.cost:.6g}{left}"
-        )
+        self._work.watch(share, f"{text}{left}")
         self.reported = True
         return self.stopped
 
