@@ -16,6 +16,7 @@ from ..arguments import (
     check_file_name,
     check_object,
     initial_state_arguments,
+    made_by,
     threads_argument,
     times_argument,
     tolerance_argument,
@@ -67,6 +68,12 @@ class Sensitivity:
     __repr__ = short_repr
 
 
+@made_by(
+    "reconstruct(deformation, momentum), where articulated(body, path) makes a deformation, or load_motion(file)",
+    Body="of one made by articulated, it is motion.deformation.description.body",
+    ShapePath="of one made by articulated, it is motion.deformation.description.path",
+    Deformation="it is motion.deformation",
+)
 @copied_when_read("initial_attitude")
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion(MotionViews):
