@@ -118,17 +118,6 @@ def test_waypoints_within_limits_of_efforts(two_halves):
     np.testing.assert_allclose(seen, direction, atol=1e-8)
 
 
-@pytest.mark.full
-def test_both_methods_pass_a_waypoint_alike(two_halves):
-    via = [Waypoint(BESIDE.shape, time=0.25)]
-    ours = planned(two_halves, via)
-    other = plan_reorientation(two_halves, GOAL, via=via, search=Search(pieces=12, method="reduced"))
-    assert other.cost == pytest.approx(ours.cost, rel=1e-4)
-    np.testing.assert_allclose(other.path.shape(0.25), BESIDE.shape, atol=1e-9)
-    with pytest.raises(TrajectoryError, match="give their times"):
-        plan_reorientation(two_halves, GOAL, via=[BESIDE], search=Search(pieces=12, method="reduced"))
-
-
 def test_waypoints_bind_what_follows(two_halves):
     """A follower's coordinate is its leader's divided by the factor, beside a joint that is held."""
     task = reorientation(

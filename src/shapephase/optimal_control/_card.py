@@ -26,7 +26,7 @@ def plan_card(self: Plan) -> Card:
         ("off the goal", f"{self.goal_error:.1e} rad"),
         ("cost", f"{numbers(self.cost, self.cost_unit)} ({self.cost_name})"),
         ("of the limits", ", ".join(f"{name} {share:.1%}" for name, share in self.limit_shares.items())),
-        ("found by", f"{self.method}, {self.iterations} iterations, {self.seconds:.3g} s"),
+        ("found by", f"{self.iterations} iterations, {self.seconds:.3g} s"),
         ("starts", f"{len(self.starts)}, {converged} of them converged, {self.agreeing_starts} to this cost"),
         ("KKT residual", f"{self.kkt_residual:.1e}"),
         ("second order", _SECOND_ORDER[self.second_order]),

@@ -15,7 +15,6 @@ from ..errors import ShapePhaseError
 from ._path_cost import path_cost
 from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
-from ._reduced import ReducedProgram
 from ._spline_basis import SplineBasis
 from ._via_rows import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
@@ -86,21 +85,21 @@ class LocalSearch:
     ----------
     basis : of the path's spline at first
     program : for this basis
-    halvings : how often its pieces may be halved; never where the user said how many there are, or for "reduced"
+    halvings : how often its pieces may be halved; never where the user gave their number
     settles : whether the solver may end where the cost changes no more, as that of a long motion
     """
 
     task: Reorientation
     basis: SplineBasis
-    program: CollocationProgram | ReducedProgram
+    program: CollocationProgram
     iterations: int
     halvings: int
     settles: bool = False
 
     @classmethod
     def of(cls, task: Reorientation, basis: SplineBasis, search: Search, *, settles: bool = False) -> LocalSearch:
-        halvings = _HALVINGS if search.pieces is None and search.method == "collocation" else 0
-        return cls(task, basis, _program(task, basis, search.method), int(search.iterations), halvings, settles)
+        halvings = _HALVINGS if search.pieces is None else 0
+        return cls(task, basis, CollocationProgram(task, basis), int(search.iterations), halvings, settles)
 
     def attempt(self, guess: Guess, callback: IterationCallback) -> Attempt:
         """The local optimum, its path corrected to reach the goal; on finer pieces where these are too coarse."""
@@ -123,7 +122,7 @@ class LocalSearch:
     def _on(
         self,
         basis: SplineBasis,
-        program: CollocationProgram | ReducedProgram,
+        program: CollocationProgram,
         guess: Guess,
         callback: IterationCallback,
     ) -> tuple[Attempt, Array]:
@@ -135,7 +134,7 @@ class LocalSearch:
     def _optimum(
         self,
         basis: SplineBasis,
-        program: CollocationProgram | ReducedProgram,
+        program: CollocationProgram,
         guess: Guess,
         callback: IterationCallback,
     ) -> tuple[NlpSolution, PolishedPath | None]:
@@ -149,8 +148,8 @@ class LocalSearch:
             "iterations": self.iterations,
             "via_places": guess.via_places,
             "iteration_callback": callback,
+            "settles": self.settles,
         }
-        options |= {"settles": True} if self.settles else {}
         rounds = 0
         while True:
             solution = program.solve(control, duration, attitudes, **options)
@@ -228,10 +227,6 @@ def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPa
     slack = 1.0 + LIMIT_SLACK
     shares = limit_shares(task, basis, polished.control, polished.motion)
     return polished.path.duration <= task.duration * slack and max(shares.values(), default=0.0) <= slack
-
-
-def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
-    return CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
 
 
 def failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Attempt | None, stopped: str) -> str:

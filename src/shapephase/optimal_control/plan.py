@@ -80,7 +80,6 @@ class Plan:
     kkt_residual : of the discrete optimum before the corrections, scaled; for a motion of many strokes that of the
         optimum among motions of so many equal ones
     coefficients : (pieces + 1, m) control points of the free coordinates [rad or m]
-    method : that found it
     iterations : over all starts
     seconds : over all starts
     starts : one for each start, in their order
@@ -117,7 +116,6 @@ class Plan:
     polish_steps: int
     kkt_residual: float
     coefficients: Array
-    method: str
     iterations: int
     seconds: float
     starts: tuple[Start, ...]

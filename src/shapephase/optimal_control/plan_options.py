@@ -16,7 +16,6 @@ from ..errors import ShapeError, unknown_name
 from ..letters import what_came
 from ._symmetry import different, symmetry_argument
 
-METHODS = ("collocation", "reduced")
 RATES_AT_ENDS = ("zero", "periodic", "free")
 LIMIT_UNITS = {
     "rate_limits": ("rad/s or m/s", True),
@@ -195,15 +194,10 @@ class Limits:
 
 @dataclass(frozen=True)
 class Search:
-    """How a plan is searched for.
+    """Effort of the search for a plan: by Gauss collocation of the attitude, a sparse program for IPOPT.
 
     Attributes
     ----------
-    method : "collocation", the attitude by Gauss collocation, the whole a sparse program with exact second derivatives
-        for IPOPT; or "reduced", the path's coefficients alone, with the exact derivative of the integrator's attitude
-        (not for the costs "time" and "effort", nor with limits of efforts). On equal splines both come to the same
-        costs within 1.5 %, of the cat in 14 and 11 s; the first leaves a KKT residual of 1e-9, the second of some 1e-6,
-        and for the astronaut it may need more than 300 iterations: so the first is the default
     starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. For up to eight
         free joints, and for up to twelve with several starts, they are the best of more guesses, up to sixteen, by a
         coarse search. Where none leads to a plan of up to eight, two further guesses are tried, and then a motion of
@@ -217,8 +211,6 @@ class Search:
 
     Raises
     ------
-    UnknownNameError
-        For another method.
     ShapeError
         For counts that are not whole numbers, too small or too large.
 
@@ -228,7 +220,6 @@ class Search:
     4
     """
 
-    method: str = "collocation"
     starts: int = 1
     seed: int = 0
     pieces: int | None = None
@@ -239,8 +230,6 @@ class Search:
 
     def __post_init__(self) -> None:
         """Check what is given."""
-        if not isinstance(self.method, str) or self.method not in METHODS:
-            raise unknown_name("method", self.method, METHODS)
         if self.pieces is not None:
             _check_count(self.pieces, "pieces", _LEAST_PIECES, _MOST_PIECES)
         _check_count(self.starts, "starts", 1, _MOST_STARTS)

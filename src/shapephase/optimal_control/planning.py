@@ -24,7 +24,6 @@ from ._certificates import hamiltonian_spread
 from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes, polished_path
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
 from ._reachable_turns import check_reachable
-from ._reduced import check_reducible
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
@@ -66,9 +65,6 @@ _SPARE = 2
 _COARSE_ITERATIONS = 40
 # Its accuracy, scaled: it has to find the right basin, not the optimum.
 _COARSE_TOLERANCE = 1e-4
-# The same before "reduced", which without second derivatives does not get along a flat valley: it starts at its end.
-_COARSE_ITERATIONS_OF_REDUCED = 100
-_COARSE_TOLERANCE_OF_REDUCED = 1e-6
 # Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
 _COARSE_INFEASIBILITY = 1e-2
 _STAGES = {"guesses": (0.0, 0.3), "search": (0.3, 1.0)}  # shares of the whole between which each is reported
@@ -180,8 +176,6 @@ def plan_reorientation(
         )
         for member in goals
     ]
-    if chosen.method == "reduced":
-        check_reducible(tasks[0])
     check_reachable(tasks)
     warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
@@ -198,9 +192,7 @@ def plan_reorientation(
     reporter.finish()
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=Attempt.rank, default=None)
     plan = (
-        None
-        if best is None
-        else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, chosen.method, seconds, reporter.stopped)
+        None if best is None else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, seconds, reporter.stopped)
     )
     if best is None or plan is None or not best.report.converged:
         raise PlanNotFound(failure_message(tasks[0], attempts, best, reporter.stopped), plan)
@@ -272,7 +264,7 @@ def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _SearchMonito
 
 def _searched_by_strokes(task: Reorientation, search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
     """Motions of many strokes, for few joints: equal ones, and from there any."""
-    if task.dimension > _MANY_JOINTS or search.method != "collocation":
+    if task.dimension > _MANY_JOINTS:
         return
     stroked = guess_of_strokes(task, search.seed, search.pieces)
     if stroked is None:
@@ -378,9 +370,6 @@ def _starting_points(
     ranked = max(count, min(_RANKED * count, _MOST_RANKED), _LEAST_OF_FEW if few else 1)
     candidates = guesses(task, coarse, search.seed, ranked)
     program = CollocationProgram(task, coarse)
-    most, tolerance = _COARSE_ITERATIONS, _COARSE_TOLERANCE
-    if search.method == "reduced":
-        most, tolerance = _COARSE_ITERATIONS_OF_REDUCED, _COARSE_TOLERANCE_OF_REDUCED
     found: list[tuple[float, int, Guess]] = []
     for number, candidate in enumerate(candidates):
         if reporter.stopped and found:
@@ -389,8 +378,8 @@ def _starting_points(
             candidate.control,
             task.duration,
             guessed_attitudes(task, candidate),
-            iterations=min(most, int(search.iterations)),
-            tolerance=tolerance,
+            iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
+            tolerance=_COARSE_TOLERANCE,
             via_places=candidate.via_places,
             iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
         )
@@ -406,7 +395,6 @@ def _plan(
     goals: Mapping[Reorientation, Goal],
     best: Attempt,
     attempts: Sequence[Attempt],
-    method: str,
     seconds: float,
     stopped: str,
 ) -> Plan | None:
@@ -429,7 +417,6 @@ def _plan(
         polish_steps=best.polished.steps,
         kkt_residual=best.report.kkt_residual,
         coefficients=best.polished.control,
-        method=method,
         iterations=sum(attempt.report.iterations for attempt in attempts),
         seconds=seconds,
         starts=tuple(attempt.report for attempt in attempts),
