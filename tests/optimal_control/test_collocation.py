@@ -15,9 +15,8 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.optimal_control import Goal, Limits, Search, Waypoint, plan_reorientation
-from shapephase.optimal_control._gauss import gauss_tableau
 from shapephase.optimal_control._polish import end_derivative, goal_derivative, polish
-from shapephase.optimal_control._spline_basis import SplineBasis
+from shapephase.optimal_control._spline_basis import SplineBasis, gauss_tableau
 from shapephase.optimal_control.collocation import CollocationProgram
 from shapephase.optimal_control.guesses.loops import guesses
 from shapephase.optimal_control.task import reorientation

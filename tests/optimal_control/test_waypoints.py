@@ -12,7 +12,7 @@ import shapephase as sp
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.optimal_control import Goal, Limits, Search, Waypoint, plan_reorientation
 from shapephase.optimal_control._spline_basis import SplineBasis
-from shapephase.optimal_control._via_rows import nearest_places, symbolic_via_rows
+from shapephase.optimal_control._via_points import nearest_places, symbolic_via_rows
 from shapephase.optimal_control.task import reorientation
 from support.independent import apart, pinocchio_motion, turn
 

@@ -16,7 +16,7 @@ from ._path_cost import path_cost
 from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
 from ._spline_basis import SplineBasis
-from ._via_rows import via_rows
+from ._via_points import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control
 from .plan import Start

@@ -13,7 +13,7 @@ from ..errors import AccuracyNotReached, unknown_name
 from ..shape_space.body_path import route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
-from ._gauss import gauss_tableau
+from ._spline_basis import gauss_tableau
 
 # Gauss nodes of a panel: exact for the rate cost of a cubic spline, and far beyond what smooth paths need.
 _NODES = 12

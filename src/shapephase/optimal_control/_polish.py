@@ -13,10 +13,9 @@ from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.body_path import route_along
 from ..shape_space.shape_path import ShapePath
-from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits, shortest_duration
-from ._spline_basis import SplineBasis
-from ._via_rows import via_rows
+from ._spline_basis import SplineBasis, gauss_tableau
+from ._via_points import via_rows
 from .task import Reorientation
 
 # Accuracy of the reconstruction that plans are judged by [rad]: well below what they have to reach.

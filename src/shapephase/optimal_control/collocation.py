@@ -10,13 +10,11 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._gauss import gauss_tableau
 from ._polish import end_conditions
-from ._spline_basis import SplineBasis
-from ._via_rows import open_points, symbolic_via_rows
+from ._spline_basis import SplineBasis, gauss_tableau
+from ._via_points import open_points, symbolic_via_rows
 from .nodes.limit_rows import DerivativeRows, EffortTerms
-from .nodes.node_functions import node_functions
-from .nodes.unknowns import scipy_sparse, seen_at, sparse_matrix
+from .nodes.node_functions import node_functions, scipy_sparse, seen_at, sparse_matrix
 from .solver_callback import BestIterate, IterationCallback, ipopt_callback
 from .symbolic import symbolic_body
 from .task import Reorientation

@@ -16,13 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import so3
 from ..arguments import check_executor, check_object
+from ..arrays import Array
 from ..body.body import Body
 from ..errors import PlanNotFound
 from ..run_progress import ProgressCallback, check_progress
-from ._certificates import hamiltonian_spread
+from ..shape_space.connection import mechanical_connection
 from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes, polished_path
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
+from ._polish import panel_nodes
 from ._reachable_turns import check_reachable
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
@@ -30,10 +33,9 @@ from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
 from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
 from .plan import Plan
-from .plan_options import Goal, Limits, Search, goal_argument
+from .plan_options import Goal, Limits, Search, Waypoint, goal_argument
 from .solver_callback import STOP_REQUESTED, IterationCallback
 from .task import Reorientation, reorientation
-from .waypoints import Waypoint
 
 # Few free joints: each piece is so cheap that the spline can be as fine as an extremal needs.
 _FEW_JOINTS = 4
@@ -67,6 +69,10 @@ _COARSE_ITERATIONS = 40
 _COARSE_TOLERANCE = 1e-4
 # Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
 _COARSE_INFEASIBILITY = 1e-2
+# Pieces at both ends that are left out: from rest a spline takes some to come to its speed.
+_ENDS = 3
+# Of a rate limit: what counts as being at it.
+_AT_LIMIT = 1.0 - 1e-5
 _STAGES = {"guesses": (0.0, 0.3), "search": (0.3, 1.0)}  # shares of the whole between which each is reported
 _USUAL_ITERATIONS = 50  # iterations after which half of a start is reported as done
 
@@ -425,3 +431,31 @@ def _plan(
         limit_shares=position_share(task, best.basis, best.polished.control)
         | limit_shares(task, best.basis, best.polished.control, best.polished.motion),
     )
+
+
+def hamiltonian_spread(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> float | None:
+    """Largest less least mean of Pontryagin's Hamiltonian over a piece, relative to its mean; None where undefined.
+
+    Without momentum the cost's density L is quadratic in the rates, and what the holonomy adds to it is linear in them,
+    so that H = L; and H is constant as nothing depends on time. A limit of positions does not change that, a limit of
+    rates does, and so does a waypoint with a time; with limits of accelerations, jerks or efforts it is another
+    Hamiltonian.
+
+    Source: theory.md B6; Pontryagin's principle.
+    """
+    timed = any(point.place is not None for point in task.via)
+    if task.cost not in ("kinetic", "rate") or task.momentum.any() or task.limits_beyond_rates or timed:
+        return None
+    places, _ = panel_nodes(basis)
+    coordinates = basis.matrix(places) @ control
+    rates = basis.matrix(places, 1) @ control / duration
+    joints = rates @ task.coupling.T
+    if task.cost == "rate":
+        density = 0.5 * np.sum(joints**2, axis=1)
+    else:
+        shapes = task.shapes(coordinates)
+        density = task.body.kinetic_energy(shapes, joints, -so3.apply(mechanical_connection(task.body, shapes), joints))
+    limited = np.any(np.abs(basis.rate_control @ control) > _AT_LIMIT * task.rate_limit * duration, axis=1)
+    free = ~np.any(basis.rate_reaches & limited, axis=1)[_ENDS:-_ENDS]
+    means = density.reshape(basis.pieces, -1).mean(axis=1)[_ENDS:-_ENDS][free]
+    return float(np.ptp(means) / means.mean()) if means.any() else None

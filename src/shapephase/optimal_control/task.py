@@ -17,8 +17,7 @@ from ..body.couplings.coordinate_map import check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ._ball_chart import BallChart
 from ._via_points import ViaPoint, via_points
-from .plan_options import RATES_AT_ENDS, Goal, Limits, goal_argument
-from .waypoints import Waypoint
+from .plan_options import RATES_AT_ENDS, Goal, Limits, Waypoint, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "effort", "time")
 

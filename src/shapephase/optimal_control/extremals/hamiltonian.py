@@ -19,8 +19,7 @@ from ...body.couplings.coordinate_map import check_no_balls, check_smooth
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, unknown_name
 from ...shape_space.connection import mechanical_connection
-from ..casadi_calls import call_casadi
-from ..symbolic import solve_linear, symbolic_body
+from ..symbolic import call_casadi, solve_linear, symbolic_body
 
 # Costs that are the integral of a metric, which is what the equations need.
 _COSTS = ("kinetic", "rate")

@@ -15,7 +15,7 @@ from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError
 from ...shape_space.connection import mechanical_connection
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from .extremal import Extremal
 from .hamiltonian import hamiltonian, initial_state, integrated, natural_scales
 

@@ -15,7 +15,7 @@ from ...errors import AccuracyNotReached, ShapeError
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import horizontal_lift
 from ...shape_space.shape_path import ShapePath
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from .extremal import Extremal, extremal
 from .hamiltonian import Hamiltonian, hamiltonian, initial_state, integrated, natural_scales
 from .jacobi_fields import inverse_scale, jacobi_fields

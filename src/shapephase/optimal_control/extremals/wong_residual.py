@@ -17,7 +17,7 @@ from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
 from ...shape_space.shape_path import ShapePath
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from ..task import joint_coupling
 from .hamiltonian import Hamiltonian, checked_metric, hamiltonian
 

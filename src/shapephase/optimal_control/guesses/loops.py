@@ -14,7 +14,7 @@ from ...reconstruction.reconstruction import Motion, reconstruct
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import curvature, mechanical_connection
 from .._spline_basis import SplineBasis
-from .._via_rows import bent_through, nearest_places
+from .._via_points import bent_through, nearest_places
 from ..symbolic import symbolic_body
 from ..task import Reorientation
 

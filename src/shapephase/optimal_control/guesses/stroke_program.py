@@ -12,9 +12,8 @@ import numpy as np
 from ... import so3
 from ...arrays import Array, Integers
 from ...shape_space.connection import mechanical_connection
-from .._gauss import gauss_tableau
 from .._polish import end_conditions
-from .._spline_basis import SplineBasis
+from .._spline_basis import SplineBasis, gauss_tableau
 from ..collocation import CollocationProgram, NlpSolution, final_conditions
 from ..nodes.node_functions import node_functions
 from ..solver_callback import BestIterate, IterationCallback, ipopt_callback

@@ -10,7 +10,7 @@ from ...arrays import Array
 from .._spline_basis import SplineBasis
 from ..task import Reorientation
 from .node_efforts import node_efforts
-from .unknowns import scipy_sparse, seen_at, sparse_matrix
+from .node_functions import scipy_sparse, seen_at, sparse_matrix
 
 
 class DerivativeRows:
