@@ -24,16 +24,11 @@ from .plan_options import Search
 from .solver_callback import IterationCallback
 from .task import Reorientation
 
-# How often pieces are halved where the search ends at a path whose motion misses the goal: fast joints need finer ones.
-_HALVINGS = 2
-# How often efforts are given less room where they exceed their limits between the nodes.
-_TIGHTENINGS = 6
-# Share of a limit that counts as being at it, where no plan was found.
-_NEARLY = 0.9
-# Windings of the same attitude differ by half a turn or more: far less than that tells them apart [rad].
-_WINDING_TOLERANCE = 0.1
-# Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
-_WINDING_SAMPLES = 50
+_HALVINGS = 2  # of the pieces, where the motion of the optimum misses the goal: fast joints need finer ones
+_TIGHTENINGS = 6  # rounds in which efforts are given less room, where they exceed limits between the nodes
+_NEARLY = 0.9  # share of a limit that a message about a failed search counts as being at it
+_WINDING_TOLERANCE = 0.1  # [rad], far less than the half turn by which windings of one attitude differ
+_WINDING_SAMPLES = 50  # attitudes per piece: so close together that unwrapping is safe
 
 
 @dataclass(frozen=True, eq=False)

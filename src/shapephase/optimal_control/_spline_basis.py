@@ -11,8 +11,7 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..shape_space.shape_path import ShapePath
 
-# Cubic: twice differentiable, so that the acceleration cost is finite, and what `ShapePath.spline` reads back.
-_DEGREE = 3
+_DEGREE = 3  # twice differentiable: the acceleration cost is finite, and `ShapePath.spline` reads it back
 
 
 @dataclass(frozen=True)

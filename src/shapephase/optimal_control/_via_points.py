@@ -18,11 +18,8 @@ from .plan_options import Waypoint
 if TYPE_CHECKING:
     from .task import Reorientation
 
-# By how much a waypoint may break a coupling, or be beyond a limit [rad or m]: rounding of what the user computed.
-_TOLERANCE = 1e-9
-# How much further than the nearest posture of a guess a waypoint may be from where it comes by its distance along the
-# way, relative to the size of the way: decides where guesses rest or come by more than once.
-_EVENNESS = 0.1
+_TOLERANCE = 1e-9  # [rad or m] of waypoints against couplings and limits: rounding of user input
+_EVENNESS = 0.1  # weight of even spacing against nearness: decides where guesses rest or return
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,32 +19,18 @@ from .solver_callback import BestIterate, IterationCallback, ipopt_callback
 from .symbolic import symbolic_body
 from .task import Reorientation
 
-STAGES = 3
-"""Gauss nodes of a piece: order six.
-
-On 12 pieces plans of the cat are off by some 1e-4 rad, which the Newton corrections remove."""
-# Dual residual, scaled, above which IPOPT's success is reported as degenerate: it converges to 1e-8, so this is no
-# rounding.
-_DEGENERATE = 1e-3
-# Accuracy that IPOPT is run to, scaled.
-_TOLERANCE = 1e-8
-# The shortest duration as a share of the longest, for the cost "time": only to keep the division by T away from 0.
-_SHORTEST = 1e-3
-# Long motions may end where the cost has settled: their last digits take hundreds of iterations, as strokes slide along
-# themselves. Accuracy that they have to have, scaled;
-_SETTLED_TOLERANCE = 1e-3
-# relative change of the cost in an iteration;
-_SETTLED_CHANGE = 3e-4
-# iterations for which it changes by no more;
-_SETTLED_ITERATIONS = 3
-# and what IPOPT takes for no bound.
-_UNBOUNDED = 1e10
-# What IPOPT reports of a local optimum.
-GOOD_STATUS = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
-# CasADi handles Ctrl-C itself: in the middle of an iteration IPOPT then returns this status,
-_INTERRUPTED = "NonIpopt_Exception_Thrown"
-# and between iterations this one, which a callback that stops the search causes too.
-_STOPPED = "User_Requested_Stop"
+STAGES = 3  # Gauss nodes of a piece, order six: 12 pieces of the cat are off by 1e-4 rad, which the polish removes
+_DEGENERATE = 1e-3  # scaled dual residual of a degenerate success: beyond rounding, as IPOPT converges to 1e-8
+_TOLERANCE = 1e-8  # scaled, of IPOPT
+_SHORTEST = 1e-3  # least duration as a share of the longest, cost "time": keeps the division by T from zero
+# Long motions may end where the cost has settled: strokes slide along themselves for hundreds of iterations.
+_SETTLED_TOLERANCE = 1e-3  # scaled accuracy then
+_SETTLED_CHANGE = 3e-4  # relative change of the cost, during at least
+_SETTLED_ITERATIONS = 3  # iterations
+_UNBOUNDED = 1e10  # no bound, for IPOPT
+GOOD_STATUS = ("Solve_Succeeded", "Solved_To_Acceptable_Level")  # IPOPT's, for a local optimum
+_INTERRUPTED = "NonIpopt_Exception_Thrown"  # IPOPT's, after Ctrl-C within an iteration, which CasADi handles
+_STOPPED = "User_Requested_Stop"  # after Ctrl-C between iterations, or a callback that stops the search
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,15 +16,14 @@ from ..shape_space.shape_path import ShapePath
 from ..so3 import angle
 from .plan_options import Goal
 
+# Radians; metres stand for them where joints slide.
 COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "effort": "s", "time": "s"}
-"""Of each cost; metres stand for radians where joints slide."""
 
 PLAN_STATUS = ("found", "not found", "stopped", "out of time")
 """How a search ended: after all starts, with a local optimum that reaches the goal or without, or before."""
 
 _SECOND_ORDER = {True: "a minimum among paths near by", False: "not met", None: "not known"}
-AGREEMENT = 1e-3
-"""Relative difference of costs up to which starts have come to the same."""
+AGREEMENT = 1e-3  # relative difference of costs up to which starts have come to the same
 
 
 @dataclass(frozen=True)

@@ -25,19 +25,12 @@ LIMIT_UNITS = {
 }
 """Of what `Limits` bounds, and whether a body's file may state it."""
 
-# Rotations whose entries differ by less are the same: rounding of what the user computed.
-_SAME = 1e-7
-# The most rotations of a group: that of the icosahedron has 60; a body with more of them has an axis for all that it
-# looks like.
-_MOST_ROTATIONS = 120
-# Pieces of the spline: with fewer, not-a-knot ends leave too few control points for a loop.
-_LEAST_PIECES = 6
-# A plan of three joints takes half a MiB for each piece, and no path needs so many.
-_MOST_PIECES = 2000
-# The guesses of all starts are kept at once.
-_MOST_STARTS = 1000
-# What the solver's own counter holds.
-_MOST_ITERATIONS = 2**31 - 1
+_SAME = 1e-7  # difference of entries of equal rotations: rounding of user input
+_MOST_ROTATIONS = 120  # of a group: the icosahedron's has 60, larger ones have an axis of revolution instead
+_LEAST_PIECES = 6  # of the spline: with fewer, not-a-knot ends leave too few control points for a loop
+_MOST_PIECES = 2000  # a plan of three joints takes half a MiB for each
+_MOST_STARTS = 1000  # the guesses of all starts are kept at once
+_MOST_ITERATIONS = 2**31 - 1  # the solver's own counter
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,42 +37,26 @@ from .plan_options import Goal, Limits, Search, Waypoint, goal_argument
 from .solver_callback import STOP_REQUESTED, IterationCallback
 from .task import Reorientation, reorientation
 
-# Few free joints: each piece is so cheap that the spline can be as fine as an extremal needs.
-_FEW_JOINTS = 4
-# Many free joints: the spline is coarse and no coarse search comes first.
-_MANY_JOINTS = 8
-# Pieces of the spline for few joints: paths of so many obey Wong's equations to 1e-4. For the acceleration cost they
-# would lose digits, as second derivatives of the basis grow with the square of the pieces; and from rest the joints
-# start within a piece, which is to be no shorter than a machine can do.
+_FEW_JOINTS = 4  # free joints so cheap that the spline can be as fine as an extremal needs
+_MANY_JOINTS = 8  # free joints beyond which the spline is coarse and no coarse search comes first
+# For few joints: such paths obey Wong's equations to 1e-4. The acceleration cost would lose digits, as second
+# derivatives grow with the square of the pieces; and from rest, joints start within a piece.
 _PIECES_OF_FEW = 160
-# Pieces up to `_MANY_JOINTS`, and beyond.
-_PIECES = 40
-_PIECES_OF_MANY = 20
-# Pieces of the coarse search that ranks the guesses, for few joints and for more: enough for a loop to bend.
-_COARSE_PIECES = 10
-_COARSE_PIECES_OF_MORE = 20
-# Guesses that it ranks for each start, and at most unless there are more starts; for few joints, where they are cheap,
-# not fewer than eight.
-_RANKED = 4
-_MOST_RANKED = 16
-_LEAST_OF_FEW = 8
-# Joints up to which guesses are ranked for several starts; for one, up to `_MANY_JOINTS`.
-_RANKED_JOINTS = 12
-# How often a loop that starts as a circle may go round: it bends into some rounds more than it starts with.
-_ROUNDS_OF_LOOPS = 4
-# Further guesses that are gone on with where none of those asked for leads to a plan: near a degenerate optimum
-# rounding decides whether a search comes to it.
-_SPARE = 2
-# The most iterations for each: those that have not ended by then are near enough to be ranked.
-_COARSE_ITERATIONS = 40
-# Its accuracy, scaled: it has to find the right basin, not the optimum.
-_COARSE_TOLERANCE = 1e-4
-# Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
-_COARSE_INFEASIBILITY = 1e-2
-# Pieces at both ends that are left out: from rest a spline takes some to come to its speed.
-_ENDS = 3
-# Of a rate limit: what counts as being at it.
-_AT_LIMIT = 1.0 - 1e-5
+_PIECES = 40  # up to `_MANY_JOINTS`
+_PIECES_OF_MANY = 20  # beyond
+_COARSE_PIECES = 10  # of the coarse search that ranks the guesses for few joints: enough for a loop to bend
+_COARSE_PIECES_OF_MORE = 20  # for more joints
+_RANKED = 4  # guesses that it ranks for each start
+_MOST_RANKED = 16  # at most, unless there are more starts
+_LEAST_OF_FEW = 8  # at least for few joints, where they are cheap
+_RANKED_JOINTS = 12  # up to which guesses are ranked for several starts; for one, up to `_MANY_JOINTS`
+_ROUNDS_OF_LOOPS = 4  # that a loop which starts as a circle may take: it bends into some more rounds
+_SPARE = 2  # further guesses where no start led to a plan: near a degenerate optimum rounding decides that
+_COARSE_ITERATIONS = 40  # of the coarse search: what has not ended then is near enough to be ranked
+_COARSE_TOLERANCE = 1e-4  # scaled: it has to find the right basin, not the optimum
+_COARSE_INFEASIBILITY = 1e-2  # scaled violation beyond which the guess itself is taken, after all others
+_ENDS = 3  # pieces at both ends that are left out: from rest a spline takes some to come to its speed
+_AT_LIMIT = 1.0 - 1e-5  # share of a rate limit that counts as being at it
 _STAGES = {"guesses": (0.0, 0.3), "search": (0.3, 1.0)}  # shares of the whole between which each is reported
 _USUAL_ITERATIONS = 50  # iterations after which half of a start is reported as done
 
@@ -304,8 +288,7 @@ def _searched_by(
         yield replace(attempt, task=job.task)
 
 
-# What a thread of an executor has made of the last recipe that came: a program takes as long as some starts.
-_KEPT = threading.local()
+_KEPT = threading.local()  # the last program of a thread of an executor: it takes as long as some starts
 
 
 def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> Attempt:

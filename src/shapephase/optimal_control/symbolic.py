@@ -349,8 +349,7 @@ def _joint_mass_matrix(chain: JointChain, speeds: list[tuple[Any, Any]], carried
     return matrix
 
 
-# Functions of one thread; a buffer holds a few kilobytes, and a computation uses a few dozen.
-_MOST_BUFFERS = 128
+_MOST_BUFFERS = 128  # functions of one thread, of some kB each; a computation uses a few dozen
 
 
 class _Buffers(threading.local):

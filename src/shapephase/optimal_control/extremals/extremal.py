@@ -20,8 +20,7 @@ from ...shape_space.shape_path import ShapePath
 from ..symbolic import call_casadi
 from .hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales
 
-# Of the series of rates on a step of order 8, whose error is that of the step.
-_DEGREE = 12
+_DEGREE = 12  # of the series of rates on a step of order 8: its error is that of the step
 
 
 @made_by("optimal_control.extremal(...)")
