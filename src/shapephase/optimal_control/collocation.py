@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..arrays import Array
 from ._polish import end_conditions
 from ._spline_basis import SplineBasis, gauss_tableau
 from ._via_points import open_points, symbolic_via_rows
-from .nodes.limit_rows import DerivativeRows, EffortTerms
+from .nodes.limit_rows import EffortTerms, derivative_rows
 from .nodes.node_functions import node_functions, scipy_sparse, seen_at, sparse_matrix
 from .solver_callback import BestIterate, IterationCallback, ipopt_callback
 from .symbolic import symbolic_body
@@ -108,40 +108,44 @@ class CollocationProgram:
             task, unknown[duration_place - task.dimension : duration_place], unknown[core - 4 : core]
         )
         via, via_low, via_high = symbolic_via_rows(task, basis, unknown[:duration_place], unknown[self._open])
-        final = casadi.vertcat(end, via)
-        further: list[DerivativeRows | EffortTerms] = [DerivativeRows(task, basis, unknown)]
+        bends = derivative_rows(task, basis, unknown)
+        efforts = None
         if task.efforts_limited or task.cost == "effort":
-            further.append(EffortTerms(task, basis, self.places, panels, unknown))
-        groups = [linear @ unknown - from_turning @ casadi.vec(turning), final, *(part.values for part in further)]
+            efforts = EffortTerms(task, basis, self.places, panels, unknown)
+        effort_rows, effort_jacobian = (
+            (casadi.MX(0, 1), casadi.MX(0, unknown.shape[0])) if efforts is None else (efforts.values, efforts.jacobian)
+        )
+        # Rows of no particular structure, which CasADi differentiates itself.
+        others = casadi.vertcat(end, via, bends)
+        groups = [linear @ unknown - from_turning @ casadi.vec(turning), others, effort_rows]
         rows = casadi.vertcat(*groups)
         slopes = casadi.diagcat(*casadi.horzsplit(node.jacobian.map(count)(at_node), width))
         jacobian = casadi.vertcat(
             linear - from_turning @ (slopes @ seen),
-            casadi.jacobian(final, unknown),
-            *(part.jacobian for part in further),
+            casadi.jacobian(others, unknown),
+            effort_jacobian,
         )
         multipliers, cost_factor = casadi.MX.sym("multipliers", rows.shape[0]), casadi.MX.sym("cost_factor")
-        of_linear, of_final, *of_further = casadi.vertsplit(
+        of_linear, of_others, of_efforts = casadi.vertsplit(
             multipliers, np.cumsum([0, *(group.shape[0] for group in groups)]).tolist()
         )
         turning_multipliers = casadi.reshape(-from_turning.T @ of_linear, 4, count)
         density_factor = 0.0 if task.cost == "time" else cost_factor
         blocks = node.hessian.map(count)(at_node, turning_multipliers, density_factor * shares.T)
         hessian = seen.T @ (casadi.diagcat(*casadi.horzsplit(blocks, width)) @ seen)
-        for part, its_multipliers in zip(further, of_further, strict=True):
-            hessian = hessian + part.hessian(its_multipliers, cost_factor)
-        # What of the Lagrangian is no sum over nodes, left to CasADi's own differentiation.
-        others = casadi.dot(final, of_final)
+        if efforts is not None:
+            hessian = hessian + efforts.hessian(of_efforts, cost_factor)
+        lagrangian = casadi.dot(others, of_others)
         if task.cost == "time":
             cost = unknown[duration_place]
         elif task.cost == "acceleration":
             cost = self._acceleration_cost(unknown)
-            others = others + cost_factor * cost
-        elif task.cost == "effort":
-            cost = cast("EffortTerms", further[-1]).cost
+            lagrangian = lagrangian + cost_factor * cost
+        elif efforts is not None and task.cost == "effort":
+            cost = efforts.cost
         else:
             cost = casadi.dot(density.T, shares)
-        hessian = hessian + casadi.hessian(others, unknown)[0]
+        hessian = hessian + casadi.hessian(lagrangian, unknown)[0]
         none = casadi.MX.sym("p", 0, 1)
         self._cost_function = casadi.Function("cost", [unknown], [cost])
         self.program = {"x": unknown, "p": none, "f": cost, "g": rows}
@@ -151,7 +155,7 @@ class CollocationProgram:
         }
         # The third row of a pointed axis is a cosine, which only has to be positive.
         final_high = np.zeros(3) if task.target is not None else np.array([0.0, 0.0, np.inf])
-        room = np.ones(sum(part.values.shape[0] for part in further))
+        room = np.ones(bends.shape[0] + effort_rows.shape[0])
         self._low = np.concatenate([low, np.zeros(3), via_low, -room])
         self._high = np.concatenate([high, final_high, via_high, room])
 
