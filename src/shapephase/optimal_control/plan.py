@@ -78,8 +78,8 @@ class Plan:
     goal_error : angle between the reconstructed attitude at the end and the goal [rad]
     transcription_gap : the same before the Newton corrections: the error of the discretisation [rad]
     polish_steps : Newton corrections of the path's coefficients that removed it
-    kkt_residual : of the discrete optimum before the corrections, scaled; for a motion of many strokes that of the
-        optimum among motions of so many equal ones
+    kkt_residual : of the discrete optimum before the corrections, scaled; up to 1e-3 for a motion of
+        many strokes, whose search ends where the cost has settled
     coefficients : (pieces + 1, m) control points of the free coordinates [rad or m]
     iterations : over all starts
     seconds : over all starts

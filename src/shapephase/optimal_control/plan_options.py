@@ -243,7 +243,7 @@ class Search:
     starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. For up to eight
         free joints, and for up to twelve with several starts, they are the best of more guesses, up to sixteen, by a
         coarse search. Where none leads to a plan of up to eight, two further guesses are tried, and then a motion of
-        many equal strokes; at once where two joints cannot turn the body so far in four rounds
+        many strokes; at once where two joints cannot turn the body so far in four rounds
     seed : of the random guesses; the same seed gives the same plan
     pieces : of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and "rate",
         else 40 for up to eight, 20 for more, and up to four times as many where the path that was found misses the
