@@ -195,8 +195,8 @@ def reorientation(
     check_smooth(body.chain.follows, "plans need", kinks_only=True)
     if body.ball_joints and cost != "kinetic":
         raise ShapeError(
-            f"cost={cost!r} depends on the coordinates of joints, which are arbitrary for a ball joint such as "
-            f"{body.ball_joints[0]}; use 'kinetic', or three hinges in one point"
+            f"cost={cost!r} depends on the choice of coordinates, and {body.ball_joints[0]} is a ball joint, whose choice "
+            "is arbitrary; use 'kinetic', or three hinges in one point"
         )
     (checked_goal,) = goal_argument(goal).members
     within = Limits() if limits is None else limits
