@@ -167,23 +167,23 @@ def plan_reorientation(
     check_reachable(tasks)
     warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
-    reporter = _SearchMonitor(progress, chosen.time_limit)
+    monitor = _SearchMonitor(progress, chosen.time_limit)
     attempts: list[Attempt] = []
-    for searched in _searches(tasks, chosen, reporter, executor):
+    for searched in _searches(tasks, chosen, monitor, executor):
         for attempt in searched:
             attempts.append(attempt)
-            if reporter.stopped:
+            if monitor.stopped:
                 break
-        if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+        if monitor.stopped or any(attempt.report.converged for attempt in attempts):
             break
     seconds = time.perf_counter() - began
-    reporter.finish()
+    monitor.finish()
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=Attempt.rank, default=None)
     plan = (
-        None if best is None else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, seconds, reporter.stopped)
+        None if best is None else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, seconds, monitor.stopped)
     )
     if best is None or plan is None or not best.report.converged:
-        raise PlanNotFound(failure_message(tasks[0], attempts, best, reporter.stopped), plan)
+        raise PlanNotFound(failure_message(tasks[0], attempts, best, monitor.stopped), plan)
     return plan
 
 
@@ -197,7 +197,7 @@ class _Job:
 
 
 def _searches(
-    tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor, executor: Executor | None
+    tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonitor, executor: Executor | None
 ) -> Iterator[Iterator[Attempt]]:
     """Yield the searches until one leads to a plan: loops first, unless none can turn the body so far."""
     near, far = [], []
@@ -205,52 +205,52 @@ def _searches(
         beyond = float(np.linalg.norm(task.turn_to_goal())) > _ROUNDS_OF_LOOPS * most_of_a_loop(task)
         (far if beyond else near).append(task)
     if near:
-        yield _searched_by_loops(near, search, reporter, executor)
-    yield chain.from_iterable(_searched_by_strokes(task, search, reporter) for task in tasks)
+        yield _searched_by_loops(near, search, monitor, executor)
+    yield chain.from_iterable(_searched_by_strokes(task, search, monitor) for task in tasks)
     if far:
-        yield _searched_by_loops(far, search, reporter, executor)
+        yield _searched_by_loops(far, search, monitor, executor)
 
 
 def _searched_by_loops(
-    tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor, executor: Executor | None
+    tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonitor, executor: Executor | None
 ) -> Iterator[Attempt]:
     """Yield local searches from loops, and from further ones where none of the first leads to a plan."""
-    first, spare = _jobs(tasks, search, reporter)
+    first, spare = _jobs(tasks, search, monitor)
     searched = _searched_here if executor is None else partial(_searched_by, executor)
     converged = False
-    for attempt in searched(first, search, reporter):
+    for attempt in searched(first, search, monitor):
         converged = converged or attempt.report.converged
         yield attempt
     if not converged:
-        for attempt in _searched_here(spare, search, reporter):
+        for attempt in _searched_here(spare, search, monitor):
             yield attempt
             if attempt.report.converged:
                 break
 
 
-def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor) -> tuple[list[_Job], list[_Job]]:
+def _jobs(tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonitor) -> tuple[list[_Job], list[_Job]]:
     """Return the local searches of several tasks, and spare ones if none of those leads to a plan."""
     first: list[_Job] = []
     spare: list[_Job] = []
     for task in tasks:
-        if first and reporter.stopped:
+        if first and monitor.stopped:
             break
         basis = SplineBasis(int(search.pieces or _default_pieces(task)))
-        for jobs, starts in zip((first, spare), _starting_points(task, basis, search, reporter), strict=True):
+        for jobs, starts in zip((first, spare), _starting_points(task, basis, search, monitor), strict=True):
             jobs.extend(_Job(task, basis, guess) for guess in starts)
     return first, spare
 
 
-def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
+def _searched_here(jobs: Sequence[_Job], search: Search, monitor: _SearchMonitor) -> Iterator[Attempt]:
     """Yield local searches, one after the other."""
     local = None
     for number, job in enumerate(jobs):
         if local is None or local.task is not job.task:
             local = LocalSearch.of(job.task, job.basis, search)
-        yield local.attempt(job.guess, reporter.solver_callback("search", number + 1, len(jobs)))
+        yield local.attempt(job.guess, monitor.solver_callback("search", number + 1, len(jobs)))
 
 
-def _searched_by_strokes(task: Reorientation, search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
+def _searched_by_strokes(task: Reorientation, search: Search, monitor: _SearchMonitor) -> Iterator[Attempt]:
     """Yield the local search from a motion of many strokes, for few joints."""
     stroked = guess_of_strokes(task, search.seed, search.pieces) if task.dimension <= _MANY_JOINTS else None
     if stroked is None:
@@ -260,20 +260,20 @@ def _searched_by_strokes(task: Reorientation, search: Search, reporter: _SearchM
     if guess is not None:
         few = replace(search, pieces=layout.basis.pieces)
         local = LocalSearch.of(task, layout.basis, few, settles=True)
-        yield local.attempt(guess, reporter.solver_callback("search", 1, 1))
+        yield local.attempt(guess, monitor.solver_callback("search", 1, 1))
 
 
 def _searched_by(
-    executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _SearchMonitor
+    executor: Executor, jobs: Sequence[_Job], search: Search, monitor: _SearchMonitor
 ) -> Iterator[Attempt]:
     """Yield local searches by an executor, in their order."""
     recipes = {job.task: pickle.dumps((job.task, job.basis.pieces, search)) for job in jobs}
     attempts = executor.map(
-        partial(_searched_elsewhere, reporter.end), [recipes[job.task] for job in jobs], [job.guess for job in jobs]
+        partial(_searched_elsewhere, monitor.end), [recipes[job.task] for job in jobs], [job.guess for job in jobs]
     )
     for number, (job, attempt) in enumerate(zip(jobs, attempts, strict=True)):
         end = attempt.report
-        report = reporter.solver_callback("search", number + 1, len(jobs))
+        report = monitor.solver_callback("search", number + 1, len(jobs))
         report(end.iterations, end.cost, end.infeasibility, end.goal_error)
         yield replace(attempt, task=job.task)
 
@@ -335,7 +335,7 @@ def _default_pieces(task: Reorientation) -> int:
 
 
 def _starting_points(
-    task: Reorientation, basis: SplineBasis, search: Search, reporter: _SearchMonitor
+    task: Reorientation, basis: SplineBasis, search: Search, monitor: _SearchMonitor
 ) -> tuple[list[Guess], list[Guess]]:
     """Return the guesses to start from, and spare ones if none of those leads to a plan.
 
@@ -351,7 +351,7 @@ def _starting_points(
     program = CollocationProgram(task, coarse)
     improved: list[tuple[float, int, Guess]] = []
     for number, candidate in enumerate(candidates):
-        if reporter.stopped and improved:
+        if monitor.stopped and improved:
             break
         solution = program.solve(
             candidate.control,
@@ -360,7 +360,7 @@ def _starting_points(
             iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
             tolerance=_COARSE_TOLERANCE,
             via_places=candidate.via_places,
-            iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
+            iteration_callback=monitor.solver_callback("guesses", number + 1, len(candidates)),
         )
         near = solution.infeasibility < _COARSE_INFEASIBILITY
         guess = guess_of(task, basis, coarse.matrix(PLACES) @ (solution.control if near else candidate.control))

@@ -195,7 +195,7 @@ def reorientation(
     check_smooth(body.chain.follows, "plans need", kinks_only=True)
     if body.ball_joints and cost != "kinetic":
         raise ShapeError(
-            f"cost={cost!r} depends on the choice of coordinates, and {body.ball_joints[0]} is a ball joint, whose choice "
+            f"cost={cost!r} depends on the choice of coordinates, and {body.ball_joints[0]} is a ball joint, where it "
             "is arbitrary; use 'kinetic', or three hinges in one point"
         )
     (checked_goal,) = goal_argument(goal).members
@@ -214,7 +214,7 @@ def reorientation(
     if cost == "time" and not np.isfinite(rates).all():
         unstated = ", ".join(np.array(body.joint_names)[~np.isfinite(rates)][:_MOST_NAMED])
         raise TrajectoryError(
-            "cost='time' needs rate_limits for every joint: without them there is no least time, and there is none for "
+            "cost='time' needs rate_limits for every joint: without them the least time is 0; none is given for "
             f"{unstated}; give limits=Limits(rate_limits=...)"
         )
     fixed_joints = _fixed_joints(body, joints)
@@ -362,13 +362,13 @@ def _effort_measure(body: Body, cost: str, limits: Limits) -> Array:
     measure = _joint_limits(body, measured_by, "effort_limits", body.effort_limits)
     if measured_by is not None and not body.chain.follows.is_linear:
         raise ShapeError(
-            f"effort_limits: {body.name} has ball joints, or joints that follow others along curves, of which plans do "
-            "not know the efforts; leave them out, and see joint_torques(plan.motion)"
+            f"effort_limits: {body.name} has ball joints, or joints that follow others along curves, whose efforts "
+            "plans cannot bound; leave them out, and see joint_torques(plan.motion)"
         )
     if cost == "effort" and not np.isfinite(measure).all():
         unstated = ", ".join(np.array(body.joint_names)[~np.isfinite(measure)][:_MOST_NAMED])
         raise TrajectoryError(
-            "cost='effort' needs effort_limits for every joint, which efforts are measured by, and there is none for "
+            "cost='effort' needs effort_limits for every joint, as units of efforts; none is given for "
             f"{unstated}; give limits=Limits(effort_limits=...)"
         )
     return measure
