@@ -12,7 +12,6 @@ from cyclopts import App, Parameter
 
 from ..errors import ShapeError
 from ..files import write_whole
-from ..run_progress import RunProgress
 from .exit_codes import ExitCode
 from .options import AS_TEXT, AS_WRITTEN, BodyOptions, FigureFile, PrintOptions
 from .outcome import Outcome, check_writable
@@ -96,7 +95,7 @@ def sweep_command(
             def watch(now: StudyProgress) -> None:
                 said = progress_line(now)
                 say(f"shapephase: {said}", Verbosity.VERBOSE)
-                work.watch(RunProgress(now.done / now.cases, said))
+                work.watch(now.done / now.cases, said)
 
             filled = read.run(store, client, workers=workers, resume=resume, retry=retry, progress=watch)
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""The cost of a joint path, by quadrature with the body's own matrices: independent of how a plan was found."""
+"""Cost of a joint path by quadrature with the body's own matrices, independent of how a plan was found."""
 
 from __future__ import annotations
 
@@ -13,20 +13,16 @@ from ..errors import AccuracyNotReached, unknown_name
 from ..shape_space.body_path import route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
-from ._gauss import gauss_tableau
+from ._spline_basis import gauss_tableau
 
-# Gauss nodes of a panel: exact for the rate cost of a cubic spline, and far beyond what smooth paths need.
-_NODES = 12
-# Panels between two breaks: of the first value, and of those that have to confirm it.
-_FIRST_PANELS = 2
-_PANELS = (4, 8, 16, 32, 64, 128)
-# Relative change of the cost from one subdivision to the next at which it is taken as converged: below the accuracy
-# that plans are compared at, well above the rounding of the body's matrices.
-_CONVERGED = 1e-10
+_NODES = 12  # Gauss nodes of a panel: exact for the rate cost of a cubic spline, ample for smooth paths
+_FIRST_PANELS = 2  # between two breaks, for the first value
+_PANELS = (4, 8, 16, 32, 64, 128)  # for the values that have to confirm it
+_CONVERGED = 1e-10  # relative change between subdivisions: 100 roundings of the body's matrices
 
 
 def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
-    """The cost "kinetic" or "rate" of a path, as `plan_reorientation` counts it, with the body's own matrices.
+    """Cost "kinetic" or "rate" of a path (see `plan_reorientation`), with the body's own matrices.
 
     By Gauss quadrature with twelve nodes a panel; the panels between two breaks of the path are halved until the cost
     changes by no more than 1e-10 of itself.
@@ -62,7 +58,7 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
 
 
 def _quadrature(body: Body, route: ShapePath, cost: str, panels: int) -> float:
-    """The integral of the cost's density over the path, on this many panels between two breaks."""
+    """Integral of the cost's density over the path, with so many panels between two breaks."""
     inside, weights, _ = gauss_tableau(_NODES)
     ends = np.concatenate([np.linspace(a, b, panels + 1)[:-1] for a, b in pairwise(route.breaks)] + [route.breaks[-1:]])
     steps = np.diff(ends)

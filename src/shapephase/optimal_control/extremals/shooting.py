@@ -1,4 +1,4 @@
-"""The extremal that meets a given end, by shooting from a nearly optimal path."""
+"""Extremal to a given end, by shooting from a nearly optimal path."""
 
 from __future__ import annotations
 
@@ -15,39 +15,25 @@ from ...errors import AccuracyNotReached, ShapeError
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import horizontal_lift
 from ...shape_space.shape_path import ShapePath
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from .extremal import Extremal, extremal
 from .hamiltonian import Hamiltonian, hamiltonian, initial_state, integrated, natural_scales
 from .jacobi_fields import inverse_scale, jacobi_fields
 from .wong_residual import wong_residual
 
-# The most Newton steps at each accuracy: damped steps along a weakly curved valley converge slowly.
-_STEPS = 40
-# Gap that Newton's method first has to reach [rad or m], by rough integrations, which take a fraction of the time.
-_ROUGH_GAP = 1e-6
-# Relative accuracy of those integrations: a hundredth of the gap.
-_ROUGH_ACCURACY = 1e-8
-# The tightest accuracy of an integration, some hundred times rounding.
-_FINEST_ACCURACY = 1e-13
-# Accuracy of the integrations as a share of the gap that is to be reached.
-_ACCURACY_SHARE = 0.01
-# Damping of the first step, relative to the gap: nearly a plain Newton step, as the path is nearly optimal.
-_FIRST_DAMPING = 1e-5
-# A step that helps divides the damping by this.
-_RELAXATION = 4.0
-# A step that does not help multiplies it by this: in few trials to where the linear model holds.
-_TIGHTENING = 64.0
-# Damping at which the steps are too short to go on.
-_LAST_DAMPING = 1e5
-# Singular values, relative to the largest, below this many times the integration's accuracy count as zero: they belong
-# to symmetries.
-_SYMMETRY = 10.0
-# Shares of a step that are tried before the damping rises.
-_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
-# The least relative decrease of the gap by a whole step, as in Armijo's rule; shares of a step have to give that share.
-_DECREASE = 0.1
-# Evaluations after which a trial is given up: its extremal turns so fast that its end is no guide.
-_MOST_EVALUATIONS = 20_000
+_STEPS = 40  # Newton steps at each accuracy: damped steps along a weakly curved valley converge slowly
+_ROUGH_GAP = 1e-6  # [rad or m] first reached by rough integrations, which take a fraction of the time,
+_ROUGH_ACCURACY = 1e-8  # a hundredth of the gap
+_FINEST_ACCURACY = 1e-13  # some hundred roundings
+_ACCURACY_SHARE = 0.01  # of the gap to be reached
+_FIRST_DAMPING = 1e-5  # relative to the gap: nearly a plain Newton step, as the path is nearly optimal
+_RELAXATION = 4.0  # divides the damping after a step that helps
+_TIGHTENING = 64.0  # multiplies it after one that does not: few trials to where the linear model holds
+_LAST_DAMPING = 1e5  # at which the steps are too short to go on
+_SYMMETRY = 10.0  # integration accuracies below which a relative singular value belongs to a symmetry
+_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of a step, tried before the damping rises
+_DECREASE = 0.1  # least relative decrease of the gap by a whole step, as in Armijo's rule
+_MOST_EVALUATIONS = 20_000  # of a trial, whose extremal then turns too fast to be a guide
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +51,7 @@ class _BoundaryProblem:
 
     Attributes
     ----------
-    body, metric, equations : as for `extremal`
+    body, metric, equations : see `extremal`
     start, end : (n,) shapes
     turn : (3, 3) attitude at the end
     duration : [s]
@@ -80,7 +66,7 @@ class _BoundaryProblem:
     duration: float
 
     def gap(self, rate: Array, charge: Array, accuracy: float, most: int | None = None) -> Array:
-        """How far the extremal ends from the goal, shape and rotation vector: (n + 3,)."""
+        """Distance of the extremal's end from the goal, shape and rotation vector: (n + 3,)."""
         n = self.body.n_shape
         state = initial_state(self.equations, self.start, rate, charge)
         momenta, _ = natural_scales(self.body, self.equations, self.start, rate, charge)
@@ -94,12 +80,12 @@ class _BoundaryProblem:
         return np.concatenate([last[:n] - self.end, so3.log(attitude @ self.turn.T)])
 
     def slopes(self, rate: Array, charge: Array, accuracy: float) -> Array:
-        """The derivative of the gap by g rate and charge: (n + 3, n + 3)."""
+        """Derivative of the gap by g rate and charge: (n + 3, n + 3)."""
         fields = jacobi_fields(self.body, self.metric, self.start, rate, charge, self.duration, accuracy)
         return fields.end()[2] / np.concatenate([fields.momentum_scales, np.full(3, fields.charge_scale)])
 
     def step(self, now: _Iterate, gap: Array, accuracy: float) -> _Iterate | None:
-        """A rate and charge from which the end is nearer; None if there are none."""
+        """Return a rate and charge with a nearer end; None if there are none."""
         n = self.body.n_shape
         matrix = self.slopes(now.rate, now.charge, accuracy)
         momenta, charge_scale = natural_scales(self.body, self.equations, self.start, now.rate, now.charge)
@@ -108,9 +94,9 @@ class _BoundaryProblem:
         weights = np.repeat([inverse_scale(scaled[:n]), inverse_scale(scaled[n:])], [n, 3])
         left, right = weights[:, None] * scaled, weights * gap
         across, values, along = np.linalg.svd(left)
-        # The rest are symmetries, as far as the integration can tell: along them the extremal stays where the path is.
-        telling = values > _SYMMETRY * accuracy * values[0]
-        across, values, along = across[:, telling], values[telling], along[telling]
+        # The rest are symmetries, up to the integration's accuracy: along them the extremal stays where the path is.
+        regular = values > _SYMMETRY * accuracy * values[0]
+        across, values, along = across[:, regular], values[regular], along[regular]
         metric = np.array(self.equations.metric(self.start))
         damping = now.damping
         while damping < _LAST_DAMPING:
@@ -129,7 +115,7 @@ class _BoundaryProblem:
         return None
 
     def newton(self, rate: Array, charge: Array, reach: float, accuracy: float) -> tuple[Array, Array, Array]:
-        """Rate and charge after Newton's method, which ends at a gap of `reach`, and the last gap measured."""
+        """Return rate and charge after Newton's method, which ends at a gap of `reach`, and the last gap."""
         now = _Iterate(rate=rate, charge=charge, damping=_FIRST_DAMPING)
         gap = np.full(self.body.n_shape + 3, np.inf)
         for _ in range(_STEPS):
@@ -151,7 +137,7 @@ def shoot(
     metric: str = "kinetic",
     tolerance: float = 1e-10,
 ) -> Extremal:
-    """The extremal next to a nearly optimal path, with the same start and end and a given rotation.
+    """Return the extremal next to a nearly optimal path, with the same start and end and a given rotation.
 
     Newton's method on the initial rate and the charge, with steps shortened until the end comes nearer. Where a
     symmetry of the body turns one solution into others the derivative is singular, and the damping, which falls with
@@ -159,9 +145,9 @@ def shoot(
 
     Parameters
     ----------
-    path : its start, end and duration are kept, the rate and charge of `wong_residual` are the first guess
+    path : start, end and duration are kept; the rate and charge of `wong_residual` are the first guess
     target : (3, 3) rotation over the path at zero momentum; None: that of the path
-    metric : as for `extremal`
+    metric : see `extremal`
     tolerance : of the end shape and the rotation [rad or m]
 
     Raises
@@ -169,7 +155,7 @@ def shoot(
     AccuracyNotReached
         If it does not converge: the message holds the remaining distance. Plans of bodies of up to 36 joints are near
         enough from 20 pieces on, except where light joints whirl.
-    As `extremal` and `wong_residual`.
+    Errors of `extremal` and `wong_residual`.
 
     Examples
     --------

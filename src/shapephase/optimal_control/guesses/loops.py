@@ -14,48 +14,35 @@ from ...reconstruction.reconstruction import Motion, reconstruct
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import curvature, mechanical_connection
 from .._spline_basis import SplineBasis
-from .._via_rows import bent_through, nearest_places
+from .._via_points import bent_through, nearest_places
 from ..symbolic import symbolic_body
 from ..task import Reorientation
 
-# Where guesses are sampled along [0, 1]: dense enough for two rounds of a loop on any spline.
-PLACES = np.linspace(0.0, 1.0, 101)
-# Radii of the circles, relative to the one that turns far enough in a constant curvature: the curvature may be smaller
-# or larger away from the start.
-_RADIUS_FACTORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)
-# Directions in which a circle leaves the start: 60 degrees apart.
-_DIRECTIONS = 6
-# Rounds of a circle: two small ones may stay within limits that one large one would exceed.
-_ROUNDS = (1, 2)
-# Lengths of a straight motion to a free end, relative to the one that turns far enough to first order.
-_STRAIGHT_FACTORS = (0.5, 1.0)
-# Random loops tried for each one that is needed: some cannot be reconstructed.
-_ATTEMPTS = 10
-# Accuracy of the reconstruction [rad]: guesses are off by far more.
-_RECONSTRUCTION_TOLERANCE = 1e-6
-# A guess that turns the body by less than this share of the way is ranked as if by this share: its price diverges.
-_LEAST_SHARE = 1e-3
-# Curvature in units of the metric below which loops turn the body by less than rounding.
-_FLAT = 1e-9
-# Ridge on the kinetic metric, as a share of its mean eigenvalue, so that motions without energy have a finite length.
-_RIDGE = 1e-9
-# Singular values below this share of the largest are directions that the connection does not turn to.
-_RANK = 1e-8
-# Guesses closer than this are the same [rad or m]: clipping to the limits can make them equal.
-_SAME = 1e-6
+PLACES = np.linspace(0.0, 1.0, 101)  # samples of a guess: dense enough for two rounds on any spline
+_RADIUS_FACTORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)  # of the radius that a constant curvature would need
+_DIRECTIONS = 6  # in which a circle leaves the start: 60 degrees apart
+_ROUNDS = (1, 2)  # two small circles may stay within limits that one large one would exceed
+_STRAIGHT_FACTORS = (0.5, 1.0)  # of the way to a free end that turns far enough to first order
+_ATTEMPTS = 10  # random loops for each one that is needed: some cannot be reconstructed
+_RECONSTRUCTION_TOLERANCE = 1e-6  # [rad]: guesses are off by far more
+_LEAST_SHARE = 1e-3  # of the way that a guess counts as turning, so that its price is finite
+_FLAT = 1e-9  # curvature in units of the metric below which loops turn the body by rounding alone
+_RIDGE = 1e-9  # on the metric, share of its mean eigenvalue: motions without energy get a finite length
+_RANK = 1e-8  # share of the largest singular value below which the connection does not turn
+_SAME = 1e-6  # [rad or m] between guesses that clipping to limits has made equal
 
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A motion of the joints to start a search from.
+    """Motion of the joints from which a search starts.
 
     Attributes
     ----------
     control : (k, m) control points
-    motion : its reconstruction, roughly
+    motion : its rough reconstruction
     goal_error : angle between its attitude at the end and the goal [rad]
-    price : its cost in the metric of the start, more where it turns only part of the way; guesses are ranked by it
-    via_places : (v,) where it passes the waypoints, about
+    price : its cost in the metric of the start, divided by the squared share of the turn that it makes; ranks guesses
+    via_places : (v,) approximate places of the waypoints
     """
 
     control: Array
@@ -74,12 +61,12 @@ class Guess:
 
 
 def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> list[Guess]:
-    """Guesses, the best first: circles through the start in the planes of largest curvature, then random loops.
+    """Return guesses, the best first: circles through the start in the planes of largest curvature, then random loops.
 
     The curvature F of the mechanical connection along the axis of the turn, in the kinetic metric, is an antisymmetric
     form; its largest singular value sigma belongs to the plane of shapes in which a small loop turns the body most for
     its length: a circle of radius rho turns it by pi rho^2 sigma. Circles of several sizes, in several directions from
-    the start, once or twice round, are tried by the integrator; of each direction and number of rounds the size is
+    the start, once or twice round, are tried by the integrator; for each direction and number of rounds the size is
     taken that comes near the goal at the least cost, and the cheapest come first.
 
     Raises
@@ -100,28 +87,28 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
             tried.append(min(of_family, key=lambda guess: guess.price))
     tried.sort(key=lambda guess: guess.price)
     # Every second start is random: circles are all alike where the optimum is not.
-    found = _different(tried)[: count - count // 2]
+    chosen = _different(tried)[: count - count // 2]
     for _ in range(_ATTEMPTS * count):
-        if len(found) == count:
+        if len(chosen) == count:
             break
         guess = guess_of(task, basis, _random(task, rng))
         if guess is not None:
-            found.append(guess)
-    if not found:
+            chosen.append(guess)
+    if not chosen:
         raise PlanNotFound(
             f"no guess of a motion of {task.body.name} could be reconstructed; change the start or the limits"
         )
-    return found
+    return chosen
 
 
 def _circles(task: Reorientation) -> list[list[Array]]:
-    """Loops (N, m) over `PLACES` through the start; in each list those that differ by their radius only."""
+    """Loops (N, m) over `PLACES` through the start; those of a list differ by their radius only."""
     families = []
     turn = task.turn_to_goal()
     angle = float(np.linalg.norm(turn))
     if angle == 0.0 or np.count_nonzero(task.movable) < 2:
         return []
-    # The plane is looked for at the start and half way to the middle of the limits: the start may be special.
+    # At the start, which may be special, and half way to the middle of the limits.
     lower, upper = np.maximum(task.lower, task.start - np.pi), np.minimum(task.upper, task.start + np.pi)
     middle = 0.5 * (lower + upper)
     for centre in (task.start, 0.5 * (task.start + middle)):
@@ -141,7 +128,7 @@ def _circles(task: Reorientation) -> list[list[Array]]:
 
 
 def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array, Array, float] | None:
-    """Two orthogonal directions of length 1 in the kinetic metric, and sigma, loops turning by +axis."""
+    """Two orthonormal directions in the kinetic metric, and sigma; loops turn by +axis."""
     shape = task.shapes(coordinates)
     moves = np.flatnonzero(task.movable)
     form = task.coupling.T @ (curvature(task.body, shape) @ axis) @ task.coupling
@@ -156,12 +143,12 @@ def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array,
     first, second = np.zeros((2, task.dimension))
     first[moves] = np.sqrt(2.0) * inverse.T @ np.real(vectors[:, -1])
     second[moves] = np.sqrt(2.0) * inverse.T @ np.imag(vectors[:, -1])
-    # A loop from `first` to `second` turns by -F(first, second): the plane's sense is chosen so that this is positive.
+    # A loop from `first` to `second` turns by -F(first, second), which is to be positive.
     return (first, second, sigma) if first @ form @ second < 0.0 else (first, -second, sigma)
 
 
 def _straight(task: Reorientation) -> list[Array]:
-    """The way that turns the body best to first order, for a free end; else straight to another end."""
+    """Straight ways: to a free end, those that turn the body best to first order; else to a different end."""
     ramp = PLACES[:, None]
     if task.end is not None:
         moves = np.any(task.end != task.start) or task.via
@@ -176,7 +163,7 @@ def _straight(task: Reorientation) -> list[Array]:
 
 
 def _random(task: Reorientation, rng: np.random.Generator) -> Array:
-    """A loop of two random harmonics through the start, as large as half the limits or one radian."""
+    """Loop of two random harmonics through the start, of the size of half the limits or one radian."""
     reach = np.minimum(0.5 * (task.upper - task.lower), 1.0)
     phase = 2.0 * np.pi * PLACES[:, None]
     curve = np.zeros((len(PLACES), task.dimension))
@@ -187,7 +174,7 @@ def _random(task: Reorientation, rng: np.random.Generator) -> Array:
 
 
 def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | None:
-    """A curve (101, m) over `PLACES`, taken within the limits and from start to end; None where it has no motion."""
+    """Return the guess of a curve (101, m) over `PLACES`, put within limits and ends; None where it has no motion."""
     if task.end is not None:
         curve = curve + PLACES[:, None] * (task.end - curve[-1])
     at = nearest_places(task, curve, PLACES)
@@ -198,7 +185,7 @@ def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | N
 def guess_of_control(
     task: Reorientation, basis: SplineBasis, control: Array, via_places: Array | None = None
 ) -> Guess | None:
-    """The spline of control points, taken within the limits and at rest at its ends; None where it has no motion."""
+    """Return the guess of control points, put within limits and at rest at the ends; None where it has no motion."""
     control, equal = control.copy(), task.equal_points
     control[:equal], control[-equal:] = control[0], control[-1]
     if task.rates_at_ends == "periodic":
@@ -226,12 +213,12 @@ def guess_of_control(
 
 
 def start_metric(task: Reorientation) -> Array:
-    """The kinetic metric of the coordinates at the start: (m, m)."""
+    """Kinetic metric of the coordinates at the start: (m, m)."""
     return task.coupling.T @ symbolic_body(task.body).shape_metric(task.shapes(task.start)).full() @ task.coupling
 
 
 def _different(tried: list[Guess]) -> list[Guess]:
-    """The guesses without those that clipping made equal."""
+    """Guesses without those that clipping made equal."""
     kept: list[Guess] = []
     for guess in tried:
         if all(np.abs(guess.control - other.control).max() > _SAME for other in kept):
