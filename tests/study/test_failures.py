@@ -17,7 +17,8 @@ from shapephase import study as room
 from shapephase.cli.exit_codes import ExitCode
 from shapephase.cli.main import main
 from shapephase.errors import StudyError, UnknownNameError
-from shapephase.study import _cluster, run
+from shapephase.study import dask_client
+from shapephase.study._workers import recipe_of
 from support.study_functions import POISON, orphaning
 
 RIGID = room.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0)
@@ -165,10 +166,10 @@ def test_a_worker_of_another_version_is_refused_at_the_start(tmp_path, client, m
 def test_a_worker_of_another_version_that_joins_later_is_refused(client):
     """What a worker of this version does with a study of another."""
     study = room.Study(RIGID)
-    versions, content = pickle.loads(run.recipe_of(study))
+    versions, content = pickle.loads(recipe_of(study))
     theirs = pickle.dumps(({**versions, "pin": "1.0", "shapephase": "0.0.1"}, content))
     with pytest.raises(StudyError, match=r"shapephase 0\.0\.1 in the study and .* pin 1\.0 in the study and "):
-        client.submit(_cluster.compute_chunk, theirs, 0).result(timeout=60)
+        client.submit(dask_client.compute_chunk, theirs, 0).result(timeout=60)
 
 
 def test_a_worker_whose_functions_are_others_is_refused(tmp_path, monkeypatch):
