@@ -57,20 +57,19 @@ def test_a_cluster_finds_the_same_plan():
 
 @pytest.mark.full
 def test_one_thread_finds_the_same_plan_and_a_callback_hears_of_every_start():
-    heard = []
+    reported = []
     with ThreadPoolExecutor(1) as executor:
-        found = planned(executor, starts=2, iteration_callback=heard.append)
+        found = planned(executor, starts=2, progress=lambda *now: reported.append(now))
     same(found, planned(starts=2))
-    ends = [one for one in heard if one.stage == "search"]
-    assert [(one.start, one.starts, one.iteration) for one in ends] == [
-        (number + 1, 2, start.iterations) for number, start in enumerate(found.starts)
-    ]
+    ends = [text.partition(",")[0] for _, text in reported if text.startswith("search")]
+    assert ends == [f"search {k + 1} of 2: iteration {start.iterations}" for k, start in enumerate(found.starts)]
+    assert reported[-1] == (1.0, "done")
 
 
 @pytest.mark.full
 def test_a_callback_ends_the_search_after_a_start():
     with ThreadPoolExecutor(1) as executor:
-        found = planned(executor, starts=3, iteration_callback=lambda now: now.stage == "search")
+        found = planned(executor, starts=3, progress=lambda _, text: text.startswith("search"))
     assert len(found.starts) == 1
 
 

@@ -170,14 +170,15 @@ def test_goals_that_make_no_sense_are_refused(two_halves, goal, end, error, matc
 @pytest.mark.usefixtures("few_guesses")
 def test_what_ended_a_search_is_told(two_halves, stop):
     """With the best so far, the same by whichever means."""
-    heard = []
+    shares = []
 
-    def callback(now):
-        heard.append(now)
-        return stop == "callback" and now.stage == "search"
+    def callback(share, text):
+        shares.append(share)
+        return stop == "callback" and text.startswith("search")
 
     limit = 1e-9 if stop == "time" else None
     with pytest.raises(PlanNotFound, match="time limit" if stop == "time" else "on request") as ended:
-        plan_reorientation(two_halves, FAR, search=Search(pieces=8, time_limit=limit), iteration_callback=callback)
+        plan_reorientation(two_halves, FAR, search=Search(pieces=8, time_limit=limit), progress=callback)
     assert ended.value.best.status == ("out of time" if stop == "time" else "stopped")
-    assert all(0.0 <= now.goal_error <= np.pi for now in heard)
+    assert shares == sorted(shares)
+    assert shares[-1] < 1.0

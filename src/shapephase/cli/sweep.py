@@ -11,7 +11,6 @@ from cyclopts import App, Parameter
 
 from ..errors import ShapeError
 from ..files import write_whole
-from ..run_progress import RunProgress
 from .exit_codes import ExitCode
 from .options import AS_TEXT, AS_WRITTEN, BodyOptions, FigureFile, PrintOptions
 from .outcome import Outcome, check_writable
@@ -90,7 +89,7 @@ def sweep_command(
 
             def watch(share: float, text: str) -> None:
                 say(f"shapephase: {text}", Verbosity.VERBOSE)
-                work.watch(RunProgress(share, text))
+                work.watch(share, text)
 
             filled = read.run(store, client, workers=workers, resume=resume, retry=retry, progress=watch)
     except KeyboardInterrupt:

@@ -26,37 +26,6 @@ AGREEMENT = 1e-3
 
 
 @dataclass(frozen=True)
-class Progress:
-    """The state of a search after an iteration of the solver.
-
-    Attributes
-    ----------
-    stage : "guesses", each improved on a coarse spline, or "search"
-    start, starts : which of how many, from 1
-    iteration : of the solver, from 0
-    cost : so far [unit of the plan's cost]
-    infeasibility : the largest violation of a constraint so far, scaled: the equations of motion, the goal, the limits
-    goal_error : angle between the solver's own attitude at the end and the goal so far [rad]
-
-    Examples
-    --------
-    >>> said = sp.optimal_control.Progress("search", 1, 1, 12, 0.09, 1e-9, 1e-10)
-    >>> said.iteration, said.cost
-    (12, 0.09)
-    """
-
-    stage: str
-    start: int
-    starts: int
-    iteration: int
-    cost: float
-    infeasibility: float
-    goal_error: float
-
-    __repr__ = short_repr
-
-
-@dataclass(frozen=True)
 class Start:
     """The result of one start of the search.
 

@@ -6,7 +6,7 @@ import math
 import pickle
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_executor, check_object
 from ..body.body import Body
 from ..errors import PlanNotFound
+from ..run_progress import ProgressCallback, check_progress
 from ._certificates import hamiltonian_spread
 from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes, polished_path
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
@@ -29,9 +30,9 @@ from .collocation import CollocationProgram
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
 from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
-from .plan import Plan, Progress
+from .plan import Plan
 from .plan_options import Goal, Limits, Search, goal_argument
-from .solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
+from .solver_callback import STOP_REQUESTED, IterationCallback
 from .task import Reorientation, reorientation
 from .waypoints import Waypoint
 
@@ -70,6 +71,8 @@ _COARSE_ITERATIONS_OF_REDUCED = 100
 _COARSE_TOLERANCE_OF_REDUCED = 1e-6
 # Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
 _COARSE_INFEASIBILITY = 1e-2
+_STAGES = {"guesses": (0.0, 0.3), "search": (0.3, 1.0)}  # shares of the whole between which each is reported
+_USUAL_ITERATIONS = 50  # iterations after which half of a start is reported as done
 
 
 def plan_reorientation(
@@ -87,7 +90,7 @@ def plan_reorientation(
     symmetric: Mapping[str, tuple[str, float]] | None = None,
     limits: Limits | None = None,
     search: Search | None = None,
-    iteration_callback: Callable[[Progress], Any] | None = None,
+    progress: ProgressCallback | None = None,
     executor: Executor | None = None,
 ) -> Plan:
     """The cheapest motion of the joints that turns a free body to a goal: the falling cat's problem, for any body.
@@ -118,13 +121,14 @@ def plan_reorientation(
     limits : of positions, rates, accelerations, jerks and efforts; None: `Limits()`, positions and rates as the body's
         file has them
     search : method, starts, resolution; None: `Search()`
-    iteration_callback : called with a `Progress` after each iteration; if it returns something true, the search stops
-        there, as it does when its time is over (`Search.time_limit`): with the cheapest plan of the starts that had
-        ended, or else PlanNotFound with the best so far. Ctrl-C is raised as KeyboardInterrupt, and
-        nothing is kept
+    progress : called after each iteration as `progress(share, text)`: the share of the search that is done, from 0 to
+        1, which never falls, and a text such as "search 2 of 3: iteration 12, off the goal by 2.0e-02 rad, cost 0.125".
+        A true return stops the search, as its time limit does (`Search.time_limit`): the cheapest plan of the starts
+        that had ended is returned, or else PlanNotFound raised with the best so far. Ctrl-C is raised as
+        KeyboardInterrupt, and nothing is kept
     executor : of `concurrent.futures` or of a cluster (`distributed.Client.get_executor()`), whose processes search
-        from several starts (`Search.starts`) side by side; `iteration_callback` then hears of a start when it has
-        ended. None: one start after the other, here. Plans do not depend on it
+        from several starts (`Search.starts`) side by side; `progress` is then called when a start has ended.
+        None: one start after the other, here. Plans do not depend on it
 
     Raises
     ------
@@ -133,8 +137,8 @@ def plan_reorientation(
     UnreachableGoalError
         If no motion can reach the goal, as the holonomy algebra (`reachable`) or a plane of symmetry shows at once.
     PlanNotFound
-        If no start came to a local optimum that reaches the goal, or `iteration_callback` or its time limit stopped
-        the search before; it carries the best attempt.
+        If no start came to a local optimum that reaches the goal, or `progress` or its time limit stopped the search
+        before; it carries the best attempt.
 
     Warns
     -----
@@ -156,6 +160,7 @@ def plan_reorientation(
     """
     check_object(body, "Body", "body")
     check_executor(executor)
+    check_progress(progress)
     chosen = Search() if search is None else search
     goals = goal_argument(goal).members
     tasks = [
@@ -180,17 +185,17 @@ def plan_reorientation(
     check_reachable(tasks)
     warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
-    reporter = _ProgressReporter(iteration_callback, chosen.time_limit)
+    reporter = _SearchMonitor(progress, chosen.time_limit)
     attempts: list[Attempt] = []
-    with heard_interrupts():
-        for searched in _searches(tasks, chosen, reporter, executor):
-            for attempt in searched:
-                attempts.append(attempt)
-                if reporter.stopped:
-                    break
-            if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+    for searched in _searches(tasks, chosen, reporter, executor):
+        for attempt in searched:
+            attempts.append(attempt)
+            if reporter.stopped:
                 break
+        if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+            break
     seconds = time.perf_counter() - began
+    reporter.finish()
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=Attempt.rank, default=None)
     plan = (
         None
@@ -212,7 +217,7 @@ class _Job:
 
 
 def _searches(
-    tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
+    tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor, executor: Executor | None
 ) -> Iterator[Iterator[Attempt]]:
     """What is tried until something leads to a plan: loops first, unless none can turn the body so far."""
     near, far = [], []
@@ -227,7 +232,7 @@ def _searches(
 
 
 def _searched_by_loops(
-    tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
+    tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor, executor: Executor | None
 ) -> Iterator[Attempt]:
     """From loops, and from some more where none of those asked for leads to a plan."""
     first, spare = _jobs(tasks, search, reporter)
@@ -243,7 +248,7 @@ def _searched_by_loops(
                 break
 
 
-def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter) -> tuple[list[_Job], list[_Job]]:
+def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor) -> tuple[list[_Job], list[_Job]]:
     """The local searches for each of several tasks, and those to go on with if none of them leads to a plan."""
     first: list[_Job] = []
     spare: list[_Job] = []
@@ -256,7 +261,7 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _ProgressRep
     return first, spare
 
 
-def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter) -> Iterator[Attempt]:
+def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
     """The local searches, one after the other."""
     local = None
     for number, job in enumerate(jobs):
@@ -265,7 +270,7 @@ def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressRepo
         yield local.attempt(job.guess, reporter.solver_callback("search", number + 1, len(jobs)))
 
 
-def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[Attempt]:
+def _searched_by_strokes(task: Reorientation, search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
     """Motions of many strokes, for few joints: equal ones, and from there any."""
     if task.dimension > _MANY_JOINTS or search.method != "collocation":
         return
@@ -287,7 +292,7 @@ def _searched_by_strokes(task: Reorientation, search: Search, reporter: _Progres
 
 
 def _searched_by(
-    executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter
+    executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _SearchMonitor
 ) -> Iterator[Attempt]:
     """The local searches by an executor, in their order."""
     recipes = {job.task: pickle.dumps((job.task, job.basis.pieces, search)) for job in jobs}
@@ -306,41 +311,50 @@ _KEPT = threading.local()
 
 
 def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> Attempt:
-    """One of them, in another process or thread, until Ctrl-C there or the time `end` [s since 1970]."""
-    with stopping_interrupts() as stopped:
-        if getattr(_KEPT, "recipe", None) != recipe:
-            task, pieces, search = pickle.loads(recipe)
-            _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
-            _KEPT.recipe = recipe
-        return _KEPT.local.attempt(guess, lambda *_: stopped() or time.time() > end)
+    """A local search in another process or thread, until `STOP_REQUESTED` is set there or the time `end` [s, Unix]."""
+    if getattr(_KEPT, "recipe", None) != recipe:
+        task, pieces, search = pickle.loads(recipe)
+        _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
+        _KEPT.recipe = recipe
+    return _KEPT.local.attempt(guess, lambda *_: STOP_REQUESTED.is_set() or time.time() > end)
 
 
-class _ProgressReporter:
-    """Passes the progress of a search on to the user's callback, and ends it in time.
+class _SearchMonitor:
+    """Reports the progress of a search to the user's callback, and stops it on request or at its time limit.
 
     Attributes
     ----------
-    end : when the time is over [s since 1970]: a clock that other processes have, too
-    stopped : what has stopped the search, one of `PLAN_STATUS`; empty: nothing
+    end : when the time limit is reached [s since 1970]: a clock that other processes share
+    stopped : reason why the search was stopped, one of `PLAN_STATUS`; empty: none
     """
 
-    def __init__(self, callback: Callable[[Progress], Any] | None, time_limit: float | None) -> None:
-        self._callback = callback
+    def __init__(self, progress: ProgressCallback | None, time_limit: float | None) -> None:
+        self._progress = progress
+        self._share = 0.0
         self.end = math.inf if time_limit is None else time.time() + time_limit
         self.stopped = ""
 
     def solver_callback(self, stage: str, start: int, starts: int) -> IterationCallback:
-        """The solver's callback during one start."""
+        """Return the solver's callback during one start."""
+        first, last = _STAGES[stage]
+        which = f" {start} of {starts}" if starts > 1 else ""
 
-        def report(iteration: int, cost: float, infeasibility: float, goal_error: float) -> bool:
-            now = Progress(stage, start, starts, iteration, cost, infeasibility, goal_error)
-            if not self.stopped and self._callback is not None and self._callback(now):
+        def report(iteration: int, cost: float, infeasibility: float, goal_error: float) -> bool:  # noqa: ARG001
+            done = (start - 1 + iteration / (iteration + _USUAL_ITERATIONS)) / starts
+            self._share = max(self._share, first + (last - first) * done)
+            text = f"{stage}{which}: iteration {iteration}, off the goal by {goal_error:.1e} rad, cost {cost:.6g}"
+            if not self.stopped and self._progress is not None and self._progress(self._share, text):
                 self.stopped = "stopped"
             if not self.stopped and time.time() > self.end:
                 self.stopped = "out of time"
             return bool(self.stopped)
 
         return report
+
+    def finish(self) -> None:
+        """Report the end of a search that was not stopped."""
+        if self._progress is not None and not self.stopped:
+            self._progress(1.0, "done")
 
 
 def _default_pieces(task: Reorientation) -> int:
@@ -350,7 +364,7 @@ def _default_pieces(task: Reorientation) -> int:
 
 
 def _starting_points(
-    task: Reorientation, basis: SplineBasis, search: Search, reporter: _ProgressReporter
+    task: Reorientation, basis: SplineBasis, search: Search, reporter: _SearchMonitor
 ) -> tuple[list[Guess], list[Guess]]:
     """The guesses to start from, and those to go on with if none of them leads to a plan.
 

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 from cyclopts import Parameter
 
 from ...errors import PlanNotFound, ShapeError
+from ..ctrl_c import stop_searches_on_ctrl_c
 from ..exit_codes import ExitCode
 from ..options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, GivenMomentum, PrintOptions, ReportFile
 from ..outcome import Outcome, check_writable
@@ -28,7 +29,7 @@ from .postures import mirrored, moving_joints, posture, waypoint
 
 if TYPE_CHECKING:
     from ...body.body import Body
-    from ...optimal_control.plan import Plan, Progress
+    from ...optimal_control.plan import Plan
     from ...optimal_control.plan_options import Limits
 
 # What stands for the limits that a body's file states.
@@ -210,7 +211,7 @@ def plan_command(
                     search=Search(
                         starts=starts, seed=seed, pieces=pieces, iterations=iterations, time_limit=time_limit
                     ),
-                    iteration_callback=search.report,
+                    progress=search.report,
                     executor=executor,
                 )
             except PlanNotFound as failure:
@@ -299,11 +300,9 @@ def _executor(workers: int | None, search: _InterruptibleSearch) -> Iterator[Exe
     if workers is None:
         yield None
         return
-    from ...optimal_control.solver_callback import keep_interrupts
-
     # A process that was forked beside threads of the solver may hang.
     spawned = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=keep_interrupts) as processes:
+    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=stop_searches_on_ctrl_c) as processes:
         # They begin deaf to Ctrl-C, until they can take note of it.
         with _deaf():
             processes.submit(int)
@@ -387,14 +386,10 @@ class _InterruptibleSearch:
         self.reported, self.stopped = beside, False
         self.beside: list[int] = []
 
-    def report(self, now: Progress) -> bool:
-        """Show the progress of the search; returns whether to stop it."""
-        which = f" {now.start} of {now.starts}" if now.starts > 1 else ""
+    def report(self, share: float, text: str) -> bool:
+        """Show the progress of the search; return whether to stop it."""
         left = "" if self._end == math.inf else f", {max(self._end - time.monotonic(), 0.0):.0f} s left"
-        self._work.say(
-            f"{now.stage}{which}: iteration {now.iteration}, off the goal by {now.goal_error:.1e} rad, "
-            f"cost {now.cost:.6g}{left}"
-        )
+        self._work.watch(share, f"{text}{left}")
         self.reported = True
         return self.stopped
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import OdeSolution
 
 from ... import so3
-from ...arguments import check_object, positive_argument, times_argument, tolerance_argument, vector_argument
+from ...arguments import check_object, made_by, positive_argument, times_argument, tolerance_argument, vector_argument
 from ...arrays import Array, check_reach
 from ...body.body import Body
 from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
@@ -24,6 +24,7 @@ from .hamiltonian import checked_metric, hamiltonian, initial_state, integrated,
 _DEGREE = 12
 
 
+@made_by("optimal_control.extremal(...)")
 @dataclass(frozen=True, eq=False)
 class Extremal:
     """A motion with zero momentum that solves Wong's equations, as a function of time.
