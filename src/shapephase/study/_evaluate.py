@@ -32,6 +32,7 @@ from ..warning_filters import quiet
 from ._sources import RigidBody, described, inertia_factors, loaded_body_inputs, made_path
 from .cases import Case, CaseTable
 from .distributions import generators
+from .outputs import ends_of
 
 STATUS: Mapping[str, int] = {"missing": 0, "done": 1, "raised": 2, "timed_out": 3, "died": 4}
 """Numbers in `status`: not computed yet, done, an error was raised, the time limit was reached, its process died.
@@ -98,35 +99,55 @@ class Evaluator:
         """Return the results of cases, by batches where that is possible."""
         values = self.study.axis_values(indices)
         results, cases = empty_results(self.study, indices, values), self.study.some_cases(indices, values)
-        for rows in _batches(cases):
-            try:
-                self._compute([cases[row] for row in rows], rows, results)
-            except Exception:
-                # Case by case the one at fault is found.
-                for row in rows:
-                    self._single(cases[row], row, results)
+        for rows in self._batches(cases):
+            self._compute([cases[row] for row in rows], rows, results)
         return results
 
     def alone(self, index: int) -> Results:
         """Return the results of one case."""
         results = empty_results(self.study, indices := np.array([index]))
-        self._single(self.study.some_cases(indices)[0], 0, results)
+        self._compute(self.study.some_cases(indices), [0], results)
         return results
 
     @cached_property
     def _needs(self) -> set[str]:
         return {output.needs for output in self.study.resolved_outputs}
 
-    def _single(self, case: Case, row: int, results: Results) -> None:
-        try:
-            self._compute([case], [row], results)
-        except Exception as error:
-            fail(self.study, results, row, "raised", type(error).__name__, str(error))
+    def _batches(self, cases: list[Case]) -> list[list[int]]:
+        """Return rows that are computed together: those of one path, and for ends those with a path of their own."""
+        groups: dict[Any, list[int]] = {}
+        for row, case in enumerate(cases):
+            is_alone = self._needs != {"ends"} and not _has_own_inertias(case)
+            key = row if is_alone else (id(case.body), *_path_key(case), case.tolerance, case.gauge)
+            groups.setdefault(key, []).append(row)
+        batches, own_paths = [], dict[Any, list[int]]()
+        for rows in groups.values():
+            first = cases[rows[0]]
+            if (
+                len(rows) > 1
+                or self._needs != {"ends"}
+                or isinstance(first.body, RigidBody)
+                or _has_own_inertias(first)
+            ):
+                batches.append(rows)
+            else:
+                own_paths.setdefault((id(first.body), first.tolerance), []).extend(rows)
+        return batches + list(own_paths.values())
 
     def _compute(self, cases: list[Case], rows: list[int], results: Results) -> None:
-        """Compute cases of one body, motion, tolerance and gauge; of many motions where only the ends are needed."""
+        """Compute a batch; where that fails its cases are computed one by one, and the one at fault has a status."""
         if self._is_closed:
             raise KeyboardInterrupt
+        try:
+            self._compute_batch(cases, rows, results)
+        except Exception as error:
+            if len(rows) == 1:
+                fail(self.study, results, rows[0], "raised", type(error).__name__, str(error))
+                return
+            for case, row in zip(cases, rows, strict=True):
+                self._compute([case], [row], results)
+
+    def _compute_batch(self, cases: list[Case], rows: list[int], results: Results) -> None:
         first = cases[0]
         settings: dict[str, Any] = {"tolerance": first.tolerance, "threads": 1}
         momenta = np.array([case.momentum for case in cases])
@@ -138,20 +159,16 @@ class Evaluator:
                 start = None if attitudes is None else attitudes[lot]
                 motions = reconstruct(self._family(cases[lot]), momenta[lot], start, **settings)
                 if self._needs == {"ends"}:
-                    ends = motions.initial_attitude, motions.final_attitude, motions.error_estimate
-                    self._put_ends(rows[lot], *ends, results)
+                    self._put_ends(rows[lot], *ends_of(motions), results)
                     continue
                 for number, (case, row) in enumerate(zip(cases[lot], rows[lot], strict=True)):
                     self._put_motion(motions[number], case, row, results)
-        elif self._needs != {"ends"} and len(cases) > 1:
-            for case, row in zip(cases, rows, strict=True):
-                self._single(case, row, results)
         elif self._needs != {"ends"}:
             motion = reconstruct(self._deformation(first), first.momentum, first.attitude, **settings)
             self._put_motion(motion, first, rows[0], results)
         elif first.joint_noise is None and all(_path_key(case) == _path_key(first) for case in cases):
             motion = reconstruct(self._deformation(first), momenta, attitudes, **settings)
-            self._put_ends(rows, motion.initial_attitude, motion.final_attitude, motion.error_estimate, results)
+            self._put_ends(rows, *ends_of(motion), results)
         else:
             body = self._body(first)
             paths = (self._path(case, body) for case in cases)
@@ -166,11 +183,11 @@ class Evaluator:
         results["status"][rows] = DONE
 
     def _put_motion(self, motion: Motion, case: Case, row: int, results: Results) -> None:
-        """Store the outputs of one motion; what they raise is a fault of the case."""
         try:
             parts = split(motion, case.gauge) if "split" in self._needs else None
             values = {output.name: output.of(motion, parts) for output in self.study.resolved_outputs}
         except Exception as error:
+            # Only this case is at fault, not the batch.
             fail(self.study, results, row, "raised", type(error).__name__, str(error))
             return
         for name, value in values.items():
@@ -226,21 +243,6 @@ class Evaluator:
         """Raise StudyError for a file that differs from that of the study."""
         if self.inputs.get(name, digest) != digest:
             raise StudyError(f"{name}: the file here is another than the study was begun with")
-
-
-def _batches(cases: list[Case]) -> list[list[int]]:
-    """Return rows that a batch computes: those of one path, and those with a path of their own together."""
-    groups: dict[Any, list[int]] = {}
-    for row, case in enumerate(cases):
-        groups.setdefault((id(case.body), *_path_key(case), case.tolerance, case.gauge), []).append(row)
-    batches, alone = [], dict[Any, list[int]]()
-    for rows in groups.values():
-        first = cases[rows[0]]
-        if len(rows) > 1 or isinstance(first.body, RigidBody) or _has_own_inertias(first):
-            batches.append(rows)
-        else:
-            alone.setdefault((id(first.body), first.tolerance), []).extend(rows)
-    return batches + list(alone.values())
 
 
 def _path_key(case: Case) -> tuple[Any, ...]:

@@ -1,18 +1,20 @@
-"""SHA-256 of all that the values of a study depend on: numbers of bodies, samples of motions, code of functions."""
+"""All that the values of a study depend on: versions, numbers of bodies, samples of motions, code of functions."""
 
 from __future__ import annotations
 
+import contextlib
 import dis
 import hashlib
 import importlib
 import io
 import os
 import pickle
+import platform
 import sys
 import sysconfig
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
@@ -21,11 +23,36 @@ import numpy as np
 
 from ..body.body import Body
 from ..errors import StudyError
+from ..integrator.machine_code import is_used
 from ..letters import what_came
+from ..provenance import provenance
 from ..shape_space.shape_path import ShapePath
 
 _SAMPLES = 33  # times at which a path that a function makes is compared
 _LIBRARY_FOLDERS = tuple(sysconfig.get_paths()[name] for name in ("stdlib", "platstdlib", "purelib", "platlib"))
+
+
+@lru_cache(maxsize=1)
+def processor_text() -> str:
+    """Return processor and host, for example "x86_64, AMD EPYC 9B14, machine code, node7"."""
+    name = platform.processor()
+    with contextlib.suppress(OSError, StopIteration):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        name = next(line.partition(":")[2].strip() for line in lines if line.lower().startswith("model name"))
+    code = "machine code" if is_used() else "interpreted"
+    return ", ".join(text for text in (platform.machine(), name, code, platform.node()) if text)
+
+
+def computing_versions() -> dict[str, Any]:
+    """Return the versions on which the bits of results depend, and whether machine code is used."""
+    # Interpreted motions sample with Pinocchio, which rounds differently.
+    return {**provenance()["versions"], "machine code": is_used()}
+
+
+def version_differences(begun: Mapping[str, Any], here: Mapping[str, Any]) -> str:
+    """Return what differs, for example "numpy 2.4.6 in the study and 2.4.5 here"; empty where nothing does."""
+    pairs = {name: (begun.get(name), version) for name, version in here.items()}
+    return ", ".join(f"{name} {old} in the study and {new} here" for name, (old, new) in pairs.items() if old != new)
 
 
 def body_digest(body: Body) -> str:
@@ -247,11 +274,11 @@ def _label(value: Any) -> str:
 def _is_library(name: str | None) -> bool:
     """Return True for modules of Python, installed packages and this one, which are known by their versions."""
     top = (name or "").partition(".")[0]
-    if top in (__name__.partition(".")[0], "") or top in sys.builtin_module_names:
+    if top == __name__.partition(".")[0] or top in sys.builtin_module_names:
         return True
     file = getattr(sys.modules.get(name or ""), "__file__", None)
     if file is None:
-        return top != "__main__" and top in sys.stdlib_module_names
+        return top in sys.stdlib_module_names
     installed = {"site-packages", "dist-packages"} & {*Path(file).parts}
     return bool(installed) or file.startswith(_LIBRARY_FOLDERS)
 

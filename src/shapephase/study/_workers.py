@@ -24,17 +24,16 @@ from typing import Any
 
 import numpy as np
 
+from ..child_process import start_python
 from ..errors import StudyError
 from ._evaluate import Evaluator, Results, empty_results, fail
-from ._versions import computing_versions
+from ._identity import computing_versions
 from .cases import CaseTable
 
 _STARTING = 300.0  # s: imports of a process on a busy machine take half a minute
 _INTERVAL = 0.5  # s between checks that the other process lives
 _STARTS = 3  # attempts before the processes count as unable to start
 _SHARE_OF_A_CASE = 0.1  # of the time limit, which each case of a chunk adds to that of the chunk
-# One thread each: the processes share the processors, and sums have one order.
-_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 ChunkResults = tuple[int, Results, str]
 """Number of a chunk, its results, and the processor that computed it."""
@@ -64,13 +63,8 @@ def completed(
 ) -> Iterator[ChunkResults]:
     """Yield chunks in the order in which they are done.
 
-    Parameters
-    ----------
-    submit : makes a future of a chunk
-    take : returns the results of a future that is done, or None: its chunk is submitted again
-    under_way : the futures that are not taken, by the numbers of their chunks
-    ahead : how many there may be
-    watch : called at least every half second
+    `submit` makes a future of a chunk, and `take` returns its results, or None: it is submitted again. `under_way` are
+    the futures that are not taken, at most `ahead`. `watch` is called every half second or more often.
     """
     done: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
     left = iter(numbers)
@@ -95,62 +89,26 @@ def completed(
 
 
 class WorkerPool:
-    """Processes of one study, one for each thread that asks at the same time."""
+    """Processes of one study, one for each thread that asks at the same time, replaced when they are lost."""
 
     def __init__(self, study: CaseTable, recipe: bytes) -> None:
         self._study, self._recipe = study, recipe
-        self._free: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
-        self._workers: list[_Worker] = []
+        self._processes: list[_Process] = []
+        self._free: list[_Process] = []
         self._is_closed = False
 
     def chunk(self, number: int) -> Results:
         """Return the results of a chunk. Raises StudyError if processes do not start."""
-        try:
-            worker = self._free.get_nowait()
-        except queue.Empty:
-            worker = _Worker(self._study, self._recipe)
-            self._workers.append(worker)
-            if self._is_closed:
-                worker.close()
-        try:
-            return worker.chunk(number)
-        finally:
-            self._free.put(worker)
-
-    def close(self) -> None:
-        """End the processes, from any thread."""
-        self._is_closed = True
-        for worker in self._workers:
-            worker.close()
-
-
-class _LostError(Exception):
-    """The process hangs or is gone."""
-
-    def __init__(self, status: str, text: str) -> None:
-        super().__init__(text)
-        self.status = status
-
-
-class _Worker:
-    """One process, started when it is first needed, and again when it was lost."""
-
-    def __init__(self, study: CaseTable, recipe: bytes) -> None:
-        self._study, self._recipe = study, recipe
-        self._process: subprocess.Popen[bytes] | None = None
-        self._connection: Any = None
-        self._lock, self._is_closed = threading.Lock(), False
-
-    def chunk(self, number: int) -> Results:
         first, stop = self._study.chunk_range(number)
         limit = self._study.time_limit
         with contextlib.suppress(_LostError):
             seconds = None if limit is None else limit * (1.0 + _SHARE_OF_A_CASE * (stop - first))
-            return next(self._results("together", first, stop, seconds))
+            (results,) = self._answers("together", first, stop, seconds)
+            return results
         results, index = empty_results(self._study, np.arange(first, stop)), first
         while index < stop:
             try:
-                for case_results in self._results("alone", index, stop, limit):
+                for case_results in self._answers("alone", index, stop, limit):
                     for name, rows in case_results.items():
                         results[name][index - first] = rows[0]
                     index += 1
@@ -161,54 +119,91 @@ class _Worker:
         return results
 
     def close(self) -> None:
-        with self._lock:
-            self._is_closed = True
-            _kill_group(self._process)
+        """End the processes, from any thread."""
+        self._is_closed = True
+        for process in list(self._processes):
+            process.end()
 
-    def _results(self, way: str, first: int, stop: int, seconds: float | None) -> Iterator[Results]:
-        """Yield the answers to one request. Raises _LostError, and StudyError if processes do not start."""
-        for _ in range(_STARTS if self._process is None else 0):
-            with contextlib.suppress(_LostError):
-                self._start()
-                if isinstance(refusal := self._answer(_STARTING), StudyError):
-                    raise refusal
-                break
-        if self._process is None:
-            raise StudyError("the processes that are to compute the cases end before they begin; see what they printed")
-        with self._losses():
-            self._connection.send((way, first, stop))
-        for _ in range(1 if way == "together" else stop - first):
-            yield self._answer(seconds)
+    def _answers(self, way: str, first: int, stop: int, seconds: float | None) -> Iterator[Results]:
+        """Yield the results of cases together or alone. Raises _LostError."""
+        process = self._ready()
+        try:
+            process.send((way, first, stop))
+            for _ in range(1 if way == "together" else stop - first):
+                yield process.answer(seconds)
+        except _LostError:
+            self._processes.remove(process)
+            raise
+        self._free.append(process)
 
-    def _start(self) -> None:
-        path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+    def _ready(self) -> _Process:
+        """Return a process that waits for requests. Raises StudyError."""
+        with contextlib.suppress(IndexError):
+            return self._free.pop()
+        for _ in range(_STARTS):
+            if self._is_closed:
+                raise StudyError("stopped")
+            process = _Process(self._recipe)
+            self._processes.append(process)
+            if self._is_closed:
+                process.end()
+            try:
+                refusal = process.answer(_STARTING)
+            except _LostError:
+                self._processes.remove(process)
+                continue
+            if isinstance(refusal, StudyError):
+                raise refusal
+            return process
+        raise StudyError("the processes that are to compute the cases end before they begin; see what they printed")
+
+
+class _LostError(Exception):
+    """The process hangs or is gone."""
+
+    def __init__(self, status: str, text: str) -> None:
+        super().__init__(text)
+        self.status = status
+
+
+class _Process:
+    """A process that computes cases, in a group of its own."""
+
+    def __init__(self, recipe: bytes) -> None:
         ours, theirs = socket.socketpair()
+        self._connection = Connection(ours.detach())
         source = f"from shapephase.study._workers import serve; serve({theirs.fileno()}, {os.getpid()})"
-        with self._lock, theirs:
-            self._connection = Connection(ours.detach())
-            self._check_open()
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", source],
-                pass_fds=[theirs.fileno()],
-                env={**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONPATH": path},
-                stdin=subprocess.DEVNULL,
-                process_group=0,
-            )
-        with self._losses():
-            self._connection.send_bytes(self._recipe)
+        options = {"pass_fds": [theirs.fileno()], "stdin": subprocess.DEVNULL, "process_group": 0}
+        with theirs:
+            self._process = start_python(source, folder=True, **options)
+        with contextlib.suppress(_LostError):
+            self.send(recipe)
 
-    def _answer(self, seconds: float | None) -> Any:
+    def send(self, message: Any) -> None:
+        """Send a request. Raises _LostError."""
+        with self._losses():
+            self._connection.send(message)
+
+    def answer(self, seconds: float | None) -> Any:
+        """Return what comes within a time. Raises _LostError."""
         end = math.inf if seconds is None else time.monotonic() + seconds
         with self._losses():
             # The process is watched too: a child of it may keep the connection open.
             while (left := end - time.monotonic()) > 0.0:
-                is_gone = self._process is None or self._process.poll() is not None
+                is_gone = self._process.poll() is not None
                 if self._connection.poll(0.0 if is_gone else min(left, _INTERVAL)):
                     return self._connection.recv()
                 if is_gone:
                     raise EOFError
-        self._end()
+        self.end()
+        self._connection.close()
         raise _LostError("timed_out", f"not done after {seconds:g} s")
+
+    def end(self) -> None:
+        """End the process, with the children that its cases have left."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
 
     @contextlib.contextmanager
     def _losses(self) -> Iterator[None]:
@@ -216,33 +211,13 @@ class _Worker:
         try:
             yield
         except (EOFError, OSError):
-            code = self._end()
-            self._check_open()
+            # A connection ends a moment before its process does.
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_INTERVAL)
+            code = self._process.returncode
+            self.end()
+            self._connection.close()
             raise _LostError("died", _ending(code)) from None
-
-    def _end(self) -> int | None:
-        """End the process, with the children that its cases have left, and return its own exit code."""
-        process, self._process = self._process, None
-        self._connection.close()
-        if process is None:
-            return None
-        # A connection ends a moment before its process does.
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(0.2)
-        code = process.returncode
-        _kill_group(process)
-        return code
-
-    def _check_open(self) -> None:
-        if self._is_closed:
-            raise StudyError("stopped")
-
-
-def _kill_group(process: subprocess.Popen[bytes] | None) -> None:
-    if process is not None:
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
 
 
 def _ending(code: int | None) -> str:
@@ -266,7 +241,7 @@ def serve(descriptor: int, parent: int) -> None:
     os.set_inheritable(descriptor, False)
     os.register_at_fork(after_in_child=connection.close)
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
-        _, recipe = pickle.loads(connection.recv_bytes())
+        _, recipe = pickle.loads(connection.recv())
         study, inputs = pickle.loads(recipe)
         for name, digest in study.function_inputs.items():
             if inputs.get(name, digest) != digest:

@@ -7,7 +7,7 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, asdict, dataclass, field, fields
+from dataclasses import KW_ONLY, dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
@@ -23,6 +23,7 @@ from ..deformation.frames import gauge_link
 from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError, WrongObjectError
 from ..letters import what_came
+from . import _sources
 from ._axes import (
     COMPONENTS,
     LABELS,
@@ -35,20 +36,7 @@ from ._axes import (
     start_attitudes,
 )
 from ._identity import function_digests
-from ._sources import (
-    BodySource,
-    MotionSource,
-    RigidBody,
-    body_inputs,
-    check_source,
-    described,
-    inertia_factors,
-    is_file,
-    motion_function,
-    motion_inputs,
-    parameters_of,
-    part_number,
-)
+from ._sources import BodySource, MotionSource, RigidBody, described
 from .distributions import Distribution
 from .outputs import Output, outputs_argument
 
@@ -168,7 +156,7 @@ class CaseTable:
                 check_labels(name, self.over[name])
         for kind, sources in (("body", self._bodies), ("motion", self._motions)):
             for source in sources:
-                check_source(kind, source)
+                _sources.check_source(kind, source)
         self._check_motions()
         for name in self.over:
             if isinstance(self.body, RigidBody) and name.partition(".")[0] in _NOT_OF_RIGID:
@@ -213,10 +201,10 @@ class CaseTable:
         """SHA-256 by name of all that its values depend on beside its numbers: bodies, motions, functions."""
         digests = {}
         for source in self._bodies:
-            digests |= body_inputs(source, self.loading)
+            digests |= _sources.body_inputs(source, self.loading)
         parameters = dict(self.some_cases(np.array([0]))[0].parameters) if self._motions else {}
         for source in self._motions:
-            digests |= motion_inputs(source, parameters)
+            digests |= _sources.motion_inputs(source, parameters)
         return digests | self.function_inputs
 
     @cached_property
@@ -224,8 +212,8 @@ class CaseTable:
         """SHA-256 of the functions of the user and all that they refer to; empty where a version is given."""
         functions = {f"output {output.name}": output.function for output in self.outputs if isinstance(output, Output)}
         for source in self._motions:
-            if not is_file(source):
-                functions[f"motion {described(source)}"] = motion_function(source)
+            if not _sources.is_file(source):
+                functions[f"motion {described(source)}"] = _sources.motion_function(source)
         digests = {}
         for name, function in functions.items() if self.version is None else ():
             digests |= function_digests(name, function)
@@ -234,17 +222,14 @@ class CaseTable:
     @cached_property
     def description(self) -> dict[str, Any]:
         """All that its results depend on, as JSON can hold it."""
-        names = ("draws", "seed", "chunk", "momentum", "tolerance", "gauge", "parameters", "time_limit", "version")
-        return {
-            "body": described(self.body),
-            "motion": None if self.motion is None else described(self.motion),
-            "over": {name: _plain(given) for name, given in self.over.items()},
-            "outputs": [[output.name, list(output.shape), output.unit] for output in self.resolved_outputs],
-            "attitude": None if self.attitude is None else _plain(self.attitude),
+        names = [attribute.name for attribute in fields(self) if attribute.name not in (*LOADING, "outputs")]
+        whole = {
+            **{name: getattr(self, name) for name in names},
+            "outputs": [(output.name, output.shape, output.unit) for output in self.resolved_outputs],
             "inputs": self.inputs,
-            **{name: _plain(getattr(self, name)) for name in names},
             **self.loading,
         }
+        return json.loads(json.dumps(whole, default=_plain))
 
     @property
     def hash(self) -> str:
@@ -319,12 +304,12 @@ class CaseTable:
         varied = [name.partition(".") for name in self.over if name.partition(".")[0] in OF_PARTS]
         for _, _, link in varied:
             if link:
-                part_number(self._first_body, link)
-        return len(inertia_factors(self._first_body)[0]) if varied else 0
+                _sources.part_number(self._first_body, link)
+        return len(_sources.inertia_factors(self._first_body)[0]) if varied else 0
 
     @cached_property
     def _known_parameters(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(name for source in self._motions for name in parameters_of(source)))
+        return tuple(dict.fromkeys(name for source in self._motions for name in _sources.parameters_of(source)))
 
     def _check_motions(self) -> None:
         if isinstance(self.body, RigidBody) != (self.motion is None):
@@ -332,7 +317,7 @@ class CaseTable:
         if self.motion is None and self.parameters:
             raise StudyError(f"parameters.{next(iter(self.parameters))}: a rigid body has no motion to give it to")
         for source in self._motions:
-            known = parameters_of(source)
+            known = _sources.parameters_of(source)
             for name, is_needed in known.items():
                 if is_needed and name not in (*self.parameters, *self.over):
                     raise StudyError(f"motion {described(source)}: parameter {name} has no value; vary or give it")
@@ -347,7 +332,7 @@ class CaseTable:
         for axis in self.axes:
             lead, _, link = axis.name.partition(".")
             if lead == name and link:
-                numbers[:, part_number(self._first_body, link)] = values[axis.name]
+                numbers[:, _sources.part_number(self._first_body, link)] = values[axis.name]
         return numbers
 
 
@@ -359,14 +344,12 @@ def _check_whole(name: str, value: Any, least: int, most: int | None) -> None:
 
 
 def _plain(value: Any) -> Any:
+    """Return what stands for an object in JSON."""
     if isinstance(value, Distribution):
-        return {"distribution": type(value).__name__, **_plain(asdict(value))}  # type: ignore[call-overload]
-    if isinstance(value, Mapping):
-        return {str(key): _plain(entry) for key, entry in value.items()}
-    if isinstance(value, str | bool | int | float) or value is None:
-        return value
+        return {"distribution": type(value).__name__, **vars(value)}
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
-    return described(value) if callable(value) or isinstance(value, os.PathLike | RigidBody) else repr(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    is_source = callable(value) or isinstance(value, os.PathLike | RigidBody)
+    return described(value) if is_source else np.asarray(value).tolist()

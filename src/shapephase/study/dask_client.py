@@ -18,7 +18,7 @@ from ..arguments import check_text
 from ..arrays import Integers
 from ..errors import MissingExtraError, SchedulerLostError, StudyError
 from ..provenance import provenance
-from ._versions import computing_versions, processor_text, version_differences
+from ._identity import computing_versions, processor_text, version_differences
 from ._workers import ChunkResults, WorkerPool, completed, recipe_of
 from .cases import CaseTable
 

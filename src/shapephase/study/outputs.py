@@ -63,8 +63,8 @@ class Output:
 
     def of(self, motion: Motion, parts: PhaseSplit | None) -> Array:
         """Return its value for a motion and the split of that. Raises StudyError for another shape."""
-        ends = motion.initial_attitude, motion.final_attitude, motion.error_estimate
-        value = np.asarray(self.function(*{"motion": (motion,), "split": (parts,), "ends": ends}[self.needs]), float)
+        arguments = {"motion": (motion,), "split": (parts,), "ends": ends_of(motion)}[self.needs]
+        value = np.asarray(self.function(*arguments), dtype=float)
         if value.shape != self.shape:
             raise StudyError(f"output {self.name}: shape {self.shape} is declared, the function gave {value.shape}")
         return value
@@ -80,6 +80,11 @@ class _OfEnds(Output):
     """A function of start, end and error estimate: batches compute these without a motion for each case."""
 
     needs = "ends"
+
+
+def ends_of(motion: Any) -> tuple[Array, Array, Array]:
+    """Return start, end and error estimate of a motion or a family of them."""
+    return motion.initial_attitude, motion.final_attitude, motion.error_estimate
 
 
 def _directions(motion: Motion) -> Array:

@@ -10,6 +10,7 @@ import contextlib
 import errno
 import fcntl
 import hashlib
+import importlib
 import itertools
 import json
 import os
@@ -33,12 +34,13 @@ from ..provenance import provenance
 from ..warning_filters import quiet
 from ._axes import OF_PARTS
 from ._evaluate import DONE, LETTERS, STATUS, Results, letters
-from ._versions import computing_versions, processor_text, version_differences
+from ._identity import computing_versions, processor_text, version_differences
 from .cases import CaseTable
 
 _FORMAT, _FORMAT_WITHOUT_SEALS = "shapephase study 2", "shapephase study 1"
 _OF_EVERY_STUDY = ("status", *LETTERS, "processor")
 _PROCESSOR_LENGTH = 96  # bytes
+_NEEDS_ZARR = "a study needs Zarr"
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,14 +80,15 @@ class StudyStore:
         StudyStoreError
             If a chunk is damaged, which is named.
         """
-        array, missing = self._array(name), self.missing_chunks()
-        if len(bad := self._with_seal(missing)):
-            raise _damaged(self.path, self.chunk_texts(bad))
-        return self._sealed(array, missing)
+        check_choice(name, "array of the store", (*self.attributes["units"], *_OF_EVERY_STUDY))
+        missing = self.missing_chunks()
+        if len(damaged := self._with_seal(missing)):
+            raise _damaged(self.path, self.chunk_texts(damaged))
+        return self._sealed(name, missing)
 
     def statuses(self) -> Any:
         """Return (cases,) whole numbers as in `STATUS`; the cases of a damaged chunk are missing."""
-        return self._sealed(self._array("status"), self.missing_chunks())
+        return self._sealed("status", self.missing_chunks())
 
     def counts(self) -> dict[str, int]:
         """Return how many cases have which status."""
@@ -94,25 +97,15 @@ class StudyStore:
 
     def missing_chunks(self) -> Integers:
         """Return the numbers of the chunks that are not stored, or only in part, or damaged."""
-        chunks = range(-(-self.cases // self._chunk))
-        return np.array([n for n in chunks if _content(self._file("seal", n)) != self._seal(n)], dtype=np.int64)
+        return np.array([n for n in self._chunks if _content(self._file("seal", n)) != self._seal(n)], dtype=np.int64)
 
     def damaged_chunks(self) -> Integers:
-        """Return the numbers of the chunks that differ from what was stored; a run with `resume` computes them again.
-
-        Examples
-        --------
-        >>> study = sp.study.Study("cat", "cat_righting", {"momentum_z": [0.0, 0.1, 0.2]}, outputs=("turn",), chunk=1)
-        >>> store = study.run("flipped.zarr", workers=0)
-        >>> _ = (store.path / "turn" / "c" / "1").write_bytes(b"")
-        >>> store.damaged_chunks().tolist(), store.counts()["missing"]
-        ([1], 1)
-        """
+        """Return the numbers of the chunks that are not what was stored; a resumed run computes them again."""
         return self._with_seal(self.missing_chunks())
 
     def failed_chunks(self) -> Integers:
         """Return the numbers of the chunks with cases that have no results."""
-        return np.unique(np.flatnonzero(self.statuses() > DONE) // self._chunk)
+        return np.unique(np.flatnonzero(self.statuses() > DONE) // self.attributes["chunk"])
 
     def chunk_texts(self, numbers: Integers) -> str:
         """Return for example "chunk 3 (cases 15 to 19) and 2 more"."""
@@ -125,14 +118,7 @@ class StudyStore:
         return [failure[:3] for failure in itertools.islice(self._failures(), most)]
 
     def complaints(self) -> list[tuple[int, int, str, str]]:
-        """Return errors, the most frequent first: how many cases, the first of them, the error, its processor.
-
-        Examples
-        --------
-        >>> study = sp.study.Study("cat", "cat_righting", {"momentum_z": [0.0, 0.1, 0.2]}, outputs=("turn",))
-        >>> study.run("well.zarr", workers=0).complaints()
-        []
-        """
+        """Return errors, the most frequent first: how many cases, the first of them, the error, its processor."""
         cases: dict[tuple[str, str], list[int]] = {}
         for index, name, text, processor in self._failures():
             cases.setdefault((f"{name}: {text}", processor), []).append(index)
@@ -140,19 +126,8 @@ class StudyStore:
         return sorted(listed, key=lambda complaint: -complaint[0])
 
     def dataset(self) -> Any:
-        """Return an `xarray.Dataset` along the dimensions of the grids, and of the draws where there are more.
-
-        Raises
-        ------
-        MissingExtraError
-            Without xarray.
-        """
-        try:
-            import xarray
-        except ImportError:
-            raise MissingExtraError(
-                "a data set needs xarray; install it with: pip install 'shapephase[study]'"
-            ) from None
+        """Return an `xarray.Dataset` along the dimensions of the grids, and of the draws where there are more."""
+        xarray = _imported("xarray", "a data set needs xarray")
         grids, units = self.attributes["grids"], self.attributes["units"]
         dims = {**{name: len(values) for name, values in grids.items()}, "draw": int(self.attributes["draws"])}
         if dims["draw"] == 1 and len(dims) > 1:
@@ -160,7 +135,7 @@ class StudyStore:
         variables = {}
         for name in (*units, "status", *LETTERS):
             if name not in grids:
-                array, values = self._array(name), self.values(name)
+                array, values = self._arrays[name], self.values(name)
                 shape = (*dims.values(), *values.shape[1:])
                 named = (*dims, *array.metadata.dimension_names[1:])
                 variables[name] = (named, values.reshape(shape), dict(array.attrs))
@@ -177,12 +152,12 @@ class StudyStore:
                 # Zarr reads a chunk that it fills only in part, and it may be damaged.
                 self._file(name, number).unlink(missing_ok=True)
             for name, values in rows.items():
-                self._array(name)[self._part(number)] = values
-            self._array("processor")[number] = letters(processor, _PROCESSOR_LENGTH)
+                self._arrays[name][self._part(number)] = values
+            self._arrays["processor"][number] = letters(processor, _PROCESSOR_LENGTH)
             # Zarr writes no file for a chunk of fill values alone.
             files = [self._file(name, number) for name in (*rows, "processor")]
             _sync(self.path, [file for file in files if file.exists()])
-            self._array("seal")[number] = np.frombuffer(self._seal(number), dtype=np.uint8)
+            self._arrays["seal"][number] = np.frombuffer(self._seal(number), dtype=np.uint8)
             _sync(self.path, [self._file("seal", number)])
 
     @contextlib.contextmanager
@@ -204,26 +179,19 @@ class StudyStore:
     def _failures(self) -> Iterator[tuple[int, str, str, str]]:
         for number in self.failed_chunks().tolist():
             part = self._part(number)
-            statuses, names, texts = (self._array(name)[part] for name in ("status", *LETTERS))
-            processor = _text(self._array("processor")[number])
+            statuses, names, texts = (self._arrays[name][part] for name in ("status", *LETTERS))
+            processor = _text(self._arrays["processor"][number])
             for row in np.flatnonzero(statuses > DONE).tolist():
                 yield part.start + row, _text(names[row]), _text(texts[row]), processor
 
-    def _array(self, name: str) -> Any:
-        """Return one array of the store, opened once."""
-        if not isinstance(name, str) or name not in self._arrays:
-            if name != "seal":
-                check_choice(name, "array of the store", (*self.attributes["units"], *_OF_EVERY_STUDY))
-            self._arrays[name] = self._group[name]
-        return self._arrays[name]
-
-    def _sealed(self, array: Any, missing: Integers) -> Any:
+    def _sealed(self, name: str, missing: Integers) -> Any:
         """Return the numbers of an array where its chunks are whole, elsewhere its fill value."""
+        array = self._arrays[name]
         if not len(missing):
             return array[...]
         rows = np.full(array.shape, array.fill_value, dtype=array.dtype)
-        for number in np.setdiff1d(np.arange(-(-self.cases // self._chunk)), missing).tolist():
-            part = self._part(number) if array.metadata.dimension_names[0] == "case" else slice(number, number + 1)
+        for number in np.setdiff1d(self._chunks, missing).tolist():
+            part = self._part(number) if array.shape[0] == self.cases else number
             rows[part] = array[part]
         return rows
 
@@ -231,12 +199,13 @@ class StudyStore:
         return np.array([number for number in numbers.tolist() if self._file("seal", number).exists()], dtype=np.int64)
 
     @property
-    def _chunk(self) -> int:
-        return int(self.attributes["chunk"])
+    def _chunks(self) -> range:
+        return range(-(-self.cases // self.attributes["chunk"]))
 
     def _part(self, number: int) -> slice:
         """Return the cases of a chunk."""
-        return slice(number * self._chunk, min((number + 1) * self._chunk, self.cases))
+        chunk = self.attributes["chunk"]
+        return slice(number * chunk, min((number + 1) * chunk, self.cases))
 
     @property
     def _names(self) -> tuple[str, ...]:
@@ -245,7 +214,7 @@ class StudyStore:
 
     def _file(self, name: str, number: int) -> Path:
         """Return the file of a chunk of an array."""
-        return self.path.joinpath(name, "c", str(number), *["0"] * (self._array(name).ndim - 1))
+        return self.path.joinpath(name, "c", str(number), *["0"] * (self._arrays[name].ndim - 1))
 
     def _seal(self, number: int) -> bytes:
         """Return SHA-256 of the files of a chunk, its number, the study and the versions."""
@@ -258,11 +227,7 @@ class StudyStore:
 
     @cached_property
     def _arrays(self) -> dict[str, Any]:
-        return {}
-
-    @cached_property
-    def _group(self) -> Any:
-        return _zarr().open_group(self.path, mode="r+", zarr_format=3)
+        return dict(_imported("zarr", _NEEDS_ZARR).open_group(self.path, mode="r+", zarr_format=3).arrays())
 
 
 def open_study(path: str | os.PathLike[str]) -> StudyStore:
@@ -335,15 +300,15 @@ def store_to_resume(path: str | os.PathLike[str], study: CaseTable) -> StudyStor
             # Its description is lost: a seal shows whether the store is this study's.
             _make(fresh := Path(folder) / place.name, study)
             store = StudyStore(place, open_study(fresh).attributes)
-            store.__dict__["_group"] = open_study(fresh)._group
+            store.__dict__["_arrays"] = open_study(fresh)._arrays
             if len(store.missing_chunks()) == study.chunks:
                 raise
-            _write(place / "zarr.json", (fresh / "zarr.json").read_bytes())
+            _write(place, (fresh / "zarr.json").read_bytes())
             store = open_study(place)
         _check_same(store, study)
         for name, metadata in _metadata(place)["consolidated_metadata"]["metadata"].items():
             if _metadata(place / name) != metadata:
-                _write(place / name / "zarr.json", json.dumps(metadata).encode())
+                _write(place / name, json.dumps(metadata).encode())
     return store
 
 
@@ -369,63 +334,58 @@ def _check_same(store: StudyStore, study: CaseTable) -> None:
 
 
 def _make(place: Path, study: CaseTable) -> None:
+    """Make an empty store, which holds only descriptions."""
     grids = {
         axis.name: [str(label) for label in axis.labels] or np.asarray(axis.grid).tolist()
         for axis in study.axes
         if axis.grid is not None
     }
-    quantities = (*study.axes, *study.resolved_outputs)
     origin = provenance()
     attributes = {
         "format": _FORMAT,
         "study": study.description,
         "study_hash": study.hash,
-        "cases": study.cases,
-        **{name: getattr(study, name) for name in ("chunk", "draws", "seed", "inputs")},
+        **{name: getattr(study, name) for name in ("cases", "chunk", "draws", "seed", "inputs")},
         "grids": grids,
         "versions": computing_versions(),
-        "command": origin["command"],
-        "date": origin["date"],
+        **{name: origin[name] for name in ("command", "date")},
         "processor": processor_text(),
-        "units": {quantity.name: quantity.unit for quantity in quantities},
+        "units": {quantity.name: quantity.unit for quantity in (*study.axes, *study.resolved_outputs)},
     }
-    zarr = _zarr()
+    text = {"about": "letters in UTF-8"}
+    arrays: list[tuple[str, str, Mapping[str, int], Mapping[str, Any]]] = [
+        ("status", "case", {}, {"flag_values": [*STATUS.values()], "flag_meanings": " ".join(STATUS)}),
+        *((name, "case", {f"{name}_letter": length}, text) for name, length in LETTERS.items()),
+        ("processor", "chunk", {"processor_letter": _PROCESSOR_LENGTH}, text),
+        ("seal", "chunk", {"seal_letter": 32}, {"about": "SHA-256 of the files of each chunk"}),
+    ]
+    for axis in study.axes:
+        labels = {"labels": grids[axis.name]} if axis.labels else {}
+        about = {"units": axis.unit, "role": "varied", **labels}
+        arrays.append((axis.name, "case", _dimensions(axis.name, axis.shape), about))
+    for output in study.resolved_outputs:
+        about = {"units": output.unit, "role": "result", "about": output.about}
+        arrays.append((output.name, "case", _dimensions(output.name, output.shape), about))
+    zarr = _imported("zarr", _NEEDS_ZARR)
     group = zarr.create_group(place, zarr_format=3, attributes=attributes)
-
-    def create(name: str, of_one: Mapping[str, int], attributes: Mapping[str, Any], by: str, **more: Any) -> None:
+    for name, by, dimensions, about in arrays:
         rows, chunk = (study.cases, min(study.chunk, study.cases)) if by == "case" else (study.chunks, 1)
         group.create_array(
             name,
-            shape=(rows, *of_one.values()),
-            chunks=(chunk, *of_one.values()),
-            dimension_names=(by, *of_one),
-            attributes=attributes,
-            **{"dtype": np.uint8, "fill_value": 0, **more},
+            shape=(rows, *dimensions.values()),
+            chunks=(chunk, *dimensions.values()),
+            dtype=np.float64 if "units" in about else np.uint8,
+            fill_value=np.nan if "units" in about else 0,
+            dimension_names=(by, *dimensions),
+            attributes=dict(about),
+            compressors=[zarr.codecs.ZstdCodec(), zarr.codecs.Crc32cCodec()] if by == "case" else None,
         )
-
-    codecs = {"compressors": [zarr.codecs.ZstdCodec(), zarr.codecs.Crc32cCodec()]}
-    meanings = {"flag_values": list(STATUS.values()), "flag_meanings": " ".join(STATUS)}
-    create("status", {}, meanings, "case", **codecs)
-    for name, length in LETTERS.items():
-        create(name, {f"{name}_letter": length}, {"about": "letters in UTF-8"}, "case", **codecs)
-    about = {"about": "letters in UTF-8"}
-    create("processor", {"processor_letter": _PROCESSOR_LENGTH}, about, "chunk", compressors=None)
-    about = {"about": "SHA-256 of the files of each chunk"}
-    create("seal", {"seal_letter": hashlib.sha256().digest_size}, about, "chunk", compressors=None)
-    for quantity in quantities:
-        about = {"units": quantity.unit, "role": "varied"}
-        if quantity in study.resolved_outputs:
-            about |= {"role": "result", "about": quantity.about}
-        elif quantity.labels:
-            about["labels"] = grids[quantity.name]
-        dimensions = _dimensions(quantity.name, quantity.shape)
-        create(quantity.name, dimensions, about, "case", dtype=np.float64, fill_value=np.nan, **codecs)
     # Zarr warns that its specification does not have this yet, and xarray where it is missing.
     with quiet():
         zarr.consolidate_metadata(place)
     metadata = _metadata(place)
     metadata["attributes"]["digest"] = _metadata_digest(metadata)
-    (place / "zarr.json").write_text(json.dumps(metadata, indent=2))
+    _write(place, json.dumps(metadata, indent=2).encode())
 
 
 def _dimensions(name: str, shape: tuple[int, ...]) -> dict[str, int]:
@@ -461,9 +421,8 @@ def _content(file: Path) -> bytes | None:
     return None
 
 
-def _write(file: Path, content: bytes) -> None:
-    file.parent.mkdir(exist_ok=True)
-    write_whole(file, lambda stream: stream.write(content))
+def _write(place: Path, metadata: bytes) -> None:
+    write_whole(place / "zarr.json", lambda stream: stream.write(metadata))
 
 
 def _sync(root: Path, files: Collection[Path]) -> None:
@@ -492,13 +451,12 @@ def _damaged(path: Path, what: str) -> StudyStoreError:
     return StudyStoreError(f"{path}: the store is damaged: {what}; compute it again with resume=True (--resume)")
 
 
-def _zarr() -> Any:
+def _imported(name: str, sentence: str) -> Any:
     try:
         with quiet():
-            import zarr
+            return importlib.import_module(name)
     except ImportError:
-        raise MissingExtraError("a study needs Zarr; install it with: pip install 'shapephase[study]'") from None
-    return zarr
+        raise MissingExtraError(f"{sentence}; install it with: pip install 'shapephase[study]'") from None
 
 
 def _text(row: Any) -> str:

@@ -18,7 +18,7 @@ from ..arrays import Integers
 from ..errors import RunStopped, StudyError
 from ..letters import what_came
 from ._evaluate import DONE, Evaluator
-from ._versions import processor_text
+from ._identity import processor_text
 from ._workers import ChunkResults, WorkerPool, completed, recipe_of
 from .cases import CaseTable
 from .dask_client import chunks_on_cluster
