@@ -16,12 +16,13 @@ from ..errors import ShapeError
 
 Numbers = float | Sequence[float]
 
-_FARTHEST_DRAWN = 10.0  # standard deviations from the mean: exceeded once in 1e23 draws
+_MOST = 1e100  # of parameters: no draw overflows, nor the square of one
 
 
 class Distribution:
     """Base of the distributions, which are dataclasses of their parameters."""
 
+    _most_deviation: ClassVar[float] = _MOST
     _only: ClassVar[tuple[tuple[int, ...], str] | None] = None  # shape and name of all that can be drawn, if limited
 
     __repr__ = short_repr
@@ -36,10 +37,8 @@ class Distribution:
                 raise ShapeError(f"{parameter} of {name}: one number or an array {shape} is needed, got {value.shape}")
             if parameter in ("deviation", "median") and np.any(value < 0.0):
                 raise ShapeError(f"{parameter} of {name}: 0 or more is needed, got {given}")
-        with np.errstate(over="ignore", invalid="ignore"):
-            ends: Any = [self._draw(_Farthest(sign), shape) for sign in (-1.0, 1.0)]  # type: ignore[arg-type]
-        if not np.isfinite(ends).all():
-            raise ShapeError(f"{name}: it is spread so widely that no number holds what may be drawn")
+            if np.any(np.abs(value) > (self._most_deviation if parameter == "deviation" else _MOST)):
+                raise ShapeError(f"{name}: it is spread so widely that no number holds what may be drawn")
 
     def _draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
         raise NotImplementedError
@@ -86,6 +85,8 @@ class LogNormal(Distribution):
     >>> print(study.case(7).masses.round(3)[:4], study.case(7).masses.min() > 0.0)
     [0.979 1.026 1.065 0.944] True
     """
+
+    _most_deviation = 10.0  # the logarithm of a draw is below 100 but for one in 1e23
 
     deviation: Numbers
     median: Numbers = 1.0
@@ -193,22 +194,6 @@ class Rotations(Distribution):
 
 DISTRIBUTIONS = {kind.__name__.lower(): kind for kind in (Normal, LogNormal, Uniform, Choice, Directions, Rotations)}
 """Their names in a file."""
-
-
-@dataclass(frozen=True)
-class _Farthest:
-    """Stands for a generator, and gives the numbers that are farthest from the middle."""
-
-    sign: float
-
-    def standard_normal(self, shape: tuple[int, ...]) -> Array:
-        return np.full(shape, self.sign * _FARTHEST_DRAWN)
-
-    def random(self, shape: tuple[int, ...]) -> Array:
-        return np.full(shape, 0.5 + 0.5 * self.sign)
-
-    def integers(self, count: int) -> int:
-        return count - 1
 
 
 def generators(seed: int, axis: str, cases: Integers) -> Iterator[np.random.Generator]:

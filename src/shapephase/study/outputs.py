@@ -145,7 +145,7 @@ def outputs_argument(given: Sequence[str | Output], taken: Sequence[str]) -> tup
     outputs: list[Output] = []
     for entry in (given,) if isinstance(given, str) else given:
         if not isinstance(entry, Output):
-            check_choice(entry, "output", {*OUTPUTS, *_FORMER})
+            check_choice(entry, "output", (*OUTPUTS, *_FORMER))
             entry = OUTPUTS[entry] if entry in OUTPUTS else replace(OUTPUTS[_FORMER[entry]], name=entry)
         outputs.append(entry)
     names = [output.name for output in outputs]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from contextvars import copy_context
@@ -13,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_choice, check_file_name, check_flag, check_function, check_object
+from ..arguments import check_choice, check_file_name, check_flag, check_object
 from ..arrays import Integers
 from ..errors import RunStopped, StudyError
 from ..letters import what_came
+from ..run_progress import ProgressCallback, check_progress
 from ._evaluate import DONE, Evaluator
 from ._identity import processor_text
 from ._workers import ChunkResults, WorkerPool, completed, recipe_of
@@ -80,7 +80,7 @@ class Study(CaseTable):
         workers: int | None = None,
         resume: bool = False,
         retry: str | None = None,
-        progress: Callable[[float, str], object] | None = None,
+        progress: ProgressCallback | None = None,
     ) -> StudyStore:
         """Compute what is missing, and store it.
 
@@ -115,8 +115,7 @@ class Study(CaseTable):
             check_choice(retry, "retry", ("failed",))
         if client is not None:
             check_object(client, "Client", "client")
-        if progress is not None:
-            check_function(progress, "progress", "a function of a share and a text")
+        check_progress(progress)
         if workers is not None and (client is not None or not isinstance(workers, int) or workers < 0):
             raise StudyError(
                 f"workers: a whole number, 0 or more, is needed, without a client; got {what_came(workers)}"
@@ -129,20 +128,23 @@ class Study(CaseTable):
             statuses, missing = target.statuses(), target.missing_chunks()
             if retry:
                 missing = np.union1d(missing, target.failed_chunks())
+            if not len(missing):
+                return target
             for number in missing.tolist():
                 statuses[slice(*self.chunk_range(number))] = 0
             if client is None:
                 chunks = _chunks_here(self, missing, workers)
             else:
                 chunks = chunks_on_cluster(self, missing, client)
-            begun, before = time.monotonic(), np.count_nonzero(statuses)
+            before = done = int(np.count_nonzero(statuses))
+            failed, begun = int(np.count_nonzero(statuses > DONE)), time.monotonic()
             with closing(chunks):  # type: ignore[type-var]
                 for number, results, processor in chunks:
                     target.write(number, results, processor)
-                    statuses[slice(*self.chunk_range(number))] = results["status"]
-                    done = np.count_nonzero(statuses)
+                    done += len(results["status"])
+                    failed += int(np.count_nonzero(results["status"] > DONE))
                     rate = (done - before) / max(time.monotonic() - begun, 1e-9)
-                    text = _progress_text(statuses, done, rate)
+                    text = _progress_text(done, self.cases, failed, rate)
                     if progress is not None and progress(done / self.cases, text) and done < self.cases:
                         raise RunStopped(f"stopped on request with {done} of {self.cases} cases stored")
         return target
@@ -150,7 +152,7 @@ class Study(CaseTable):
 
 def _chunks_here(study: Study, missing: Integers, workers: int | None) -> Iterator[ChunkResults]:
     """Yield chunks in the order in which threads or processes of this machine have done them."""
-    count = min(workers or (1 if workers == 0 else _processors()), max(len(missing), 1))
+    count = 1 if workers == 0 else min(workers or _processors(), len(missing))
     pool = Evaluator(study, study.inputs) if workers == 0 else WorkerPool(study, recipe_of(study))
     # Cases in this process have a thread too: Ctrl-C interrupts the main one, whatever code of the user does with it.
     executor = ThreadPoolExecutor(count)
@@ -173,11 +175,10 @@ def _processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _progress_text(statuses: Any, done: int, rate: float) -> str:
-    failed = np.count_nonzero(statuses > DONE)
-    seconds = (len(statuses) - done) / rate if rate else math.inf
+def _progress_text(done: int, cases: int, failed: int, rate: float) -> str:
+    seconds = (cases - done) / rate
     left = f"{seconds:.0f} s"
     if seconds >= _MINUTES:
         left = f"{seconds / 60.0:.0f} min" if seconds < _HOURS else f"{seconds / 3600.0:.1f} h"
-    words = f", {failed} failed" if failed else ""
-    return f"{done} of {len(statuses)} cases{words}, {rate:.3g}/s, {left} left"
+    failures = f", {failed} failed" if failed else ""
+    return f"{done} of {cases} cases{failures}, {rate:.3g}/s, {left} left"

@@ -78,8 +78,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
 
 def _study(entries: dict[str, Any], folder: Path) -> Study:
     _refuse_booleans({name: entry for name, entry in entries.items() if name != "xacro_args"}, "")
-    arguments = {field.name for field in fields(Study)}
-    given = dict(_table(entries, "the study", {*arguments, "rigid", "functions"}))
+    arguments = [field.name for field in fields(Study)]
+    given = dict(_table(entries, "the study", (*arguments, "rigid", "functions")))
     over = _table(given.pop("over", {}), "over")
     functions = _table(given.pop("functions", {}), "functions")
     if ("body" in given or "body" in over) == ("rigid" in given):
