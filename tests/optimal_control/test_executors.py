@@ -16,8 +16,8 @@ GOAL = sp.so3.exp(np.array([1.0, 0.0, 0.0]))
 OPTIONS = {"limits": Limits(rate_limits=None)}
 
 
-def planned(executor=None, *, method="collocation", starts=3, **more):
-    search = Search(pieces=8, starts=starts, seed=2, method=method)
+def planned(executor=None, *, starts=3, **more):
+    search = Search(pieces=8, starts=starts, seed=2)
     return sp.plan_reorientation(
         sp.load_body("cat_two_halves"), GOAL, search=search, executor=executor, **OPTIONS, **more
     )
@@ -33,13 +33,12 @@ def same(one, other):
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("method", ["collocation", "reduced"])
-def test_plans_do_not_depend_on_who_searches(method):
-    alone = planned(method=method)
+def test_plans_do_not_depend_on_who_searches():
+    alone = planned()
     with ThreadPoolExecutor(2) as executor:
-        same(planned(executor, method=method), alone)
+        same(planned(executor), alone)
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
-        same(planned(executor, method=method), alone)
+        same(planned(executor), alone)
 
 
 @pytest.mark.full

@@ -117,17 +117,6 @@ def test_a_link_is_pointed_and_its_joints_help(name):
     assert free.cost < shut.cost
 
 
-@pytest.mark.full
-def test_both_methods_point_a_link_alike(two_halves):
-    goal = Goal(pointing=([0.0, 0.0, 1.0], DIRECTION), link="rear")
-    plans = [
-        plan_reorientation(two_halves, goal, end="free", search=Search(pieces=12, method=method))
-        for method in ("collocation", "reduced")
-    ]
-    assert plans[0].cost == pytest.approx(plans[1].cost, rel=1e-4)
-    assert plans[1].goal_error < 1e-8
-
-
 @pytest.mark.usefixtures("few_guesses")
 def test_a_tumbling_body_ends_in_a_steady_spin(two_halves):
     """Its axis of largest inertia along the momentum at the end: as a rigid body it turns about it for ever."""

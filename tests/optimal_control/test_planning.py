@@ -364,7 +364,6 @@ def test_nothing_to_turn_costs_nothing():
 @pytest.mark.parametrize(
     ("options", "error", "match"),
     [
-        ({"method": "shooting"}, UnknownNameError, "collocation, reduced"),
         ({"pieces": 5}, ShapeError, "pieces"),
         ({"starts": 0}, ShapeError, "starts"),
         ({"iterations": 1.5}, ShapeError, "iterations"),
@@ -508,13 +507,11 @@ def test_a_plan_with_free_rates_is_an_extremal(cost):
         assert (round(time, 6), multiplicity) == (1.0, 1)
 
 
-@pytest.mark.parametrize("method", full_but(["collocation", "reduced"], "collocation"))
-def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far(method, request):
-    if method == "collocation":
-        request.getfixturevalue("few_guesses")
+@pytest.mark.usefixtures("few_guesses")
+def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far():
     body = sp.load_body("cat_two_halves")
     turn = so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))
-    search = Search(method=method, pieces=10)
+    search = Search(pieces=10)
     whole = plan_reorientation(body, turn, search=search)
     reported = []
 

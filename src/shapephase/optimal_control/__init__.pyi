@@ -5,10 +5,9 @@ from .extremals.jacobi_fields import ConjugateTime, JacobiFields, conjugate_time
 from .extremals.shooting import shoot
 from .extremals.wong_residual import WongFit, wong_residual
 from .plan import Plan, Start
-from .plan_options import Goal, Limits, Search
+from .plan_options import Goal, Limits, Search, Waypoint
 from .planning import plan_reorientation
 from .symbolic import SymbolicBody, symbolic_body
-from .waypoints import Waypoint
 
 __all__ = [
     "ConjugateTime",

@@ -11,7 +11,7 @@ from ...errors import ShapeError
 if TYPE_CHECKING:
     from ...arrays import Array
     from ...body.body import Body
-    from ...optimal_control.waypoints import Waypoint
+    from ...optimal_control.plan_options import Waypoint
 
 
 def posture(body: Body, text: str, option: str, *, first: bool) -> Array:
@@ -50,7 +50,7 @@ def waypoint(body: Body, text: str) -> Waypoint:
 
     Of a motion file the posture at that time is passed at that time.
     """
-    from ...optimal_control.waypoints import Waypoint
+    from ...optimal_control.plan_options import Waypoint
 
     named, timed, at = text.rpartition("@")
     named, at = (named, at) if timed else (text, "")

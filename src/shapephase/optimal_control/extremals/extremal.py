@@ -17,11 +17,10 @@ from ...body.body import Body
 from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
 from ...shape_space.shape_path import ShapePath
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from .hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales
 
-# Of the series of rates on a step of order 8, whose error is that of the step.
-_DEGREE = 12
+_DEGREE = 12  # of the series of rates on a step of order 8: its error is that of the step
 
 
 @made_by("optimal_control.extremal(...)")
