@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 sweep_app = App(name="sweep", help_format="markdown")
 _MOST = 20  # complaints shown
-# [in] Of a figure of a study.
-_HEIGHT = 2.8
+_HEIGHT = 2.8  # in, of a figure of a study
 
 
 @sweep_app.default

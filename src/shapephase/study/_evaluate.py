@@ -1,7 +1,7 @@
 """Computing the cases of a chunk: by batches where these give every case the bits that it has alone, else one by one.
 
 Batches are a family of bodies along one path (in machine code), many momenta on one deformation where only the ends
-are asked for, and `final_attitudes`. The bits of a case are always those of a family of one body where inertias are
+are needed, and `final_attitudes`. The bits of a case are always those of a family of one body where inertias are
 varied, and of the single call where they are not: they do not depend on the other cases of the batch.
 """
 
@@ -65,8 +65,8 @@ def fail(study: CaseTable, results: Results, row: int, status: str, name: str, t
     for output in study.resolved_outputs:
         results[output.name][row] = np.nan
     results["status"][row] = STATUS[status]
-    for array, said in (("error_name", name), ("error_text", text)):
-        results[array][row] = letters(said, LETTERS[array])
+    for array, words in (("error_name", name), ("error_text", text)):
+        results[array][row] = letters(words, LETTERS[array])
 
 
 def letters(text: str, length: int) -> Any:

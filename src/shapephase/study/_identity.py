@@ -247,7 +247,10 @@ class _Pickler(pickle.Pickler):
             return (type(value).__qualname__, inner)
         if is_dataclass(value) and _is_library(type(value).__module__):
             # Values that were computed on the way are kept beside the fields.
-            return (_label(type(value)), [(one.name, getattr(value, one.name)) for one in fields(value) if one.init])
+            return (
+                _label(type(value)),
+                [(field.name, getattr(value, field.name)) for field in fields(value) if field.init],
+            )
         return None
 
 

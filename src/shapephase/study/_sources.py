@@ -128,7 +128,7 @@ def parameters_of(source: MotionSource) -> dict[str, bool]:
         return {}
     parameters = inspect.signature(motion_function(source)).parameters.values()
     variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    return {one.name: one.default is one.empty and one.kind not in variadic for one in parameters}
+    return {par.name: par.default is par.empty and par.kind not in variadic for par in parameters}
 
 
 def body_inputs(source: BodySource, loading: Mapping[str, Any]) -> dict[str, str]:

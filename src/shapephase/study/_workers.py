@@ -1,4 +1,4 @@
-"""Processes that compute chunks of cases, and what is done when one hangs or dies.
+"""Processes that compute chunks of cases, and what is done when one of them hangs or dies.
 
 First a chunk is computed together. If the process dies or takes far too long, it is computed case by case in a new one:
 the case at which that one ends has a status, and the others their results, with equal bits.
@@ -89,7 +89,7 @@ def completed(
 
 
 class WorkerPool:
-    """Processes of one study, one for each thread that asks at the same time, replaced when they are lost."""
+    """Processes of one study, as many as threads compute at once, replaced when they are lost."""
 
     def __init__(self, study: CaseTable, recipe: bytes) -> None:
         self._study, self._recipe = study, recipe
@@ -103,12 +103,12 @@ class WorkerPool:
         limit = self._study.time_limit
         with contextlib.suppress(_LostError):
             seconds = None if limit is None else limit * (1.0 + _SHARE_OF_A_CASE * (stop - first))
-            (results,) = self._answers("together", first, stop, seconds)
+            (results,) = self._results("together", first, stop, seconds)
             return results
         results, index = empty_results(self._study, np.arange(first, stop)), first
         while index < stop:
             try:
-                for case_results in self._answers("alone", index, stop, limit):
+                for case_results in self._results("alone", index, stop, limit):
                     for name, rows in case_results.items():
                         results[name][index - first] = rows[0]
                     index += 1
@@ -124,13 +124,13 @@ class WorkerPool:
         for process in list(self._processes):
             process.end()
 
-    def _answers(self, way: str, first: int, stop: int, seconds: float | None) -> Iterator[Results]:
+    def _results(self, way: str, first: int, stop: int, seconds: float | None) -> Iterator[Results]:
         """Yield the results of cases together or alone. Raises _LostError."""
         process = self._ready()
         try:
             process.send((way, first, stop))
             for _ in range(1 if way == "together" else stop - first):
-                yield process.answer(seconds)
+                yield process.receive(seconds)
         except _LostError:
             self._processes.remove(process)
             raise
@@ -148,7 +148,7 @@ class WorkerPool:
             if self._is_closed:
                 process.end()
             try:
-                refusal = process.answer(_STARTING)
+                refusal = process.receive(_STARTING)
             except _LostError:
                 self._processes.remove(process)
                 continue
@@ -184,8 +184,8 @@ class _Process:
         with self._losses():
             self._connection.send(message)
 
-    def answer(self, seconds: float | None) -> Any:
-        """Return what comes within a time. Raises _LostError."""
+    def receive(self, seconds: float | None) -> Any:
+        """Return the next message. Raises _LostError, also where it takes longer than these seconds."""
         end = math.inf if seconds is None else time.monotonic() + seconds
         with self._losses():
             # The process is watched too: a child of it may keep the connection open.

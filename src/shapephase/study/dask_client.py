@@ -24,7 +24,7 @@ from .cases import CaseTable
 
 TASKS_PER_THREAD = 3  # submitted at once: one that runs and some that wait at its worker
 FEWEST_TASKS = 4  # submitted at once while workers are still to come
-PATIENCE = 20.0  # s: a connection that is lost for so long is not found again
+PATIENCE = 20.0  # s: a connection lost for longer does not come back
 _PAUSE = 0.5  # s before a lost chunk is submitted again
 _MOST_LOSSES = 10  # of one chunk
 _LOSSES = ("CancelledError", "KilledWorker", "FutureCancelledError", "CommClosedError")
@@ -37,7 +37,7 @@ def connected(address: str) -> Iterator[Any]:
     Raises
     ------
     SchedulerLostError
-        If it does not answer.
+        If it cannot be reached.
     MissingExtraError
         Without Dask.
 

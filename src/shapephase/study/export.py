@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +74,4 @@ def study_table(store: StudyStore) -> Any:
 def _netcdf(store: StudyStore) -> bytes:
     data = store.dataset().drop_vars([*LETTERS])
     data.attrs = {name: value if isinstance(value, str | int) else str(value) for name, value in data.attrs.items()}
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "study.nc"
-        data.to_netcdf(file, engine="scipy")
-        return file.read_bytes()
+    return bytes(data.to_netcdf(engine="scipy"))

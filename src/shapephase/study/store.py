@@ -7,10 +7,8 @@ or does not fit is not done: a flipped bit, a lost, exchanged or older file is n
 from __future__ import annotations
 
 import contextlib
-import errno
 import fcntl
 import hashlib
-import importlib
 import itertools
 import json
 import os
@@ -40,7 +38,6 @@ from .cases import CaseTable
 _FORMAT, _FORMAT_WITHOUT_SEALS = "shapephase study 2", "shapephase study 1"
 _OF_EVERY_STUDY = ("status", *LETTERS, "processor")
 _PROCESSOR_LENGTH = 96  # bytes
-_NEEDS_ZARR = "a study needs Zarr"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +78,7 @@ class StudyStore:
             If a chunk is damaged, which is named.
         """
         check_choice(name, "array of the store", (*self.attributes["units"], *_OF_EVERY_STUDY))
-        missing = self.missing_chunks()
-        if len(damaged := self._with_seal(missing)):
-            raise _damaged(self.path, self.chunk_texts(damaged))
-        return self._sealed(name, missing)
+        return self._sealed(name, self._unfinished_chunks())
 
     def statuses(self) -> Any:
         """Return (cases,) whole numbers as in `STATUS`; the cases of a damaged chunk are missing."""
@@ -127,18 +121,19 @@ class StudyStore:
 
     def dataset(self) -> Any:
         """Return an `xarray.Dataset` along the dimensions of the grids, and of the draws where there are more."""
-        xarray = _imported("xarray", "a data set needs xarray")
+        try:
+            import xarray
+        except ImportError:
+            raise MissingExtraError("xarray is needed; install it with: pip install 'shapephase[study]'") from None
         grids, units = self.attributes["grids"], self.attributes["units"]
         dims = {**{name: len(values) for name, values in grids.items()}, "draw": int(self.attributes["draws"])}
         if dims["draw"] == 1 and len(dims) > 1:
             del dims["draw"]
-        variables = {}
-        for name in (*units, "status", *LETTERS):
-            if name not in grids:
-                array, values = self._arrays[name], self.values(name)
-                shape = (*dims.values(), *values.shape[1:])
-                named = (*dims, *array.metadata.dimension_names[1:])
-                variables[name] = (named, values.reshape(shape), dict(array.attrs))
+        variables, missing = {}, self._unfinished_chunks()
+        for name in (name for name in (*units, "status", *LETTERS) if name not in grids):
+            array, values = self._arrays[name], self._sealed(name, missing)
+            named = (*dims, *array.metadata.dimension_names[1:])
+            variables[name] = (named, values.reshape(*dims.values(), *values.shape[1:]), dict(array.attrs))
         coordinates = {
             name: (name, values, {"units": units[name]}) for name, values in grids.items() if np.ndim(values) == 1
         }
@@ -165,14 +160,13 @@ class StudyStore:
         """Keep others from writing. Raises StudyStoreError where somebody does."""
         handle = os.open(self.path, os.O_RDONLY)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            yield
-        except OSError as error:
-            if error.errno in (errno.EAGAIN, errno.EACCES):
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
                 raise StudyStoreError(
                     f"{self.path}: another run is writing to this store; wait for it, or name another place"
                 ) from None
-            raise
+            yield
         finally:
             os.close(handle)
 
@@ -194,6 +188,13 @@ class StudyStore:
             part = self._part(number) if array.shape[0] == self.cases else number
             rows[part] = array[part]
         return rows
+
+    def _unfinished_chunks(self) -> Integers:
+        """Return `missing_chunks`. Raises StudyStoreError where some of them are damaged."""
+        missing = self.missing_chunks()
+        if len(damaged := self._with_seal(missing)):
+            raise _damaged(self.path, self.chunk_texts(damaged))
+        return missing
 
     def _with_seal(self, numbers: Integers) -> Integers:
         return np.array([number for number in numbers.tolist() if self._file("seal", number).exists()], dtype=np.int64)
@@ -227,7 +228,7 @@ class StudyStore:
 
     @cached_property
     def _arrays(self) -> dict[str, Any]:
-        return dict(_imported("zarr", _NEEDS_ZARR).open_group(self.path, mode="r+", zarr_format=3).arrays())
+        return dict(_zarr().open_group(self.path, mode="r+", zarr_format=3).arrays())
 
 
 def open_study(path: str | os.PathLike[str]) -> StudyStore:
@@ -366,7 +367,7 @@ def _make(place: Path, study: CaseTable) -> None:
     for output in study.resolved_outputs:
         about = {"units": output.unit, "role": "result", "about": output.about}
         arrays.append((output.name, "case", _dimensions(output.name, output.shape), about))
-    zarr = _imported("zarr", _NEEDS_ZARR)
+    zarr = _zarr()
     group = zarr.create_group(place, zarr_format=3, attributes=attributes)
     for name, by, dimensions, about in arrays:
         rows, chunk = (study.cases, min(study.chunk, study.cases)) if by == "case" else (study.chunks, 1)
@@ -451,12 +452,13 @@ def _damaged(path: Path, what: str) -> StudyStoreError:
     return StudyStoreError(f"{path}: the store is damaged: {what}; compute it again with resume=True (--resume)")
 
 
-def _imported(name: str, sentence: str) -> Any:
+def _zarr() -> Any:
     try:
         with quiet():
-            return importlib.import_module(name)
+            import zarr
     except ImportError:
-        raise MissingExtraError(f"{sentence}; install it with: pip install 'shapephase[study]'") from None
+        raise MissingExtraError("a study needs Zarr; install it with: pip install 'shapephase[study]'") from None
+    return zarr
 
 
 def _text(row: Any) -> str:

@@ -126,9 +126,9 @@ def _axis(name: str, entry: Any, folder: Path) -> Any:
     needed = [parameter.name for parameter in fields(kind) if parameter.default is MISSING]  # type: ignore[arg-type]
     parameters = [parameter.name for parameter in fields(kind)]  # type: ignore[arg-type]
     _table(table, where, ("distribution", "unit", *parameters), needed=needed)
-    numbers = {one: _numbers(table, where, one) for one in parameters if one in table}
-    has_unit = {one: not (kind is LogNormal and one == "deviation") for one in numbers}
-    return kind(**{one: (factor * value if has_unit[one] else value).tolist() for one, value in numbers.items()})
+    numbers = {name: _numbers(table, where, name) for name in parameters if name in table}
+    in_unit = {name for name in numbers if kind is not LogNormal or name != "deviation"}
+    return kind(**{name: (factor * value if name in in_unit else value).tolist() for name, value in numbers.items()})
 
 
 def _factor(name: str, unit: Any) -> float:
