@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,68 +15,47 @@ from ..errors import StudyError, unknown_name
 from ..letters import what_came
 from .distributions import Distribution, Normal, drawn_values
 
-
-class Quantity(NamedTuple):
-    """A number that may be varied: its unit, and its shape, in which -1 stands for the moving parts of the body."""
-
-    unit: str
-    shape: tuple[int, ...] = ()
-
-
 COMPONENTS = ("momentum_x", "momentum_y", "momentum_z")
 OF_PARTS = ("masses", "centres", "inertias")
 LABELS = ("body", "motion", "gauge")  # axes of names
-QUANTITIES = {
-    "momentum": Quantity("kg m^2/s", (3,)),
-    **dict.fromkeys(COMPONENTS, Quantity("kg m^2/s")),
-    "tolerance": Quantity("rad"),
-    "joint_noise": Quantity("rad or m"),
-    "masses": Quantity("", (-1,)),
-    "centres": Quantity("radii of gyration", (-1, 3)),
-    "inertias": Quantity("", (-1,)),
-    "attitude": Quantity("", (4,)),
+# Units and shapes of numbers that are varied; -1 stands for the moving parts of the body.
+QUANTITIES: dict[str, tuple[str, tuple[int, ...]]] = {
+    "momentum": ("kg m^2/s", (3,)),
+    **dict.fromkeys(COMPONENTS, ("kg m^2/s", ())),
+    "tolerance": ("rad", ()),
+    "joint_noise": ("rad or m", ()),
+    "masses": ("", (-1,)),
+    "centres": ("radii of gyration", (-1, 3)),
+    "inertias": ("", (-1,)),
+    "attitude": ("", (4,)),
 }
 LONGEST_NAME = 200  # characters: folders of the store have the names of axes and outputs
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
-    """A quantity or a label that is varied.
-
-    Attributes
-    ----------
-    name : of the quantity or label
-    shape : of one value
-    grid : (n,) + shape values of a grid, or labels; None where it is drawn
-    distribution : what it is drawn from, or None
-    """
+class Axis(NamedTuple):
+    """A quantity that is varied, over a grid (n,) + shape or from a distribution; or a list of labels."""
 
     name: str
-    shape: tuple[int, ...]
-    grid: Array | tuple[Any, ...] | None
+    shape: tuple[int, ...] = ()
+    grid: Array | None = None
     distribution: Distribution | None = None
+    labels: tuple[Any, ...] = ()
 
     @property
-    def unit(self) -> str:
-        """Unit of its values."""
-        return unit_of(self.name)
-
-    @property
-    def labels(self) -> tuple[Any, ...]:
-        """Labels of the grid; empty where it has numbers."""
-        return self.grid if isinstance(self.grid, tuple) else ()
+    def size(self) -> int | None:
+        """Number of values of the grid or list; None for a distribution."""
+        return len(self.labels) or (None if self.grid is None else len(self.grid))
 
     def values(self, seed: int, cases: Integers, places: Integers) -> Array:
         """Return (N,) + shape values in cases at these places of the grid; the places themselves for labels."""
         if self.distribution is not None:
             return drawn_values(seed, self.name, cases, self.distribution, self.shape)
-        return places.astype(float) if self.grid is None or self.labels else np.asarray(self.grid)[places]
+        return places.astype(float) if self.grid is None else self.grid[places]
 
 
 def unit_of(name: str) -> str:
     """Return the unit of an axis, which is not known of a parameter."""
-    quantity = QUANTITIES.get(name.partition(".")[0])
-    return quantity.unit if quantity else ""
+    return QUANTITIES.get(name.partition(".")[0], ("", ()))[0]
 
 
 def check_name(name: object, entry: str) -> None:
@@ -107,14 +85,14 @@ def checked_axis(name: str, given: Any, parts: int, parameters: Sequence[str]) -
     if name in LABELS:
         for label in given if name == "gauge" else ():
             gauge_link(label)
-        return Axis(name, (), tuple(given))
-    shape = QUANTITIES.get(lead if lead in OF_PARTS else name, Quantity("")).shape
+        return Axis(name, labels=tuple(given))
+    _, shape = QUANTITIES.get(lead if lead in OF_PARTS else name, ("", ()))
     shape = shape[1:] if link and lead in OF_PARTS else tuple(parts if size < 0 else size for size in shape)
     if isinstance(given, Distribution):
         # A normal attitude is a turn of the start, a rotation vector.
         shape = (3,) if name == "attitude" and isinstance(given, Normal) else shape
         given.check(f"over.{name}", shape)
-        return Axis(name, shape, None, given)
+        return Axis(name, shape, distribution=given)
     try:
         size = len(given)
     except TypeError:

@@ -180,7 +180,7 @@ class CaseTable:
     @property
     def grid_shape(self) -> tuple[int, ...]:
         """Number of values of each grid, and last the draws."""
-        return (*(len(axis.grid) for axis in self.axes if axis.grid is not None), self.draws)
+        return (*(axis.size for axis in self.axes if axis.size is not None), self.draws)
 
     @property
     def cases(self) -> int:
@@ -273,7 +273,7 @@ class CaseTable:
         """Return what is varied, in some cases: (N,) + shape by the name of the axis; labels by their places."""
         grid_places = iter(np.unravel_index(indices, self.grid_shape))
         return {
-            axis.name: axis.values(self.seed, indices, indices if axis.grid is None else next(grid_places))
+            axis.name: axis.values(self.seed, indices, indices if axis.size is None else next(grid_places))
             for axis in self.axes
         }
 
@@ -305,7 +305,7 @@ class CaseTable:
         for _, _, link in varied:
             if link:
                 _sources.part_number(self._first_body, link)
-        return len(_sources.inertia_factors(self._first_body)[0]) if varied else 0
+        return len(self._first_body.moving_parts) if varied else 0
 
     @cached_property
     def _known_parameters(self) -> tuple[str, ...]:

@@ -30,7 +30,7 @@ from ..errors import MissingExtraError, OutputFileError, StudyStoreError
 from ..files import write_whole
 from ..provenance import provenance
 from ..warning_filters import quiet
-from ._axes import OF_PARTS
+from ._axes import OF_PARTS, unit_of
 from ._evaluate import DONE, LETTERS, STATUS, Results, letters
 from ._identity import computing_versions, processor_text, version_differences
 from .cases import CaseTable
@@ -339,7 +339,7 @@ def _make(place: Path, study: CaseTable) -> None:
     grids = {
         axis.name: [str(label) for label in axis.labels] or np.asarray(axis.grid).tolist()
         for axis in study.axes
-        if axis.grid is not None
+        if axis.size is not None
     }
     origin = provenance()
     attributes = {
@@ -351,7 +351,10 @@ def _make(place: Path, study: CaseTable) -> None:
         "versions": computing_versions(),
         **{name: origin[name] for name in ("command", "date")},
         "processor": processor_text(),
-        "units": {quantity.name: quantity.unit for quantity in (*study.axes, *study.resolved_outputs)},
+        "units": {
+            **{axis.name: unit_of(axis.name) for axis in study.axes},
+            **{output.name: output.unit for output in study.resolved_outputs},
+        },
     }
     text = {"about": "letters in UTF-8"}
     arrays: list[tuple[str, str, Mapping[str, int], Mapping[str, Any]]] = [
@@ -362,7 +365,7 @@ def _make(place: Path, study: CaseTable) -> None:
     ]
     for axis in study.axes:
         labels = {"labels": grids[axis.name]} if axis.labels else {}
-        about = {"units": axis.unit, "role": "varied", **labels}
+        about = {"units": unit_of(axis.name), "role": "varied", **labels}
         arrays.append((axis.name, "case", _dimensions(axis.name, axis.shape), about))
     for output in study.resolved_outputs:
         about = {"units": output.unit, "role": "result", "about": output.about}
