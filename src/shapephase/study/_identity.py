@@ -6,6 +6,7 @@ import contextlib
 import dis
 import hashlib
 import importlib
+import inspect
 import io
 import os
 import pickle
@@ -95,7 +96,7 @@ class _Inputs:
     def __init__(self, name: str) -> None:
         self._name = name
         self.digests: dict[str, str] = {}
-        self._labels: dict[int, str] = {}
+        self.labels: dict[int, str] = {}
         # Ids stay those of these objects as long as they live.
         self._labelled: list[Any] = []
 
@@ -127,33 +128,30 @@ class _Inputs:
         """Add the parts of a function of the user, and return its label."""
         label = self._label(function)
         code = function.__code__
-        names, defaults = code.co_varnames[: code.co_argcount], function.__defaults__ or ()
-        named = (
-            *zip(names[len(names) - len(defaults) :], defaults, strict=True),
-            *(function.__kwdefaults__ or {}).items(),
-        )
-        for name, value in named:
-            self.put(f"default {name} of {label}", value)
+        for parameter in inspect.signature(function, follow_wrapped=False).parameters.values():
+            if parameter.default is not parameter.empty:
+                self.put(f"default {parameter.name} of {label}", parameter.default)
         for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
             # A cell is empty until its name is bound.
             self.put(f"closure {name} of {label}", cell.cell_contents if cell != CellType() else None)
         self.module(function.__module__)
         used, imports = _names_of(code)
+        modules = []
         for name in used:
             if name in function.__globals__ and name != function.__name__:
-                value = function.__globals__[name]
-                self._global(name, value, function.__module__)
-                if isinstance(value, ModuleType) and not _is_library(value.__name__):
-                    self._attributes(value, used)
+                self._global(name, function.__globals__[name], function.__module__)
+                modules.append(function.__globals__[name])
         for name, level in imports:
-            try:
-                module = importlib.import_module("." * level + name, function.__globals__.get("__package__"))
-            except Exception:
-                # Whether it can be imported is the cases' affair.
-                continue
-            if not _is_library(module.__name__):
+            # Whether it can be imported is the cases' affair.
+            with contextlib.suppress(Exception):
+                modules.append(importlib.import_module("." * level + name, function.__globals__.get("__package__")))
+        for module in modules:
+            if isinstance(module, ModuleType) and not _is_library(module.__name__):
                 self.module(module.__name__)
-                self._attributes(module, used)
+                for name in used:
+                    if name in vars(module):
+                        # Its value may have been set since the import.
+                        self._global(name, vars(module)[name], module.__name__)
         self.put(f"code of {label}", code)
         return label
 
@@ -185,23 +183,13 @@ class _Inputs:
                     value.__name__ if isinstance(value, ModuleType) else getattr(value, "__module__", None) or ""
                 )
 
-    def known(self, value: Any) -> str | None:
-        """Return the label of a function or class that has been added."""
-        return self._labels.get(id(value))
-
     def _label(self, value: Any) -> str:
         label = _label(value)
-        while label in self._labels.values():
+        while label in self.labels.values():
             label += "'"
-        self._labels[id(value)] = label
+        self.labels[id(value)] = label
         self._labelled.append(value)
         return label
-
-    def _attributes(self, module: ModuleType, used: list[str]) -> None:
-        """Add what a function may read of a module of the user, with values that were set since its import."""
-        for name in used:
-            if name in vars(module):
-                self._global(name, vars(module)[name], module.__name__)
 
     def _global(self, name: str, value: Any, module: str) -> None:
         """Add a global of a module; what fills up while functions run, such as a cache, counts as the module's text."""
@@ -223,8 +211,8 @@ class _Pickler(pickle.Pickler):
         """Return what stands for an object in the bytes; None for others than those above."""
         self.last = value
         if isinstance(value, FunctionType | type):
-            if label := self._inputs.known(value):
-                return label
+            if id(value) in self._inputs.labels:
+                return self._inputs.labels[id(value)]
             if _is_library(value.__module__):
                 return (_label(value), _version(value.__module__))
             return self._inputs.kind(value) if isinstance(value, type) else self._inputs.function(value)

@@ -79,7 +79,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
 def _study(entries: dict[str, Any], folder: Path) -> Study:
     _refuse_booleans({name: entry for name, entry in entries.items() if name != "xacro_args"}, "")
     arguments = [field.name for field in fields(Study)]
-    given = dict(_table(entries, "the study", (*arguments, "rigid", "functions")))
+    given = dict(_table(entries, "", (*arguments, "rigid", "functions")))
     over = _table(given.pop("over", {}), "over")
     functions = _table(given.pop("functions", {}), "functions")
     if ("body" in given or "body" in over) == ("rigid" in given):
@@ -171,7 +171,7 @@ def _table(
     allowed = (*(known or ()), *needed)
     for name in entry if allowed else ():
         if name not in allowed:
-            raise unknown_name(f"entry of {where}", name, allowed)
+            raise unknown_name(f"entry of {where}" if where else "entry", name, allowed)
     for name in needed:
         if name not in entry:
             raise StudyError(f"{where}: {name} is missing")
