@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import signal
+import subprocess
 import sys
 
 import numpy as np
@@ -19,6 +21,8 @@ from shapephase.cli.main import main
 from shapephase.errors import StudyError, UnknownNameError
 from shapephase.study import dask_client
 from shapephase.study._workers import recipe_of
+from support.mortal_process import started
+from support.places import ROOT
 from support.study_functions import POISON, orphaning
 
 RIGID = room.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0)
@@ -183,3 +187,25 @@ def test_a_worker_whose_functions_are_others_is_refused(tmp_path, monkeypatch):
     (tmp_path / "study_late").with_suffix(".py").write_text("def value(motion):\n    return 2.0\n")
     with pytest.raises(StudyError, match="study_late"):
         study.run(tmp_path / "out.zarr", workers=1)
+
+
+SLEEPING = """
+import time, numpy as np, shapephase as sp
+def value(motion):
+    print("begun", flush=True)
+    time.sleep(600.0)
+study = sp.study.Study(sp.study.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0), outputs=(sp.study.Output("value", value),))
+study.run("out.zarr", workers=0)
+"""
+
+
+@pytest.mark.full
+def test_ctrl_c_does_not_wait_for_a_case_that_sleeps(tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    process = started(
+        [sys.executable, "-c", SLEEPING], tmp_path, environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout.readline() == b"begun\n"
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert errors.strip().endswith(b"KeyboardInterrupt")

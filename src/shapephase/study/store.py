@@ -316,13 +316,9 @@ def store_to_resume(path: str | os.PathLike[str], study: CaseTable) -> StudyStor
 def _check_same(store: StudyStore, study: CaseTable) -> None:
     """Raise StudyStoreError for a store that another study began, or this one with other versions."""
     if store.attributes["study_hash"] != study.hash:
-        mine, theirs = study.description, store.attributes["study"]
-        changed = [
-            name
-            for ours, other in ((mine, theirs), (mine["inputs"], theirs["inputs"]))
-            for name in dict.fromkeys((*ours, *other))
-            if name != "inputs" and json.dumps(ours.get(name)) != json.dumps(other.get(name))
-        ]
+        described = study.description, store.attributes["study"]
+        mine, theirs = ({**whole, **whole["inputs"], "inputs": None} for whole in described)
+        changed = [name for name in dict.fromkeys((*mine, *theirs)) if mine.get(name) != theirs.get(name)]
         raise StudyStoreError(
             f"{store.path}: this is the store of another study, of seed {store.attributes['seed']} and "
             f"{store.cases} cases; different: {', '.join(changed)}"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from contextvars import copy_context
 from typing import Any
@@ -24,6 +25,7 @@ from .cases import CaseTable
 from .dask_client import chunks_on_cluster
 from .store import StudyStore, new_store, store_to_resume
 
+_GRACE = 1.0  # s that a batch has to end after Ctrl-C; most take less
 _MINUTES, _HOURS = 120.0, 7200.0  # s from which on remaining time is given in these
 
 
@@ -154,20 +156,36 @@ def _chunks_here(study: Study, missing: Integers, workers: int | None) -> Iterat
     """Yield chunks in the order in which threads or processes of this machine have done them."""
     count = 1 if workers == 0 else min(workers or _processors(), len(missing))
     pool = Evaluator(study, study.inputs) if workers == 0 else WorkerPool(study, recipe_of(study))
-    # Cases in this process have a thread too: Ctrl-C interrupts the main one, whatever code of the user does with it.
     executor = ThreadPoolExecutor(count)
+    # Cases in this process have a thread too: Ctrl-C interrupts the main one, whatever code of the user does with it.
+    submit = _daemon_call if workers == 0 else executor.submit
+    under_way: dict[int, Any] = {}
     try:
         yield from completed(
             missing.tolist(),
-            lambda number: executor.submit(copy_context().run, pool.chunk, number),
+            lambda number: submit(copy_context().run, pool.chunk, number),
             lambda number, future: (number, future.result(), processor_text()),
-            {},
+            under_way,
             ahead=lambda: 2 * count if workers != 0 else 1,
         )
     finally:
         executor.shutdown(wait=False, cancel_futures=True)
         pool.close()
-        executor.shutdown()
+        wait(under_way.values(), timeout=_GRACE)
+
+
+def _daemon_call(call: Callable[..., Any], *arguments: Any) -> Future[Any]:
+    """Return the future of a call in a thread that does not keep this process from ending."""
+    future: Future[Any] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(call(*arguments))
+        except BaseException as error:
+            future.set_exception(error)
+
+    threading.Thread(target=run, daemon=True).start()
+    return future
 
 
 def _processors() -> int:
