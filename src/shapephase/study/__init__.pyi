@@ -1,5 +1,5 @@
 from ._evaluate import STATUS
-from ._sources import RigidBody
+from ._recipes import RigidBody
 from .cases import Case
 from .dask_client import connected
 from .distributions import Choice, Directions, LogNormal, Normal, Rotations, Uniform

@@ -42,7 +42,7 @@ class Axis(NamedTuple):
     labels: tuple[Any, ...] = ()
 
     @property
-    def size(self) -> int | None:
+    def grid_length(self) -> int | None:
         """Number of values of the grid or list; None for a distribution."""
         return len(self.labels) or (None if self.grid is None else len(self.grid))
 
@@ -87,24 +87,24 @@ def checked_axis(name: str, given: Any, parts: int, parameters: Sequence[str]) -
             gauge_link(label)
         return Axis(name, labels=tuple(given))
     _, shape = QUANTITIES.get(lead if lead in OF_PARTS else name, ("", ()))
-    shape = shape[1:] if link and lead in OF_PARTS else tuple(parts if size < 0 else size for size in shape)
+    shape = shape[1:] if link and lead in OF_PARTS else tuple(parts if length < 0 else length for length in shape)
     if isinstance(given, Distribution):
         # A normal attitude is a turn of the start, a rotation vector.
         shape = (3,) if name == "attitude" and isinstance(given, Normal) else shape
         given.check(f"over.{name}", shape)
         return Axis(name, shape, distribution=given)
     try:
-        size = len(given)
+        count = len(given)
     except TypeError:
         raise StudyError(f"over.{name}: a grid of values or a distribution is needed, got {what_came(given)}") from None
-    if not size:
+    if not count:
         raise StudyError(f"over.{name}: a grid needs one value or more")
     values = finite_array(given, f"over.{name}")
     if values.shape[1:] != shape and (values.ndim > 1 or lead not in OF_PARTS):
         came = str(values.shape[1:]) if values.ndim > 1 else "single numbers"
         raise StudyError(f"over.{name}: values of shape {shape} are needed, got {came}")
     if values.shape[1:] != shape:
-        values = np.broadcast_to(values.reshape(-1, *(1,) * len(shape)), (size, *shape)).copy()
+        values = np.broadcast_to(values.reshape(-1, *(1,) * len(shape)), (count, *shape)).copy()
     if name == "attitude":
         so3.quat_argument(values, "over.attitude")
     for tolerance in values.tolist() if name == "tolerance" else ():

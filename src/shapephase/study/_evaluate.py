@@ -29,7 +29,7 @@ from ..shape_space.many_paths import final_attitudes
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
-from ._sources import RigidBody, described, inertia_factors, loaded_body_inputs, made_path
+from ._recipes import RigidBody, described, inertia_factors, loaded_body_inputs, made_path
 from .cases import Case, CaseTable
 from .distributions import generators
 from .outputs import ends_of

@@ -23,7 +23,7 @@ from ..deformation.frames import gauge_link
 from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError, WrongObjectError
 from ..letters import what_came
-from . import _sources
+from . import _recipes
 from ._axes import (
     COMPONENTS,
     LABELS,
@@ -36,7 +36,7 @@ from ._axes import (
     start_attitudes,
 )
 from ._identity import function_digests
-from ._sources import BodySource, MotionSource, RigidBody, described
+from ._recipes import BodySource, MotionSource, RigidBody, described
 from .distributions import Distribution
 from .outputs import Output, outputs_argument
 
@@ -156,7 +156,7 @@ class CaseTable:
                 check_labels(name, self.over[name])
         for kind, sources in (("body", self._bodies), ("motion", self._motions)):
             for source in sources:
-                _sources.check_source(kind, source)
+                _recipes.check_source(kind, source)
         self._check_motions()
         for name in self.over:
             if isinstance(self.body, RigidBody) and name.partition(".")[0] in _NOT_OF_RIGID:
@@ -180,7 +180,7 @@ class CaseTable:
     @property
     def grid_shape(self) -> tuple[int, ...]:
         """Number of values of each grid, and last the draws."""
-        return (*(axis.size for axis in self.axes if axis.size is not None), self.draws)
+        return (*(axis.grid_length for axis in self.axes if axis.grid_length is not None), self.draws)
 
     @property
     def cases(self) -> int:
@@ -201,10 +201,10 @@ class CaseTable:
         """SHA-256 by name of all that its values depend on beside its numbers: bodies, motions, functions."""
         digests = {}
         for source in self._bodies:
-            digests |= _sources.body_inputs(source, self.loading)
+            digests |= _recipes.body_inputs(source, self.loading)
         parameters = dict(self.some_cases(np.array([0]))[0].parameters) if self._motions else {}
         for source in self._motions:
-            digests |= _sources.motion_inputs(source, parameters)
+            digests |= _recipes.motion_inputs(source, parameters)
         return digests | self.function_inputs
 
     @cached_property
@@ -212,8 +212,8 @@ class CaseTable:
         """SHA-256 of the functions of the user and all that they refer to; empty where a version is given."""
         functions = {f"output {output.name}": output.function for output in self.outputs if isinstance(output, Output)}
         for source in self._motions:
-            if not _sources.is_file(source):
-                functions[f"motion {described(source)}"] = _sources.motion_function(source)
+            if not _recipes.is_file(source):
+                functions[f"motion {described(source)}"] = _recipes.motion_function(source)
         digests = {}
         for name, function in functions.items() if self.version is None else ():
             digests |= function_digests(name, function)
@@ -273,7 +273,7 @@ class CaseTable:
         """Return what is varied, in some cases: (N,) + shape by the name of the axis; labels by their places."""
         grid_places = iter(np.unravel_index(indices, self.grid_shape))
         return {
-            axis.name: axis.values(self.seed, indices, indices if axis.size is None else next(grid_places))
+            axis.name: axis.values(self.seed, indices, indices if axis.grid_length is None else next(grid_places))
             for axis in self.axes
         }
 
@@ -304,12 +304,12 @@ class CaseTable:
         varied = [name.partition(".") for name in self.over if name.partition(".")[0] in OF_PARTS]
         for _, _, link in varied:
             if link:
-                _sources.part_number(self._first_body, link)
+                _recipes.part_number(self._first_body, link)
         return len(self._first_body.moving_parts) if varied else 0
 
     @cached_property
     def _known_parameters(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(name for source in self._motions for name in _sources.parameters_of(source)))
+        return tuple(dict.fromkeys(name for source in self._motions for name in _recipes.parameters_of(source)))
 
     def _check_motions(self) -> None:
         if isinstance(self.body, RigidBody) != (self.motion is None):
@@ -317,7 +317,7 @@ class CaseTable:
         if self.motion is None and self.parameters:
             raise StudyError(f"parameters.{next(iter(self.parameters))}: a rigid body has no motion to give it to")
         for source in self._motions:
-            known = _sources.parameters_of(source)
+            known = _recipes.parameters_of(source)
             for name, is_needed in known.items():
                 if is_needed and name not in (*self.parameters, *self.over):
                     raise StudyError(f"motion {described(source)}: parameter {name} has no value; vary or give it")
@@ -332,7 +332,7 @@ class CaseTable:
         for axis in self.axes:
             lead, _, link = axis.name.partition(".")
             if lead == name and link:
-                numbers[:, _sources.part_number(self._first_body, link)] = values[axis.name]
+                numbers[:, _recipes.part_number(self._first_body, link)] = values[axis.name]
         return numbers
 
 

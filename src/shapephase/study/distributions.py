@@ -45,7 +45,7 @@ class Distribution:
 
     def _fits(self, given: tuple[int, ...], shape: tuple[int, ...]) -> bool:
         matching = zip(reversed(given), reversed(shape), strict=False)
-        return len(given) <= len(shape) and all(size in (1, wanted) for size, wanted in matching)
+        return len(given) <= len(shape) and all(length in (1, expected) for length, expected in matching)
 
 
 @dataclass(frozen=True, repr=False)

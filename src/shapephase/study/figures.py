@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _KINDS = ("histogram", "quantiles", "map")  # in the order of how many grids they need
-_FEWEST_BINS, _MOST_BINS = 10, 120  # 2 n^(1/3) bins (Rice), but no more than a column shows
+_FEWEST_BINS = 10  # 2 n^(1/3) (Rice) where that is more
+_MOST_BINS = 120  # no more than a column shows
 _BANDS = ((0.05, 0.95, 0.35, "9 of 10 cases"), (0.25, 0.75, 0.8, "half of them"))  # quantiles, opacity, label
 _TICKS = 6  # numbers of five letters that have room along a column
 

@@ -58,7 +58,9 @@ class Output:
         check_function(self.function, "function", "a function of a Motion")
         for name in ("name", "unit", "about"):
             check_text(getattr(self, name), name, "a text")
-        if not isinstance(self.shape, tuple) or not all(isinstance(size, int) and size > 0 for size in self.shape):
+        if not isinstance(self.shape, tuple) or not all(
+            isinstance(length, int) and length > 0 for length in self.shape
+        ):
             raise StudyError(f"shape: a tuple of whole numbers above 0 is needed, got {what_came(self.shape)}")
 
     def of(self, motion: Motion, parts: PhaseSplit | None) -> Array:

@@ -35,7 +35,8 @@ from ._evaluate import DONE, LETTERS, STATUS, Results, letters
 from ._identity import computing_versions, processor_text, version_differences
 from .cases import CaseTable
 
-_FORMAT, _FORMAT_WITHOUT_SEALS = "shapephase study 2", "shapephase study 1"
+_FORMAT = "shapephase study 2"  # with seals
+_FORMAT_WITHOUT_SEALS = "shapephase study 1"  # of earlier versions
 _OF_EVERY_STUDY = ("status", *LETTERS, "processor")
 _PROCESSOR_LENGTH = 96  # bytes
 
@@ -335,7 +336,7 @@ def _make(place: Path, study: CaseTable) -> None:
     grids = {
         axis.name: [str(label) for label in axis.labels] or np.asarray(axis.grid).tolist()
         for axis in study.axes
-        if axis.size is not None
+        if axis.grid_length is not None
     }
     origin = provenance()
     attributes = {

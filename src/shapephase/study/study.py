@@ -26,7 +26,8 @@ from .dask_client import chunks_on_cluster
 from .store import StudyStore, new_store, store_to_resume
 
 _GRACE = 1.0  # s that a batch has to end after Ctrl-C; most take less
-_MINUTES, _HOURS = 120.0, 7200.0  # s from which on remaining time is given in these
+_MINUTES = 120.0  # s: remaining time from which on it is given in minutes
+_HOURS = 7200.0  # s: remaining time from which on it is given in hours
 
 
 class Study(CaseTable):

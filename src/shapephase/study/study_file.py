@@ -15,7 +15,7 @@ from ..arguments import check_file_name
 from ..arrays import Array, finite_array
 from ..errors import InputFileNotFoundError, ShapePhaseError, StudyError, unknown_name
 from ._axes import LABELS, QUANTITIES, check_name, unit_of
-from ._sources import RigidBody, imported
+from ._recipes import RigidBody, imported
 from .distributions import DISTRIBUTIONS, LogNormal
 from .outputs import Output
 from .study import Study
@@ -148,7 +148,7 @@ def _function(name: str, entry: Any) -> Output:
     where = f"functions.{name}"
     table = _table(entry, where, ("shape", "unit", "about"), needed=("call",))
     shape = table.get("shape", [])
-    if not isinstance(shape, list) or not all(isinstance(size, int) and 1 <= size <= 1000 for size in shape):
+    if not isinstance(shape, list) or not all(isinstance(length, int) and 1 <= length <= 1000 for length in shape):
         raise StudyError(f"{where}.shape: a list of whole numbers from 1 to 1000 is needed, got {shape!r}")
     call = imported(str(table["call"]), f"{where}.call")
     return Output(name, call, tuple(shape), str(table.get("unit", "")), str(table.get("about", "")))
