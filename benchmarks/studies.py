@@ -152,7 +152,7 @@ def _rates(name: str) -> tuple[float, float]:
     pair = [subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     stored: list[float] = []
 
-    def note(_: sp.study.StudyProgress) -> None:
+    def note(*_: object) -> None:
         if not stored:
             for process in pair:
                 process.stdin.write("go\n")  # type: ignore[union-attr]

@@ -15,7 +15,7 @@ from distributed import Client, LocalCluster
 import shapephase as sp
 from shapephase import study as room
 from shapephase.cli.exit_codes import ExitCode
-from shapephase.study._cluster import _AHEAD, _LEAST_AHEAD, _PATIENCE
+from shapephase.study.dask_client import FEWEST_TASKS, PATIENCE, TASKS_PER_THREAD
 from support import counted_chunks
 from support.dask_cluster import Cluster, wait_for_lines
 from support.mortal_process import started
@@ -23,7 +23,7 @@ from support.places import ROOT
 from support.study_functions import POISON, bend, logged, poisoned
 
 # Chunks that are out at a time, of two workers of one thread each: of a death no more are computed again.
-IN_FLIGHT = max(_LEAST_AHEAD, 2 * _AHEAD)
+IN_FLIGHT = max(FEWEST_TASKS, 2 * TASKS_PER_THREAD)
 
 
 @pytest.mark.full
@@ -78,7 +78,7 @@ def test_two_thousand_cases_survive_the_death_of_worker_scheduler_and_driver(tmp
     print(f"computed again: {again} cases")
     assert again <= 3 * IN_FLIGHT * 50
     # The driver's patience, once while it waits and once while it asks: within a minute.
-    assert 2.0 * _PATIENCE < 60.0
+    assert 2.0 * PATIENCE < 60.0
     attitudes, estimates = plain_loop(
         sp.load_body("cat_two_halves"), bend(0.5), range(2000), 0, ([0.0, 0.0, 0.01], 0.004)
     )

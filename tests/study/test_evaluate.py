@@ -90,9 +90,9 @@ def test_a_study_is_a_plain_loop_to_the_last_bit(name, outputs):
     more = {"momentum": [0.0, 0.0, 0.01], **more}
     study = room.Study(body, motion, over, outputs, draws=6 // max(1, 2 * (name in ("paths", "centres"))), **more)
     found, expected = Evaluator(study).together(np.arange(study.cases)), plain_loop(study)
-    assert np.all(found.status == DONE), found.error_text
+    assert np.all(found["status"] == DONE), found["error_text"]
     for output in outputs:
-        np.testing.assert_array_equal(found.values[output], expected[output], err_msg=output)
+        np.testing.assert_array_equal(found[output], expected[output], err_msg=output)
 
 
 @pytest.mark.parametrize("name", ["momenta", "inertias", "paths", "own paths"])
@@ -104,8 +104,8 @@ def test_cases_do_not_depend_on_those_beside_them_nor_on_their_order(name):
     for rows in (every[::-1], every[:1], every[3:8], np.array([7, 2, 11])):
         found = Evaluator(study).together(rows)
         for output in ENDS:
-            np.testing.assert_array_equal(found.values[output], whole.values[output][rows])
-    np.testing.assert_array_equal(evaluator.alone(5).values["turn"], whole.values["turn"][5:6])
+            np.testing.assert_array_equal(found[output], whole[output][rows])
+    np.testing.assert_array_equal(evaluator.alone(5)["turn"], whole["turn"][5:6])
 
 
 @pytest.mark.full
@@ -116,20 +116,20 @@ def test_cases_have_the_bits_of_a_plain_loop(name):
     study = room.Study(body, motion, over, ENDS, draws=draws, momentum=[0.0, 0.0, 0.01], **more)
     found, expected = Evaluator(study).together(np.arange(60)), plain_loop(study)
     for output in ENDS:
-        np.testing.assert_array_equal(found.values[output], expected[output], err_msg=output)
+        np.testing.assert_array_equal(found[output], expected[output], err_msg=output)
     for rows in (np.arange(60)[::-1], np.arange(7, 31)):
         again = Evaluator(study).together(rows)
-        np.testing.assert_array_equal(again.values["final_attitude"], found.values["final_attitude"][rows])
+        np.testing.assert_array_equal(again["final_attitude"], found["final_attitude"][rows])
 
 
 def test_a_list_of_bodies_whose_joints_do_not_fit_is_data():
     body, motion, over, more = STUDIES["bodies"]
     found = Evaluator(room.Study(body, motion, over, ENDS, **more)).together(np.arange(2))
-    assert found.status.tolist() == [room.STATUS["done"], room.STATUS["raised"]]
-    assert bytes(found.error_name[1]).rstrip(b"\0") == b"UnknownNameError"
-    assert b"unknown joint" in bytes(found.error_text[1])
-    assert np.isfinite(found.values["turn"][0])
-    assert np.isnan(found.values["final_attitude"][1]).all()
+    assert found["status"].tolist() == [room.STATUS["done"], room.STATUS["raised"]]
+    assert bytes(found["error_name"][1]).rstrip(b"\0") == b"UnknownNameError"
+    assert b"unknown joint" in bytes(found["error_text"][1])
+    assert np.isfinite(found["turn"][0])
+    assert np.isnan(found["final_attitude"][1]).all()
 
 
 def test_a_function_of_the_motion_is_an_output():
@@ -139,11 +139,11 @@ def test_a_function_of_the_motion_is_an_output():
     found = Evaluator(study).together(np.arange(3))
     deformation = sp.articulated(sp.load_body("cat_two_halves"), bend(0.5))
     expected = [peak_rate(sp.reconstruct(deformation, study.case(index).momentum)) for index in range(3)]
-    np.testing.assert_array_equal(found.values["peak"], expected)
+    np.testing.assert_array_equal(found["peak"], expected)
     wrong = room.Study(
         "cat_two_halves", bend, over, (room.Output("peak", peak_rate, shape=(2,)),), parameters={"depth": 0.5}
     )
-    assert Evaluator(wrong).alone(0).status[0] == room.STATUS["raised"]
+    assert Evaluator(wrong).alone(0)["status"][0] == room.STATUS["raised"]
 
 
 def test_a_rigid_body_is_that_of_rigid():
@@ -153,7 +153,7 @@ def test_a_rigid_body_is_that_of_rigid():
     deformation = sp.rigid(inertia, 3.0)
     for index in range(20):
         one = sp.reconstruct(deformation, study.case(index).momentum)
-        np.testing.assert_array_equal(found.values["final_attitude"][index], one.final_attitude)
+        np.testing.assert_array_equal(found["final_attitude"][index], one.final_attitude)
 
 
 def test_noise_of_the_joints_moves_the_samples_of_a_recording(tmp_path):
@@ -163,7 +163,7 @@ def test_noise_of_the_joints_moves_the_samples_of_a_recording(tmp_path):
     study = room.Study(
         "cat_two_halves", tmp_path / "bend.csv", {"joint_noise": [1e-4]}, ENDS, draws=100, tolerance=1e-6, seed=1
     )
-    found = Evaluator(study).together(np.arange(100)).values["final_attitude"]
+    found = Evaluator(study).together(np.arange(100))["final_attitude"]
     path = sp.read_shape_path(tmp_path / "bend.csv", body)
     motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3))
     expected = np.sqrt(np.diag(sp.uncertainty(motion, joints=1e-4).final_attitude))

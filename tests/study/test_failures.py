@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 import signal
+import subprocess
 import sys
 
 import numpy as np
@@ -17,7 +19,10 @@ from shapephase import study as room
 from shapephase.cli.exit_codes import ExitCode
 from shapephase.cli.main import main
 from shapephase.errors import StudyError, UnknownNameError
-from shapephase.study import _cluster, run
+from shapephase.study import dask_client
+from shapephase.study._workers import recipe_of
+from support.mortal_process import started
+from support.places import ROOT
 from support.study_functions import POISON, orphaning
 
 RIGID = room.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0)
@@ -165,10 +170,10 @@ def test_a_worker_of_another_version_is_refused_at_the_start(tmp_path, client, m
 def test_a_worker_of_another_version_that_joins_later_is_refused(client):
     """What a worker of this version does with a study of another."""
     study = room.Study(RIGID)
-    versions, content = pickle.loads(run.recipe_of(study))
+    versions, content = pickle.loads(recipe_of(study))
     theirs = pickle.dumps(({**versions, "pin": "1.0", "shapephase": "0.0.1"}, content))
     with pytest.raises(StudyError, match=r"shapephase 0\.0\.1 in the study and .* pin 1\.0 in the study and "):
-        client.submit(_cluster.compute_chunk, theirs, 0).result(timeout=60)
+        client.submit(dask_client.compute_chunk, theirs, 0).result(timeout=60)
 
 
 def test_a_worker_whose_functions_are_others_is_refused(tmp_path, monkeypatch):
@@ -182,3 +187,25 @@ def test_a_worker_whose_functions_are_others_is_refused(tmp_path, monkeypatch):
     (tmp_path / "study_late").with_suffix(".py").write_text("def value(motion):\n    return 2.0\n")
     with pytest.raises(StudyError, match="study_late"):
         study.run(tmp_path / "out.zarr", workers=1)
+
+
+SLEEPING = """
+import time, numpy as np, shapephase as sp
+def value(motion):
+    print("begun", flush=True)
+    time.sleep(600.0)
+study = sp.study.Study(sp.study.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0), outputs=(sp.study.Output("value", value),))
+study.run("out.zarr", workers=0)
+"""
+
+
+@pytest.mark.full
+def test_ctrl_c_does_not_wait_for_a_case_that_sleeps(tmp_path):
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    process = started(
+        [sys.executable, "-c", SLEEPING], tmp_path, environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout.readline() == b"begun\n"
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert errors.strip().endswith(b"KeyboardInterrupt")

@@ -42,7 +42,7 @@ def stores(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stores")
     study().run(folder / "finished", workers=0)
     with pytest.raises(RunStopped):
-        study().run(folder / "half", workers=0, progress=lambda now: now.done >= 6)
+        study().run(folder / "half", workers=0, progress=lambda share, _: share >= 6 / 11)
     return folder
 
 

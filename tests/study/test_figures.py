@@ -28,9 +28,9 @@ def store(tmp_path_factory):
 
 def lose(store, cases):
     """Store NaN for cases, and seal their chunks anew."""
-    store._group["turn"][cases] = np.nan
-    for number, seal in enumerate(store._group["seal"][:]):
-        store._group["seal"][number] = np.frombuffer(store._seal(number), seal.dtype)
+    store._arrays["turn"][cases] = np.nan
+    for number, seal in enumerate(store._arrays["seal"][:]):
+        store._arrays["seal"][number] = np.frombuffer(store._seal(number), seal.dtype)
 
 
 @pytest.fixture

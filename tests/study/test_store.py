@@ -79,7 +79,7 @@ def test_a_run_computes_only_what_is_missing(tmp_path, monkeypatch):
         draws=11, chunk=3, parameters={"depth": 0.5},
     )  # fmt: skip
     with pytest.raises(RunStopped, match="6 of 11"):
-        study.run(tmp_path / "out.zarr", workers=0, progress=lambda now: now.done >= 6)
+        study.run(tmp_path / "out.zarr", workers=0, progress=lambda share, _: share >= 6 / 11)
     assert len(logged(log)) == 6
     store = study.run(tmp_path / "out.zarr", workers=0, resume=True)
     assert len(logged(log)) == len(set(logged(log))) == 11
@@ -133,7 +133,7 @@ def test_other_versions_are_refused(tmp_path, monkeypatch):
 def test_two_runs_do_not_write_to_one_store(tmp_path):
     study = rigid()
 
-    def second(_):
+    def second(*_):
         with pytest.raises(StudyStoreError, match="another run"):
             study.run(tmp_path / "out.zarr", workers=0, resume=True)
 
@@ -156,7 +156,7 @@ def test_a_disk_that_takes_no_more_is_an_error_and_leaves_a_store_that_goes_on(t
         "from pathlib import Path\n"
         "study = sp.study.Study(sp.study.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0),\n"
         "    over={'momentum': sp.study.Directions(1.0)}, draws=120, chunk=60)\n"
-        "def full(now):\n"
+        "def full(*_):\n"
         "    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
         "try:\n"

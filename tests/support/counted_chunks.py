@@ -12,7 +12,7 @@ import sys
 from typing import Any
 
 from shapephase.cli.main import main
-from shapephase.study import StudyStore, _cluster
+from shapephase.study import StudyStore, dask_client
 
 
 def _note(file: str, number: int) -> None:
@@ -22,13 +22,13 @@ def _note(file: str, number: int) -> None:
 
 def dask_setup(_: Any) -> None:
     """Count what this worker computes."""
-    compute = _cluster.compute_chunk
+    compute = dask_client.compute_chunk
 
     def counted(recipe: bytes, number: int) -> Any:
         _note("CHUNKS_BEGUN", number)
         return compute(recipe, number)
 
-    _cluster.compute_chunk = counted
+    dask_client.compute_chunk = counted
 
 
 def _count_what_is_stored() -> None:

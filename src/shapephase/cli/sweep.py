@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -19,16 +18,11 @@ from .progress import steps
 from .terminal import Verbosity, say, say_written
 
 if TYPE_CHECKING:
-    from ..study.progress import StudyProgress
     from ..study.store import StudyStore
 
 sweep_app = App(name="sweep", help_format="markdown")
-# [s] From there on remaining time is said in minutes, and in hours.
-_MINUTES = 120.0
-_HOURS = 7200.0
 _MOST = 20  # complaints shown
-# [in] Of a figure of a study.
-_HEIGHT = 2.8
+_HEIGHT = 2.8  # in, of a figure of a study
 
 
 @sweep_app.default
@@ -78,7 +72,7 @@ def sweep_command(
         The file, as of `shapephase.study.read_study`; for example `study.toml`.
     """
     from ..integrator.machine_code import expect_much
-    from ..study.connection import connected
+    from ..study.dask_client import connected
     from ..study.store import open_study
     from ..study.study_file import read_study
 
@@ -92,10 +86,9 @@ def sweep_command(
         with steps(1) as work, nullcontext() if scheduler is None else connected(scheduler) as client:
             work.begin(f"computing {read.cases} cases")
 
-            def watch(now: StudyProgress) -> None:
-                said = progress_line(now)
-                say(f"shapephase: {said}", Verbosity.VERBOSE)
-                work.watch(now.done / now.cases, said)
+            def watch(share: float, text: str) -> None:
+                say(f"shapephase: {text}", Verbosity.VERBOSE)
+                work.watch(share, text)
 
             filled = read.run(store, client, workers=workers, resume=resume, retry=retry, progress=watch)
     except KeyboardInterrupt:
@@ -192,20 +185,6 @@ def plot_study_command(
     write_whole(out, lambda stream: stream.write(image))
     say_written(out)
     return Outcome("", {"figure": str(out)})
-
-
-def progress_line(now: StudyProgress) -> str:
-    """For example "1200 of 20000 cases, 3 failed, 57.1/s, 5 min left"."""
-    failed = f", {now.failed} failed" if now.failed else ""
-    return f"{now.done} of {now.cases} cases{failed}, {now.rate:.3g}/s, {_time(now.remaining)} left"
-
-
-def _time(seconds: float) -> str:
-    if not math.isfinite(seconds):
-        return "unknown time"
-    if seconds < _MINUTES:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < _HOURS else f"{seconds / 3600.0:.1f} h"
 
 
 def _report(store: StudyStore) -> Outcome:

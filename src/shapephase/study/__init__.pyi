@@ -1,12 +1,12 @@
+from ._evaluate import STATUS
 from ._recipes import RigidBody
-from .case import Case
-from .connection import connected
+from .cases import Case
+from .dask_client import connected
 from .distributions import Choice, Directions, LogNormal, Normal, Rotations, Uniform
 from .export import export_study
 from .figures import plot_study
 from .outputs import OUTPUTS, Output
-from .progress import StudyProgress
-from .store import STATUS, StudyStore, open_study
+from .store import StudyStore, open_study
 from .study import Study
 from .study_file import read_study
 
@@ -22,7 +22,6 @@ __all__ = [
     "RigidBody",
     "Rotations",
     "Study",
-    "StudyProgress",
     "StudyStore",
     "Uniform",
     "connected",

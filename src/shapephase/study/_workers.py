@@ -1,7 +1,7 @@
-"""Processes that compute chunks of cases for whoever asks, and what is done when one hangs or dies.
+"""Processes that compute chunks of cases, and what is done when one of them hangs or dies.
 
 First a chunk is computed together. If the process dies or takes far too long, it is computed case by case in a new one:
-the case at which that one ends has a status, and the others their results, with the same bits.
+the case at which that one ends has a status, and the others their results, with equal bits.
 """
 
 from __future__ import annotations
@@ -9,193 +9,256 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import pickle
+import queue
 import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+import warnings
+from collections.abc import Callable, Iterable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any
 
 import numpy as np
 
+from ..child_process import start_python
 from ..errors import StudyError
-from ._evaluate import DIED, TIMED_OUT, Results
-from .study import Study
+from ._evaluate import Evaluator, Results, empty_results, fail
+from ._identity import computing_versions
+from .cases import CaseTable
 
-# [s] A process that has not begun by then will not.
-_BEGINNING = 300.0
-# [s] Between looks at whether a process is still there.
-_LOOK = 0.5
-# Processes in a row that end before they begin.
-_MOST_STARTS = 3
-# Of the time limit of a case: what each case of a chunk adds to the time of the chunk.
-_SHARE_OF_A_CASE = 0.1
-# One thread each: the processes share the processors, and sums have one order.
-_ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_STARTING = 300.0  # s: imports of a process on a busy machine take half a minute
+_INTERVAL = 0.5  # s between checks that the other process lives
+_STARTS = 3  # attempts before the processes count as unable to start
+_SHARE_OF_A_CASE = 0.1  # of the time limit, which each case of a chunk adds to that of the chunk
+
+ChunkResults = tuple[int, Results, str]
+"""Number of a chunk, its results, and the processor that computed it."""
 
 
-class _Over(Exception):
+def recipe_of(study: CaseTable) -> bytes:
+    """Return a study and its inputs as bytes, functions that have no module with their code. Raises StudyError."""
+    try:
+        import cloudpickle
+    except ImportError:
+        cloudpickle = pickle  # type: ignore[assignment]
+    try:
+        # Versions come first: with others the study may not even be readable.
+        return pickle.dumps((computing_versions(), cloudpickle.dumps((study, study.inputs))))
+    except Exception as error:
+        raise StudyError(f"the study cannot be sent to another process: {error}") from None
+
+
+def completed(
+    numbers: Iterable[int],
+    submit: Callable[[int], Any],
+    take: Callable[[int, Any], ChunkResults | None],
+    under_way: dict[int, Any],
+    *,
+    ahead: Callable[[], int],
+    watch: Callable[[], object] = bool,
+) -> Iterator[ChunkResults]:
+    """Yield chunks in the order in which they are done.
+
+    `submit` makes a future of a chunk, and `take` returns its results, or None: it is submitted again. `under_way` are
+    the futures that are not taken, at most `ahead`. `watch` is called every half second or more often.
+    """
+    done: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
+    left = iter(numbers)
+
+    def send(number: int) -> None:
+        under_way[number] = future = submit(number)
+        future.add_done_callback(lambda future: done.put((number, future)))
+
+    while True:
+        while len(under_way) < ahead() and (following := next(left, None)) is not None:
+            send(following)
+        if not under_way:
+            return
+        watch()
+        with contextlib.suppress(queue.Empty):
+            number, future = done.get(timeout=_INTERVAL)
+            if (results := take(number, future)) is None:
+                send(number)
+                continue
+            del under_way[number]
+            yield results
+
+
+class WorkerPool:
+    """Processes of one study, as many as threads compute at once, replaced when they are lost."""
+
+    def __init__(self, study: CaseTable, recipe: bytes) -> None:
+        self._study, self._recipe = study, recipe
+        self._processes: list[_Process] = []
+        self._free: list[_Process] = []
+        self._is_closed = False
+
+    def chunk(self, number: int) -> Results:
+        """Return the results of a chunk. Raises StudyError if processes do not start."""
+        first, stop = self._study.chunk_range(number)
+        limit = self._study.time_limit
+        with contextlib.suppress(_LostError):
+            seconds = None if limit is None else limit * (1.0 + _SHARE_OF_A_CASE * (stop - first))
+            (results,) = self._results("together", first, stop, seconds)
+            return results
+        results, index = empty_results(self._study, np.arange(first, stop)), first
+        while index < stop:
+            try:
+                for case_results in self._results("alone", index, stop, limit):
+                    for name, rows in case_results.items():
+                        results[name][index - first] = rows[0]
+                    index += 1
+            except _LostError as error:
+                name = "TimeLimit" if error.status == "timed_out" else "ProcessDied"
+                fail(self._study, results, index - first, error.status, name, str(error))
+                index += 1
+        return results
+
+    def close(self) -> None:
+        """End the processes, from any thread."""
+        self._is_closed = True
+        for process in list(self._processes):
+            process.end()
+
+    def _results(self, way: str, first: int, stop: int, seconds: float | None) -> Iterator[Results]:
+        """Yield the results of cases together or alone. Raises _LostError."""
+        process = self._ready()
+        try:
+            process.send((way, first, stop))
+            for _ in range(1 if way == "together" else stop - first):
+                yield process.receive(seconds)
+        except _LostError:
+            self._processes.remove(process)
+            raise
+        self._free.append(process)
+
+    def _ready(self) -> _Process:
+        """Return a process that waits for requests. Raises StudyError."""
+        with contextlib.suppress(IndexError):
+            return self._free.pop()
+        for _ in range(_STARTS):
+            if self._is_closed:
+                raise StudyError("stopped")
+            process = _Process(self._recipe)
+            self._processes.append(process)
+            if self._is_closed:
+                process.end()
+            try:
+                refusal = process.receive(_STARTING)
+            except _LostError:
+                self._processes.remove(process)
+                continue
+            if isinstance(refusal, StudyError):
+                raise refusal
+            return process
+        raise StudyError("the processes that are to compute the cases end before they begin; see what they printed")
+
+
+class _LostError(Exception):
     """The process hangs or is gone."""
 
-    def __init__(self, status: int, said: str) -> None:
-        super().__init__(said)
+    def __init__(self, status: str, text: str) -> None:
+        super().__init__(text)
         self.status = status
 
 
-class CaseWorker:
-    """One process, started when it is first needed, and again when it was lost.
+class _Process:
+    """A process that computes cases, in a group of its own."""
 
-    Parameters
-    ----------
-    study : of which it computes cases
-    recipe : study and inputs as bytes
-    """
-
-    def __init__(self, study: Study, recipe: bytes) -> None:
-        self._study, self._recipe = study, recipe
-        self._process: subprocess.Popen[bytes] | None = None
-        self._connection: Connection | None = None
-        self._lock, self._closed = threading.Lock(), False
-
-    def chunk(self, number: int) -> Results:
-        """The results of a chunk. Raises StudyError if processes do not start."""
-        first, stop = self._study.chunk_range(number)
-        limit = self._study.time_limit
-        with contextlib.suppress(_Over):
-            self._begin()
-            self._ask("together", first, stop)
-            return self._answer(None if limit is None else limit * (1.0 + _SHARE_OF_A_CASE * (stop - first)))
-        self._check_open()
-        return self._one_by_one(first, stop)
-
-    def close(self) -> None:
-        """End the process, from any thread."""
-        with self._lock:
-            self._closed = True
-            self._end()
-
-    def _one_by_one(self, first: int, stop: int) -> Results:
-        found = Results.empty(self._study, np.arange(first, stop))
-        index = first
-        while index < stop:
-            self._check_open()
-            try:
-                self._begin()
-                self._ask("alone", index, stop)
-                while index < stop:
-                    found.put(index - first, self._answer(self._study.time_limit))
-                    index += 1
-            except _Over as over:
-                self._check_open()
-                name = "TimeLimit" if over.status == TIMED_OUT else "ProcessDied"
-                found.fail(index - first, over.status, name, str(over))
-                index += 1
-        return found
-
-    def _begin(self) -> None:
-        for _ in range(_MOST_STARTS):
-            if self._process is not None and self._process.poll() is None:
-                return
-            try:
-                self._start()
-                if isinstance(refusal := self._answer(_BEGINNING), StudyError):
-                    raise refusal
-            except _Over:
-                self._check_open()
-        if self._process is None or self._process.poll() is not None:
-            raise StudyError("the processes that are to compute the cases end before they begin; see what they said")
-
-    def _start(self) -> None:
+    def __init__(self, recipe: bytes) -> None:
         ours, theirs = socket.socketpair()
-        path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
-        environment = {**os.environ, **dict.fromkeys(_ONE_THREAD, "1"), "PYTHONPATH": path}
-        source = f"from shapephase.study._worker_process import serve; serve({theirs.fileno()}, {os.getpid()})"
-        with self._lock:
-            self._end()
-            if self._closed:
-                ours.close()
-                theirs.close()
-                raise _Over(DIED, "closed")
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", source],
-                pass_fds=[theirs.fileno()],
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                process_group=0,
-            )
-            self._connection = Connection(ours.detach())
-        theirs.close()
-        with self._lost():
-            self._connected.send_bytes(self._recipe)
+        self._connection = Connection(ours.detach())
+        source = f"from shapephase.study._workers import serve; serve({theirs.fileno()}, {os.getpid()})"
+        options = {"pass_fds": [theirs.fileno()], "stdin": subprocess.DEVNULL, "process_group": 0}
+        with theirs:
+            self._process = start_python(source, folder=True, **options)
+        with contextlib.suppress(_LostError):
+            self.send(recipe)
 
-    def _ask(self, way: str, first: int, stop: int) -> None:
-        with self._lost():
-            self._connected.send((way, first, stop))
+    def send(self, message: Any) -> None:
+        """Send a request. Raises _LostError."""
+        with self._losses():
+            self._connection.send(message)
 
-    def _answer(self, seconds: float | None) -> Any:
+    def receive(self, seconds: float | None) -> Any:
+        """Return the next message. Raises _LostError, also where it takes longer than these seconds."""
         end = math.inf if seconds is None else time.monotonic() + seconds
-        with self._lost():
+        with self._losses():
             # The process is watched too: a child of it may keep the connection open.
             while (left := end - time.monotonic()) > 0.0:
-                is_gone = self._process is None or self._process.poll() is not None
-                if self._connected.poll(0.0 if is_gone else min(left, _LOOK)):
-                    return self._connected.recv()
+                is_gone = self._process.poll() is not None
+                if self._connection.poll(0.0 if is_gone else min(left, _INTERVAL)):
+                    return self._connection.recv()
                 if is_gone:
                     raise EOFError
-        self._stop()
-        raise _Over(TIMED_OUT, f"not done after {seconds:g} s")
+        self.end()
+        self._connection.close()
+        raise _LostError("timed_out", f"not done after {seconds:g} s")
 
-    @property
-    def _connected(self) -> Connection:
-        connection = self._connection
-        if connection is None:
-            raise EOFError
-        return connection
+    def end(self) -> None:
+        """End the process, with the children that its cases have left."""
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
 
     @contextlib.contextmanager
-    def _lost(self) -> Iterator[None]:
-        """A connection that ends means that the process has."""
+    def _losses(self) -> Iterator[None]:
+        """Turn the end of a connection into the end of its process."""
         try:
             yield
         except (EOFError, OSError):
-            code = self._stop()
-            raise _Over(DIED, _ending(code)) from None
-
-    def _stop(self) -> int | None:
-        with self._lock:
-            return self._end()
-
-    def _end(self) -> int | None:
-        """End the process if there is one, and say how it ended."""
-        process, connection = self._process, self._connection
-        self._process, self._connection = None, None
-        if connection is not None:
-            connection.close()
-        if process is None:
-            return None
-        code = process.poll()
-        if code is None:
             # A connection ends a moment before its process does.
             with contextlib.suppress(subprocess.TimeoutExpired):
-                code = process.wait(0.2 if connection is not None and not self._closed else 0.0)
-        # With the children that its cases have left.
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        return code
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise StudyError("stopped")
+                self._process.wait(_INTERVAL)
+            code = self._process.returncode
+            self.end()
+            self._connection.close()
+            raise _LostError("died", _ending(code)) from None
 
 
 def _ending(code: int | None) -> str:
     if code is None:
         return "its process was lost"
-    if code < 0:
-        with contextlib.suppress(ValueError):
-            return f"its process died by {signal.Signals(-code).name}"
+    with contextlib.suppress(ValueError):
+        return f"its process died by {signal.Signals(-code).name}"
     return f"its process ended with code {code}"
+
+
+def serve(descriptor: int, parent: int) -> None:
+    """Compute, in a process of its own, what is requested through a connection, until that or the parent ends."""
+    # Ctrl-C goes to all processes of a terminal; the parent decides.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    # What cases print is not to wait in a buffer that nobody reads.
+    sys.stdout = sys.stderr
+    warnings.simplefilter("ignore")
+    connection = Connection(descriptor)
+    # A child of a case would keep the connection open when this process is gone.
+    os.set_inheritable(descriptor, False)
+    os.register_at_fork(after_in_child=connection.close)
+    with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
+        _, recipe = pickle.loads(connection.recv())
+        study, inputs = pickle.loads(recipe)
+        for name, digest in study.function_inputs.items():
+            if inputs.get(name, digest) != digest:
+                connection.send(StudyError(f"{name} is another where it is computed than where the study was begun"))
+                return
+        evaluator = Evaluator(study, inputs)
+        connection.send("ready")
+        while True:
+            way, first, stop = connection.recv()
+            if way == "together":
+                connection.send(evaluator.together(np.arange(first, stop)))
+            for index in range(first, stop) if way == "alone" else ():
+                connection.send(evaluator.alone(index))
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_INTERVAL)
+    # The group of this process holds the children of its cases too.
+    os.killpg(0, signal.SIGKILL)

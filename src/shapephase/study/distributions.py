@@ -1,11 +1,11 @@
-"""Distributions by name, and the random numbers of a case: seed, axis and index of the case give them."""
+"""Distributions by name, and the random numbers of a case, which seed, axis and index of the case determine."""
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,27 +16,41 @@ from ..errors import ShapeError
 
 Numbers = float | Sequence[float]
 
-_FARTHEST_DRAWN = 10.0
-"""Deviations from the mean; once in 1e23 draws one lies farther."""
+_MOST = 1e100  # of parameters: no draw overflows, nor the square of one
 
 
-class Distribution(Protocol):
-    """What is drawn for every case."""
+class Distribution:
+    """Base of the distributions, which are dataclasses of their parameters."""
 
-    def drawn(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-        """One value of this shape."""
-        ...
+    _most_deviation: ClassVar[float] = _MOST
+    _only: ClassVar[tuple[tuple[int, ...], str] | None] = None  # shape and name of all that can be drawn, if limited
+
+    __repr__ = short_repr
 
     def check(self, name: str, shape: tuple[int, ...]) -> None:
-        """Raise ShapeError where it cannot give such values."""
-        ...
+        """Raise ShapeError where values of this shape cannot be drawn."""
+        if self._only is not None and self._only[0] != shape:
+            raise ShapeError(f"{name}: {type(self).__name__} are drawn of {self._only[1]} only")
+        for parameter, given in vars(self).items():
+            value = finite_array(given, f"{parameter} of {name}")
+            if not self._fits(value.shape, shape):
+                raise ShapeError(f"{parameter} of {name}: one number or an array {shape} is needed, got {value.shape}")
+            if parameter in ("deviation", "median") and np.any(value < 0.0):
+                raise ShapeError(f"{parameter} of {name}: 0 or more is needed, got {given}")
+            if np.any(np.abs(value) > (self._most_deviation if parameter == "deviation" else _MOST)):
+                raise ShapeError(f"{name}: it is spread so widely that no number holds what may be drawn")
+
+    def _draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+        raise NotImplementedError
+
+    def _fits(self, given: tuple[int, ...], shape: tuple[int, ...]) -> bool:
+        matching = zip(reversed(given), reversed(shape), strict=False)
+        return len(given) <= len(shape) and all(length in (1, expected) for length, expected in matching)
 
 
-@dataclass(frozen=True)
-class Normal:
-    """Normal numbers, each independent of the others.
-
-    Of an attitude they are a rotation vector in rad, by which the start is turned about its own axes.
+@dataclass(frozen=True, repr=False)
+class Normal(Distribution):
+    """Independent normal numbers; for an attitude a rotation vector in rad, which turns the start about its own axes.
 
     Attributes
     ----------
@@ -52,23 +66,12 @@ class Normal:
     mean: Numbers = 0.0
     deviation: Numbers = 1.0
 
-    __repr__ = short_repr
-
-    def drawn(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-        """One value of this shape."""
+    def _draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
         return np.asarray(self.mean) + np.asarray(self.deviation) * rng.standard_normal(shape)
 
-    def check(self, name: str, shape: tuple[int, ...]) -> None:
-        """Raise ShapeError where it cannot give such values."""
-        mean = _fitting(f"mean of {name}", self.mean, shape)
-        deviation = _fitting(f"deviation of {name}", self.deviation, shape)
-        if np.any(deviation < 0.0):
-            raise ShapeError(f"deviation of {name}: 0 or more is needed, got {self.deviation}")
-        _check_drawn(name, lambda: np.abs(mean) + _FARTHEST_DRAWN * deviation)
 
-
-@dataclass(frozen=True)
-class LogNormal:
+@dataclass(frozen=True, repr=False)
+class LogNormal(Distribution):
     """Positive numbers whose logarithm is normal: factors of masses and inertias, which stay physical.
 
     Attributes
@@ -83,26 +86,18 @@ class LogNormal:
     [0.979 1.026 1.065 0.944] True
     """
 
+    _most_deviation = 10.0  # the logarithm of a draw is below 100 but for one in 1e23
+
     deviation: Numbers
     median: Numbers = 1.0
 
-    __repr__ = short_repr
-
-    def drawn(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-        """One value of this shape."""
+    def _draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
         return np.asarray(self.median) * np.exp(np.asarray(self.deviation) * rng.standard_normal(shape))
 
-    def check(self, name: str, shape: tuple[int, ...]) -> None:
-        """Raise ShapeError where it cannot give such values."""
-        for what, value in (("deviation", self.deviation), ("median", self.median)):
-            if np.any(_fitting(f"{what} of {name}", value, shape) < 0.0):
-                raise ShapeError(f"{what} of {name}: 0 or more is needed, got {value}")
-        _check_drawn(name, lambda: np.asarray(self.median) * np.exp(_FARTHEST_DRAWN * np.asarray(self.deviation)))
 
-
-@dataclass(frozen=True)
-class Uniform:
-    """Numbers that are anywhere between two ends with the same probability.
+@dataclass(frozen=True, repr=False)
+class Uniform(Distribution):
+    """Numbers between two ends, all equally probable.
 
     Attributes
     ----------
@@ -119,27 +114,23 @@ class Uniform:
     low: Numbers
     high: Numbers
 
-    __repr__ = short_repr
-
-    def drawn(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-        """One value of this shape."""
-        low = np.asarray(self.low)
-        return low + (np.asarray(self.high) - low) * rng.random(shape)
+    def _draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
+        return np.asarray(self.low) + (np.asarray(self.high) - np.asarray(self.low)) * rng.random(shape)
 
     def check(self, name: str, shape: tuple[int, ...]) -> None:
-        """Raise ShapeError where it cannot give such values."""
-        if np.any(_fitting(f"high of {name}", self.high, shape) < _fitting(f"low of {name}", self.low, shape)):
+        """Raise ShapeError where values of this shape cannot be drawn."""
+        super().check(name, shape)
+        if np.any(np.asarray(self.high) < np.asarray(self.low)):
             raise ShapeError(f"{name}: the high end lies below the low one, {self.high} and {self.low}")
-        _check_drawn(name, lambda: np.asarray(self.high) - np.asarray(self.low))
 
 
-@dataclass(frozen=True)
-class Choice:
-    """One of some values, each with the same probability.
+@dataclass(frozen=True, repr=False)
+class Choice(Distribution):
+    """One of some values, all equally probable.
 
     Attributes
     ----------
-    values : (n, ...) they are, in the unit of what is drawn
+    values : (n, ...) in the unit of what is drawn
 
     Examples
     --------
@@ -151,23 +142,17 @@ class Choice:
 
     values: Sequence[Any]
 
-    __repr__ = short_repr
-
-    def drawn(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-        """One value of this shape."""
+    def _draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
         values = np.asarray(self.values, dtype=float)
         return np.broadcast_to(values[rng.integers(len(values))], shape).copy()
 
-    def check(self, name: str, shape: tuple[int, ...]) -> None:
-        """Raise ShapeError where it cannot give such values."""
-        values = finite_array(self.values, f"values of {name}")
-        if not values.ndim or not len(values) or values.shape[1:] not in ((), shape):
-            raise ShapeError(f"values of {name}: some of shape {shape} are needed, got {values.shape}")
+    def _fits(self, given: tuple[int, ...], shape: tuple[int, ...]) -> bool:
+        return bool(given and given[0]) and given[1:] in ((), shape)
 
 
-@dataclass(frozen=True)
-class Directions:
-    """Vectors of one magnitude in all directions, evenly: of the momentum.
+@dataclass(frozen=True, repr=False)
+class Directions(Distribution):
+    """Vectors of one magnitude, such as momenta, with evenly distributed directions.
 
     Attributes
     ----------
@@ -180,24 +165,19 @@ class Directions:
     0.1
     """
 
+    _only = (3,), "vectors"
     magnitude: float
 
-    __repr__ = short_repr
-
-    def drawn(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-        """One value of this shape."""
+    def _draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
         return self.magnitude * so3.normalised(rng.standard_normal(shape))
 
-    def check(self, name: str, shape: tuple[int, ...]) -> None:
-        """Raise ShapeError where it cannot give such values."""
-        _fitting(f"magnitude of {name}", self.magnitude, ())
-        if shape != (3,):
-            raise ShapeError(f"{name}: directions are of vectors, this has the shape {shape}")
+    def _fits(self, given: tuple[int, ...], shape: tuple[int, ...]) -> bool:
+        return not given and bool(shape)
 
 
-@dataclass(frozen=True)
-class Rotations:
-    """Attitudes at the start, all alike probable (the invariant measure of the rotations).
+@dataclass(frozen=True, repr=False)
+class Rotations(Distribution):
+    """Evenly distributed attitudes at the start (the invariant measure of the rotations).
 
     Examples
     --------
@@ -206,31 +186,18 @@ class Rotations:
     [ 0.2377 -0.8969  0.2214  0.3001]
     """
 
-    __repr__ = short_repr
+    _only = (4,), "attitudes"
 
-    def drawn(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
-        """One value of this shape."""
+    def _draw(self, rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
         return so3.normalised(rng.standard_normal(shape))
 
-    def check(self, name: str, shape: tuple[int, ...]) -> None:
-        """Raise ShapeError where it cannot give such values."""
-        if shape != (4,):
-            raise ShapeError(f"{name}: rotations are drawn of attitudes only")
 
-
-DISTRIBUTIONS = {
-    "normal": Normal,
-    "lognormal": LogNormal,
-    "uniform": Uniform,
-    "choice": Choice,
-    "directions": Directions,
-    "rotations": Rotations,
-}
+DISTRIBUTIONS = {kind.__name__.lower(): kind for kind in (Normal, LogNormal, Uniform, Choice, Directions, Rotations)}
 """Their names in a file."""
 
 
 def generators(seed: int, axis: str, cases: Integers) -> Iterator[np.random.Generator]:
-    """The generator of each case, at the start of its random numbers: it is one object, turned to the next case.
+    """Yield the generator of each case, at the start of its random numbers: one object, reset for the next case.
 
     The key of Philox is made of the seed and the name of the axis, its counter of the index of the case.
     """
@@ -238,36 +205,16 @@ def generators(seed: int, axis: str, cases: Integers) -> Iterator[np.random.Gene
     source = np.random.Philox(key=sequence.generate_state(2, np.uint64))
     generator = np.random.Generator(source)
     state: Any = source.state
-    counter = state["state"]["counter"]
     for index in cases.tolist():
         # The third word: a case may draw 2^128 numbers before it meets the next.
-        counter[:] = (0, 0, index, 0)
-        state |= {"buffer_pos": 4, "has_uint32": 0, "uinteger": 0}
-        source.state = state
+        state["state"]["counter"][:] = (0, 0, index, 0)
+        source.state = state | {"buffer_pos": 4, "has_uint32": 0, "uinteger": 0}
         yield generator
 
 
-def drawn_values(seed: int, axis: str, cases: Integers, what: Distribution, shape: tuple[int, ...]) -> Array:
-    """The values of an axis in some cases: (N,) + shape."""
+def drawn_values(seed: int, axis: str, cases: Integers, source: Distribution, shape: tuple[int, ...]) -> Array:
+    """Return the values of an axis in some cases: (N,) + shape."""
     values = np.empty((len(cases), *shape))
     for row, rng in enumerate(generators(seed, axis, cases)):
-        values[row] = what.drawn(rng, shape)
+        values[row] = source._draw(rng, shape)
     return values
-
-
-def _check_drawn(name: str, largest: Callable[[], Array]) -> None:
-    """Raise ShapeError where what is drawn may be larger than any number."""
-    with np.errstate(over="ignore"):
-        if not np.isfinite(largest()).all():
-            raise ShapeError(f"{name}: it is spread so widely that no number holds what may be drawn")
-
-
-def _fitting(name: str, value: Numbers, shape: tuple[int, ...]) -> Array:
-    array = finite_array(value, name)
-    try:
-        fits = np.broadcast_shapes(array.shape, shape) == shape
-    except ValueError:
-        fits = False
-    if not fits:
-        raise ShapeError(f"{name}: one number or an array {shape} is needed, got {array.shape}")
-    return array

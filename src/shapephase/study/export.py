@@ -1,10 +1,9 @@
-"""What a store holds, in formats of other programs."""
+"""Contents of a store in formats of other programs."""
 
 from __future__ import annotations
 
 import itertools
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +12,8 @@ import numpy as np
 from ..arguments import check_file_name, check_object
 from ..errors import MissingExtraError, UnknownNameError
 from ..files import write_whole
-from .store import STATUS, StudyStore
-
-_LETTERS = ("error_name", "error_text")
+from ._evaluate import LETTERS, STATUS
+from .store import StudyStore
 
 
 def export_study(store: StudyStore, path: str | os.PathLike[str]) -> None:
@@ -30,7 +28,7 @@ def export_study(store: StudyStore, path: str | os.PathLike[str]) -> None:
     OutputFileError
         If it cannot be written.
     MissingExtraError
-        Without xarray, pandas or pyarrow.
+        Without xarray or pyarrow.
 
     Examples
     --------
@@ -42,50 +40,38 @@ def export_study(store: StudyStore, path: str | os.PathLike[str]) -> None:
     """
     check_object(store, "StudyStore", "store")
     check_file_name(path, "path")
-    place = Path(path)
-    ending = place.suffix.lower()
+    ending = Path(path).suffix.lower()
     if ending == ".nc":
-        write_whole(place, lambda stream: stream.write(_netcdf(store)))
-    elif ending in (".parquet", ".csv"):
-        table = study_table(store)
-        if ending == ".csv":
-            write_whole(place, lambda stream: stream.write(table.to_csv(index=False).encode()))
-            return
+        write_whole(path, lambda stream: stream.write(_netcdf(store)))
+    elif ending == ".csv":
+        write_whole(path, lambda stream: study_table(store).to_csv(stream, index=False))
+    elif ending == ".parquet":
         try:
-            write_whole(place, lambda stream: table.to_parquet(stream, index=False))
+            write_whole(path, lambda stream: study_table(store).to_parquet(stream, index=False))
         except ImportError:
             raise MissingExtraError("Parquet needs pyarrow; install it with: pip install 'shapephase[data]'") from None
     else:
-        raise UnknownNameError(f"{place}: the file's name must end in .nc, .parquet or .csv")
+        raise UnknownNameError(f"{path}: the file's name must end in .nc, .parquet or .csv")
 
 
 def study_table(store: StudyStore) -> Any:
-    """All cases as a table of pandas, one row for each. Raises MissingExtraError without pandas."""
-    try:
-        from pandas import DataFrame
-    except ImportError:
-        raise MissingExtraError("a table needs pandas; install it with: pip install pandas") from None
-    names = {number: name for name, number in STATUS.items()}
-    statuses = store.statuses()
-    columns: dict[str, Any] = {"case": np.arange(store.cases), "status": [names[int(one)] for one in statuses]}
-    grids = store.attributes["grids"]
+    """Return all cases as a table of pandas, one row for each."""
+    from pandas import DataFrame
+
+    columns: dict[str, Any] = {"case": np.arange(store.cases), "status": np.array([*STATUS])[store.statuses()]}
     for name in store.attributes["units"]:
-        values = store.values(name)
-        labels = grids.get(name, [])
-        if labels and isinstance(labels[0], str):
-            columns[name] = [labels[int(one)] if np.isfinite(one) else "" for one in values]
+        values, grid = store.values(name), store.attributes["grids"].get(name, [None])
+        if isinstance(grid[0], str):
+            columns[name] = [grid[int(place)] if np.isfinite(place) else "" for place in values]
             continue
         for entry in itertools.product(*map(range, values.shape[1:])):
             columns["_".join([name, *map(str, entry)])] = values[(slice(None), *entry)]
-    said = {index: f"{name}: {text}" for index, name, text in store.errors(most=store.cases)}
-    columns["error"] = [said.get(index, "") for index in range(store.cases)]
+    errors = {index: f"{name}: {text}" for index, name, text in store.errors(most=store.cases)}
+    columns["error"] = [errors.get(index, "") for index in range(store.cases)]
     return DataFrame(columns)
 
 
 def _netcdf(store: StudyStore) -> bytes:
-    found = store.dataset().drop_vars(_LETTERS, errors="ignore")
-    found.attrs = {name: value if isinstance(value, str | int) else str(value) for name, value in found.attrs.items()}
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "study.nc"
-        found.to_netcdf(file, engine="scipy")
-        return file.read_bytes()
+    data = store.dataset().drop_vars([*LETTERS])
+    data.attrs = {name: value if isinstance(value, str | int) else str(value) for name, value in data.attrs.items()}
+    return bytes(data.to_netcdf(engine="scipy"))

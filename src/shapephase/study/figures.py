@@ -1,10 +1,9 @@
-"""Figures of a store: how an output is spread, how it goes along a grid, and maps over two grids."""
+"""Figures of a store: the spread of an output, its quantiles along a grid, and maps over two grids."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,22 +17,26 @@ from .store import StudyStore
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-KINDS = ("histogram", "quantiles", "map")
-# Bins of a histogram: 2 n^(1/3) after Rice, but no more than a column shows.
-_FEWEST_BINS = 10
-_MOST_BINS = 120
-# The bands of quantiles: half and nine tenths of the cases are in them.
-_HALF = (0.25, 0.75)
-_MOST = (0.05, 0.95)
-_DEGREES = 180.0 / np.pi
-# Numbers along an axis, at most: of five letters each they have room in a column.
-_TICKS = 6
+_KINDS = ("histogram", "quantiles", "map")  # in the order of how many grids they need
+_FEWEST_BINS = 10  # 2 n^(1/3) (Rice) where that is more
+_MOST_BINS = 120  # no more than a column shows
+_BANDS = ((0.05, 0.95, 0.35, "9 of 10 cases"), (0.25, 0.75, 0.8, "half of them"))  # quantiles, opacity, label
+_TICKS = 6  # numbers of five letters that have room along a column
+
+
+class _Grid(NamedTuple):
+    """A grid as an axis: its places, in degrees where they are angles, and names where it has no numbers."""
+
+    name: str
+    label: str
+    places: Array
+    names: list[str]
 
 
 def plot_study(
     ax: Axes, store: StudyStore, output: str, *, kind: str | None = None, along: str | Sequence[str] = ()
 ) -> Axes:
-    """One number of each case: how it is spread, its quantiles along a grid, or its median over two grids.
+    """Draw one number of each case: its spread, its quantiles along a grid, or its median over two grids.
 
     Cases without results are left out; angles are shown in degrees. What is not an axis of the figure, draws and other
     grids, is taken together.
@@ -65,135 +68,110 @@ def plot_study(
     """
     check_flat_axes(ax)
     check_object(store, "StudyStore", "store")
-    grids = [_Grid.of(store, name) for name in store.attributes["grids"]]
+    grids = {name: _grid(store, name) for name in store.attributes["grids"]}
     given = (along,) if isinstance(along, str) else names_argument(along, "along", "names of grids")
     for name in given:
-        check_choice(name, "grid of the study", [grid.name for grid in grids])
-    chosen = [next(grid for grid in grids if grid.name == name) for name in given]
-    chosen += [grid for grid in grids if len(grid.places) > 1 and grid not in chosen]
-    if kind is None:
-        kind = KINDS[min(len(given) or len(chosen), 2)]
-    check_choice(kind, "kind of figure", KINDS)
-    if len(chosen) < KINDS.index(kind):
-        raise StudyError(f"a figure of kind {kind!r} needs {KINDS.index(kind)} grids, the study has {len(chosen)}")
+        check_choice(name, "grid of the study", grids)
+    chosen = [*given, *(name for name, grid in grids.items() if len(grid.places) > 1 and name not in given)]
+    kind = _KINDS[min(len(given) or len(chosen), 2)] if kind is None else kind
+    check_choice(kind, "kind of figure", _KINDS)
+    needed = _KINDS.index(kind)
+    if len(chosen) < needed:
+        raise StudyError(f"a figure of kind {kind!r} needs {needed} grids, the study has {len(chosen)}")
     values, label = _values(store, output)
-    table = values.reshape(*(len(grid.places) for grid in grids), -1)
-    numbers = {grid.name: number for number, grid in enumerate(grids)}
-    axes = [numbers[grid.name] for grid in chosen[: KINDS.index(kind)]]
-    if kind == "histogram":
-        _draw_histograms(ax, table, label, chosen, numbers)
-        return ax
-    sorted_out = np.moveaxis(table, axes, range(len(axes)))
-    cells = sorted_out.reshape(*sorted_out.shape[: len(axes)], -1)
+    is_series = kind == "histogram" and len(chosen) == 1 and len(grids[chosen[0]].places) <= len(SERIES)
+    axes = [grids[name] for name in chosen[: 1 if is_series else needed]]
+    table = values.reshape(*(len(grid.places) for grid in grids.values()), -1)
+    table = np.moveaxis(table, [list(grids).index(grid.name) for grid in axes], range(len(axes)))
+    cells = table.reshape(*(len(grid.places) for grid in axes), -1)
     # A cell in which all cases failed stays empty.
     with quiet(category=RuntimeWarning):
-        if kind == "quantiles":
-            _draw_quantiles(ax, chosen[0], cells, label)
+        if kind == "histogram":
+            _draw_histogram(ax, cells, label, axes)
+        elif kind == "quantiles":
+            _draw_quantiles(ax, cells, label, *axes)
         else:
-            _draw_map(ax, chosen[0], chosen[1], np.nanmedian(cells, axis=-1), label)
+            _draw_map(ax, cells, label, *axes)
     return ax
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Grid:
-    """A grid as an axis: its places, in degrees where they are angles, and names where it has no numbers."""
-
-    name: str
-    label: str
-    places: Array
-    names: list[str]
-
-    @classmethod
-    def of(cls, store: StudyStore, name: str) -> _Grid:
-        values = store.attributes["grids"][name]
-        if isinstance(values[0], str) or np.ndim(values) > 1:
-            names = [str(one) for one in values] if isinstance(values[0], str) else []
-            return cls(name=name, label=_words(name), places=np.arange(len(values), dtype=float), names=names)
-        factor, label = _shown(name, store.attributes["units"][name])
-        return cls(name=name, label=label, places=factor * np.asarray(values, dtype=float), names=[])
-
-    def say(self, number: int) -> str:
-        return self.names[number] if self.names else f"{self.places[number]:.4g}"
+def _grid(store: StudyStore, name: str) -> _Grid:
+    values = store.attributes["grids"][name]
+    if isinstance(values[0], str) or np.ndim(values) > 1:
+        names = values if isinstance(values[0], str) else []
+        return _Grid(name, name.replace("_", " "), np.arange(len(values), dtype=float), names)
+    factor, label = _shown(name, store.attributes["units"][name])
+    return _Grid(name, label, factor * np.asarray(values, dtype=float), [])
 
 
 def _values(store: StudyStore, output: str) -> tuple[Array, str]:
-    """One number of each case, and what it is called. Raises UnknownNameError, StudyError."""
+    """Return one number of each case, and its label. Raises UnknownNameError, StudyError."""
     units = {name: unit for name, unit in store.attributes["units"].items() if name not in store.attributes["grids"]}
-    if not isinstance(output, str):
-        raise unknown_name("output of the study", output, units)
-    name = next((name for name in units if output == name or output.startswith(f"{name}_")), None)
+    text = output if isinstance(output, str) else ""
+    name = next((name for name in units if text == name or text.startswith(f"{name}_")), None)
     if name is None:
         raise unknown_name("output of the study", output, units)
     values = store.values(name)
-    entry = output.removeprefix(name).split("_")[1:]
     try:
-        places = tuple(int(place) for place in entry)
-        one = values[(slice(None), *places)]
+        numbers = values[(slice(None), *(int(place) for place in text.removeprefix(name).split("_")[1:]))]
     except (ValueError, IndexError):
         raise unknown_name(f"entry of {name}", output, [f"{name}{'_0' * (values.ndim - 1)}"]) from None
-    if one.ndim > 1:
-        example = f"{output}{'_0' * (one.ndim - 1)}"
-        raise StudyError(f"{output}: one number of each case is drawn, this has {one[0].size}; name one, as {example}")
-    if not np.isfinite(one).any():
+    if numbers.ndim > 1:
+        example = f"{output}{'_0' * (numbers.ndim - 1)}"
+        raise StudyError(
+            f"{output}: one number of each case is drawn, this has {numbers[0].size}; name one, as {example}"
+        )
+    if not np.isfinite(numbers).any():
         raise StudyError(f"{output}: no case has a value yet")
     factor, label = _shown(output, units[name])
-    return factor * one, label
+    return factor * numbers, label
 
 
 def _shown(name: str, unit: str) -> tuple[float, str]:
-    """What numbers are multiplied by, and their label."""
-    if unit == "rad":
-        return _DEGREES, f"{_words(name)} [deg]"
-    return 1.0, f"{_words(name)} [{unit.replace('^2', '²')}]" if unit else _words(name)
+    """Return what numbers are multiplied by, and their label."""
+    factor, unit = (180.0 / np.pi, "deg") if unit == "rad" else (1.0, unit.replace("^2", "²"))
+    return factor, name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _draw_histograms(ax: Any, table: Array, label: str, grids: list[_Grid], numbers: dict[str, int]) -> None:
-    finite = table[np.isfinite(table)]
+def _draw_histogram(ax: Any, cells: Array, label: str, series: list[_Grid]) -> None:
+    finite = cells[np.isfinite(cells)]
     bins = int(np.clip(2.0 * len(finite) ** (1.0 / 3.0), _FEWEST_BINS, _MOST_BINS))
     edges = np.histogram_bin_edges(finite, bins)
-    if len(grids) == 1 and len(grids[0].places) <= len(SERIES):
-        for number, rows in enumerate(np.moveaxis(table, numbers[grids[0].name], 0)):
-            looks = SERIES[number]
-            ax.hist(rows[np.isfinite(rows)], edges, histtype="step", label=grids[0].say(number), **looks)
-        finish(ax, title=grids[0].label)
+    if series:
+        names = series[0].names or [f"{place:.4g}" for place in series[0].places]
+        for name, row, style in zip(names, cells, SERIES, strict=False):
+            ax.hist(row[np.isfinite(row)], edges, histtype="step", label=name, **style)
+        finish(ax, title=series[0].label)
     else:
         ax.hist(finite, edges, color=SKY)
-        low, middle, high = np.quantile(finite, [_MOST[0], 0.5, _MOST[1]])
+        low, middle, high = np.quantile(finite, [0.05, 0.5, 0.95])
         ax.axvline(middle, color=BLUE, linewidth=1.4, label=f"median {middle:.4g}")
-        for place, said in ((low, f"5 % and 95 %: {low:.4g}, {high:.4g}"), (high, None)):
-            ax.axvline(place, color=BLACK, linewidth=1.0, linestyle=(0, (4, 2)), label=said)
+        for place, name in ((low, f"5 % and 95 %: {low:.4g}, {high:.4g}"), (high, None)):
+            ax.axvline(place, color=BLACK, linewidth=1.0, linestyle=(0, (4, 2)), label=name)
         finish(ax)
     ax.set_xlabel(label, fontsize=SMALL)
     ax.set_ylabel("cases", fontsize=SMALL)
 
 
-def _draw_quantiles(ax: Any, grid: _Grid, cells: Array, label: str) -> None:
-    """Cells (n, cases)."""
-    places = grid.places
-    if cells.shape[-1] > 1:
-        low, high = np.nanquantile(cells, _MOST, axis=-1)
-        ax.fill_between(places, low, high, color=SKY, alpha=0.35, linewidth=0.0, label="9 of 10 cases")
-        low, high = np.nanquantile(cells, _HALF, axis=-1)
-        ax.fill_between(places, low, high, color=SKY, alpha=0.8, linewidth=0.0, label="half of them")
+def _draw_quantiles(ax: Any, cells: Array, label: str, grid: _Grid) -> None:
+    has_bands = cells.shape[-1] > 1
+    for low, high, opacity, name in _BANDS if has_bands else ():
+        ends = np.nanquantile(cells, [low, high], axis=-1)
+        ax.fill_between(grid.places, *ends, color=SKY, alpha=opacity, linewidth=0.0, label=name)
     middle = np.nanmedian(cells, axis=-1)
-    ax.plot(places, middle, color=BLUE, linewidth=1.6, marker=".", label="median" if cells.shape[-1] > 1 else None)
+    ax.plot(grid.places, middle, color=BLUE, linewidth=1.6, marker=".", label="median" if has_bands else None)
     ax.grid(color=GREY, alpha=0.3, linewidth=0.5)
     ax.margins(x=0.0)
     _name_axis(ax.xaxis, grid)
     ax.set_ylabel(label, fontsize=SMALL)
-    if cells.shape[-1] > 1:
+    if has_bands:
         finish(ax, ncols=3)
-    else:
-        ax.tick_params(labelsize=SMALL)
+    ax.tick_params(labelsize=SMALL)
 
 
-def _draw_map(ax: Any, across: _Grid, up: _Grid, middle: Array, label: str) -> None:
-    """Medians (n, m)."""
-    mesh = ax.pcolormesh(across.places, up.places, middle.T, shading="nearest", cmap="viridis", rasterized=True)
+def _draw_map(ax: Any, cells: Array, label: str, across: _Grid, up: _Grid) -> None:
+    middle = np.nanmedian(cells, axis=-1).T
+    mesh = ax.pcolormesh(across.places, up.places, middle, shading="nearest", cmap="viridis", rasterized=True)
     _name_axis(ax.xaxis, across)
     _name_axis(ax.yaxis, up)
     ax.tick_params(labelsize=SMALL)

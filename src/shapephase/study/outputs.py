@@ -1,15 +1,15 @@
-"""What is known of each case at the end: numbers of fixed shape, by name or by a function of the motion."""
+"""Results of each case: numbers of fixed shape, by name or by a function of the motion."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from .. import so3
-from ..arguments import check_choice, check_function
+from ..arguments import check_choice, check_function, check_text
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import StudyError, WrongObjectError
@@ -17,14 +17,13 @@ from ..letters import what_came
 from ..phases.phase_split import PhaseSplit
 from ..phases.return_map import fixed_points
 from ..reconstruction.reconstruction import Motion
-from ._axes import LONGEST_NAME
+from ._axes import check_name
 
+MOST_FIXED_POINTS = 12  # directions that a case has room for: cats, astronaut and satellite have two to six
 _ROTATION = (3, 3)
-MOST_FIXED_POINTS = 12
-"""Directions that a case has room for: the cats, the astronaut and the satellite have two to six."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Output:
     """A number, or an array of numbers, of each case.
 
@@ -32,7 +31,7 @@ class Output:
     ----------
     name : of the array in the store
     function : of the case's `Motion`; another process must find it by its name
-    shape : of what it gives
+    shape : of its result
     unit : for people
     about : one sentence
 
@@ -45,10 +44,12 @@ class Output:
     """
 
     name: str
-    function: Callable[[Any], Any] = field(repr=False)
+    function: Callable[..., Any] = field(repr=False)
     shape: tuple[int, ...] = ()
     unit: str = ""
     about: str = ""
+
+    needs: ClassVar[str] = "motion"
 
     __repr__ = short_repr
 
@@ -56,39 +57,43 @@ class Output:
         """Check what came. Raises WrongObjectError, StudyError."""
         check_function(self.function, "function", "a function of a Motion")
         for name in ("name", "unit", "about"):
-            if not isinstance(text := getattr(self, name), str):
-                raise WrongObjectError(f"{name}: a text is needed, got {what_came(text)}")
-        whole = isinstance(self.shape, tuple) and all(isinstance(one, int) and one > 0 for one in self.shape)
-        if not whole:
+            check_text(getattr(self, name), name, "a text")
+        if not isinstance(self.shape, tuple) or not all(
+            isinstance(length, int) and length > 0 for length in self.shape
+        ):
             raise StudyError(f"shape: a tuple of whole numbers above 0 is needed, got {what_came(self.shape)}")
 
     def of(self, motion: Motion, parts: PhaseSplit | None) -> Array:
-        """Its value. Raises StudyError for another shape."""
-        found = self.function(motion if parts is None or not isinstance(self, _OfSplit) else parts)
-        value = np.asarray(found, dtype=float)
+        """Return its value for a motion and the split of that. Raises StudyError for another shape."""
+        arguments = {"motion": (motion,), "split": (parts,), "ends": ends_of(motion)}[self.needs]
+        value = np.asarray(self.function(*arguments), dtype=float)
         if value.shape != self.shape:
-            raise StudyError(f"output {self.name}: the shape {self.shape} was said, the function gave {value.shape}")
+            raise StudyError(f"output {self.name}: shape {self.shape} is declared, the function gave {value.shape}")
         return value
 
 
 class _OfSplit(Output):
     """A field of `split`."""
 
-
-class _OfEnd(Output):
-    """What is known from the end alone: batches give it without a motion for each case."""
+    needs = "split"
 
 
-def final_turn(start: Array, end: Array) -> Array:
-    """The angle from the start to the end: (..., 3, 3), (..., 3, 3) -> (...) [rad]."""
-    return so3.angle(so3.transpose(start) @ end)
+class _OfEnds(Output):
+    """A function of start, end and error estimate: batches compute these without a motion for each case."""
+
+    needs = "ends"
+
+
+def ends_of(motion: Any) -> tuple[Array, Array, Array]:
+    """Return start, end and error estimate of a motion or a family of them."""
+    return motion.initial_attitude, motion.final_attitude, motion.error_estimate
 
 
 def _directions(motion: Motion) -> Array:
-    found = np.full((MOST_FIXED_POINTS, 3), np.nan)
+    rows = np.full((MOST_FIXED_POINTS, 3), np.nan)
     points = fixed_points(motion.deformation, float(np.linalg.norm(motion.momentum))).directions[:MOST_FIXED_POINTS]
-    found[: len(points)] = points
-    return found
+    rows[: len(points)] = points
+    return rows
 
 
 def _field(name: str, shape: tuple[int, ...], unit: str, about: str) -> _OfSplit:
@@ -96,12 +101,11 @@ def _field(name: str, shape: tuple[int, ...], unit: str, about: str) -> _OfSplit
 
 
 _ALL = (
-    _OfEnd("final_attitude", lambda motion: motion.final_attitude, _ROTATION, "", "base axes to inertial axes"),
-    _OfEnd("error_estimate", lambda motion: motion.error_estimate, (), "rad", "of the attitude over the whole motion"),
-    _OfEnd(
-        "turn",
-        lambda motion: final_turn(motion.initial_attitude, motion.final_attitude),
-        (), "rad", "angle from the start to the end, up to pi",
+    _OfEnds("final_attitude", lambda _start, end, _error: end, _ROTATION, "", "base axes to inertial axes"),
+    _OfEnds("error_estimate", lambda _start, _end, error: error, (), "rad", "of the attitude over the whole motion"),
+    _OfEnds(
+        "turn", lambda start, end, _error: so3.angle(so3.transpose(start) @ end), (), "rad",
+        "angle from the start to the end, up to pi",
     ),
     Output("evaluations", lambda motion: motion.evaluations, (), "", "how often inertia and momentum were computed"),
     Output("amplification", lambda motion: motion.amplification, (), "", "the largest growth of a small error"),
@@ -109,7 +113,7 @@ _ALL = (
     _field("holonomy", _ROTATION, "", "what the shape alone does, inertial axes"),
     _field("dynamical_rotation", _ROTATION, "", "what the momentum adds, inertial axes"),
     _field("montgomery_phase", (), "rad", "dynamic and geometric phase together, unwrapped"),
-    _field("montgomery_angle", (), "rad", "the same in (-pi, pi]"),
+    _field("montgomery_angle", (), "rad", "the phase in (-pi, pi]"),
     _field("dynamic_phase", (), "rad", "of the rate along the momentum"),
     _field("geometric_phase", (), "rad", "minus the solid angle"),
     _field("solid_angle", (), "sr", "of the momentum's curve in the gauge"),
@@ -125,10 +129,9 @@ _ALL = (
         "of the return map at the magnitude of the momentum: unit vectors, then NaN",
     ),
 )  # fmt: skip
-_FORMER = {"tilt": "closing_tilt"}
-"""Names that studies and stores had for outputs before."""
+_FORMER = {"tilt": "closing_tilt"}  # names in studies and stores of earlier versions
 OUTPUTS: Mapping[str, Output] = {output.name: output for output in _ALL}
-"""What a study can say by name: the end, its error, every field of `split`, fixed points of the return map.
+"""Outputs that a study has by name: the end, its error, every field of `split`, fixed points of the return map.
 
 Examples
 --------
@@ -138,32 +141,20 @@ Examples
 
 
 def outputs_argument(given: Sequence[str | Output], taken: Sequence[str]) -> tuple[Output, ...]:
-    """The outputs of a study; `taken` are names that its arrays have already. Raises UnknownNameError, StudyError."""
-    found: list[Output] = []
+    """Return the outputs of a study, whose arrays have names already. Raises UnknownNameError, StudyError."""
     if not isinstance(given, Sequence):
         raise WrongObjectError(f"outputs: names, or Output of a function, in a list are needed, got {what_came(given)}")
-    for one in (given,) if isinstance(given, str) else given:
-        if isinstance(one, Output):
-            found.append(one)
-        else:
-            check_choice(one, "output", {*OUTPUTS, *_FORMER})
-            found.append(OUTPUTS[one] if one in OUTPUTS else replace(OUTPUTS[_FORMER[one]], name=one))
-    names = [output.name for output in found]
-    if not found:
+    outputs: list[Output] = []
+    for entry in (given,) if isinstance(given, str) else given:
+        if not isinstance(entry, Output):
+            check_choice(entry, "output", (*OUTPUTS, *_FORMER))
+            entry = OUTPUTS[entry] if entry in OUTPUTS else replace(OUTPUTS[_FORMER[entry]], name=entry)
+        outputs.append(entry)
+    names = [output.name for output in outputs]
+    if not outputs:
         raise StudyError("outputs: at least one is needed")
     for name in names:
-        if len(name) > LONGEST_NAME:
-            raise StudyError(f"outputs: a name of {len(name)} characters, {name[:20]!r}...; use {LONGEST_NAME} at most")
+        check_name(name, "outputs")
         if names.count(name) > 1 or name in taken or not name.isidentifier():
             raise StudyError(f"outputs: {name!r} stands twice, is no plain name, or has another meaning already")
-    return tuple(found)
-
-
-def needs_split(outputs: Sequence[Output]) -> bool:
-    """Whether a split is computed."""
-    return any(isinstance(output, _OfSplit) for output in outputs)
-
-
-def ends_suffice(outputs: Sequence[Output]) -> bool:
-    """Whether a batch gives all of them."""
-    return all(isinstance(output, _OfEnd) for output in outputs)
+    return tuple(outputs)

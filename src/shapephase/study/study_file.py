@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
@@ -14,32 +14,22 @@ import numpy as np
 from ..arguments import check_file_name
 from ..arrays import Array, finite_array
 from ..errors import InputFileNotFoundError, ShapePhaseError, StudyError, unknown_name
-from ._axes import LABELS, LONGEST_NAME, UNITS, unit_of
+from ._axes import LABELS, QUANTITIES, check_name, unit_of
 from ._recipes import RigidBody, imported
-from .distributions import DISTRIBUTIONS, Choice, LogNormal
+from .distributions import DISTRIBUTIONS, LogNormal
 from .outputs import Output
 from .study import Study
 
-_PLAIN = (
-    *("outputs", "draws", "seed", "chunk", "momentum", "attitude", "tolerance", "gauge", "parameters", "time_limit"),
-    "version",
-    *("root", "root_body", "packages", "xacro_args", "on_unphysical", "length_unit", "person_mass"),
-)
-_ENTRIES = ("body", "motion", "rigid", "over", "functions", *_PLAIN)
-_FACTORS = {
-    "rad": 1.0,
-    "deg": float(np.pi / 180.0),
-    "m": 1.0,
-    "mm": 1e-3,
-    "kg m^2/s": 1.0,
-    "s": 1.0,
-    "ms": 1e-3,
-    "": 1.0,
+# What a number in a unit is multiplied by, and the unit of the library that it then has.
+_UNITS = {
+    **{unit: (1.0, unit) for unit in ("rad", "m", "s", "kg m^2/s")},
+    "deg": (float(np.pi / 180.0), "rad"),
+    "mm": (1e-3, "m"),
+    "ms": (1e-3, "s"),
+    "": (1.0, ""),
 }
-"""What a number in a unit is multiplied by to be one of the library."""
-_BASE = {"deg": "rad", "mm": "m", "ms": "s"}
-# A file that is longer is no study.
-_MOST_BYTES = 50_000_000
+_MOST_BYTES = 50_000_000  # a longer file is no study
+_MOST_VALUES = 10_000_000  # of an even grid
 
 
 def read_study(path: str | os.PathLike[str]) -> Study:
@@ -77,7 +67,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     try:
         if len(content) > _MOST_BYTES:
             raise StudyError(f"it has more than {_MOST_BYTES // 10**6} MB")
-        return _made(tomllib.loads(content.decode()), place.parent)
+        return _study(tomllib.loads(content.decode()), place.parent)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise StudyError(f"{place}: no TOML that can be read ({error})") from None
     except ShapePhaseError as error:
@@ -86,135 +76,117 @@ def read_study(path: str | os.PathLike[str]) -> Study:
         raise StudyError(f"{place}: an entry is of another type than is needed ({error})") from None
 
 
-def _made(said: Mapping[str, Any], folder: Path) -> Study:
-    _check_names("entry", said, _ENTRIES)
-    _check_truths({name: value for name, value in said.items() if name != "xacro_args"}, "")
-    given: dict[str, Any] = {name: said[name] for name in _PLAIN if name in said}
-    if isinstance(given.get("packages"), list):
-        given["packages"] = [_folder(one, folder) for one in given["packages"]]
-    if ("body" in said or "body" in said.get("over", {})) == ("rigid" in said):
+def _study(entries: dict[str, Any], folder: Path) -> Study:
+    _refuse_booleans({name: entry for name, entry in entries.items() if name != "xacro_args"}, "")
+    arguments = [field.name for field in fields(Study)]
+    given = dict(_table(entries, "", (*arguments, "rigid", "functions")))
+    over = _table(given.pop("over", {}), "over")
+    functions = _table(given.pop("functions", {}), "functions")
+    if ("body" in given or "body" in over) == ("rigid" in given):
         raise StudyError("one of body and rigid is needed")
-    over = {name: _axis(name, one, folder) for name, one in _table(said, "over").items()}
-    if "rigid" in said:
-        _check_names("entry of rigid", _table(said, "rigid"), ("inertia", "duration"), needed=("inertia", "duration"))
-        body: Any = RigidBody(**said["rigid"])
-    else:
-        body = _file(said.get("body", over["body"][0] if "body" in over else ""), folder, "body")
-    motion = said.get("motion", over["motion"][0] if "motion" in over else None)
-    if motion is not None:
-        motion = _file(motion, folder, "motion")
-    outputs = said.get("outputs", Study.outputs)
-    if isinstance(outputs, str) or not all(isinstance(one, str) for one in outputs):
+    given["over"] = {name: _axis(name, entry, folder) for name, entry in over.items()}
+    for name in ("body", "motion"):
+        if name in given or name in over:
+            given[name] = _beside(given[name], folder, name) if name in given else given["over"][name][0]
+    if "rigid" in given:
+        given["body"] = RigidBody(**_table(given.pop("rigid"), "rigid", needed=("inertia", "duration")))
+    if isinstance(given.get("packages"), list):
+        given["packages"] = [_beside(entry, folder, "packages") for entry in given["packages"]]
+    outputs = given.get("outputs", Study.outputs)
+    if isinstance(outputs, str) or not all(isinstance(output, str) for output in outputs):
         raise StudyError("outputs: a list of names is needed")
-    given["outputs"] = (*outputs, *(_function(*one) for one in _table(said, "functions").items()))
-    return Study(body, motion, over, **given)
+    given["outputs"] = (*outputs, *(_function(name, entry) for name, entry in functions.items()))
+    return Study(**given)
 
 
-def _axis(name: str, said: Any, folder: Path) -> Any:
-    if len(name) > LONGEST_NAME:
-        raise StudyError(f"over: a name of {len(name)} characters, {name[:20]!r}...; {LONGEST_NAME} are enough")
+def _axis(name: str, entry: Any, folder: Path) -> Any:
+    check_name(name, "over")
     where = f"over.{name}"
-    if not isinstance(said, Mapping):
-        raise StudyError(f"{where}: a table is needed, with values, with from, to and count, or with a distribution")
+    table = _table(entry, where)
     if name in LABELS:
-        _check_names(f"entry of {where}", said, ("values",), needed=("values",))
-        values = said["values"]
-        if not isinstance(values, list) or not all(isinstance(one, str) for one in values):
+        values = _table(table, where, needed=("values",))["values"]
+        if not isinstance(values, list) or not all(isinstance(label, str) for label in values):
             raise StudyError(f"{where}.values: a list of names is needed")
-        return values if name == "gauge" else [_file(one, folder, where) for one in values]
-    factor = _factor(name, said.get("unit"))
-    ways = [way for way in ("values", "from", "distribution") if way in said]
+        return values if name == "gauge" else [_beside(label, folder, where) for label in values]
+    factor = _factor(name, table.get("unit", unit_of(name)))
+    ways = [way for way in ("values", "from", "distribution") if way in table]
     if len(ways) != 1:
         raise StudyError(f"{where}: one of values, from (with to and count) and distribution is needed")
-    if ways[0] == "values":
-        _check_names(f"entry of {where}", said, ("values", "unit"))
-        return factor * _numbers(said["values"], f"{where}.values")
-    if ways[0] == "from":
-        needed = ("from", "to", "count")
-        _check_names(f"entry of {where}", said, (*needed, "unit"), needed=needed)
-        count = said["count"]
-        if not isinstance(count, int) or isinstance(count, bool) or not 1 <= count <= 10**7:
-            raise StudyError(f"{where}.count: a whole number from 1 to 10000000 is needed, got {count!r}")
-        first, last = (_numbers(said[end], f"{where}.{end}") for end in ("from", "to"))
-        return factor * np.linspace(first, last, count)
-    if said["distribution"] not in DISTRIBUTIONS:
-        raise unknown_name(f"distribution of {where}", str(said["distribution"]), DISTRIBUTIONS)
-    kind = DISTRIBUTIONS[said["distribution"]]
-    names = [one.name for one in fields(kind)]
-    needed_names = [one.name for one in fields(kind) if one.default is MISSING]
-    _check_names(f"entry of {where}", said, ("distribution", "unit", *names), needed=needed_names)
-    numbers = {one: _numbers(said[one], f"{where}.{one}") for one in names if one in said}
-    for one, value in numbers.items():
-        scaled = value if kind is LogNormal and one == "deviation" else factor * value
-        numbers[one] = scaled.tolist()  # type: ignore[assignment]
-    return kind(**numbers) if kind is not Choice else Choice(numbers["values"])  # type: ignore[arg-type]
+    if ways == ["values"]:
+        return factor * _numbers(_table(table, where, ("values", "unit")), where, "values")
+    if ways == ["from"]:
+        _table(table, where, ("unit",), needed=("from", "to", "count"))
+        count = table["count"]
+        if not isinstance(count, int) or not 1 <= count <= _MOST_VALUES:
+            raise StudyError(f"{where}.count: a whole number from 1 to {_MOST_VALUES} is needed, got {count!r}")
+        return factor * np.linspace(_numbers(table, where, "from"), _numbers(table, where, "to"), count)
+    if table["distribution"] not in DISTRIBUTIONS:
+        raise unknown_name(f"distribution of {where}", str(table["distribution"]), DISTRIBUTIONS)
+    kind = DISTRIBUTIONS[table["distribution"]]
+    needed = [parameter.name for parameter in fields(kind) if parameter.default is MISSING]  # type: ignore[arg-type]
+    parameters = [parameter.name for parameter in fields(kind)]  # type: ignore[arg-type]
+    _table(table, where, ("distribution", "unit", *parameters), needed=needed)
+    numbers = {name: _numbers(table, where, name) for name in parameters if name in table}
+    in_unit = {name for name in numbers if kind is not LogNormal or name != "deviation"}
+    return kind(**{name: (factor * value if name in in_unit else value).tolist() for name, value in numbers.items()})
 
 
 def _factor(name: str, unit: Any) -> float:
-    """What numbers of an axis are multiplied by."""
-    if unit is None:
-        return 1.0
+    """Return what numbers of an axis in a unit are multiplied by."""
     own = unit_of(name)
-    if unit not in _FACTORS and unit != own:
-        raise unknown_name(f"unit of over.{name}", str(unit), [one for one in _FACTORS if one])
-    fits = unit == own or _BASE.get(unit, unit) in own.split(" or ") or name.partition(".")[0] not in UNITS
-    if not fits:
+    if unit == own:
+        return 1.0
+    if unit not in _UNITS:
+        raise unknown_name(f"unit of over.{name}", str(unit), [known for known in _UNITS if known])
+    factor, base = _UNITS[unit]
+    if base not in own.split(" or ") and name.partition(".")[0] in QUANTITIES:
         raise StudyError(f"over.{name}.unit: it is in {own or 'no unit'}, got {unit!r}")
-    return _FACTORS.get(unit, 1.0)
+    return factor
 
 
-def _function(name: str, said: Any) -> Output:
+def _function(name: str, entry: Any) -> Output:
     where = f"functions.{name}"
-    if not isinstance(said, Mapping):
-        raise StudyError(f'{where}: a table with call = "module:function" is needed')
-    _check_names(f"entry of {where}", said, ("call", "shape", "unit", "about"), needed=("call",))
-    shape = said.get("shape", [])
-    if not isinstance(shape, list) or not all(isinstance(one, int) and 1 <= one <= 1000 for one in shape):
+    table = _table(entry, where, ("shape", "unit", "about"), needed=("call",))
+    shape = table.get("shape", [])
+    if not isinstance(shape, list) or not all(isinstance(length, int) and 1 <= length <= 1000 for length in shape):
         raise StudyError(f"{where}.shape: a list of whole numbers from 1 to 1000 is needed, got {shape!r}")
-    call = imported(str(said["call"]), f"{where}.call")
-    return Output(name, call, tuple(shape), str(said.get("unit", "")), str(said.get("about", "")))
+    call = imported(str(table["call"]), f"{where}.call")
+    return Output(name, call, tuple(shape), str(table.get("unit", "")), str(table.get("about", "")))
 
 
-def _file(name: Any, folder: Path, where: str) -> str:
-    """A file beside the study's, if there is one, or the name as it is."""
+def _beside(name: Any, folder: Path, where: str) -> str:
+    """Return a file or folder beside the study's, if there is one, or the name as it is."""
     if not isinstance(name, str) or not name:
         raise StudyError(f"{where}: a name or a file is needed, got {name!r}")
-    beside = str(folder / name)
-    return beside if os.path.isfile(beside) else name
+    beside = folder / name
+    return str(beside) if os.path.isfile(beside) or (where == "packages" and os.path.isdir(beside)) else name
 
 
-def _folder(name: Any, folder: Path) -> Any:
-    """A folder beside the study's file, if there is one, or the name as it is."""
-    return str(folder / name) if isinstance(name, str) and name and os.path.isdir(folder / name) else name
-
-
-def _table(said: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    found = said.get(name, {})
-    if not isinstance(found, Mapping):
-        raise StudyError(f"{name}: a table is needed, got {found!r:.60}")
-    return found
-
-
-def _check_names(kind: str, said: Mapping[str, Any], known: Any, *, needed: Any = ()) -> None:
-    for name in said:
-        if name not in known:
-            raise unknown_name(kind, name, known)
+def _table(
+    entry: Any, where: str, known: Iterable[str] | None = None, *, needed: Iterable[str] = ()
+) -> Mapping[str, Any]:
+    """Return a table after a check of the names in it; any are allowed where none are known or needed."""
+    if not isinstance(entry, Mapping):
+        raise StudyError(f"{where}: a table is needed, got {entry!r:.60}")
+    allowed = (*(known or ()), *needed)
+    for name in entry if allowed else ():
+        if name not in allowed:
+            raise unknown_name(f"entry of {where}" if where else "entry", name, allowed)
     for name in needed:
-        if name not in said:
-            raise StudyError(f"{kind}: {name} is missing")
+        if name not in entry:
+            raise StudyError(f"{where}: {name} is missing")
+    return entry
 
 
-def _numbers(value: Any, name: str) -> Array:
-    return finite_array(value, name)
+def _numbers(table: Mapping[str, Any], where: str, name: str) -> Array:
+    return finite_array(table[name], f"{where}.{name}")
 
 
-def _check_truths(value: Any, name: str) -> None:
-    """Raise StudyError for what is true or false, as no entry is: NumPy reads it as 1 and 0."""
+def _refuse_booleans(value: Any, name: str) -> None:
+    """Raise StudyError for true and false, which NumPy reads as 1 and 0."""
     if isinstance(value, bool):
         raise StudyError(f"{name}: true and false are no numbers")
-    if isinstance(value, Mapping):
-        for key, entry in value.items():
-            _check_truths(entry, f"{name}.{key}" if name else key)
-    elif isinstance(value, list):
-        for entry in value:
-            _check_truths(entry, name)
+    for key, entry in value.items() if isinstance(value, Mapping) else ():
+        _refuse_booleans(entry, f"{name}.{key}" if name else key)
+    for entry in value if isinstance(value, list) else ():
+        _refuse_booleans(entry, name)
