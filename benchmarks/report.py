@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import shapephase as sp
-from shapephase.plotting import motion_page, write_report
+from shapephase.plots import motion_page, write_report
 
 
 def main() -> None:

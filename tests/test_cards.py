@@ -16,11 +16,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase import so3
+from shapephase import plots, so3
 from shapephase.display import Card, card_html, card_text, short_repr
 from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting, kane_scher
-from shapephase.plotting import plots
 from shapephase.reconstruction.attitude_angles import euler_angles
 from support.places import ROOT
 

@@ -25,7 +25,7 @@ def once(k):
     "reports": """
 import tempfile
 from pathlib import Path
-from shapephase.plotting.report import write_report
+from shapephase.plots.report import write_report
 body, path = sp.load_body("cat_two_halves"), kane_scher(0.3, 1.0)
 folder = tempfile.TemporaryDirectory()
 def once(k):

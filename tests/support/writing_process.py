@@ -164,7 +164,7 @@ def _call(writer: str, version: int, target: str) -> None:
     elif writer == "motion.csv":
         motion.write_csv(target, np.linspace(0.0, 1.0, 2000))
     elif writer == "figure.svg":
-        from shapephase.plotting.named_figures import write_figure
+        from shapephase.plots.named_figures import write_figure
 
         write_figure("attitude", motion, target)
     else:

@@ -129,7 +129,7 @@ def _browser() -> str | None:
 def _film_browser() -> str | None:
     """The Chromium that would draw a film."""
     from ..errors import MissingExtraError
-    from ..plotting.pages.video import chromium
+    from ..plots.pages.video import chromium
 
     try:
         return chromium()

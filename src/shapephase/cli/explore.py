@@ -38,8 +38,8 @@ def explore_command(
 
     from ..body.catalog import load_body
     from ..files import write_whole
-    from ..plotting.explorer import explore_html
-    from ..plotting.viewer import LiveView
+    from ..plots.explorer import explore_html
+    from ..plots.viewer import LiveView
 
     aside = check_writable(html, "--html", ".html")
     loaded = load_body(body, **floating.loading)

@@ -59,9 +59,9 @@ def view_command(
         Seconds of motion in a second of playing; without it 1, or such that playing takes from 4 to 20 s. For example
         `--speed 0.1` for slow motion.
     """
-    from ..plotting.pages.up_axis import up_axis
-    from ..plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
-    from ..plotting.viewer import motion_page, motion_video, view
+    from ..plots.pages.up_axis import up_axis
+    from ..plots.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
+    from ..plots.viewer import motion_page, motion_video, view
     from . import motion as motions
     from .texts.recording_text import recording_data
 
@@ -119,7 +119,7 @@ def plot_command(
         What is drawn: momentum, phases, attitude, shape, torques, inertia, internal_momentum or energy; for example
         `phases`.
     """
-    from ..plotting.named_figures import FIGURES, write_figure
+    from ..plots.named_figures import FIGURES, write_figure
     from . import motion as motions
     from .texts.recording_text import recording_data
 

@@ -68,8 +68,8 @@ def _coordinate(word: str) -> tuple[str, float]:
 
 def _draw(out: Path, found: Reach) -> None:
     from ..files import write_whole
-    from ..plotting.plot_style import axes_image, column_axes
-    from ..plotting.shape_plots import plot_reach
+    from ..plots.plot_style import axes_image, column_axes
+    from ..plots.shape_plots import plot_reach
 
     image = axes_image(plot_reach(column_axes(2.8), found), out.suffix[1:].lower())
     write_whole(out, lambda stream: stream.write(image))

@@ -76,7 +76,7 @@ def split_command(
     aside = check_writable(phases, "--phases", ".csv") or aside
     aside = check_writable(html, "--html", ".html") or aside
     if html is not None:
-        from ..plotting.pages.up_axis import up_axis
+        from ..plots.pages.up_axis import up_axis
 
         up_axis(recording.up, None)
     with steps(13 if html else 2) as work:
@@ -100,7 +100,7 @@ def split_command(
             running_phases(flown.motion, times, gauge).write_csv(phases)
             say_written(phases)
         if html is not None:
-            from ..plotting.report import write_report
+            from ..plots.report import write_report
 
             title = f"{flown.body.name} along {Path(motion).name}"
             write_report(

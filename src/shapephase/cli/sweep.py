@@ -183,7 +183,7 @@ def plot_study_command(
     output
         What is drawn, an output of the study, or an entry such as `final_attitude_0_1`; for example `turn`.
     """
-    from ..plotting.plot_style import axes_image, column_axes
+    from ..plots.plot_style import axes_image, column_axes
     from ..study.figures import plot_study
     from ..study.store import open_study
 

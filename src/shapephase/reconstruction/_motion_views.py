@@ -203,7 +203,7 @@ class MotionViews:
         return offered("Motion.to_xarray")(self, times, **fall)
 
     def plot(self: Any, kind: str | None = None, *, ax: Any = None, gauge: Any = "horizontal") -> Any:
-        """Draw one of the figures of `plotting.FIGURES` and return its Matplotlib axes.
+        """Draw one of the figures of `plots.FIGURES` and return its Matplotlib axes.
 
         Parameters
         ----------

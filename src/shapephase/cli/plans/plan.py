@@ -223,7 +223,7 @@ def plan_command(
             write_shape_path(found.path, out, comment=_comment(loaded, found))
             say_written(out)
         if html is not None:
-            from ...plotting.report import write_report
+            from ...plots.report import write_report
 
             write_report(
                 found.motion,

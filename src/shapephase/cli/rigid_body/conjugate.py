@@ -97,8 +97,8 @@ def conjugate_command(
 
 def _draw(out: Path, moments: tuple[float, float, float], order: int, momenta: Array) -> None:
     from ...files import write_whole
-    from ...plotting.geodesic_plots import plot_conjugate_locus
-    from ...plotting.plot_style import axes_image, column_axes
+    from ...plots.geodesic_plots import plot_conjugate_locus
+    from ...plots.plot_style import axes_image, column_axes
 
     image = axes_image(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=momenta), out.suffix[1:].lower())
     write_whole(out, lambda stream: stream.write(image))

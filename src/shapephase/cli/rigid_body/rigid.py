@@ -68,9 +68,9 @@ def rigid_command(
         is written. A Chromium draws it (`pip install 'shapephase[video]'`). For example `--video rolling.gif`.
     """
     from ...errors import unknown_name
-    from ...plotting.named_figures import RIGID_FIGURES, write_rigid_figure
-    from ...plotting.pages.poinsot_page import poinsot_page, poinsot_video, rolling_facts
-    from ...plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
+    from ...plots.named_figures import RIGID_FIGURES, write_rigid_figure
+    from ...plots.pages.poinsot_page import poinsot_page, poinsot_video, rolling_facts
+    from ...plots.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
 
     if figure not in RIGID_FIGURES:
         raise unknown_name("kind of figure", figure, RIGID_FIGURES)
