@@ -6,9 +6,9 @@ import warnings
 
 from ..errors import ImplausibleBodyWarning, TrajectoryWarning
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
@@ -23,9 +23,9 @@ def check_command(
     motion: MotionArgument | None = None,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
-    recording: RecordingOptions = AS_RECORDED,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    floating: BodyOptions = BODY_DEFAULTS,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Check a body, and a joint motion for it: what was read, what is unlikely of it, and whether it can be used."""
     from ..body.plausibility import implausible, person_height

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .options import AS_TEXT, PrintOptions
+from .options import PRINT_DEFAULTS, PrintOptions
 from .outcome import Outcome
 
 _PACKAGES = (
@@ -30,7 +30,7 @@ _COMPILER_TIMEOUT = 10.0
 """For the compiler to say its version [s]."""
 
 
-def doctor_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
+def doctor_command(*, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # noqa: ARG001
     """List what the library finds on this machine: versions, features, compiler, cache, browser; for bug reports."""
     import platform
 

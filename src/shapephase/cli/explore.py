@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, PrintOptions, UpAxis
+from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyArgument, BodyOptions, PrintOptions, UpAxis
 from .outcome import Outcome, check_writable
 from .terminal import put, say_written
 
@@ -16,11 +16,11 @@ def explore_command(
     body: BodyArgument,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
+    floating: BodyOptions = BODY_DEFAULTS,
     joints: Annotated[tuple[str, str], Parameter(negative_iterable="")],
     html: Path | None = None,
     up: UpAxis = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome | None:
     """Draw loops of two joints on a map of the curvature, and see what they turn the body by, in a browser or a file.
 

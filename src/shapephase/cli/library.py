@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from .options import AS_TEXT, PrintOptions
+from .options import PRINT_DEFAULTS, PrintOptions
 from .outcome import Outcome
 from .progress import steps
 
 
-def robots_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
+def robots_command(*, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # noqa: ARG001
     """List the bodies and motions that come with the library."""
     from ..body.catalog import example_names, load_body, robot_names
     from ..examples.scenarios import MOTIONS
@@ -29,7 +29,7 @@ def robots_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG
     return Outcome("\n".join(lines), {"bodies": listed, "motions": motions, "examples": examples})
 
 
-def compile_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
+def compile_command(*, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # noqa: ARG001
     """Compile the innermost loops with Numba now, not when they are first needed.
 
     Once is enough for all later sessions: what is compiled is kept in $XDG_CACHE_HOME/shapephase, or

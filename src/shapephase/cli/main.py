@@ -26,6 +26,7 @@ from .doctor import doctor_command
 from .exit_codes import ExitCode, exit_code_list, exit_code_of
 from .explore import explore_command
 from .library import compile_command, robots_command
+from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
 from .outcome import Outcome
 from .pictures import plot_command, view_command
@@ -39,33 +40,43 @@ from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
 from .texts.usage import usage_message
 from .torques import torques_command
 
+_EXIT_CODES = f"Exit codes:\n\n{exit_code_list()}"
+_WHERE_EXIT_CODES = "Exit codes: `shapephase --help`"
 app = App(
     name="shapephase",
     help="A free body changes its shape in a known way; how does it turn?",
-    help_epilogue=f"Exit codes:\n\n{exit_code_list()}",
+    help_epilogue=_EXIT_CODES,
+    help_flags=["--help", "-h", HELP_ALL],
     help_format="markdown",
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-app.command(split_command, name="split")
-app.command(torques_command, name="torques")
-app.command(view_command, name="view")
-plot_app = App(name="plot")
+plot_app = App(name="plot", help_epilogue=_WHERE_EXIT_CODES)
 plot_app.default(plot_command)
 plot_app.command(plot_study_command, name="sweep")
-app.command(plot_app)
-app.command(explore_command, name="explore")
-app.command(plan_command, name="plan")
-app.command(conjugate_command, name="conjugate")
-app.command(reach_command, name="reach")
-app.command(rigid_command, name="rigid")
-app.command(check_command, name="check")
-app.command(audit_command, name="audit")
-app.command(orbits_command, name="orbits")
-app.command(sweep_app)
-app.command(robots_command, name="robots")
-app.command(compile_command, name="compile")
-app.command(doctor_command, name="doctor")
+sweep_app.help_epilogue = _WHERE_EXIT_CODES
+for _name, _command in {
+    "split": split_command,
+    "torques": torques_command,
+    "view": view_command,
+    "plot": plot_app,
+    "explore": explore_command,
+    "plan": plan_command,
+    "conjugate": conjugate_command,
+    "reach": reach_command,
+    "rigid": rigid_command,
+    "check": check_command,
+    "audit": audit_command,
+    "orbits": orbits_command,
+    "sweep": sweep_app,
+    "robots": robots_command,
+    "compile": compile_command,
+    "doctor": doctor_command,
+}.items():
+    if isinstance(_command, App):
+        app.command(_command)
+    else:
+        app.command(_command, name=_name, help_epilogue=_WHERE_EXIT_CODES)
 app.register_install_completion_command(
     help="Let the shell complete commands and options with the tabulator key; for bash, zsh and fish."
 )
@@ -86,6 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     Warnings are lines on stderr too, and a list in what `--json` prints.
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
+    SHOWS_ALL.set(HELP_ALL in tokens)
     with spoken(tokens), command_line(tokens), as_command():
         try:
             code = _ran(tokens, as_json="--json" in tokens)

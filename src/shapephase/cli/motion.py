@@ -27,7 +27,8 @@ from ..shape_space.files.flight import ANY_GRAVITY, RECORDED
 from ..shape_space.files.mapping_files import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
-from .options import AS_RECORDED, AS_WRITTEN, BodyOptions, FlightOptions, RecordingOptions
+from .joint_values import joint_values
+from .options import BODY_DEFAULTS, RECORDING_DEFAULTS, BodyOptions, RecordingOptions, StartOptions
 
 if TYPE_CHECKING:
     from ..error_bars.recorded_momentum import RecordedMomentum
@@ -88,14 +89,14 @@ class Flight:
 def flight(
     body: str,
     motion: str,
-    options: FlightOptions,
+    options: StartOptions,
     recording: RecordingOptions,
     tolerance: float = DEFAULT_TOLERANCE,
     progress: Callable[[RunProgress], Any] | None = None,
     *,
     gauge: str = "base",
     trail: str | None = None,
-    floating: BodyOptions = AS_WRITTEN,
+    floating: BodyOptions = BODY_DEFAULTS,
 ) -> Flight:
     """The motion that the arguments and options of a command describe.
 
@@ -129,7 +130,7 @@ def flight(
     return Flight(flown.motion, loaded, path, recorded, flown.fitted, flown.momentum_by)
 
 
-def _start(motion: str, options: FlightOptions) -> Array | None:
+def _start(motion: str, options: StartOptions) -> Array | None:
     """The attitude at the start (3, 3): the one that is given, or that with which a motion of the library begins."""
     if options.attitude is not None:
         return so3.quat_argument(options.attitude, "attitude")
@@ -141,7 +142,7 @@ def _is_named(motion: str) -> bool:
     return motion in MOTIONS and not os.path.isfile(motion)
 
 
-def is_without_momentum(motion: str, options: FlightOptions) -> bool:
+def is_without_momentum(motion: str, options: StartOptions) -> bool:
     """Whether the momentum is known to be zero before the motion is read: a recorded base may still show one."""
     return _is_named(motion) if options.momentum is None else not any(options.momentum)
 
@@ -157,7 +158,7 @@ def body_argument(body: str, floating: BodyOptions) -> Body:
 
 
 def joint_motion(
-    motion: str, body: Body, recording: RecordingOptions = AS_RECORDED, *, given: bool | None = None
+    motion: str, body: Body, recording: RecordingOptions = RECORDING_DEFAULTS, *, given: bool | None = None
 ) -> tuple[ShapePath, RecordedMotion | None]:
     """The path of a motion, and its record if it comes from a file.
 
@@ -178,13 +179,14 @@ def joint_motion(
         raise ShapeError(f"there is no option {motion[:_LONGEST_SHOWN]!r} of this command, and no such file either")
     if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):
         raise unknown_name("motion (no such file either)", motion[:_LONGEST_SHOWN], MOTIONS)
-    said = vars(recording) | {
+    choices = {name: value for name, value in vars(recording).items() if name != "step"} | {
+        "timestep": recording.step,
         "names": column_names(recording.names),
-        "rest": _rest(recording.rest),
+        "rest": joint_values(body, recording.rest, "--rest"),
         "flight": flight_words(recording.flight) or (RECORDED if given is False else None),
         "gravity": ANY_GRAVITY if given and recording.gravity is None else recording.gravity,
     }
-    recorded = read_recorded_motion(motion, body, **said)
+    recorded = read_recorded_motion(motion, body, **choices)
     return recorded.path, recorded
 
 
@@ -217,16 +219,3 @@ def flight_words(words: tuple[str, ...]) -> str | tuple[float, float] | None:
     except ValueError:
         raise ShapeError(f"--flight: auto, auto:2, all or two times are needed, got {' '.join(words)!r:.60}") from None
     return first, last
-
-
-def _rest(words: tuple[str, ...]) -> dict[str, str]:
-    """The joints of `--rest` with their values as written. Raises ShapeError."""
-    found: dict[str, str] = {}
-    for word in words:
-        joint, mark, value = word.partition("=")
-        if not mark or not joint.strip() or not value.strip():
-            raise ShapeError(f"--rest: JOINT=VALUE is needed, got {word!r:.60}")
-        if joint.strip() in found:
-            raise ShapeError(f"--rest: joint {joint.strip()!r:.60} stands twice")
-        found[joint.strip()] = value.strip()
-    return found

@@ -7,9 +7,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
@@ -37,9 +37,9 @@ def orbits_command(
         ),
     ] = "horizontal",
     tolerance: float | None = None,
-    floating: BodyOptions = AS_WRITTEN,
-    recording: RecordingOptions = AS_RECORDED,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    floating: BodyOptions = BODY_DEFAULTS,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find the motions whose shape and momentum close together, and split each.
 

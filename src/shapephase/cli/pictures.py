@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING
 
 from ..errors import ShapeError, unknown_name
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
-    AT_REST,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
+    START_DEFAULTS,
     BodyArgument,
     BodyOptions,
     FigureFile,
-    FlightOptions,
     Gauge,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    StartOptions,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -34,14 +34,14 @@ def view_command(
     motion: MotionArgument,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
-    flight: FlightOptions = AT_REST,
+    floating: BodyOptions = BODY_DEFAULTS,
+    flight: StartOptions = START_DEFAULTS,
     html: Path | None = None,
     video: Path | None = None,
     trail: str | None = None,
     speed: float | None = None,
-    recording: RecordingOptions = AS_RECORDED,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome | None:
     """Show a motion in 3-D: in a browser until Ctrl-C, or as one HTML file that opens offline.
 
@@ -105,11 +105,11 @@ def plot_command(
     /,
     *,
     out: FigureFile,
-    floating: BodyOptions = AS_WRITTEN,
-    flight: FlightOptions = AT_REST,
+    floating: BodyOptions = BODY_DEFAULTS,
+    flight: StartOptions = START_DEFAULTS,
     gauge: Gauge = "horizontal",
-    recording: RecordingOptions = AS_RECORDED,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Draw one figure of a motion, one column wide.
 

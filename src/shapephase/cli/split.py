@@ -5,20 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
-    AT_REST,
-    EXACT,
+    BODY_DEFAULTS,
+    ERROR_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
+    START_DEFAULTS,
     BodyArgument,
     BodyOptions,
     ErrorOptions,
-    FlightOptions,
     Gauge,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
     ReportFile,
+    StartOptions,
     Tolerance,
 )
 from .outcome import Outcome, check_writable
@@ -34,17 +34,17 @@ def split_command(
     motion: MotionArgument,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
-    flight: FlightOptions = AT_REST,
+    floating: BodyOptions = BODY_DEFAULTS,
+    flight: StartOptions = START_DEFAULTS,
     gauge: Gauge = "horizontal",
     tolerance: Tolerance = 1e-9,
-    recording: RecordingOptions = AS_RECORDED,
-    errors: ErrorOptions = EXACT,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    errors: ErrorOptions = ERROR_DEFAULTS,
     out: Path | None = None,
     samples: Path | None = None,
     phases: Path | None = None,
     html: ReportFile = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Split the rotation of a free body into shape holonomy and Montgomery phase.
 

@@ -14,7 +14,7 @@ from ..errors import ShapeError
 from ..files import write_whole
 from ..run_progress import RunProgress
 from .exit_codes import ExitCode
-from .options import AS_TEXT, AS_WRITTEN, BodyOptions, FigureFile, PrintOptions
+from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyOptions, FigureFile, PrintOptions
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import Verbosity, say, say_written
@@ -66,8 +66,8 @@ def sweep_command(
             help="Go on with a store that is there, and compute cases that failed again; for example `--retry failed`.",
         ),
     ] = None,
-    floating: BodyOptions = AS_WRITTEN,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Compute the cases of a study in a TOML file, on all processors or on a cluster, into a Zarr store.
 
@@ -110,7 +110,7 @@ def sweep_command(
 
 
 @sweep_app.command(name="status")
-def status_command(store: str, /, *, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
+def status_command(store: str, /, *, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # noqa: ARG001
     """Say what the store of a study holds.
 
     Parameters
@@ -132,7 +132,7 @@ def export_command(
         Path,
         Parameter(help="Write a table (.parquet, .csv) or arrays (.nc) to this file; for example `--out out.nc`."),
     ],
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Write what the store of a study holds to a NetCDF, Parquet or CSV file.
 
@@ -172,7 +172,7 @@ def plot_study_command(
             "`--along momentum_z`.",
         ),
     ] = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Draw one output of a study, one column wide: how it is spread, its quantiles along a grid, or a map over two.
 

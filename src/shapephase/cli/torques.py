@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
-    AT_REST,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
+    START_DEFAULTS,
     BodyArgument,
     BodyOptions,
-    FlightOptions,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    StartOptions,
     Tolerance,
 )
 from .outcome import Outcome, check_writable
@@ -27,12 +27,12 @@ def torques_command(
     motion: MotionArgument,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
-    flight: FlightOptions = AT_REST,
+    floating: BodyOptions = BODY_DEFAULTS,
+    flight: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
-    recording: RecordingOptions = AS_RECORDED,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
     out: Path | None = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find the torques of the joints: their peaks against the limits of the body's file, power and work.
 

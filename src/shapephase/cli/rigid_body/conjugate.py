@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...errors import ShapeError
-from ..options import AS_TEXT, PrintOptions
+from ..options import PRINT_DEFAULTS, PrintOptions
 from ..outcome import Outcome, check_writable
 from ..terminal import say_written
 
@@ -31,7 +31,7 @@ def conjugate_command(
     ] = (),
     order: int = 1,
     out: Path | None = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """List conjugate points of the free rigid body's Serret-Andoyer metric, and draw their locus.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...errors import ShapeError
-from ..options import AS_TEXT, PrintOptions
+from ..options import PRINT_DEFAULTS, PrintOptions
 from ..outcome import Outcome, check_writable
 from ..terminal import say_written
 
@@ -41,7 +41,7 @@ def rigid_command(
     out: Path | None = None,
     html: Path | None = None,
     video: Path | None = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Say how a free rigid body turns, and draw its polhodes, its rolling ellipsoid or its cones.
 

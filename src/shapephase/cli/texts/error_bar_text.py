@@ -15,7 +15,7 @@ from ...plain_data import plain
 from ...reconstruction.reconstruction import Motion
 from ...shape_space.files.labels import amounts
 from ...shape_space.files.read import RecordedMotion
-from ..options import EXACT, ErrorOptions
+from ..options import ERROR_DEFAULTS, ErrorOptions
 
 if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
@@ -64,7 +64,7 @@ def error_bar_lines(
     result: PhaseSplit,
     found: Uncertainty | None,
     recorded: RecordedMotion | None = None,
-    options: ErrorOptions = EXACT,
+    options: ErrorOptions = ERROR_DEFAULTS,
 ) -> list[str]:
     """For people: angles with their bars, in degrees; where an angle has none, how far the rotation may be off.
 
