@@ -26,7 +26,7 @@ from support.places import ROOT
 SOURCE = ROOT / "src"
 ROOMS = sorted(".".join(stub.parent.relative_to(SOURCE).parts) for stub in SOURCE.glob("shapephase/**/__init__.pyi"))
 # Classes that say of themselves what they are in a line.
-OWN = {"Body", "BodyFamily", "EulerTop", "FlightRecorder", "Gyrostat", "LiveView"}
+OWN = {"Body", "BodyFamily", "EulerTop", "FlightRecorder", "Gyrostat", "Page"}
 # Of the inside of a motion; and what is made for a browser.
 INSIDE = {"Interpolant", "SteppedRotation", "Sampler", "MovingScene"}
 WITH_CARDS = (sp.Body, sp.ShapePath, sp.Deformation, sp.Motion, sp.phases.PhaseSplit, sp.FixedPoints,

@@ -214,11 +214,11 @@ def test_the_split_of_a_batch_is_a_table_of_spreads():
 @pytest.mark.full
 @pytest.mark.parametrize("number", range(COUNT))
 def test_the_report_has_the_numbers_of_the_table(number, tmp_path):
-    from shapephase.plots.report import write_report
+    from shapephase.plots.report_page import report
 
     motion, gauge = motion_of(number), gauge_of(number)
     split = sp.split(motion, gauge)
-    write_report(motion, split, tmp_path / "report.html")
+    report(motion, split).write(tmp_path / "report.html")
     page = re.sub(
         r'srcdoc="[^"]*"|src="data:[^"]*"|<(script|style).*?</\1>',
         "",

@@ -49,7 +49,7 @@ def at_values(body, words, _, capsys):
     return dict(zip(body.joint_names, json.loads(capsys.readouterr().out)["shape"]))
 
 
-def rest_values(body, words, _, capsys):
+def rest_values(_body, words, _planned, capsys):
     main(["check", "satellite", "m.csv", "--rest", *words, "--rest-missing", "--json"])
     return json.loads(capsys.readouterr().out)["motion"]["recording"]["at_rest"]
 

@@ -94,7 +94,7 @@ def test_options_that_do_not_go_together(take, capsys):
     for arguments, words in (
         (["--flight", "auto", "--attitude", "0", "0", "0", "1"], "attitude at the start is fitted"),
         (["--base-axes", "estimate", "--momentum", "0", "0", "1"], "leave the momentum out"),
-        (["--flight", "1", "x"], "--flight: auto, auto:2, all or two times"),
+        (["--flight", "1", "x"], "--flight: auto, auto:2, all, or a first and a later"),
         (["--flight", "soon"], "'auto', 'auto:2' (the second), 'all', 'recorded' or two times"),
         (["--flight", "0", "2.1", "--tolerance", "1e-6"], "no free flight of this body"),
     ):

@@ -15,8 +15,9 @@ import pytest
 
 import shapephase as sp
 from shapephase import plots
-from shapephase.plots import motion_page, write_report
-from shapephase.plots._letters import plain_text, printable
+from shapephase.letters import printable
+from shapephase.plots import report, view
+from shapephase.plots._joint_styles import plain_text
 from shapephase.plots.plot_style import axes_image
 from support.browser import opened
 from support.hostile_names import HALF_A_PAIR, MARK, OF_FILES, OF_MODELS, star_urdf, swinging
@@ -99,7 +100,7 @@ def policy_in(page):
 
 def test_the_policy_knows_the_scripts_by_their_hashes_and_lets_nothing_out(star, tmp_path):
     _, _, motion = star
-    motion_page(motion, tmp_path / "star.html", frames=2)
+    view(motion, frames=2).write(tmp_path / "star.html")
     page = (tmp_path / "star.html").read_text(encoding="utf-8")
     policy = policy_in(page)
     assert policy["default-src"] == ["'none'"]
@@ -118,7 +119,7 @@ def test_pages_and_reports_of_models_with_unprintable_names(tmp_path):
     path = swinging(body)
     motion = sp.reconstruct(sp.articulated(body, path), [0.0, 0.3, 1.0])
     title = f"{HALF_A_PAIR} & \u202e swings"
-    write_report(motion, sp.split(motion), tmp_path / "r.html", shape_path=path, title=title)
+    report(motion, sp.split(motion), shape_path=path, title=title).write(tmp_path / "r.html")
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
     assert "<title>\\ud800 &amp; \\u202e swings</title>" in page
     outside = re.sub(r'"[^"]*"', "", page)
@@ -127,9 +128,9 @@ def test_pages_and_reports_of_models_with_unprintable_names(tmp_path):
 
 def report_of(star, folder):
     body, path, motion = star
-    motion_page(motion, folder / "page.html", frames=3, trail=OF_FILES[0])
+    view(motion, frames=3, trail=OF_FILES[0]).write(folder / "page.html")
     title = f"{body.name} </h1><script>{MARK}=1</script>"
-    write_report(motion, sp.split(motion), folder / "report.html", shape_path=path, title=title, trail="<!--")
+    report(motion, sp.split(motion), shape_path=path, title=title, trail="<!--").write(folder / "report.html")
 
 
 def test_in_a_browser_no_name_runs_a_script_or_asks_for_anything_and_nothing_fails(star, tmp_path, chromium):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import html
 import re
 import signal
@@ -22,7 +21,7 @@ from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting, satellite_sweep
 from shapephase.plots.named_figures import FIGURES, figure_image, write_figure
 from shapephase.plots.pages.report_data import continued_rotation_vectors
-from shapephase.plots.report import figure_rows, write_report
+from shapephase.plots.report_page import figure_rows, report
 from support.bodies import random_loop
 from support.browser import furred, opened, seen
 from support.long_runs import full_but
@@ -45,7 +44,7 @@ def moving_report(sweep, tmp_path_factory):
     folder, told = tmp_path_factory.mktemp("moving"), []
     path, moving, _ = sweep
     options = {"shape_path": path, "title": "a <satellite>", "begin": told.append}
-    write_report(moving, sp.split(moving), folder / "report.html", **options)
+    report(moving, sp.split(moving), **options).write(folder / "report.html")
     return folder, (folder / "report.html").read_text(encoding="utf-8"), told
 
 
@@ -92,27 +91,27 @@ def test_rows_of_figures_have_no_holes():
 @pytest.mark.usefixtures("no_pictures")
 def test_the_report_of_a_rigid_body_does_not_speak_of_its_shape(tmp_path):
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
-    write_report(motion, sp.split(motion), tmp_path / "report.html")
+    report(motion, sp.split(motion)).write(tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "The body is rigid and turns for 4 s." in page
     assert "The shape alone" not in page
     assert "Internal momentum" not in page
-    assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2, 3]
+    assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2]
 
 
-def test_figures_of_a_row_are_equally_high(moving_report):
-    """Breadths as the style shares them, by the figures' own sides: read off the page."""
-    _, page, _ = moving_report
-    (usual,) = re.findall(r"\.row figure \{[^}]*flex: ([0-9.]+) 1 0", page)
-    (tall,) = re.findall(r"\.row \.tall \{ flex-grow: ([0-9.]+)", page)
-    rows = re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)
-    assert [row.count("<figure") for row in rows] == [2, 2, 2, 2]
-    for row in rows:
-        heights = []
-        for name, image in re.findall(r'<figure( class="tall")?><img[^>]*base64,([^"]*)"', row):
-            width, height = map(float, re.findall(rb'(?:width|height)="([0-9.]+)pt"', base64.b64decode(image))[:2])
-            heights.append(float(tall if name else usual) * height / width)
-        assert heights == pytest.approx([heights[0]] * len(heights), rel=2e-3)
+def test_a_report_shows_each_figure_once(moving_report):
+    """Momentum, phases, attitude and joints as curves that move; the others as pictures, in full rows."""
+    folder, page, _ = moving_report
+    data = page_data(folder / "report.html")
+    assert data["directions"] is not None
+    titles = [plot["title"].split(",")[0] for plot in data["plots"]]
+    assert titles[:2] == ["phases so far", "turn since the start"]
+    assert "joints that turn" in titles
+    drawn = re.findall(r"<figcaption>(.*?)</figcaption>", page)
+    others = ("torques", "inertia", "internal_momentum", "energy")
+    assert drawn == [FIGURES[kind].caption for kind in others]
+    assert set(FIGURES) == {"momentum", "phases", "attitude", "shape", *others}
+    assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2, 2]
 
 
 @pytest.mark.parametrize("momentum", [True, False])
@@ -124,12 +123,12 @@ def test_the_report_says_what_the_split_says(sweep, tmp_path, momentum, request)
         folder, page, told = request.getfixturevalue("moving_report")
     else:
         folder, told = tmp_path, []
-        write_report(motion, result, folder / "report.html", shape_path=path, title="a <satellite>", begin=told.append)
+        report(motion, result, shape_path=path, title="a <satellite>", begin=told.append).write(folder / "report.html")
         page = (folder / "report.html").read_text(encoding="utf-8")
     text = text_of(page)
     assert "a <satellite>" in text
     assert len(page) < 6e6
-    assert page.count("<figure") == (8 if momentum else 5)
+    assert page.count("<figure") == (4 if momentum else 3)
     assert len(told) == page.count("<figure") + 1
     assert f"{np.degrees(so3.angle(result.total_rotation)):.6f}°" in text
     assert f"{np.degrees(so3.angle(result.holonomy)):.6f}°" in text
@@ -220,7 +219,7 @@ def test_the_report_of_the_righting_opens_offline_and_the_cat_lands_on_its_feet(
     on_its_back = np.diag([1.0, -1.0, -1.0])
     motion = sp.reconstruct(sp.articulated(sp.load_body("cat"), path), np.zeros(3), on_its_back)
     out = tmp_path / "righting.html"
-    write_report(motion, sp.split(motion), out, shape_path=path, title="The cat rights itself")
+    report(motion, sp.split(motion), shape_path=path, title="The cat rights itself").write(out)
     page, said, asked = opened(chromium, out)
     page.get_by_text("side", exact=True).click()
     up, down = (furred(seen(page, time))[:, 0] for time in (0.0, path.duration))
@@ -241,7 +240,7 @@ def test_what_is_beside_the_body_follows_the_scrubber(tmp_path, chromium):
     motion = sp.reconstruct(sp.articulated(sp.load_body("cat"), path), [0.05, 0.0, 0.1])
     result = sp.split(motion)
     out = tmp_path / "cat.html"
-    write_report(motion, result, out, shape_path=path)
+    report(motion, result, shape_path=path).write(out)
     assert out.stat().st_size < 3e6
     page, said, _ = opened(chromium, out)
     bar = page.locator("input.scrub")
@@ -277,7 +276,7 @@ def test_the_report_of_a_body_with_36_joints_is_small_and_says_what_was_given(tm
     motion = sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 40.0])
     out = tmp_path / "human.html"
     bars = ("error bars: one standard deviation", "total rotation   12 ± 3 deg & <more>")
-    write_report(motion, sp.split(motion), out, shape_path=path, error_bars=bars)
+    report(motion, sp.split(motion), shape_path=path, error_bars=bars).write(out)
     assert out.stat().st_size < 4e6
     text = text_of(out.read_text(encoding="utf-8"))
     for words in (*bars, *body.joint_names, "The shape alone turned it by", f"{body.mass:.4g} kg", "36 joints"):
@@ -299,7 +298,7 @@ def test_no_zero_of_a_report_has_a_sign(tmp_path):
     cat = sp.load_body("cat")
     path = random_loop(cat, np.random.default_rng(7), duration=1.0, amplitude=1e-5)
     motion = sp.reconstruct(sp.articulated(cat, path), [0.0, 0.0, 1e-9])
-    write_report(motion, sp.split(motion), tmp_path / "report.html", shape_path=path)
+    report(motion, sp.split(motion), shape_path=path).write(tmp_path / "report.html")
     text = text_of((tmp_path / "report.html").read_text(encoding="utf-8"))
     assert "0.0°" in text
     assert not re.findall(r"[-−]0\.0*(?![0-9])", text)

@@ -18,7 +18,7 @@ from shapephase.bounds.regimes import regime_certificate
 from shapephase.deformation.gauge import named_gauge
 from shapephase.errors import GaugeError, MissingExtraError, ShapeError, UnknownNameError
 from shapephase.examples.scenarios import MOTIONS, astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
-from shapephase.plots._joint_looks import other_side
+from shapephase.plots._joint_styles import other_side
 from shapephase.plots._sphere_area import enclosed_cells, outlines
 from shapephase.plots.motion_plots import _pieces
 from shapephase.plots.plot_style import axes_image

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError
-from shapephase.plots import poinsot_page, poinsot_video
+from shapephase.plots import rolling_ellipsoid
 from shapephase.rigid_body.poinsot import Poinsot
 from support.browser import opened, seen
 from support.pages import page_data
@@ -26,7 +26,7 @@ def top():
 @pytest.fixture(scope="module")
 def top_page(top, tmp_path_factory):
     file = tmp_path_factory.mktemp("poinsot") / "rolling.html"
-    poinsot_page(top, file, frames=2401)
+    rolling_ellipsoid(top, frames=2401).write(file)
     return file
 
 
@@ -72,7 +72,7 @@ def test_every_regime_has_a_page(tmp_path):
         sp.EulerTop.principal(moments, [0.5, 0.0, np.sqrt(0.75)]),
     ]
     for top in tops:
-        poinsot_page(top, tmp_path / "a.html", frames=5, duration=2.5)
+        rolling_ellipsoid(top, frames=5, duration=2.5).write(tmp_path / "a.html")
         data = page_data(tmp_path / "a.html")
         assert data["motion"]["duration"] == 2.5
         contact = data["rolling"]["contact"].reshape(-1, 3)
@@ -88,22 +88,22 @@ def test_every_regime_has_a_page(tmp_path):
         )
         foot = float(np.linalg.norm(data["rolling"]["foot"]))
         assert data["motion"]["arrow"] * data["motion"]["reach"] > 1.3 * foot - 1e-12
-    poinsot_page(tops[1], tmp_path / "a.html", frames=5)
+    rolling_ellipsoid(tops[1], frames=5).write(tmp_path / "a.html")
     assert page_data(tmp_path / "a.html")["motion"]["duration"] == pytest.approx(24.0 * np.pi, rel=1e-12)
 
 
 def test_what_cannot_roll_is_refused(top, tmp_path):
     page = tmp_path / "a.html"
     with pytest.raises(ShapeError, match="momentum"):
-        poinsot_page(sp.EulerTop(INERTIA, [0.0, 0.0, 0.0]), page)
+        rolling_ellipsoid(sp.EulerTop(INERTIA, [0.0, 0.0, 0.0])).write(page)
     for duration in (0.0, -1.0, np.inf):
         with pytest.raises(ShapeError, match="duration"):
-            poinsot_page(top, page, duration=duration)
+            rolling_ellipsoid(top, duration=duration).write(page)
     for frames in (1, 2.5, True):
         with pytest.raises(ShapeError, match="frames"):
-            poinsot_page(top, page, frames=frames)
+            rolling_ellipsoid(top, frames=frames).write(page)
     with pytest.raises(ShapeError, match="speed"):
-        poinsot_page(top, page, speed=0.0)
+        rolling_ellipsoid(top, speed=0.0).write(page)
     assert not list(tmp_path.iterdir())
 
 
@@ -149,7 +149,9 @@ def test_a_film_shows_the_ellipsoid_and_nothing_else(tmp_path, chromium):
     from PIL import Image
 
     chromium.close()
-    poinsot_video(sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5]), tmp_path / "rolling.png", pixels=(320, 240))
+    rolling_ellipsoid(sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])).film(
+        tmp_path / "rolling.png", pixels=(320, 240)
+    )
     with Image.open(tmp_path / "rolling.png") as strip:
         pictures = np.split(np.asarray(strip.convert("RGB"), dtype=int), 6, axis=1)
     orange = []

@@ -13,7 +13,7 @@ import pytest
 import shapephase as sp
 from shapephase.errors import MissingExtraError, OutputFileError, ShapeError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting
-from shapephase.plots import motion_video
+from shapephase.plots import view
 from shapephase.plots.pages import video
 from support.browser import furred
 
@@ -97,23 +97,23 @@ def test_what_lacks_is_named(turning, tmp_path, monkeypatch):
     old.write_text("old")
     for name in ("film.webm", "film"):
         with pytest.raises(UnknownNameError, match="kind of film"):
-            motion_video(turning, tmp_path / name)
+            view(turning).film(tmp_path / name)
     for size in ((640, 481), (640,), (0, 480), (640.0, 480), (10_000, 480)):
         with pytest.raises(ShapeError, match="pixels"):
-            motion_video(turning, old, pixels=size)
+            view(turning).film(old, pixels=size)
     with monkeypatch.context() as changed:
         changed.setenv("CHROMIUM", "no-such-browser")
         with pytest.raises(MissingExtraError, match="'no-such-browser', which is no program"):
-            motion_video(turning, old)
+            view(turning).film(old)
         changed.delenv("CHROMIUM")
         changed.setenv("PATH", str(tmp_path))
         with pytest.raises(MissingExtraError, match=r"none of chromium, .* is here; install one"):
-            motion_video(turning, old)
+            view(turning).film(old)
     for lacking, ending in (("playwright", "gif"), ("PIL", "png"), ("imageio_ffmpeg", "mp4")):
         with monkeypatch.context() as changed:
             changed.setitem(sys.modules, lacking, None)
             with pytest.raises(MissingExtraError, match=rf"{lacking}.*shapephase\[video\]"):
-                motion_video(turning, tmp_path / f"film.{ending}")
+                view(turning).film(tmp_path / f"film.{ending}")
     assert [path.name for path in tmp_path.iterdir()] == ["film.gif"]
     assert old.read_text() == "old"
 
@@ -130,7 +130,7 @@ def test_a_browser_that_fails_leaves_the_old_film(turning, tmp_path):
     old = tmp_path / "film.gif"
     old.write_text("old")
     with pytest.raises(OutputFileError, match=r"film\.gif: the browser that draws it, .*false, failed: "):
-        motion_video(turning, old)
+        view(turning).film(old)
     assert old.read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 1
 
@@ -142,11 +142,11 @@ def test_the_cat_of_a_film_starts_on_its_back_and_ends_on_its_feet(righting, tmp
         video.chromium()
     except MissingExtraError as error:
         pytest.skip(str(error))
-    motion_video(righting, tmp_path / "cat.png", pixels=(320, 240))
+    view(righting).film(tmp_path / "cat.png", pixels=(320, 240))
     with Image.open(tmp_path / "cat.png") as picture:
         strip = np.asarray(picture, dtype=int)
     assert strip.shape == (240, 6 * 320, 3)
-    motion_video(righting, tmp_path / "cat.gif", pixels=(320, 240), speed=0.5)
+    view(righting, speed=0.5).film(tmp_path / "cat.gif", pixels=(320, 240))
     with Image.open(tmp_path / "cat.gif") as film:
         assert (film.n_frames, film.size) == (26, (320, 240))
         film.seek(25)
@@ -164,4 +164,4 @@ def test_the_cat_of_a_film_starts_on_its_back_and_ends_on_its_feet(righting, tmp
 
 
 async def in_a_loop(motion, file):
-    motion_video(motion, file, pixels=(64, 64))
+    view(motion).film(file, pixels=(64, 64))

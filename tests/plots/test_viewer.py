@@ -8,8 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-import urllib.error
-import urllib.request
 
 import numpy as np
 import pytest
@@ -20,10 +18,10 @@ from shapephase import so3
 from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
 from shapephase.errors import ShapeError, UnknownNameError, VisualWarning
 from shapephase.examples.scenarios import cat_righting
-from shapephase.plots import viewer
+from shapephase.plots import report, viewer
 from shapephase.plots._moving_scene import moving_scene
-from shapephase.plots.pages.up_axis import up_axis
-from shapephase.plots.viewer import motion_html, motion_page, view
+from shapephase.plots.pages.motion_data import up_axis
+from shapephase.plots.viewer import view
 from support.bodies import link, random_loop, urdf
 from support.browser import furred, opened, seen, wait_for
 from support.coupled_bodies import KNOTS, LEG, TURN, couplings
@@ -266,17 +264,17 @@ def test_what_cannot_be_shown_is_refused(righting, tmp_path):
     one = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [0.0, 0.0, 1.0])
     page = tmp_path / "page.html"
     with pytest.raises(ShapeError, match="batch"):
-        motion_page(several, page)
+        view(several).write(page)
     with pytest.raises(UnknownNameError, match="tail"):
-        motion_page(one, page, trail="tail")
+        view(one, trail="tail").write(page)
     for speed in (0.0, -1.0, np.nan, np.inf, "fast"):
         with pytest.raises(ShapeError, match="speed"):
-            motion_page(righting, page, speed=speed)
+            view(righting, speed=speed).write(page)
     for frames in (1, 0, -3, 2.5, True, 10**6):
         with pytest.raises(ShapeError, match="frames"):
-            motion_page(righting, page, frames=frames)
+            view(righting, frames=frames).write(page)
     with pytest.raises(ShapeError, match="gravity"):
-        motion_page(one, page, gravity=9.81)
+        view(one, gravity=9.81).write(page)
     assert not list(tmp_path.iterdir())
 
 
@@ -295,7 +293,7 @@ def test_what_draws_is_imported_only_when_something_is_shown():
 @pytest.fixture(scope="module")
 def cat_page(righting, tmp_path_factory):
     page = tmp_path_factory.mktemp("page") / "cat.html"
-    motion_page(righting, page, trail="head")
+    view(righting, trail="head").write(page)
     return page
 
 
@@ -341,7 +339,7 @@ def test_every_shape_of_the_body_is_in_the_page_as_it_is(righting, cat_page):
 
 def test_the_page_has_the_momentum_and_at_every_frame_the_attitude_of_its_motion(tumbling, tmp_path):
     """Every frame against the motion at that time; SciPy reads the quaternions."""
-    motion_page(tumbling, tmp_path / "a.html", frames=41)
+    view(tumbling, frames=41).write(tmp_path / "a.html")
     motion = page_data(tmp_path / "a.html")["motion"]
     assert motion["momentum"] == [3.0, -2.0, 4.0]
     expected = tumbling.attitude(np.linspace(0.0, tumbling.duration, 41))
@@ -349,23 +347,23 @@ def test_the_page_has_the_momentum_and_at_every_frame_the_attitude_of_its_motion
 
 
 def test_speed_and_frames(righting, tmp_path):
-    motion_page(righting, tmp_path / "a.html", speed=0.1, frames=11)
+    view(righting, speed=0.1, frames=11).write(tmp_path / "a.html")
     motion = page_data(tmp_path / "a.html")["motion"]
     assert (motion["speed"], motion["frames"], len(motion["turns"])) == (0.1, 11, 44)
-    motion_page(righting, tmp_path / "a.html", speed=0.1)
+    view(righting, speed=0.1).write(tmp_path / "a.html")
     assert page_data(tmp_path / "a.html")["motion"]["frames"] == 151
 
 
 @pytest.mark.parametrize(("named", "axis"), [("x", [1, 0, 0]), ("-y", [0, -1, 0]), ("z", [0, 0, 1]), (None, [0, 0, 1])])
 def test_the_axis_that_is_up(righting, tmp_path, named, axis):
-    motion_page(righting, tmp_path / "a.html", frames=2, up=named)
+    view(righting, frames=2, up=named).write(tmp_path / "a.html")
     assert page_data(tmp_path / "a.html")["motion"]["up"] == axis
     with pytest.raises(UnknownNameError, match="axis"):
-        motion_page(righting, tmp_path / "a.html", frames=2, up="upwards")
+        view(righting, frames=2, up="upwards").write(tmp_path / "a.html")
 
 
 def test_with_gravity_there_is_a_floor_below_and_up_is_against_it(righting, tmp_path):
-    motion_page(righting, tmp_path / "a.html", frames=5, gravity=[0.0, 9.81, 0.0])
+    view(righting, frames=5, gravity=[0.0, 9.81, 0.0]).write(tmp_path / "a.html")
     motion = page_data(tmp_path / "a.html")["motion"]
     assert motion["up"] == [0.0, -1.0, 0.0]
     heights = motion["floor"].reshape(-1, 3)[:, 1]
@@ -383,8 +381,8 @@ def test_turns_too_fast_for_the_frames_are_said(tmp_path):
     fast = sp.reconstruct(sp.rigid(np.eye(3), 20.0), [0.0, 0.0, 60.0])
     assert moving_scene(fast, 601).largest_turn == pytest.approx(2.0, abs=1e-6)
     with pytest.warns(VisualWarning, match="115 degrees"):
-        motion_page(fast, tmp_path / "a.html")
-    motion_page(fast, tmp_path / "a.html", frames=601)
+        view(fast).write(tmp_path / "a.html")
+    view(fast, frames=601).write(tmp_path / "a.html")
 
 
 def test_the_page_is_small_named_and_asks_for_nothing(cat_page):
@@ -401,17 +399,15 @@ def test_a_page_is_written_whole_or_not_at_all(righting, tmp_path, monkeypatch):
     def interrupted(*_args, **_more):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(viewer, "page_html", interrupted)
+    monkeypatch.setattr(viewer, "page_from", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        motion_page(righting, page, frames=2)
+        view(righting, frames=2).write(page)
     assert [p.name for p in tmp_path.iterdir()] == ["cat.html"]
     assert page.read_text() == "old"
 
 
 def test_nothing_is_printed(righting, tmp_path, capfd):
-    motion_page(righting, tmp_path / "cat.html", frames=2)
-    with view(righting, frames=2, browser=False, port=0) as live:
-        urllib.request.urlopen(live.url, timeout=60).close()
+    view(righting, frames=2).write(tmp_path / "cat.html")
     said = capfd.readouterr()
     assert said.out == said.err == ""
 
@@ -426,7 +422,7 @@ def test_pages_of_bodies_without_links(kind, tmp_path):
         ),
     }[kind]()
     motion = sp.reconstruct(deformation, [0.2, 1.0, 0.3])
-    motion_page(motion, tmp_path / "a.html", frames=5, gravity=[0.0, 0.0, -9.81 if kind == "falling" else 0.0])
+    view(motion, frames=5, gravity=[0.0, 0.0, -9.81 if kind == "falling" else 0.0]).write(tmp_path / "a.html")
     data = page_data(tmp_path / "a.html")
     turn, _ = moved(data, -1)
     np.testing.assert_allclose(turn, motion.final_attitude, atol=1e-6)
@@ -444,54 +440,40 @@ def test_a_page_of_a_body_with_36_joints_is_small(tmp_path):
     body = sp.load_body("example:human")
     assert body.n_shape == 36
     motion = sp.reconstruct(sp.articulated(body, random_loop(body, np.random.default_rng(1))), [0.0, 0.0, 20.0])
-    motion_page(motion, tmp_path / "human.html")
+    view(motion).write(tmp_path / "human.html")
     assert (tmp_path / "human.html").stat().st_size < 1e6
 
 
-# ---- Live -----------------------------------------------------------------------------------------------------------
+# ---- Shown ----------------------------------------------------------------------------------------------------------
 
 
-def test_a_live_view_serves_the_page_and_stops(righting, monkeypatch):
+def test_a_page_is_opened_in_a_browser_from_a_file(righting, monkeypatch):
     opened_there = []
-    monkeypatch.setattr(viewer.webbrowser, "open", opened_there.append)
-    with view(righting, frames=3, port=0) as live:
-        assert opened_there == [live.url]
-        with urllib.request.urlopen(live.url, timeout=60) as answer:
-            assert answer.read().decode() == motion_html(righting, frames=3)
-        with pytest.raises(urllib.error.HTTPError, match="404"):
-            urllib.request.urlopen(f"{live.url}/etc/passwd", timeout=60)
-        assert repr(live) == f"LiveView('cat along a path', {live.url})"
-        port = int(live.url.rsplit(":", 1)[1])
-        # The port is in use: the next one is taken.
-        with view(righting, frames=2, browser=False, port=port) as second:
-            assert int(second.url.rsplit(":", 1)[1]) > port
-    with pytest.raises(OSError):
-        urllib.request.urlopen(live.url, timeout=2)
-
-
-def test_a_script_may_wait_for_the_end_of_a_view(righting):
-    live = view(righting, frames=2, browser=False, port=0)
-    events = []
-
-    def end():
-        events.append("stop")
-        live.stop()
-
-    timer = threading.Timer(0.3, end)
-    timer.start()
-    live.wait()
-    events.append("waited")
-    timer.join()
-    assert events == ["stop", "waited"]
+    monkeypatch.setattr("webbrowser.open", opened_there.append)
+    page = view(righting, frames=3)
+    file = page.show()
+    assert opened_there == [file.as_uri()]
+    assert file.read_text(encoding="utf-8") == page.html
+    file.unlink()
+    assert repr(page) == f"Page('cat along a path', {len(page.html) / 1e3:.0f} kB)"
 
 
 def test_in_a_notebook_the_page_is_shown_in_the_cell(righting, monkeypatch):
     display = pytest.importorskip("IPython.display")
     shown = []
     monkeypatch.setattr(display, "display", shown.append)
-    assert view(righting, notebook=True, frames=5) is None
-    (frame,) = shown
-    assert html.unescape(frame.data).count(motion_html(righting, frames=5)) == 1
+    monkeypatch.setattr("shapephase.plots.page._in_notebook", lambda: True)
+    page = view(righting, frames=5)
+    assert page.show() is None
+    assert shown == [page]
+    assert html.unescape(page._repr_html_()).count(page.html) == 1
+
+
+def test_only_pages_of_one_motion_are_filmed(righting, tmp_path, monkeypatch):
+    monkeypatch.setattr("shapephase.plots.page.check_video", lambda *_: ".gif")
+    page = report(righting, sp.split(righting))
+    with pytest.raises(ShapeError, match="view or rolling_ellipsoid"):
+        page.film(tmp_path / "report.gif")
 
 
 # ---- In a browser ---------------------------------------------------------------------------------------------------
@@ -546,7 +528,7 @@ def test_joints_that_follow_others_are_drawn_where_they_are(tmp_path, chromium, 
     """The page has the functions themselves: at shapes between knots, at one, and beyond them."""
     body = load_urdf(LEG).with_couplings(couplings(TURN["spline"][0]))
     path = sp.ShapePath.fourier([0.1, 0.0], [[0.3], [0.2]], [[0.2], [0.7]], 1.0)
-    motion_page(sp.reconstruct(sp.articulated(body, path), np.zeros(3)), tmp_path / "leg.html")
+    view(sp.reconstruct(sp.articulated(body, path), np.zeros(3))).write(tmp_path / "leg.html")
     page, said, _ = opened(chromium, tmp_path / "leg.html")
     for shape in ([0.3, -0.9], [0.1, -0.1], [0.2, KNOTS[2]], [-0.4, 0.5], [0.0, 1.2]):
         poses = page.evaluate("shape => framePoses(page.figure.data.chain, shape)", shape)
@@ -578,7 +560,7 @@ def test_the_arrow_in_the_page_is_the_momentum_of_the_motion(tumbling, tmp_path,
     Only the arrow is shown where pixels are counted. In the body's frame it is R(t)^T L. Between two frames, h apart,
     the attitude goes along the shortest arc, which is off by h^2/8 of the angular acceleration.
     """
-    motion_page(tumbling, tmp_path / "a.html", frames=1201, trail="head")
+    view(tumbling, frames=1201, trail="head").write(tmp_path / "a.html")
     page, said, _ = opened(chromium, tmp_path / "a.html")
     momentum = tumbling.momentum
     times = np.linspace(0.0, tumbling.duration, 8)
@@ -617,7 +599,7 @@ def test_the_arrow_in_the_page_is_the_momentum_of_the_motion(tumbling, tmp_path,
 def test_the_camera_goes_with_a_body_that_falls_far(tmp_path, chromium):
     """It is seen as large at the end as at the start, in the same place; the floor below it is grey."""
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.0, 0.0, 3.0 * np.pi])
-    motion_page(motion, tmp_path / "a.html", velocity=[1.0, 0.0, 6.0], gravity=[0.0, 0.0, -9.81])
+    view(motion, velocity=[1.0, 0.0, 6.0], gravity=[0.0, 0.0, -9.81]).write(tmp_path / "a.html")
     page, said, _ = opened(chromium, tmp_path / "a.html")
     where = "page.scene.onScreen(page.figure.centrePlace, 520, 400)"
 
@@ -684,7 +666,7 @@ def test_pages_are_made_in_two_threads_and_the_streams_of_the_process_stay_as_th
 
     def make(k):
         for n in range(3):
-            motion_page(motion, tmp_path / f"page{k}_{n}.html", frames=3)
+            view(motion, frames=3).write(tmp_path / f"page{k}_{n}.html")
 
     watcher = threading.Thread(target=watch)
     makers = [threading.Thread(target=make, args=(k,)) for k in range(2)]

@@ -14,7 +14,7 @@ from distributed import Client, LocalCluster
 
 import shapephase as sp
 from shapephase import study as room
-from shapephase.cli.exit_codes import ExitCode
+from shapephase.cli.outcome import ExitCode
 from shapephase.study._cluster import _AHEAD, _LEAST_AHEAD, _PATIENCE
 from support import counted_chunks
 from support.dask_cluster import Cluster, wait_for_lines

@@ -160,8 +160,8 @@ def audit_command(
     from ..auditing.reading import read_trajectory
     from ..auditing.trajectory_audit import audit
     from ..errors import ShapeError
-    from .exit_codes import ExitCode
     from .motion import body_argument, column_names, flight_words
+    from .outcome import ExitCode
 
     aside = check_writable(figure, "--figure", *_ENDINGS)
     if not trajectories:

@@ -7,13 +7,15 @@ commands import what they compute with when they are called, so that `shapephase
 from __future__ import annotations
 
 import json
+import re
 import sys
 import traceback
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, UnknownOptionError
+from cyclopts.help import format_usage
 
 from .. import __version__
 from ..errors import OutputFileError, ShapePhaseError
@@ -21,25 +23,29 @@ from ..integrator.machine_code import as_command
 from ..provenance import command_line, provenance
 from .audit import audit_command
 from .check import check_command
-from .ctrl_c import forget, was_pressed
-from .doctor import doctor_command
-from .exit_codes import ExitCode, exit_code_list, exit_code_of
-from .explore import explore_command
-from .library import compile_command, robots_command
+from .installation import compile_command, doctor_command, robots_command
 from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
-from .outcome import Outcome
-from .pictures import plot_command, view_command
+from .outcome import ExitCode, Outcome, exit_code_list, exit_code_of
+from .pictures import explore_command, plot_command, view_command
 from .plans.plan import plan_command
 from .reach import reach_command
 from .rigid_body.conjugate import conjugate_command
 from .rigid_body.rigid import rigid_command
 from .split import split_command
+from .start import forget, was_pressed
 from .sweep import plot_study_command, sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
-from .texts.usage import usage_message
 from .torques import torques_command
 
+# Options that had a second name.
+_RENAMED = {
+    "--rotate": '--turn "DEGREES about AXIS"',
+    "--about": '--turn "DEGREES about AXIS"',
+    "--hold": "--joints -JOINT",
+    "--trim": "--flight FIRST LAST",
+    "--timestep": "--step",
+}
 _EXIT_CODES = f"Exit codes:\n\n{exit_code_list()}"
 _WHERE_EXIT_CODES = "Exit codes: `shapephase --help`"
 app = App(
@@ -148,7 +154,7 @@ def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
     try:
         return app(tokens, exit_on_error=False, print_error=False)
     except CycloptsError as error:
-        return _Failure(message=usage_message(error, app), code=ExitCode.USAGE, kind="usage")
+        return _Failure(message=_usage_message(error), code=ExitCode.USAGE, kind="usage")
     except ShapePhaseError as error:
         # Such an import may also have become a missing extra.
         if was_pressed():
@@ -167,6 +173,24 @@ def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
         message = f"{type(error).__name__}: {one_line(error)} ({place.filename}:{place.lineno})"
         hint = "this is a fault of shapephase, please report it"
         return _Failure(message=f"{hint}: {message}", code=ExitCode.INTERNAL, kind=type(error).__name__)
+
+
+def _usage_message(error: CycloptsError) -> str:
+    """Return one line on words that do not fit: the message of Cyclopts, an example of the option, and the usage."""
+    chain, apps, _ = app.parse_commands(error.command_chain or ())
+    usage = format_usage(app, chain, execution_path=apps).plain.strip()
+    words = [one_line(error)]
+    option = error.argument.name if error.argument is not None else ""
+    if isinstance(error, UnknownOptionError):
+        option = error.token.keyword or error.token.value
+        words = [f"Unknown option: {option}. Use {_RENAMED[option]}."] if option in _RENAMED else words
+    elif error.argument is not None:
+        page = f"{error.argument.parameter.help} {getattr(error.target, '__doc__', '')}"
+        example = re.search(rf"example\s+`({re.escape(option)} [^`]*)`", page)
+        words += [f"For example `{' '.join(example[1].split())}`."] if example else []
+    elif not chain:
+        words.append("The command comes first, as in `shapephase split cat cat_righting`.")
+    return f"{' '.join(words)} Usage: {usage}; see {' '.join(('shapephase', *chain))} --help"
 
 
 def _failure(error: ShapePhaseError) -> _Failure:

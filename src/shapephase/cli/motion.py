@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -179,11 +180,13 @@ def joint_motion(
         raise ShapeError(f"there is no option {motion[:_LONGEST_SHOWN]!r} of this command, and no such file either")
     if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):
         raise unknown_name("motion (no such file either)", motion[:_LONGEST_SHOWN], MOTIONS)
+    stretch = flight_words(recording.flight)
     choices = {name: value for name, value in vars(recording).items() if name != "step"} | {
         "timestep": recording.step,
         "names": column_names(recording.names),
         "rest": joint_values(body, recording.rest, "--rest"),
-        "flight": flight_words(recording.flight) or (RECORDED if given is False else None),
+        "flight": stretch or (RECORDED if given is False else None),
+        "trim": stretch if isinstance(stretch, tuple) else None,  # what lies outside may have gaps
         "gravity": ANY_GRAVITY if given and recording.gravity is None else recording.gravity,
     }
     recorded = read_recorded_motion(motion, body, **choices)
@@ -211,11 +214,15 @@ def column_names(words: tuple[str, ...]) -> dict[str, str | None]:
 
 
 def flight_words(words: tuple[str, ...]) -> str | tuple[float, float] | None:
-    """What `--flight` says: a word or two times. Raises ShapeError."""
+    """Return what `--flight` states: a word or two times. Raises ShapeError."""
     if len(words) < 2:
         return words[0] if words else None
     try:
         first, last = map(float, words)
     except ValueError:
-        raise ShapeError(f"--flight: auto, auto:2, all or two times are needed, got {' '.join(words)!r:.60}") from None
+        first = last = math.nan
+    if not first < last:
+        raise ShapeError(
+            f"--flight: auto, auto:2, all, or a first and a later last time are needed, got {' '.join(words)!r:.60}"
+        )
     return first, last

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from ..errors import ShapeError
 from .joint_values import joint_values
-from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyArgument, BodyOptions, PrintOptions
+from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyArgument, BodyOptions, OptionalFigureFile, PrintOptions
 from .outcome import Outcome, check_writable
 from .terminal import say_written
-
-if TYPE_CHECKING:
-    from ..shape_space.reach.holonomy_algebra import Reach
 
 _ENDINGS = (".svg", ".pdf", ".png")
 
@@ -26,7 +22,7 @@ def reach_command(
     floating: BodyOptions = BODY_DEFAULTS,
     at: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative_iterable="", show_default=False)] = (),
     pairs: int = 10,
-    out: Path | None = None,
+    out: OptionalFigureFile = None,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """List which rotations loops of the joints reach, the smallest loops about each axis, and the best pairs of joints.
@@ -40,9 +36,6 @@ def reach_command(
         are at zero. For example `--at waist_pitch=20deg`.
     pairs
         How many pairs of joints are listed, without unit; for example `--pairs 20`.
-    out
-        Write a figure of the best pairs to this file, .svg, .pdf or .png; without it none is drawn. For example
-        `--out reach.svg`.
     """
     from ..shape_space.reach.holonomy_algebra import reachable
     from .motion import body_argument
@@ -52,18 +45,12 @@ def reach_command(
     if pairs < 0:
         raise ShapeError(f"--pairs: a whole number, 0 or more, is needed, got {pairs}")
     loaded = body_argument(body, floating)
-    found = reachable(loaded, loaded.shape(joint_values(loaded, at, "--at")))
+    reach = reachable(loaded, loaded.shape(joint_values(loaded, at, "--at")))
     if out is not None:
-        _draw(out, found)
-    data = reach_data(found, pairs) | {"figure": None if out is None else str(out)}
-    return Outcome("\n".join(reach_lines(found, pairs)), data, aside=aside)
+        from ..plots.plot_style import column_axes, write_axes
+        from ..plots.shape_plots import plot_reach
 
-
-def _draw(out: Path, found: Reach) -> None:
-    from ..files import write_whole
-    from ..plots.plot_style import axes_image, column_axes
-    from ..plots.shape_plots import plot_reach
-
-    image = axes_image(plot_reach(column_axes(2.8), found), out.suffix[1:].lower())
-    write_whole(out, lambda stream: stream.write(image))
-    say_written(out)
+        write_axes(plot_reach(column_axes(2.8), reach), out)
+        say_written(out)
+    data = reach_data(reach, pairs) | {"figure": None if out is None else str(out)}
+    return Outcome("\n".join(reach_lines(reach, pairs)), data, aside=aside)

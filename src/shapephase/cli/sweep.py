@@ -13,9 +13,8 @@ from cyclopts import App, Parameter
 from ..errors import ShapeError
 from ..files import write_whole
 from ..run_progress import RunProgress
-from .exit_codes import ExitCode
 from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyOptions, FigureFile, PrintOptions
-from .outcome import Outcome, check_writable
+from .outcome import ExitCode, Outcome, check_writable
 from .progress import steps
 from .terminal import Verbosity, say, say_written
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from .options import (
     BODY_DEFAULTS,
@@ -16,6 +17,7 @@ from .options import (
     RecordingOptions,
     StartOptions,
     Tolerance,
+    option,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -27,22 +29,22 @@ def torques_command(
     motion: MotionArgument,
     /,
     *,
-    floating: BodyOptions = BODY_DEFAULTS,
-    flight: StartOptions = START_DEFAULTS,
+    start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
     recording: RecordingOptions = RECORDING_DEFAULTS,
-    out: Path | None = None,
+    out: Annotated[
+        Path | None,
+        option(
+            "Write torque or force, rate and power of each joint in time, in N m, N, rad/s, m/s and W, to this CSV "
+            "file; for example `--out torques.csv`."
+        ),
+    ] = None,
+    floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find the torques of the joints: their peaks against the limits of the body's file, power and work.
 
     The body floats or falls freely: gravity loads no joint.
-
-    Parameters
-    ----------
-    out
-        Write torque (or force), rate and power of each joint in time, in N m, N, rad/s, m/s and W, to this CSV file;
-        without it none is written. For example `--out torques.csv`.
     """
     from ..dynamics.torques import joint_torques
     from . import motion as motions
@@ -52,7 +54,7 @@ def torques_command(
     aside = check_writable(out, "--out", ".csv")
     with steps(3) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, floating=floating)
+        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
         work.begin("inverse dynamics")
         found = joint_torques(flown.motion)
         if out is not None:

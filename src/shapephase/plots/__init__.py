@@ -2,7 +2,7 @@
 
 Functions `plot_...` draw into given Matplotlib axes and return them; `column_axes` makes axes one column wide. None of
 them opens a window or keeps any state, and Matplotlib is imported by the first drawing. `write_figure` writes one of
-`FIGURES` to a file, `view` and `motion_page` show a motion in 3-D, `write_report` puts all of it into one page.
+`FIGURES` to a file. `view`, `report`, `explore` and `rolling_ellipsoid` return a `Page` to write, show or film.
 
     ax = sp.plots.plot_momentum_curve(sp.plots.column_axes(3.8), motion)
     ax.figure.savefig("curve.pdf")

@@ -1,30 +1,28 @@
 from ._moving_scene import MovingScene, moving_scene
-from .explorer import explore_page
+from .explorer import explore
 from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
 from .named_figures import FIGURES, Figure, figure_image, write_figure
-from .pages.poinsot_page import poinsot_html, poinsot_page, poinsot_video
+from .page import Page
+from .pages.poinsot_page import rolling_ellipsoid
 from .plot_style import column_axes
 from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
 from .regime_plots import plot_bounds, plot_crown
-from .report import write_report
+from .report_page import report
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .shape_plots import plot_curvature, plot_reach, plot_shape_path, plot_shape_plane
 from .torque_plots import plot_torques
-from .viewer import LiveView, motion_html, motion_page, motion_video, view
+from .viewer import view
 
 __all__ = [
     "FIGURES",
     "Figure",
-    "LiveView",
     "MovingScene",
+    "Page",
     "column_axes",
-    "explore_page",
+    "explore",
     "figure_image",
-    "motion_html",
-    "motion_page",
-    "motion_video",
     "moving_scene",
     "plot_attitude",
     "plot_bounds",
@@ -48,10 +46,8 @@ __all__ = [
     "plot_shape_path",
     "plot_shape_plane",
     "plot_torques",
-    "poinsot_html",
-    "poinsot_page",
-    "poinsot_video",
+    "report",
+    "rolling_ellipsoid",
     "view",
     "write_figure",
-    "write_report",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,19 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_file_name, check_object
+from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..body.appearance import visuals
 from ..body.body import Body
 from ..errors import ShapeError
-from ..files import write_whole
 from ..letters import what_came
 from ..shape_space.curvature_field import curvature_on_plane
 from ._moving_scene import shapes_by_link
-from .pages.motion_data import body_data, frame_nodes
+from .page import Page
+from .pages.motion_data import body_data, frame_nodes, up_axis
 from .pages.plane_series import PlaneSeries, least_perturbation_turns, plane_series
-from .pages.templates import SCENE_SCRIPTS, page_html
-from .pages.up_axis import up_axis
+from .pages.templates import SCENE_SCRIPTS, page_from
 
 # Points of the map of the curvature along each joint.
 _MAP = 101
@@ -38,56 +36,37 @@ _DURATION = 4.0
 _SIZES = 5
 
 
-def explore_page(
-    body: Body,
-    joints: Sequence[str],
-    path: str | os.PathLike[str],
-    *,
-    rest: ArrayLike | None = None,
-    up: str | None = None,
-) -> PlaneSeries:
-    """Write a page with the curvature of the connection over two joints, to draw closed loops on; it needs no network.
+def explore(body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None, up: str | None = None) -> Page:
+    """Page with the curvature of the connection over two joints, to draw closed loops on.
 
     The page computes the turn of the body along the periodic cubic spline through the loop's points, by ordered
-    products of exponentials, without angular momentum or with one that is chosen by sliders. It says how far the turn
+    products of exponentials, without angular momentum or with one that is chosen by sliders. It states how far the turn
     may be off: by the Chebyshev series of inertia and momentum that it carries, and by its steps. The loop can be saved
     as a CSV file that `split` reads.
 
     Parameters
     ----------
     joints : two of the body's, by name
-    path : of the file, written whole or not at all
-    rest : (n,) where the other joints stand, in the body's order [rad or m]; None: neutral
-    up : as in `motion_page`
+    rest : (n,) values of the other joints, in the body's order [rad or m]; None: neutral
+    up : as in `view`
 
     Returns
     -------
-    the series that the page carries
+    the page; `data["plane"]["box"]` are the ends of the series, `data["plane"]["connection_error"]` is its error
 
     Raises
     ------
     UnknownNameError, ShapeError
-        For joints that the body does not have, or that are not two; an axis that there is not.
+        For joints that the body does not have, or other than two; an unknown axis.
     SingularInertiaError
         If at a shape of the map all mass is on one line.
 
     Examples
     --------
-    >>> series = sp.plots.explore_page(sp.load_body("cat"), ("waist_pitch", "waist_yaw"), "explore.html")
-    >>> print(series.box.round(3).tolist(), series.error < 1e-9)  # the map's ends [rad]
+    >>> plane = sp.plots.explore(sp.load_body("cat"), ("waist_pitch", "waist_yaw")).data["plane"]
+    >>> print(np.round(plane["box"], 3).tolist(), plane["connection_error"] < 1e-9)  # the map's ends [rad]
     [[-2.286, 1.186], [-1.68, 1.68]] True
     """
-    check_object(body, "Body", "body")
-    check_file_name(path, "path")
-    page, series = explore_html(body, joints, rest=rest, up=up)
-    write_whole(path, lambda stream: stream.write(page.encode()))
-    return series
-
-
-def explore_html(
-    body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None, up: str | None = None
-) -> tuple[str, PlaneSeries]:
-    """The page that `explore_page` writes, as text, and its series: arguments and errors as there."""
     check_object(body, "Body", "body")
     if (
         isinstance(joints, str)
@@ -105,7 +84,7 @@ def explore_html(
     shown = _map_box(body, places)
     margin = _MARGIN * (shown[:, 1:] - shown[:, :1])
     series = plane_series(body, places, shown + margin * np.array([-1.0, 1.0]), still)
-    page = page_html(
+    return page_from(
         "explore.html",
         title=f"{body.name}: loops of {joints[0]} and {joints[1]}",
         scripts=(*SCENE_SCRIPTS, "plots", "loop", "holonomy", "map", "explore_page"),
@@ -116,7 +95,6 @@ def explore_html(
         },
         joints=list(joints),
     )
-    return page, series
 
 
 def _map_box(body: Body, places: tuple[int, int]) -> Array:
@@ -147,6 +125,7 @@ def _plane_data(
         "momentum": np.ascontiguousarray(series.momentum),
         "inertia_error": series.inertia_error,
         "momentum_error": series.momentum_error,
+        "connection_error": series.error,
         "largest_momentum": _largest_momentum(series),
         "map": _MAP,
         "curvature": {

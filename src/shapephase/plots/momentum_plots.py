@@ -14,7 +14,7 @@ from ..phases.momentum_curve import Gauge, MomentumCurve, momentum_curve
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
-from ._letters import plain_text
+from ._joint_styles import plain_text
 from ._sphere_area import AreaCells, enclosed_cells
 from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, VERMILION, check_axes, one_motion, subdivided

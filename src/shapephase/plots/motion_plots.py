@@ -17,7 +17,7 @@ from ..phases.momentum_curve import Gauge
 from ..phases.phases import RunningPhases, running_phases
 from ..phases.split_text import CLOSED_GAP
 from ..reconstruction.reconstruction import Motion
-from ._letters import plain_text
+from ._joint_styles import plain_text
 from .plot_style import (
     BLACK,
     GREY,

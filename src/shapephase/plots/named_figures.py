@@ -18,7 +18,7 @@ from ..rigid_body.euler_top import EulerTop
 from ..shape_space.shape_path import ShapePath
 from .momentum_plots import plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
-from .plot_style import axes_image, column_axes
+from .plot_style import axes_image, column_axes, write_axes
 from .polhode_plots import plot_herpolhode, plot_polhodes
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .shape_plots import plot_shape_path
@@ -219,5 +219,4 @@ def write_rigid_figure(kind: str, top: EulerTop, out: str | os.PathLike[str], ti
     height, draw = RIGID_FIGURES[kind]
     ax = column_axes(height)
     draw(ax, top, time)
-    image = axes_image(ax, Path(out).suffix.removeprefix(".").lower())
-    write_whole(out, lambda stream: stream.write(image))
+    write_axes(ax, out)

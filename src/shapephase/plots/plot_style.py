@@ -7,7 +7,9 @@ dashes and points by their markers, so that nothing is lost in black and white. 
 
 from __future__ import annotations
 
+import os
 from io import BytesIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from ..arguments import check_choice, number_argument, times_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import MissingExtraError, ShapeError
+from ..files import write_whole
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
@@ -116,6 +119,12 @@ def axes_image(ax: Any, ending: str) -> bytes:
     with quiet("Glyph .* missing from", UserWarning), rc_context({"agg.path.chunksize": _RASTER_PIECE}):
         ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
     return stream.getvalue()
+
+
+def write_axes(ax: Any, out: str | os.PathLike[str]) -> None:
+    """Write a figure to an .svg, .pdf or .png file, whole or not at all."""
+    image = axes_image(ax, Path(out).suffix.removeprefix(".").lower())
+    write_whole(out, lambda stream: stream.write(image))
 
 
 def _is_long(artist: Any) -> bool:

@@ -17,8 +17,7 @@ from ..shape_space.body_path import in_joint_order
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
-from ._joint_looks import both_sides, joint_looks
-from ._letters import plain_text
+from ._joint_styles import both_sides, joint_styles, plain_text
 from .plot_style import (
     BLACK,
     BLUE,
@@ -113,7 +112,7 @@ def plot_shape_path(
     places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
     named = chosen[:_MAX_NAMED]
     shown = [names[int(k)] for k in named]
-    looks = joint_looks(shown)
+    looks = joint_styles(shown)
     handles: list[Any] = []
     texts: list[str] = []
     for k, look in zip(named, looks, strict=True):

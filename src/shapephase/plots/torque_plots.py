@@ -12,8 +12,7 @@ from ..arguments import check_object, names_argument
 from ..dynamics.torques import joint_torques
 from ..errors import unknown_name
 from ..reconstruction.reconstruction import Motion
-from ._joint_looks import joint_looks
-from ._letters import plain_text
+from ._joint_styles import joint_styles, plain_text
 from .plot_style import GREY, SMALL, check_flat_axes, in_time, motion_times, one_motion
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def plot_torques(
     handles: list[Any] = []
     texts: list[str] = []
     named = chosen[:_MAX_NAMED]
-    for k, look in zip(named, joint_looks([found.joint_names[k] for k in named]), strict=True):
+    for k, look in zip(named, joint_styles([found.joint_names[k] for k in named]), strict=True):
         handles += places[units[k]].plot(t, found.torque[:, k], **look)
         own = "" if len(scales) == 1 else f" [{_SHOWN[units[k]]}]"
         texts.append(plain_text(found.joint_names[k]) + own)

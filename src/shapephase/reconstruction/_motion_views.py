@@ -222,16 +222,11 @@ class MotionViews:
         return offered("Motion.plot")(self, kind, ax=ax, gauge=gauge)
 
     def view(self: Any, **options: Any) -> Any:
-        """Show the motion in three dimensions, as `shapephase.view` does.
+        """Page of the motion in three dimensions, to write, show or film; a notebook displays it.
 
         Parameters
         ----------
         options : of `shapephase.view`
-
-        Raises
-        ------
-        MissingExtraError
-            Without viser.
         """
         return offered("Motion.view")(self, **options)
 

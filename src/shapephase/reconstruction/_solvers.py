@@ -202,7 +202,7 @@ def check_pieces(deformation: Deformation) -> None:
         raise TrajectoryError(
             f"a motion in {pieces} pieces, as a recording of as many samples has; up to {_MOST_PIECES} are integrated "
             f"at once: read the recording with resample={_rounded_down(_MOST_PIECES / deformation.duration):g} or less "
-            "(--resample), or a part of it with trim= (--trim)"
+            "(--resample), or a part of it with trim= (--flight)"
         )
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 from ...errors import PlanNotFound, ShapeError
-from ..exit_codes import ExitCode
 from ..options import (
     BODY_DEFAULTS,
     PRINT_DEFAULTS,
@@ -19,7 +18,7 @@ from ..options import (
     ReportFile,
     option,
 )
-from ..outcome import Outcome, check_writable
+from ..outcome import ExitCode, Outcome, check_writable
 from ..progress import steps
 from ..terminal import say_written
 from .constraints import JointOptions, LimitOptions
@@ -89,7 +88,7 @@ def plan_command(
         raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(html, "--html", ".html") or aside
-    with steps(12 if html else 2) as work:
+    with steps(7 if html else 2) as work:
         work.begin("loading")
         loaded = load_body(body, **floating.loading)
         arguments, within = joints.arguments(loaded), limits.limits(loaded)
@@ -119,17 +118,16 @@ def plan_command(
             say_written(out)
         if html is not None:
             from ...phases.phases import split
-            from ...plots.report import write_report
+            from ...plots.report_page import report
 
-            write_report(
+            report(
                 plan.motion,
                 split(plan.motion),
-                html,
                 shape_path=plan.path,
                 title=f"{loaded.name} turns itself",
                 purpose=plan_purpose(plan),
                 begin=work.begin,
-            )
+            ).write(html)
             say_written(html)
     return Outcome(
         "\n".join(plan_lines(loaded, plan)),

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from ...errors import ShapeError
-from ..options import PRINT_DEFAULTS, PrintOptions
+from ..options import PRINT_DEFAULTS, OptionalFigureFile, PrintOptions
 from ..outcome import Outcome, check_writable
 from ..terminal import say_written
-
-if TYPE_CHECKING:
-    from ...arrays import Array
 
 _ENDINGS = (".svg", ".pdf", ".png")
 _PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
@@ -30,7 +26,7 @@ def conjugate_command(
         tuple[float, ...], Parameter(consume_multiple=True, negative_iterable="", show_default=False)
     ] = (),
     order: int = 1,
-    out: Path | None = None,
+    out: OptionalFigureFile = None,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """List conjugate points of the free rigid body's Serret-Andoyer metric, and draw their locus.
@@ -48,8 +44,6 @@ def conjugate_command(
         largest, in sqrt(kg) m; without it six of them. For example `--momenta 1.5 1.6`.
     order
         Which conjugate point of each geodesic, 1 the first; for example `--order 2`.
-    out
-        Write the figure to this file, .svg, .pdf or .png; without it none is drawn. For example `--out locus.svg`.
     """
     import numpy as np
 
@@ -69,7 +63,11 @@ def conjugate_command(
     family = metric.geodesics(p)
     found = family.conjugate_points(order)
     if out is not None:
-        _draw(out, (i1, i2, i3), order, p)
+        from ...plots.geodesic_plots import plot_conjugate_locus
+        from ...plots.plot_style import column_axes, write_axes
+
+        write_axes(plot_conjugate_locus(column_axes(2.8), (i1, i2, i3), order, momenta=p), out)
+        say_written(out)
     rows = zip(p, family.period, family.first_return, found.time, found.phi, found.theta, strict=True)
     lines = [
         f"Serret-Andoyer metric of moments {i1:g} {i2:g} {i3:g} kg m^2, conjugate points of order {order}",
@@ -93,13 +91,3 @@ def conjugate_command(
         "figure": None if out is None else str(out),
     }
     return Outcome("\n".join(lines), data, aside=aside)
-
-
-def _draw(out: Path, moments: tuple[float, float, float], order: int, momenta: Array) -> None:
-    from ...files import write_whole
-    from ...plots.geodesic_plots import plot_conjugate_locus
-    from ...plots.plot_style import axes_image, column_axes
-
-    image = axes_image(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=momenta), out.suffix[1:].lower())
-    write_whole(out, lambda stream: stream.write(image))
-    say_written(out)

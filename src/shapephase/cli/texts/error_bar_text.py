@@ -91,8 +91,8 @@ def error_bar_lines(
             lines.append(f"{name:24}{_with_bar(float(phase), bar)} deg")
     elif result.has_phase:
         lines.append("phases: their bars are computed in the horizontal gauge (--gauge horizontal)")
-    of_base_alone = recorded is not None and recorded.flight is not None and recorded.smoothing is None
-    if of_base_alone and options.joint_noise is None:
+    is_flight = recorded is not None and recorded.flight is not None and recorded.base_attitude is not None
+    if is_flight and recorded.smoothing is None and options.joint_noise is None:
         lines.append(
             f"{'± of the recorded base':24}alone; the noise of the joints is not stated (--joint-noise 0.3deg)"
         )

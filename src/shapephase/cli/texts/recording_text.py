@@ -270,7 +270,7 @@ def _levels(body: Body, smoothed: Mapping[str, float]) -> str:
 def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str]:
     """What makes the path another than the samples."""
     lines = _gap_lines(record)
-    if record["trim"] is not None:
+    if record["trim"] is not None and record["flight"] is None:
         lines.append(
             f"{'kept':24}{record['samples']} of {record['samples_in_file']} samples, from {record['first_time']:.9g} "
             f"to {record['last_time']:.9g} {record['time_unit']}"

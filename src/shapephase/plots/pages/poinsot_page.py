@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
 
 from ... import so3
-from ...arguments import check_file_name, check_object, number_argument
+from ...arguments import check_object, number_argument
 from ...arrays import Array
 from ...display import numbers
 from ...errors import ShapeError
-from ...files import write_whole
 from ...inertia_tensor import inverse_inertia
 from ...letters import what_came
 from ...rigid_body.euler_top import EulerTop
 from ...rigid_body.poinsot import Poinsot
-from .playing import frame_count, playing_speed
-from .templates import SCENE_SCRIPTS, page_html
-from .video import FILM_SIZE, check_video, frame_times, write_video
+from ..page import Page, frame_count, playing_speed
+from .templates import SCENE_SCRIPTS, page_from
 
 # Periods of the body momentum that are shown, where there are any.
 _PERIODS = 3.0
@@ -39,15 +36,10 @@ _COLOUR = (0.337, 0.706, 0.914, 0.62)
 _OUTERMOST = 61
 
 
-def poinsot_page(
-    top: EulerTop,
-    path: str | os.PathLike[str],
-    *,
-    duration: float | None = None,
-    speed: float | None = None,
-    frames: int | None = None,
-) -> None:
-    """Write Poinsot's description of a free rigid body as one HTML page to play and scrub; it needs no network.
+def rolling_ellipsoid(
+    top: EulerTop, *, duration: float | None = None, speed: float | None = None, frames: int | None = None
+) -> Page:
+    """Page of Poinsot's description of a free rigid body, to play and scrub.
 
     The ellipsoid {w : w.I w = 2K} moves with the body and rolls without slipping on the plane {w : w.mu = 2K}. The
     point of contact is the angular velocity; it draws the polhode on the ellipsoid and the herpolhode on the plane.
@@ -56,7 +48,6 @@ def poinsot_page(
     Parameters
     ----------
     top : with angular momentum
-    path : of the file, written whole or not at all
     duration : of the motion shown, from t = 0 [s]; None: three periods of the body momentum, or where there is none as
         long as six turns at the rate of the angular velocity at the start
     speed : seconds of motion in a second of playing; None: 1, or such that playing takes from 4 to 20 s
@@ -73,27 +64,8 @@ def poinsot_page(
 
     Examples
     --------
-    >>> sp.plots.poinsot_page(sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5]), "rolling.html", frames=50)
-    >>> from pathlib import Path
-    >>> Path("rolling.html").stat().st_size > 1000
-    True
-    """
-    check_object(top, "EulerTop", "top")
-    check_file_name(path, "path")
-    page = poinsot_html(top, duration=duration, speed=speed, frames=frames)
-    write_whole(path, lambda stream: stream.write(page.encode()))
-
-
-def poinsot_html(
-    top: EulerTop, *, duration: float | None = None, speed: float | None = None, frames: int | None = None
-) -> str:
-    """The page that `poinsot_page` writes, as text: arguments and errors as there.
-
-    Examples
-    --------
     >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
-    >>> sp.plots.poinsot_html(top, frames=5)[:15].lower()
-    '<!doctype html>'
+    >>> sp.plots.rolling_ellipsoid(top, frames=50).write("rolling.html")
     """
     check_object(top, "EulerTop", "top")
     rolling = Poinsot(top)
@@ -103,7 +75,7 @@ def poinsot_html(
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
         raise ShapeError(f"frames: a whole number of 2 or more is needed, got {what_came(frames)}")
     times = np.linspace(0.0, shown, int(count))
-    return page_html(
+    return page_from(
         "poinsot.html",
         title="A rigid body: its ellipsoid rolls on the invariable plane",
         scripts=(*SCENE_SCRIPTS, "plots", "poinsot_page"),
@@ -113,44 +85,9 @@ def poinsot_html(
             "rolling": _rolling(rolling, times),
             "plots": _plots(rolling, times),
         },
+        film=(shown, rate),
         facts=rolling_facts(top),
     )
-
-
-def poinsot_video(
-    top: EulerTop,
-    path: str | os.PathLike[str],
-    *,
-    pixels: tuple[int, int] = FILM_SIZE,
-    duration: float | None = None,
-    speed: float | None = None,
-) -> None:
-    """Write Poinsot's description as a film, or as a strip of six pictures, drawn as `poinsot_page` draws it.
-
-    Parameters
-    ----------
-    top, duration : as in `poinsot_page`
-    path, pixels, speed : as in `motion_video`
-
-    Notes
-    -----
-    Raises as `motion_video` and `poinsot_page`.
-
-    Examples
-    --------
-    >>> try:
-    ...     sp.plots.poinsot_video(sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5]), "rolling.webm")
-    ... except sp.errors.UnknownNameError as error:
-    ...     print(error)
-    unknown kind of film '.webm'. Valid: .gif, .mp4, .png
-    """
-    check_object(top, "EulerTop", "top")
-    check_file_name(path, "path")
-    ending = check_video(path, pixels)
-    shown = _duration(top, duration)
-    rate = playing_speed(shown, speed)
-    page = poinsot_html(top, duration=shown, speed=rate)
-    write_video(page, path, frame_times(ending, shown, rate), pixels)
 
 
 def _duration(top: EulerTop, duration: float | None) -> float:

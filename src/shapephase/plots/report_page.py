@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import base64
-import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..arguments import check_file_name, check_object
+from ..arguments import check_object
 from ..arrays import Array
-from ..files import write_whole
 from ..phases.phases import PhaseSplit
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
-from ._letters import printable
 from ._report_text import (
     CONVENTIONS,
     accuracy,
@@ -27,12 +24,12 @@ from ._report_text import (
     torque_words,
 )
 from .named_figures import FIGURES, figure_image
+from .page import Page
 from .pages.report_data import report_data
-from .pages.templates import SCENE_SCRIPTS, page_html
+from .pages.templates import SCENE_SCRIPTS, page_from
 from .viewer import scene_and_data
 
-# Of a figure [in]; the style of a report has the shares of taller ones in a row.
-_USUAL_HEIGHT = 2.8
+_MOVING = ("momentum", "phases", "attitude", "shape")  # figures that the page's scripts draw
 
 
 def figure_rows(figures: Sequence[Any]) -> list[Sequence[Any]]:
@@ -42,10 +39,9 @@ def figure_rows(figures: Sequence[Any]) -> list[Sequence[Any]]:
     return rows + ([figures[last:]] if len(figures) % 2 else [])
 
 
-def write_report(
+def report(
     motion: Motion,
     result: PhaseSplit,
-    path: str | os.PathLike[str],
     *,
     shape_path: ShapePath | None = None,
     title: str | None = None,
@@ -56,25 +52,25 @@ def write_report(
     recording: Sequence[str] = (),
     noise: Array | None = None,
     begin: Callable[[str], object] = lambda _: None,
-) -> None:
-    """Write a motion and its split as one HTML file that opens offline; whole or not at all.
+) -> Page:
+    """Page about a motion and its split: words, the moving body beside its curves, figures, numbers and inputs.
 
-    The body moves in it, and the curves beside it and the momentum on its sphere show the same time.
+    The curves and the momentum on its sphere show the time of the moving body. Each figure of `FIGURES` stands there
+    once: momentum, phases, attitude and joints as curves that move, the others as pictures.
 
     Parameters
     ----------
     motion : of one momentum, no batch
     result : its split
-    path : of the file
-    shape_path : of the joints, for a figure and a table of them
+    shape_path : of the joints, for their torques and a table of them
     title : None: the label of the deformation
     purpose : a sentence or two that come first, such as what the motion was made for; None: none
     trail : a link whose origin leaves a trail in the animation
-    up : as in `motion_page`
-    error_bars : lines about how far the numbers may be off by what the inputs leave open, as `split` prints them
-    recording : lines about what was read of a recording and done to it, as `split` prints them
-    noise : of the samples of the joints, rms (n,) [rad or m], for bars of rates and torques; None: the one that a
-        recording was smoothed for
+    up : as in `view`
+    error_bars : lines of error bars, as `split` prints them
+    recording : lines about a recording and its processing, as `split` prints them
+    noise : of the samples of the joints, rms (n,) [rad or m], for bars of rates and torques; None: that for which a
+        recording was smoothed
     begin : called with a few words before each longer step
 
     Raises
@@ -87,14 +83,10 @@ def write_report(
     Examples
     --------
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
-    >>> sp.plots.write_report(motion, sp.split(motion, "base"), "report.html")
-    >>> from pathlib import Path
-    >>> Path("report.html").read_text()[:9]
-    '<!doctype'
+    >>> sp.plots.report(motion, sp.split(motion, "base")).write("report.html")
     """
     check_object(motion, "Motion", "motion")
     check_object(result, "PhaseSplit", "result")
-    check_file_name(path, "path")
     if shape_path is not None:
         check_object(shape_path, "ShapePath", "shape_path")
     begin("recording the animation")
@@ -103,17 +95,17 @@ def write_report(
     has_joints = shape_path is not None and shape_path.n_shape > 0
     figures = []
     for kind, figure in FIGURES.items():
-        if (figure.with_momentum and not result.has_phase) or (figure.with_path and not has_joints):
+        if kind in _MOVING or (figure.with_momentum and not result.has_phase) or (figure.with_path and not has_joints):
             continue
         if figure.of_change and is_rigid(motion):
             continue
         begin(f"drawing {kind.replace('_', ' ')}")
         image = base64.b64encode(figure_image(kind, motion, shape_path, result.gauge)).decode()
-        figures.append({"caption": figure.caption, "image": image, "tall": figure.height > _USUAL_HEIGHT})
+        figures.append({"caption": figure.caption, "image": image})
     torques = [torque_words(motion, noise)] if scene.body is not None and scene.body.n_shape else []
-    page = page_html(
+    return page_from(
         "report.html",
-        title=printable(title or motion.deformation.label),
+        title=title or motion.deformation.label,
         scripts=(*SCENE_SCRIPTS, "plots", "sphere", "report_page"),
         styles=("page", "report_page"),
         data={"motion": data, **beside},
@@ -135,4 +127,3 @@ def write_report(
         input_rows=input_rows(motion, result.gauge, scene.body),
         conventions=CONVENTIONS,
     )
-    write_whole(path, lambda stream: stream.write(page.encode()))

@@ -1,4 +1,4 @@
-"""Colours, dashes and markers of joints: a left and a right joint that belong together look alike."""
+"""Names of users and styles of joints in figures; a left joint and its right one have the same colour and marker."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from ..letters import printable
 from .plot_style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SERIES, VERMILION
 
 # In an order in which neighbours differ in grey, too.
@@ -16,10 +17,19 @@ _SIDES = {"left": "right", "right": "left", "l": "r", "r": "l"}
 _SIDE = re.compile(
     r"(?<![A-Za-z])(left|right|l|r)(?![A-Za-z])|(?<![a-z])(left|right)(?=[A-Z])|(?<=[a-z])(left|right)\b", re.IGNORECASE
 )
-# Share of white in the broad line of the left side.
-_PALE = 0.5
-# Markers along a curve.
-_MARKS = 6
+_PALE = 0.5  # share of white in the broad line of the left side
+_MARKS = 6  # along a curve
+_MAX_LETTERS = 32  # of a name in a figure: more would leave no room for the curves
+
+
+def plain_text(name: str) -> str:
+    """Return a name as Matplotlib draws it letter by letter: no formulas; long ones are shortened in the middle."""
+    letters = printable(name)
+    if len(letters) > _MAX_LETTERS:
+        half = _MAX_LETTERS // 2
+        letters = f"{letters[:half]}…{letters[-half:]}"
+    # An underscore at the start would leave it out of legends; a hair space before it is not seen.
+    return ("\u200a" if letters.startswith("_") else "") + letters.replace("$", r"\$")
 
 
 def other_side(name: str) -> str | None:
@@ -38,7 +48,7 @@ def both_sides(names: Sequence[str]) -> bool:
     return any(other_side(name) in names for name in names)
 
 
-def joint_looks(names: Sequence[str]) -> list[dict[str, Any]]:
+def joint_styles(names: Sequence[str]) -> list[dict[str, Any]]:
     """A look for each of at most six joints: as `SERIES`, unless there are both sides of a joint among them."""
     if not both_sides(names):
         return list(SERIES[: len(names)])
