@@ -491,7 +491,7 @@ def test_a_search_that_finds_nothing_writes_its_best_try(capfd, tmp_path):
 # ---- What is said ---------------------------------------------------------------------------------------------------
 
 
-COUNTS = ("--starts", "--seed", "--order", "--pieces", "--iterations")
+COUNTS = ("--starts", "--seed", "--order", "--pairs", "--pieces", "--iterations", "--workers")
 
 
 def options_of(text):
@@ -528,15 +528,20 @@ def test_every_option_has_a_sentence_and_an_example(name, wide_pages):
         assert re.search(r"[.;] .*|[.]$", words), words
         if option not in ("--quiet", "--verbose", "--help", "--version"):
             assert "for example" in words.lower(), words
-        if re.search(r"\b(FLOAT|INT)\b", words) and option not in (
-            "--starts",
-            "--seed",
-            "--order",
-            "--pieces",
-            "--iterations",
-        ):
-            units = r"\bin (rad|s|1/s|kg|m\b|degrees|sqrt)|[Tt]urns|without unit|Seconds|sqrt\(kg\)"
+        if re.search(r"\b(FLOAT|INT)\b", words) and option not in COUNTS:
+            units = r"\bin (rad|s|1/s|kg|m\b|degrees|sqrt)|[Tt]urns|turns about|fraction|quaternion|Seconds|sqrt\(kg\)"
             assert re.search(units, words), words
+
+
+def test_help_is_short_and_all_options_are_in_help_all(wide_pages):
+    """On a terminal of 80 columns; what `--help` does not list it counts."""
+    for name in ("", *ALL_COMMANDS):
+        page = ran(*name.split(), "--help", env={**os.environ, "COLUMNS": "80"}).stdout
+        assert page.count("\n") < 80, name
+        counted = re.search(r"^(\d+) more options: --help-all$", page, re.MULTILINE)
+        if name:
+            first = {option for option in options_of(wide_pages[name]) if re.search(rf"^│ *\*? *{option} ", page, re.M)}
+            assert len(options_of(wide_pages[name])) - len(first) == (int(counted[1]) if counted else 0)
 
 
 def coloured(*arguments, **environment):

@@ -52,7 +52,6 @@ app = App(
     name="shapephase",
     help="A free body changes its shape in a known way; how does it turn?",
     help_epilogue=_EXIT_CODES,
-    help_flags=["--help", "-h", HELP_ALL],
     help_format="markdown",
     result_action="return_value",
     suppress_keyboard_interrupt=False,
@@ -104,6 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     SHOWS_ALL.set(HELP_ALL in tokens)
+    tokens = ["--help" if token == HELP_ALL else token for token in tokens]
     with spoken(tokens), command_line(tokens), as_command():
         try:
             code = _ran(tokens, as_json="--json" in tokens)

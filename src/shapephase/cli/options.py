@@ -322,7 +322,7 @@ class StartOptions:
         tuple[float, float, float, float] | None,
         option(
             "Attitude of the base at the start, a quaternion x y z w; default: as recorded, or as a motion of the "
-            "library begins, else 0 0 0 1, without unit. For example `--attitude 1 0 0 0`.",
+            "library begins, else 0 0 0 1. For example `--attitude 1 0 0 0`.",
             rare=True,
             negative_iterable="",
         ),

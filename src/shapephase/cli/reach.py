@@ -35,7 +35,7 @@ def reach_command(
         Where the loops begin: JOINT=VALUE with blanks or commas between them, in rad or m or with a unit; other joints
         are at zero. For example `--at waist_pitch=20deg`.
     pairs
-        How many pairs of joints are listed, without unit; for example `--pairs 20`.
+        Number of pairs of joints in the list; for example `--pairs 20`.
     """
     from ..shape_space.reach.holonomy_algebra import reachable
     from .motion import body_argument
