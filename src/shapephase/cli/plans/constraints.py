@@ -57,8 +57,8 @@ class JointOptions:
     joints: Annotated[
         str | None,
         option(
-            "Joints that move, with commas between them, or with a minus before each those that rest; default: all "
-            "move. For example `--joints waist_pitch,waist_yaw` or `--joints -head_yaw`.",
+            "Joints that move, with commas between them, or with a minus before each those that rest; default: all. "
+            "For example `--joints waist_pitch,waist_yaw` or `--joints -head_yaw`.",
             allow_leading_hyphen=True,
         ),
     ] = None

@@ -35,8 +35,8 @@ class GoalOptions:
     point: Annotated[
         tuple[str, str] | None,
         option(
-            "Two vectors: an axis of the base, or behind a link's name of this link, and the direction that it has at "
-            'the end, inertial axes; the turn about it is free. For example `--point "dish 0 0 1" "0 1 0"`.',
+            "Axis of the base, or behind a link's name of this link, and its direction at the end, inertial axes; the "
+            'turn about it is free. For example `--point "dish 0 0 1" "0 1 0"`.',
             negative_iterable="",
             allow_leading_hyphen=True,
         ),

@@ -35,7 +35,7 @@ class SearchOptions:
     ] = 1
     workers: Annotated[
         int | None,
-        option("Processes that search in parallel; default: one search after the other. For example `--workers 4`."),
+        option("Processes that search in parallel; default: 1. For example `--workers 4`."),
     ] = None
     time_limit: Annotated[
         float | None,
