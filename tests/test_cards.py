@@ -49,7 +49,7 @@ def instances():
     open_path = sp.ShapePath.spline(np.linspace(0.0, 1.0, 6), np.random.default_rng(0).normal(size=(6, 2)))
     start = sp.optimal_control.Start("converged", True, 1.0, 1e-12, 1e-9, 1e-9, 40, 0.3)
     plan = sp.optimal_control.Plan(
-        body, path, motion, "kinetic", "zero", 1.0, 1e-12, 1e-5, 2, 1e-9, np.zeros((4, 3)), "reduced", 40, 0.3, (start,)
+        body, path, motion, "kinetic", "zero", 1.0, 1e-12, 1e-5, 2, 1e-9, np.zeros((4, 3)), 40, 0.3, (start,)
     )
     return {
         "body": body, "path": path, "open path": open_path, "deformation": deformation, "motion": motion,

@@ -104,8 +104,9 @@ def test_the_sentence_says_how_one_is_made_of_the_other(objects):
     for function, value, words in (
         (sp.reconstruct, objects["ShapePath"], "make it with articulated(body, path)"),
         (sp.split, objects["Deformation"], "make it with reconstruct(deformation, momentum)"),
-        (sp.split, objects["ShapePath"], r"reconstruct(articulated(body, path), momentum)"),
+        (sp.split, objects["ShapePath"], "where articulated(body, path) makes a deformation"),
         (sp.fixed_points, objects["Motion"], "it is motion.deformation"),
+        (sp.mechanical_connection, objects["Motion"], "it is motion.deformation.description.body"),
     ):
         with pytest.raises(WrongObjectError) as caught:
             function(value, [0.0, 0.0, 1.0])

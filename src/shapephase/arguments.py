@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
 from inspect import signature
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +24,7 @@ from .errors import (
 from .inertia_tensor import inverse_inertia
 from .letters import article, what_came
 
+Made = TypeVar("Made")
 TIGHTEST_TOLERANCE = 1e-13
 """[rad]; a few hundred roundings, below which no attitude of many steps can be promised."""
 LOOSEST_TOLERANCE = 1e-4
@@ -44,67 +46,40 @@ _LEAST_MOMENT_RATIO = 1e-12
 
 _LARGEST_MOMENTUM = 1e100
 """[kg m^2/s]; squares of larger ones overflow."""
-# How an object that a function needs is made of another that came, or of anything else.
-_WAYS = {
-    "Body": {
-        "": "make it with load_body(file or name)",
-        "Deformation": "of one made by articulated, it is deformation.description.body",
-        "Motion": "of one made by articulated, it is motion.deformation.description.body",
-        "BodyFamily": "take one of its bodies, family[0]",
-    },
-    "ShapePath": {
-        "": "make it with read_shape_path(file, body), or ShapePath.fourier, spline, waypoints or function",
-        "RecordedMotion": "it is recorded.path",
-        "Deformation": "of one made by articulated, it is deformation.description.path",
-        "Motion": "of one made by articulated, it is motion.deformation.description.path",
-    },
-    "Deformation": {
-        "": "make it with articulated(body, path), particles, prescribed or rigid",
-        "RecordedMotion": "make it with articulated(body, recorded.path)",
-        "Motion": "it is motion.deformation",
-        "DeformationFamily": "take one of them, family[0]",
-    },
-    "Motion": {
-        "": "make it with reconstruct(deformation, momentum)",
-        "ShapePath": "make it with reconstruct(articulated(body, path), momentum)",
-        "Body": "make it with reconstruct(articulated(body, path), momentum)",
-        "MotionFamily": "take one of its motions, family[0]",
-        "str": "read it with load_motion(file)",
-        "PosixPath": "read it with load_motion(file)",
-    },
-    "PhaseSplit": {"": "make it with split(motion)", "Motion": "make it with split(motion)"},
-    "EnergyBounds": {"": "make it with bounds.energy_bounds(deformation, momentum)"},
-    "RegimeCertificate": {"": "make it with bounds.regime_certificate(deformation, momentum)"},
-    "KeplerOrbit": {"": "make it with bounds.KeplerOrbit.from_state(...) or from_elements(...)"},
-    "FixedPoints": {"": "make it with fixed_points(deformation, magnitude)"},
-    "CrownRegion": {"": "make it with bounds.crown_region(deformation, momentum)"},
-    "EulerTop": {"": "make it with EulerTop(inertia, momentum)"},
-    "Extremal": {"": "make it with optimal_control.extremal(...)"},
-    "SurfaceOfRevolution": {"": "make it with geodesics.spheroid(...) or surface_of_metric(...)"},
-    "Reach": {"": "make it with reachable(body, shape)"},
-    "InertiaErrors": {"": "make it with InertiaErrors(masses=0.05), for example"},
-    "TrajectoryNoise": {"": "make it with auditing.TrajectoryNoise(attitude=0.002), for example"},
-    "MjModel": {"": "make it with mujoco.MjModel.from_xml_path(file)"},
-    "Model": {"": "make it with pinocchio.buildModelFromUrdf(file, pinocchio.JointModelFreeFlyer())"},
-}
+_MADE_BY: dict[str, str] = {}  # class -> the call that makes one of it
+_INSIDE: dict[tuple[str, str], str] = {}  # (class of an object that came, class needed) -> where the one has the other
 OF_A_FALL = ("start", "velocity", "gravity")
 """Keywords of `Motion.base_position`, which what writes or shows a motion hands on."""
 _IDENTITY = np.eye(3)
 _IDENTITY.flags.writeable = False
 
 
-def check_object(value: object, kind: str, name: str, *, or_kind: str = "") -> None:
-    """Raise WrongObjectError where an argument is none of our class `kind`; the message says how to make one.
+def made_by(call: str = "", **inside: str) -> Callable[[type[Made]], type[Made]]:
+    """Return a decorator of a class that says, in messages, which call makes an object of it.
 
-    One of the class `or_kind` will also do.
+    inside : name of another class -> where an object of this class has one of that
+    """
+
+    def registered(cls: type[Made]) -> type[Made]:
+        _MADE_BY[cls.__name__] = call
+        _INSIDE.update({(cls.__name__, kind): where for kind, where in inside.items()})
+        return cls
+
+    return registered
+
+
+def check_object(value: object, kind: str, name: str, *, or_kind: str = "", call: str = "") -> None:
+    """Raise WrongObjectError where an argument is not of our class `kind`, nor of `or_kind`.
+
+    The message says how to make one: with `call`, or as `made_by` of the class has it.
     """
     names = [parent.__name__ for parent in type(value).__mro__]
     if kind in names or or_kind in names:
         return
     came = type(value).__name__
     shown = what_came(value) if isinstance(value, type) else f"{article(came)} {came}"
-    ways = _WAYS.get(kind, {"": f"make it with {kind}(...)"})
-    raise WrongObjectError(f"{name}: {article(kind)} {kind} is needed, got {shown}; {ways.get(came, ways[''])}")
+    remedy = _INSIDE.get((came, kind)) or f"make it with {call or _MADE_BY.get(kind) or f'{kind}(...)'}"
+    raise WrongObjectError(f"{name}: {article(kind)} {kind} is needed, got {shown}; {remedy}")
 
 
 def check_function(value: object, name: str, what: str) -> None:

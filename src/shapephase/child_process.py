@@ -1,4 +1,4 @@
-"""Processes of their own for parsers that damaged files crash, hang, or make ask for gigabytes; with limits."""
+"""Python in a process of its own, for parsers that crash, hang or ask for gigabytes on damaged files; with limits."""
 
 from __future__ import annotations
 
@@ -7,6 +7,25 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
+
+_ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1")
+
+
+def start_python(
+    source: str, words: tuple[str, ...] = (), *, folder: bool = False, **options: Any
+) -> subprocess.Popen[bytes]:
+    """Start Python's `source` in a process that imports from where this one does and whose BLAS has one thread.
+
+    Parameters
+    ----------
+    words : its arguments
+    folder : whether it imports from the current folder, too, where functions of a user may be
+    options : further arguments of `subprocess.Popen`
+    """
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path if entry or folder)
+    environment = {**os.environ, **_ONE_THREAD, "PYTHONPATH": path}
+    return subprocess.Popen([sys.executable, "-P", "-c", source, *words], env=environment, **options)
 
 
 def run_alone(source: str, words: tuple[str, ...], data: bytes, seconds: float) -> subprocess.CompletedProcess[bytes]:
@@ -14,15 +33,18 @@ def run_alone(source: str, words: tuple[str, ...], data: bytes, seconds: float) 
 
     Raises subprocess.TimeoutExpired, after the process was stopped, if it takes longer than `seconds`.
     """
-    # Nothing is to be imported from the current folder.
-    path = os.pathsep.join(entry for entry in sys.path if entry)
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
-    command = [sys.executable, "-P", "-c", source, *words]
-    return subprocess.run(command, input=data, capture_output=True, timeout=seconds, env=environment)
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    with start_python(source, words, **pipes) as process:
+        try:
+            output, errors = process.communicate(data, timeout=seconds)
+        except BaseException:
+            process.kill()
+            raise
+    return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
 
 
 def limit_this_process(memory: int) -> None:
-    """No core dump, and only so much more memory [bytes] than is mapped now, where the system can do that."""
+    """Forbid core dumps and more memory [bytes] than is mapped now and `memory`, where the system can do that."""
     try:
         import resource
     except ImportError:

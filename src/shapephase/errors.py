@@ -291,13 +291,11 @@ class MissingExtraError(ShapePhaseError, ImportError):
 
 
 class RunStopped(ShapePhaseError):
-    """A run was stopped by the `progress` callback that watched it, as it asked; nothing is left of it.
-
-    A look at a path that was complete is kept.
+    """The `progress` callback of a run stopped it; nothing of it is kept but a complete look at its path.
 
     Examples
     --------
-    >>> def stop(run):
+    >>> def stop(share, text):
     ...     raise sp.errors.RunStopped("enough")
     >>> try:
     ...     sp.reconstruct(sp.rigid(np.eye(3), 1.0), [0.0, 0.0, 1.0], progress=stop)

@@ -1,8 +1,8 @@
-"""What a long run has done so far, told to whoever asked, who may stop it.
+"""Progress of a long run, reported to a callback, which may stop the run.
 
-A run does not know how much is before it: how many halvings a path takes, how often samples are added, whether a second
-round of steps is needed. So every stretch of work fills a part of what is left of its phase, and every phase a part of
-what is left of the run: the share grows as long as something is done, and reaches one at the end.
+How much work is left is not known in advance: halvings of a path, further samples, a second round of steps. So every
+stretch of work fills a part of what is left of its phase, and every phase a part of what is left of the run: the share
+grows as long as something is done, and reaches one at the end.
 """
 
 from __future__ import annotations
@@ -10,41 +10,33 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
-from dataclasses import dataclass
 from typing import Any
 
-from .errors import RunStopped, WrongObjectError
-from .letters import what_came
+from .arguments import check_function
+from .errors import RunStopped
+
+ProgressCallback = Callable[[float, str], Any]
+"""Called with the share that is done, from 0 to 1 and never falling, and with what is being done, in a few words; a
+true return stops the run."""
 
 LOOKING = "looking at the path"
 SAMPLING = "sampling the body"
 STEPPING = "stepping"
-# Of what is left of a run: what a phase takes, by what it usually is.
-_PHASES = {LOOKING: 0.2, SAMPLING: 0.5, STEPPING: 0.9}
-# Of what is left of a phase: what one stretch takes, since there may be others.
-_STRETCH = 0.7
-# Of the run: smaller progress is not reported.
-_NOTICEABLE = 0.005
+_PHASES = {LOOKING: 0.2, SAMPLING: 0.5, STEPPING: 0.9}  # share of the run still left that a phase usually takes
+_STRETCH = 0.7  # share of the phase still left that one stretch takes, since there may be others
+_NOTICEABLE = 0.005  # share of the run: smaller progress is not reported, so that a run makes 200 reports
 
 
-@dataclass(frozen=True)
-class RunProgress:
-    """What a run has done.
-
-    Attributes
-    ----------
-    share : done so far, from 0 to 1
-    phase : "looking at the path", "sampling the body" or "stepping"
-    """
-
-    share: float
-    phase: str
+def check_progress(progress: object) -> None:
+    """Raise WrongObjectError where an argument is not a progress callback."""
+    if progress is not None:
+        check_function(progress, "progress", "a function of the share done and a text")
 
 
 class _Watcher:
-    """Passes on to a callback what has been done."""
+    """Reports to a callback what has been done."""
 
-    def __init__(self, callback: Callable[[RunProgress], Any]) -> None:
+    def __init__(self, callback: ProgressCallback) -> None:
         self._callback = callback
         self._phase, self._phase_end = "", 0.0
         self._share = self._start = self._end = 0.0
@@ -52,55 +44,47 @@ class _Watcher:
         self._last_share = -1.0
 
     def begin(self, phase: str, total: int) -> None:
-        """A stretch of work begins."""
         self._share = max(self._share, self._end)
         is_new = phase != self._phase
         if is_new:
             self._phase, self._phase_end = phase, self._share + _PHASES[phase] * (1.0 - self._share)
         self._start, self._end = self._share, self._share + _STRETCH * (self._phase_end - self._share)
         self._total, self._done = total, 0
-        if is_new or self._share >= self._last_share + _NOTICEABLE:
-            self._report(self._share)
+        self._report(always=is_new)
 
     def advance(self, count: int) -> None:
-        """So much more of it is done."""
         self._done += count
         self._share = self._start + min(1.0, self._done / self._total) * (self._end - self._start)
-        if self._share >= self._last_share + _NOTICEABLE:
-            self._report(self._share)
+        self._report()
 
     def finish(self) -> None:
-        """The run is done: too late to stop it."""
-        self._callback(RunProgress(1.0, self._phase))
+        self._callback(1.0, self._phase)  # too late to stop it
 
-    def _report(self, share: float) -> None:
-        self._last_share = share
-        if self._callback(RunProgress(share, self._phase)):
-            raise RunStopped(f"stopped on request while {self._phase}, with {100.0 * share:.0f} % done")
+    def _report(self, *, always: bool = False) -> None:
+        if not always and self._share < self._last_share + _NOTICEABLE:
+            return
+        self._last_share = self._share
+        if self._callback(self._share, self._phase):
+            raise RunStopped(f"stopped on request while {self._phase}, with {100.0 * self._share:.0f} % done")
 
 
 _WATCHER: ContextVar[_Watcher | None] = ContextVar("_WATCHER", default=None)
 
 
-def watched(callback: Callable[[RunProgress], Any] | None) -> contextlib.AbstractContextManager[None]:
-    """Pass on to a callback, if there is one, what is done within; something true that it returns stops the run.
+@contextlib.contextmanager
+def watched(progress: ProgressCallback | None) -> Iterator[None]:
+    """Report to a callback what is done within; None reports nothing.
 
     Raises
     ------
     RunStopped
-        If the callback asked for it.
+        If the callback returned something true.
     """
-    return _UNWATCHED if callback is None else _watched(callback)
-
-
-_UNWATCHED = contextlib.nullcontext()
-
-
-@contextlib.contextmanager
-def _watched(callback: Callable[[RunProgress], Any]) -> Iterator[None]:
-    if not callable(callback) or isinstance(callback, type):
-        raise WrongObjectError(f"progress: a function of a RunProgress is needed, got {what_came(callback)}")
-    watcher = _Watcher(callback)
+    check_progress(progress)
+    if progress is None:
+        yield
+        return
+    watcher = _Watcher(progress)
     token = _WATCHER.set(watcher)
     try:
         yield
@@ -110,14 +94,14 @@ def _watched(callback: Callable[[RunProgress], Any]) -> Iterator[None]:
 
 
 def begin(phase: str, total: int) -> None:
-    """A stretch of work in so many parts begins."""
+    """Begin a stretch of work of so many parts."""
     watcher = _WATCHER.get()
     if watcher is not None:
         watcher.begin(phase, total)
 
 
 def advance(count: int) -> None:
-    """So many parts more are done."""
+    """Report that so many parts more are done."""
     watcher = _WATCHER.get()
     if watcher is not None:
         watcher.advance(count)

@@ -19,7 +19,6 @@ from shapephase import so3
 from shapephase.cli.main import main
 from shapephase.cli.plans import search as cli_search
 from shapephase.cli.progress import steps
-from shapephase.optimal_control.plan import Progress
 
 # A plan on few pieces.
 SHORT = ("cat_two_halves", "--turn", "60 about x", "--pieces", "8")
@@ -184,11 +183,10 @@ def test_postures_on_the_way(tmp_path, capsys):
 def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_take(monkeypatch):
     said = []
     monkeypatch.setattr(cli_search.time, "monotonic", iter([100.0, 103.0, 170.0]).__next__)
-    search = cli_search.InterruptibleSearch(SimpleNamespace(say=said.append), 60.0)
-    for start in (2, 3):
-        assert not search.report(Progress("search", start, 4, 12, 0.125, 1e-3, 0.02))
-    shown = "search {} of 4: iteration 12, off the goal by 2.0e-02 rad, cost 0.125, {} s left"
-    assert said == [shown.format(2, 57), shown.format(3, 0)]
+    search = cli_search.InterruptibleSearch(SimpleNamespace(watch=lambda *now: said.append(now)), 60.0)
+    for share in (0.25, 0.5):
+        assert not search.report(share, "search 2 of 4: iteration 12")
+    assert said == [(0.25, "search 2 of 4: iteration 12, 57 s left"), (0.5, "search 2 of 4: iteration 12, 0 s left")]
 
 
 @pytest.mark.usefixtures("few_guesses")
@@ -233,10 +231,10 @@ def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
     """The signal itself, in the third iteration; the motion written reaches the goal nearly."""
     plain = cli_search.InterruptibleSearch.report
 
-    def pressed(self, now):
-        if (now.stage, now.iteration) == ("search", 3):
+    def pressed(self, share, text):
+        if text.startswith("search: iteration 3,"):
             signal.raise_signal(signal.SIGINT)
-        return plain(self, now)
+        return plain(self, share, text)
 
     monkeypatch.setattr(cli_search.InterruptibleSearch, "report", pressed)
     handler = signal.getsignal(signal.SIGINT)
@@ -297,7 +295,7 @@ def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):
 def test_pressed_twice_gives_it_up():
     with steps(1) as work:
         search = cli_search.InterruptibleSearch(work, None)
-        search.report(Progress("search", 1, 1, iteration=0, cost=1.0, infeasibility=0.0, goal_error=1.0))
+        search.report(0.3, "search: iteration 0")
         search.interrupted()
         assert search.stopped
         with pytest.raises(KeyboardInterrupt):

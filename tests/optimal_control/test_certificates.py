@@ -10,10 +10,10 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.errors import TrajectoryError
 from shapephase.optimal_control import Limits, Search, Start, plan_reorientation, wong_residual
-from shapephase.optimal_control._certificates import hamiltonian_spread
 from shapephase.optimal_control._spline_basis import SplineBasis
 from shapephase.optimal_control.collocation import CollocationProgram
 from shapephase.optimal_control.guesses.loops import guesses
+from shapephase.optimal_control.planning import hamiltonian_spread
 from shapephase.optimal_control.task import reorientation
 
 QUARTER = so3.exp(np.array([0.5 * np.pi, 0.0, 0.0]))

@@ -98,11 +98,10 @@ def test_efforts_stay_within_their_limits_between_the_nodes(cost, momentum, limi
     assert plan.hamiltonian_spread is None
 
 
-@pytest.mark.parametrize("method", ["collocation", pytest.param("reduced", marks=pytest.mark.full)])
 @pytest.mark.usefixtures("few_guesses")
-def test_accelerations_and_jerks_stay_within_their_limits(method):
+def test_accelerations_and_jerks_stay_within_their_limits():
     """Of SciPy's spline; from rest without acceleration, as a limit of jerks wants it."""
-    body, search = sp.load_body("cat_two_halves"), Search(pieces=12, method=method)
+    body, search = sp.load_body("cat_two_halves"), Search(pieces=12)
     limits = Limits(acceleration_limits=[70.0, 70.0, 20.0], jerk_limits=1200.0)
     plan = plan_reorientation(body, TURN, search=search, limits=limits)
     _, _, bends, jerks = path_derivatives(plan)
@@ -173,12 +172,6 @@ def test_what_no_motor_can_do_is_told(discs):
     [
         ({"limits": Limits(effort_limits=[1.0, 2.0])}, ShapeError, "one for each of the 3 joints"),
         ({"limits": Limits(jerk_limits=[1.0])}, ShapeError, "jerk_limits"),
-        ({"limits": Limits(effort_limits=1.0), "search": Search(method="reduced")}, UnknownNameError, "collocation"),
-        (
-            {"cost": "effort", "limits": Limits(effort_limits=1.0), "search": Search(method="reduced")},
-            UnknownNameError,
-            "effort",
-        ),
     ],
 )
 def test_what_cannot_be_limited_is_refused(options, error, words):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 from types import SimpleNamespace
 from typing import Any, cast
@@ -363,7 +364,6 @@ def test_nothing_to_turn_costs_nothing():
 @pytest.mark.parametrize(
     ("options", "error", "match"),
     [
-        ({"method": "shooting"}, UnknownNameError, "collocation, reduced"),
         ({"pieces": 5}, ShapeError, "pieces"),
         ({"starts": 0}, ShapeError, "starts"),
         ({"iterations": 1.5}, ShapeError, "iterations"),
@@ -507,24 +507,25 @@ def test_a_plan_with_free_rates_is_an_extremal(cost):
         assert (round(time, 6), multiplicity) == (1.0, 1)
 
 
-@pytest.mark.parametrize("method", full_but(["collocation", "reduced"], "collocation"))
-def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far(method, request):
-    if method == "collocation":
-        request.getfixturevalue("few_guesses")
+@pytest.mark.usefixtures("few_guesses")
+def test_the_search_reports_progress_and_is_stopped_with_the_best_so_far():
     body = sp.load_body("cat_two_halves")
     turn = so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))
-    search = Search(method=method, pieces=10)
+    search = Search(pieces=10)
     whole = plan_reorientation(body, turn, search=search)
     reported = []
 
-    def callback(now):
-        reported.append(now)
-        return now.stage == "search" and now.iteration == 3
+    def callback(share, text):
+        reported.append((share, text))
+        return text.startswith("search: iteration 3,")
 
     with pytest.raises(PlanNotFound, match=r"stopped on request.*reaches the goal") as stopped:
-        plan_reorientation(body, turn, search=search, iteration_callback=callback)
-    assert (reported[-1].stage, reported[-1].iteration) == ("search", 3)
-    assert {now.stage for now in reported[:-1]} == {"guesses", "search"}
+        plan_reorientation(body, turn, search=search, progress=callback)
+    shares, texts = zip(*reported, strict=True)
+    assert re.fullmatch(r"search: iteration 3, off the goal by \d\.\de-\d\d rad, cost [\d.]+", texts[-1])
+    assert {text.partition(" ")[0].rstrip(":") for text in texts[:-1]} == {"guesses", "search"}
+    assert list(shares) == sorted(shares)
+    assert (shares[0], shares[-1] < 1.0) == (0.0, True)
     best = stopped.value.best
     assert so3.angle(best.motion.final_attitude.T @ turn) < 1e-8
     assert whole.cost * (1.0 - 1e-6) < best.cost < 2.0 * whole.cost
@@ -540,7 +541,7 @@ def test_a_search_stopped_among_its_guesses_keeps_one():
             sp.load_body("cat_two_halves"),
             goal,
             search=Search(pieces=20),
-            iteration_callback=lambda now: now.iteration == 1,
+            progress=lambda _, text: ": iteration 1," in text,
         )
     assert so3.angle(stopped.value.best.motion.final_attitude.T @ goal) < 1e-8
 
@@ -552,7 +553,7 @@ def test_a_search_stopped_after_a_start_has_its_plan():
         body,
         HALF_TURN,
         search=Search(pieces=10, starts=3, seed=1),
-        iteration_callback=lambda now: (now.stage, now.start) == ("search", 2),
+        progress=lambda _, text: text.startswith("search 2 "),
     )
     assert [start.converged for start in plan.starts] == [True, False]
     assert plan.goal_error < 1e-8
@@ -565,14 +566,12 @@ class OutOfPatience(Exception):
 @pytest.mark.parametrize("error", full_but([OutOfPatience, KeyboardInterrupt], OutOfPatience))
 @pytest.mark.usefixtures("few_guesses")
 def test_what_the_callback_raises_comes_through(error):
-    def callback(now):
-        if now.iteration == 2:
+    def callback(_, text):
+        if ": iteration 2," in text:
             raise error
 
     with pytest.raises(error):
-        plan_reorientation(
-            sp.load_body("cat_two_halves"), HALF_TURN, search=Search(pieces=10), iteration_callback=callback
-        )
+        plan_reorientation(sp.load_body("cat_two_halves"), HALF_TURN, search=Search(pieces=10), progress=callback)
 
 
 @pytest.mark.parametrize("seconds", [0.05, 0.3, 0.6])

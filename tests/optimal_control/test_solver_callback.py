@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import signal
-import time
-import weakref
 
 import casadi
 import numpy as np
 import pytest
 
-from shapephase.optimal_control.solver_callback import BestIterate, heard_interrupts, ipopt_callback
+import shapephase as sp
+from shapephase.optimal_control import Search
+from shapephase.optimal_control.solver_callback import BestIterate, ipopt_callback
 
 
 def test_the_cheapest_of_the_nearly_feasible_is_kept():
@@ -44,79 +43,18 @@ def test_an_iterate_is_reported_with_its_largest_violation():
     assert best.stopped
 
 
-class Interrupted:
-    """An argument in the middle of whose conversion Ctrl-C is pressed."""
+@pytest.mark.usefixtures("heard_ctrl_c")
+@pytest.mark.parametrize("iteration", [0, 2])
+def test_ctrl_c_in_an_iteration_is_raised_by_the_plan_and_handlers_stay_as_they_are(iteration):
+    handlers = []
 
-    def __init__(self):
-        self.presses = 0
-
-    @property
-    def tocsc(self):
-        self.presses += 1
-        if self.presses == 1:
+    def pressed(_, text):
+        handlers.append(signal.getsignal(signal.SIGINT))
+        if f": iteration {iteration}," in text:
             signal.raise_signal(signal.SIGINT)
-        raise AttributeError
 
-
-class Ending:
-    """Something in whose end Ctrl-C is pressed."""
-
-    def __del__(self):
-        signal.raise_signal(signal.SIGINT)
-
-
-class Asked:
-    """Something in whose use Ctrl-C is pressed."""
-
-    def __bool__(self):
-        signal.raise_signal(signal.SIGINT)
-        return False
-
-
-def forgotten_weakly():
-    """The end of a key of a weak dictionary, in whose own callback Ctrl-C is pressed."""
-    known = weakref.WeakKeyDictionary()
-    key = BestIterate(None, float)
-    known[key] = 1
-    known._iterating = Asked()
-    del key
-    known._iterating = set()
-
-
-@pytest.mark.usefixtures("heard_ctrl_c")
-@pytest.mark.parametrize("end", [Ending, forgotten_weakly])
-def test_ctrl_c_in_the_end_of_an_object_comes_a_moment_later(end):
-    def ended():
-        end()
-        time.sleep(30.0)
-
-    with pytest.raises(KeyboardInterrupt), heard_interrupts():
-        ended()
-
-
-@pytest.mark.usefixtures("heard_ctrl_c")
-def test_ctrl_c_of_which_a_library_made_another_error_is_ctrl_c():
-    def half_imported():
-        with contextlib.suppress(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        raise AttributeError
-
-    with pytest.raises(KeyboardInterrupt), heard_interrupts():
-        half_imported()
-    with pytest.raises(AttributeError), heard_interrupts():
-        raise AttributeError
-
-
-@pytest.mark.usefixtures("heard_ctrl_c")
-def test_ctrl_c_while_casadi_asks_what_an_argument_is_comes_a_moment_later():
-    argument = Interrupted()
-
-    def converted():
-        with contextlib.suppress(NotImplementedError):
-            casadi.sin(argument)
-        time.sleep(30.0)
-
-    with pytest.raises(KeyboardInterrupt), heard_interrupts():
-        converted()
-    assert argument.presses
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    goal = sp.so3.exp(np.array([1.0, 0.0, 0.0]))
+    with pytest.raises(KeyboardInterrupt):
+        sp.plan_reorientation(sp.load_body("cat_two_halves"), goal, search=Search(pieces=8), progress=pressed)
+    assert len(handlers) == iteration + 1
+    assert set(handlers) == {signal.default_int_handler}

@@ -12,7 +12,7 @@ import shapephase as sp
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.optimal_control import Goal, Limits, Search, Waypoint, plan_reorientation
 from shapephase.optimal_control._spline_basis import SplineBasis
-from shapephase.optimal_control._via_rows import nearest_places, symbolic_via_rows
+from shapephase.optimal_control._via_points import nearest_places, symbolic_via_rows
 from shapephase.optimal_control.task import reorientation
 from support.independent import apart, pinocchio_motion, turn
 
@@ -116,17 +116,6 @@ def test_waypoints_within_limits_of_efforts(two_halves):
     assert abs(passed[1, two_halves.joint_index("waist_roll")] + 0.1) < 1e-9
     seen = end_of(plan) @ two_halves.link_pose(plan.path.shape(1.0), "rear")[:3, 2]
     np.testing.assert_allclose(seen, direction, atol=1e-8)
-
-
-@pytest.mark.full
-def test_both_methods_pass_a_waypoint_alike(two_halves):
-    via = [Waypoint(BESIDE.shape, time=0.25)]
-    ours = planned(two_halves, via)
-    other = plan_reorientation(two_halves, GOAL, via=via, search=Search(pieces=12, method="reduced"))
-    assert other.cost == pytest.approx(ours.cost, rel=1e-4)
-    np.testing.assert_allclose(other.path.shape(0.25), BESIDE.shape, atol=1e-9)
-    with pytest.raises(TrajectoryError, match="give their times"):
-        plan_reorientation(two_halves, GOAL, via=[BESIDE], search=Search(pieces=12, method="reduced"))
 
 
 def test_waypoints_bind_what_follows(two_halves):

@@ -43,7 +43,7 @@ def moving_report(sweep, tmp_path_factory):
     """Folder, page and all that was said of the report of the body with angular momentum."""
     folder, told = tmp_path_factory.mktemp("moving"), []
     path, moving, _ = sweep
-    options = {"shape_path": path, "title": "a <satellite>", "begin": told.append}
+    options = {"shape_path": path, "title": "a <satellite>", "progress": lambda *now: told.append(now)}
     report(moving, sp.split(moving), **options).write(folder / "report.html")
     return folder, (folder / "report.html").read_text(encoding="utf-8"), told
 
@@ -123,13 +123,16 @@ def test_the_report_says_what_the_split_says(sweep, tmp_path, momentum, request)
         folder, page, told = request.getfixturevalue("moving_report")
     else:
         folder, told = tmp_path, []
-        report(motion, result, shape_path=path, title="a <satellite>", begin=told.append).write(folder / "report.html")
+        page = report(motion, result, shape_path=path, title="a <satellite>", progress=lambda *now: told.append(now))
+        page.write(folder / "report.html")
         page = (folder / "report.html").read_text(encoding="utf-8")
     text = text_of(page)
     assert "a <satellite>" in text
     assert len(page) < 6e6
     assert page.count("<figure") == (4 if momentum else 3)
-    assert len(told) == page.count("<figure") + 1
+    shares, steps = zip(*told)
+    assert shares == tuple(np.arange(len(told)) / len(told))
+    assert len(steps) == page.count("<figure") + 1
     assert f"{np.degrees(so3.angle(result.total_rotation)):.6f}°" in text
     assert f"{np.degrees(so3.angle(result.holonomy)):.6f}°" in text
     assert ("none: there is no angular momentum" in text) == (not momentum)

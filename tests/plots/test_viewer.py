@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase import so3
 from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
-from shapephase.errors import ShapeError, UnknownNameError, VisualWarning
+from shapephase.errors import RunStopped, ShapeError, UnknownNameError, VisualWarning
 from shapephase.examples.scenarios import cat_righting
 from shapephase.plots import report, viewer
 from shapephase.plots._moving_scene import moving_scene
@@ -467,6 +467,11 @@ def test_in_a_notebook_the_page_is_shown_in_the_cell(righting, monkeypatch):
     assert page.show() is None
     assert shown == [page]
     assert html.unescape(page._repr_html_()).count(page.html) == 1
+
+
+def test_a_report_is_stopped_by_its_progress_callback(righting):
+    with pytest.raises(RunStopped, match="stopped on request while drawing inertia"):
+        report(righting, sp.split(righting), progress=lambda share, _: share > 0.0)
 
 
 def test_only_pages_of_one_motion_are_filmed(righting, tmp_path, monkeypatch):

@@ -239,7 +239,7 @@ def test_a_family_of_motions_is_a_sequence():
 
 def test_a_long_run_tells_its_progress():
     shares: list[float] = []
-    sp.reconstruct(family(CAT, box=False), np.zeros(3), progress=lambda said: shares.append(said.share))
+    sp.reconstruct(family(CAT, box=False), np.zeros(3), progress=lambda share, _: shares.append(share))
     assert shares[-1] == 1.0
     assert np.all(np.diff(shares) >= 0.0)
 

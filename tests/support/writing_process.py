@@ -231,7 +231,7 @@ def _killed(writer: str, target: str, folder: str, trials: int, seed: int, whole
         durations.append(time.monotonic() - start)
         wholes.append(place.read_bytes())
     streams, chance = (f"{folder}/stdout", f"{folder}/stderr"), random.Random(seed)
-    found = {"torn": 0, "littered": 0}
+    found = {"torn": 0, "interrupted": 0}
     for trial in range(trials + whole_commands):
         begun, told = os.pipe()
         is_command = trial >= trials
@@ -248,14 +248,13 @@ def _killed(writer: str, target: str, folder: str, trials: int, seed: int, whole
         _, status = os.waitpid(child, 0)
         os.close(begun)
         assert os.WIFSIGNALED(status), Path(streams[1]).read_text()
-        left = place.read_bytes()
+        written = place.read_bytes()
         # Two pages of the same motion have other identifiers.
-        found["torn"] += left not in wholes and not (is_command and is_whole(left, writer))
-        found["littered"] += len(list(place.parent.iterdir())) > 1
+        found["torn"] += written not in wholes and not (is_command and is_whole(written, writer))
+        found["interrupted"] += len(list(place.parent.iterdir())) > 1
     last = _wrote(writer, target, folder, 1)
-    left = sorted(entry.name for entry in place.parent.iterdir())
     whole = place.read_bytes() == wholes[0] or is_whole(place.read_bytes(), writer)
-    return {**found, "differ": wholes[0] != wholes[1], "left": left, "code": last["code"], "whole": whole}
+    return {**found, "differ": wholes[0] != wholes[1], "code": last["code"], "whole": whole}
 
 
 def _recorded(writer: str, version: int, target: str) -> list[Callable[[], None]]:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import comb
 from scipy.stats import chi2
 
+from ..arguments import made_by
 from ..arrays import Array
 from ..display import short_repr
 from .floating_trajectory import FloatingTrajectory
@@ -25,6 +26,7 @@ _ROUNDING = 8.0
 """Units in the last place of a sample: what arithmetic alone leaves of numbers that are otherwise exact."""
 
 
+@made_by("auditing.TrajectoryNoise(attitude=0.002), for example")
 @dataclass(frozen=True, kw_only=True)
 class TrajectoryNoise:
     """Standard deviations of the samples, each about each axis or of each joint alike.

@@ -15,6 +15,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import made_by
 from ..arrays import Array, check_reach, common_batch, finite_array
 from ..display import card_html
 from ..errors import ShapeError, unknown_name
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from .family import BodyFamily
 
 
+@made_by("load_body(file or name)")
 class Body:
     """A tree of rigid links that floats freely; its shape is the vector of its independent joints.
 

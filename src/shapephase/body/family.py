@@ -9,6 +9,7 @@ from typing import overload
 
 import numpy as np
 
+from ..arguments import made_by
 from ..arrays import Array, Integers, lock_arrays, read_only
 from ..errors import ShapeError
 from ..letters import what_came
@@ -22,6 +23,7 @@ _AT_ONCE = 10_000_000
 _OF_A_LINK = 150
 
 
+@made_by(Body="take one of its bodies, family[0]")
 @dataclass(frozen=True, eq=False)
 class BodyFamily(Sequence[Body]):
     """N bodies that differ in their inertias only: a sequence of them, made by `Body.with_inertias`.

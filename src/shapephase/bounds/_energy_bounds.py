@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import body_momentum_argument, check_object, number_argument
+from ..arguments import body_momentum_argument, check_object, made_by, number_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
@@ -35,6 +35,7 @@ _DISTINCT = 1e-3
 _PASSES = 3
 
 
+@made_by("bounds.energy_bounds(deformation, momentum)")
 @dataclass(frozen=True, eq=False)
 class EnergyBounds:
     """Bounds of E_t along every solution from one initial momentum, on each of K cells of time.

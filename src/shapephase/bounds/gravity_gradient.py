@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, number_argument, positive_argument, vector_argument
+from ..arguments import check_object, made_by, number_argument, positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
@@ -47,6 +47,7 @@ _CHUNK = 10_000
 _SAME_TIME = 1e-12
 
 
+@made_by("bounds.KeplerOrbit.from_state(...) or from_elements(...)")
 @dataclass(frozen=True, eq=False)
 class KeplerOrbit:
     """The path of a centre of mass around a fixed point, in closed form; made by `from_state` or `from_elements`.

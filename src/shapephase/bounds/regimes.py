@@ -14,7 +14,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import body_momentum_argument, check_object
+from ..arguments import body_momentum_argument, check_object, made_by
 from ..arrays import Array, Mask, finite_array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
@@ -50,6 +50,7 @@ class Regime(StrEnum):
     MAY_CROSS = "may cross"
 
 
+@made_by("bounds.regime_certificate(deformation, momentum)")
 @dataclass(frozen=True, eq=False)
 class RegimeCertificate:
     """Which axis Pi circles over an interval, if that is certain before the motion is computed.
@@ -112,6 +113,7 @@ class RegimeCertificate:
         )
 
 
+@made_by("bounds.crown_region(deformation, momentum)")
 @dataclass(frozen=True, eq=False)
 class CrownRegion:
     """The part of the momentum sphere that Pi can reach over an interval.

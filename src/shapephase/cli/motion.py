@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.machine_code import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ..run_progress import RunProgress
+from ..run_progress import ProgressCallback
 from ..shape_space.files.base_columns import ESTIMATE
 from ..shape_space.files.flight import ANY_GRAVITY, RECORDED
 from ..shape_space.files.mapping_files import name_pair, read_names
@@ -93,7 +92,7 @@ def flight(
     options: StartOptions,
     recording: RecordingOptions,
     tolerance: float = DEFAULT_TOLERANCE,
-    progress: Callable[[RunProgress], Any] | None = None,
+    progress: ProgressCallback | None = None,
     *,
     gauge: str = "base",
     trail: str | None = None,

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from ..run_progress import RunProgress
 from .terminal import Verbosity, say, verbosity
 
 # [s] Work that takes longer shows a progress bar; what is done sooner leaves the terminal alone.
@@ -37,11 +36,10 @@ class Steps:
         self._begun += 1
         self._display.update(self._task, description=what, completed=self._begun - 1)
 
-    def watch(self, now: RunProgress) -> None:
-        """The callback of a run that is the step under way: the bar moves within the step, with the run's own words."""
+    def watch(self, share: float, text: str) -> None:
+        """Progress callback of the run that is the step under way: moves the bar within the step and shows the text."""
         if self._display is not None:
-            done = self._begun - 1 + now.share
-            self._display.update(self._task, description=now.phase or None, completed=done)
+            self._display.update(self._task, description=text or None, completed=self._begun - 1 + share)
 
     def say(self, what: str) -> None:
         """Other words for the step under way."""

@@ -84,7 +84,7 @@ def split_command(
         from ..plots.pages.motion_data import up_axis
 
         up_axis(recording.up, None)
-    with steps(7 if html else 2) as work:
+    with steps(3 if html else 2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, start, recording, tolerance, work.watch, gauge=gauge, floating=floating)
         work.begin("splitting")
@@ -105,6 +105,7 @@ def split_command(
             running_phases(flown.motion, times, gauge).write_csv(phases)
             say_written(phases)
         if html is not None:
+            work.begin("making the report")
             from ..plots.report_page import report
 
             title = f"{flown.body.name} along {Path(motion).name}"
@@ -117,7 +118,7 @@ def split_command(
                 error_bars=error_bar_lines(result, bars, flown.recorded, errors),
                 recording=[*lines, *recording_lines(flown.body, flown.recorded)],
                 noise=joint_noise(flown.body, errors),
-                begin=work.begin,
+                progress=work.watch,
             ).write(html)
             say_written(html)
     turns = turn_counts(flown.motion, result)

@@ -47,6 +47,13 @@ def forget() -> None:
     ctypes.pythonapi.PyRun_SimpleString(b"")
 
 
+def stop_searches_on_ctrl_c() -> None:
+    """Start a process that searches for plans: Ctrl-C ends its searches and nothing else."""
+    from ..optimal_control.solver_callback import STOP_REQUESTED
+
+    signal.signal(signal.SIGINT, lambda *_: STOP_REQUESTED.set())
+
+
 def _stop(number: int, _: FrameType | None) -> None:
     _PRESSED.append(number)
     raise KeyboardInterrupt

@@ -12,7 +12,6 @@ from cyclopts import App, Parameter
 
 from ..errors import ShapeError
 from ..files import write_whole
-from ..run_progress import RunProgress
 from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyOptions, FigureFile, PrintOptions
 from .outcome import ExitCode, Outcome, check_writable
 from .progress import steps
@@ -95,7 +94,7 @@ def sweep_command(
             def watch(now: StudyProgress) -> None:
                 said = progress_line(now)
                 say(f"shapephase: {said}", Verbosity.VERBOSE)
-                work.watch(RunProgress(now.done / now.cases, said))
+                work.watch(now.done / now.cases, said)
 
             filled = read.run(store, client, workers=workers, resume=resume, retry=retry, progress=watch)
     except KeyboardInterrupt:

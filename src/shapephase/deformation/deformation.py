@@ -15,6 +15,7 @@ from ..arguments import (
     check_function,
     check_object,
     inertia_argument,
+    made_by,
     on_unphysical_argument,
     positive_argument,
     times_argument,
@@ -50,6 +51,11 @@ from .descriptions import (
 from .rotors import Rotor, RotorDescription, mapping_of_joints, rotors_argument, widened_path
 
 
+@made_by(
+    "articulated(body, path), particles, prescribed or rigid",
+    Body="of one made by articulated, it is deformation.description.body",
+    ShapePath="of one made by articulated, it is deformation.description.path",
+)
 @dataclass(frozen=True, eq=False)
 class Deformation:
     """A free body that changes its shape in a known way, seen from its base frame.
@@ -224,6 +230,7 @@ class Deformation:
         return limits
 
 
+@made_by(Deformation="take one of them, family[0]")
 @dataclass(frozen=True, eq=False)
 class DeformationFamily(Sequence[Deformation]):
     """The deformations of N bodies of a family along one path: a sequence of them, made by `articulated`.

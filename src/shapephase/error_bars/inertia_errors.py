@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ..arguments import made_by
 from ..display import short_repr
 
 
+@made_by("InertiaErrors(masses=0.05), for example")
 @dataclass(frozen=True, kw_only=True)
 class InertiaErrors:
     """Relative standard deviations of the inertias of links, independent of each other.

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +14,7 @@ from ..deformation.deformation import articulated
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ..run_progress import RunProgress
+from ..run_progress import ProgressCallback
 from ..shape_space.files.flight import ALL, turns
 from ..shape_space.files.read import RecordedMotion
 from ..warning_filters import quiet
@@ -59,7 +57,7 @@ def motion_from_recording(
     attitude: ArrayLike | None = None,
     tolerance: float = 1e-9,
     find_axes: bool = False,
-    progress: Callable[[RunProgress], Any] | None = None,
+    progress: ProgressCallback | None = None,
 ) -> RecordedFlight:
     """The motion of a recorded body: what every command makes of a recording.
 

@@ -131,7 +131,7 @@ def mujoco_arrays(
         places = [whole.names.index(name) for name in names]
         qpos, qvel = np.hstack([base[0], whole.joints[:, places]]), np.hstack([base[1], whole.rates[:, places]])
         return MujocoArrays(time=whole.times, qpos=qpos, qvel=qvel, joint_names=names)
-    check_object(model, "MjModel", "model")
+    check_object(model, "MjModel", "model", call="mujoco.MjModel.from_xml_path(file)")
     free = [k for k in range(model.njnt) if model.jnt_type[k] == _MUJOCO_FREE]
     names = [model.joint(k).name for k in range(model.njnt) if k not in free]
     order = _order(whole, names, "MuJoCo", len(free))
@@ -191,7 +191,7 @@ def pinocchio_arrays(
             joint_names=whole.names,
         )
     check_no_balls(whole.body.chain.follows, "arrays by the order of another model need")
-    check_object(model, "Model", "model")
+    check_object(model, "Model", "model", call="pinocchio.buildModelFromUrdf(file, pinocchio.JointModelFreeFlyer())")
     kinds = list(model.joints)
     free = len(kinds) > 1 and (kinds[1].nq, kinds[1].nv) == (_FREE_Q, _FREE_V)
     names = list(model.names)[2:]

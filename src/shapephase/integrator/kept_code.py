@@ -124,7 +124,7 @@ class KeptFunction:
             return
         key, content = self._key(signature, compiled.codegen), dumps(compiled._reduce())
         file = self._file(key)
-        # An old file could not be used; `write_whole` would keep its owner and mode.
+        # An old file could not be used; `write_whole` would keep its mode.
         with contextlib.suppress(OSError):
             file.unlink()
         try:

@@ -4,11 +4,10 @@ from .extremals.hamiltonian import Hamiltonian, hamiltonian
 from .extremals.jacobi_fields import ConjugateTime, JacobiFields, conjugate_times, jacobi_fields
 from .extremals.shooting import shoot
 from .extremals.wong_residual import WongFit, wong_residual
-from .plan import Plan, Progress, Start
-from .plan_options import Goal, Limits, Search
+from .plan import Plan, Start
+from .plan_options import Goal, Limits, Search, Waypoint
 from .planning import plan_reorientation
 from .symbolic import SymbolicBody, symbolic_body
-from .waypoints import Waypoint
 
 __all__ = [
     "ConjugateTime",
@@ -18,7 +17,6 @@ __all__ = [
     "JacobiFields",
     "Limits",
     "Plan",
-    "Progress",
     "Search",
     "Start",
     "SymbolicBody",

@@ -12,10 +12,8 @@ from ..body.body import Body
 from ..body.couplings.ball_joints import BallJoint, vector_part
 from ..errors import TrajectoryError
 
-_FARTHEST = np.tan(np.radians(80.0))
-"""Of each of the three: 160 degrees from the start about an axis; a half turn is infinitely far."""
-_NO_TURN = 1e-9
-"""Cosine of half the turn to an end that is half a turn away."""
+_FARTHEST = np.tan(np.radians(80.0))  # 160 degrees from the start about an axis; a half turn is infinitely far
+_NO_TURN = 1e-9  # cosine of half the turn to an end that is half a turn away
 
 
 @dataclass(frozen=True, eq=False)

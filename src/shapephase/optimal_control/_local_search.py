@@ -15,9 +15,8 @@ from ..errors import ShapePhaseError
 from ._path_cost import path_cost
 from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
 from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
-from ._reduced import ReducedProgram
 from ._spline_basis import SplineBasis
-from ._via_rows import via_rows
+from ._via_points import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control
 from .plan import Start
@@ -25,16 +24,11 @@ from .plan_options import Search
 from .solver_callback import IterationCallback
 from .task import Reorientation
 
-# How often pieces are halved where the search ends at a path whose motion misses the goal: fast joints need finer ones.
-_HALVINGS = 2
-# How often efforts are given less room where they exceed their limits between the nodes.
-_TIGHTENINGS = 6
-# Share of a limit that counts as being at it, where no plan was found.
-_NEARLY = 0.9
-# Windings of the same attitude differ by half a turn or more: far less than that tells them apart [rad].
-_WINDING_TOLERANCE = 0.1
-# Attitudes for each piece from which the windings are counted: so close together that unwrapping is safe.
-_WINDING_SAMPLES = 50
+_HALVINGS = 2  # of the pieces, where the motion of the optimum misses the goal: fast joints need finer ones
+_TIGHTENINGS = 6  # rounds in which efforts are given less room, where they exceed limits between the nodes
+_NEARLY = 0.9  # share of a limit that a message about a failed search counts as being at it
+_WINDING_TOLERANCE = 0.1  # [rad], far less than the half turn by which windings of one attitude differ
+_WINDING_SAMPLES = 50  # attitudes per piece: so close together that unwrapping is safe
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,21 +80,21 @@ class LocalSearch:
     ----------
     basis : of the path's spline at first
     program : for this basis
-    halvings : how often its pieces may be halved; never where the user said how many there are, or for "reduced"
+    halvings : how often its pieces may be halved; never where the user gave their number
     settles : whether the solver may end where the cost changes no more, as that of a long motion
     """
 
     task: Reorientation
     basis: SplineBasis
-    program: CollocationProgram | ReducedProgram
+    program: CollocationProgram
     iterations: int
     halvings: int
     settles: bool = False
 
     @classmethod
     def of(cls, task: Reorientation, basis: SplineBasis, search: Search, *, settles: bool = False) -> LocalSearch:
-        halvings = _HALVINGS if search.pieces is None and search.method == "collocation" else 0
-        return cls(task, basis, _program(task, basis, search.method), int(search.iterations), halvings, settles)
+        halvings = _HALVINGS if search.pieces is None else 0
+        return cls(task, basis, CollocationProgram(task, basis), int(search.iterations), halvings, settles)
 
     def attempt(self, guess: Guess, callback: IterationCallback) -> Attempt:
         """The local optimum, its path corrected to reach the goal; on finer pieces where these are too coarse."""
@@ -123,7 +117,7 @@ class LocalSearch:
     def _on(
         self,
         basis: SplineBasis,
-        program: CollocationProgram | ReducedProgram,
+        program: CollocationProgram,
         guess: Guess,
         callback: IterationCallback,
     ) -> tuple[Attempt, Array]:
@@ -135,7 +129,7 @@ class LocalSearch:
     def _optimum(
         self,
         basis: SplineBasis,
-        program: CollocationProgram | ReducedProgram,
+        program: CollocationProgram,
         guess: Guess,
         callback: IterationCallback,
     ) -> tuple[NlpSolution, PolishedPath | None]:
@@ -149,8 +143,8 @@ class LocalSearch:
             "iterations": self.iterations,
             "via_places": guess.via_places,
             "iteration_callback": callback,
+            "settles": self.settles,
         }
-        options |= {"settles": True} if self.settles else {}
         rounds = 0
         while True:
             solution = program.solve(control, duration, attitudes, **options)
@@ -228,10 +222,6 @@ def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPa
     slack = 1.0 + LIMIT_SLACK
     shares = limit_shares(task, basis, polished.control, polished.motion)
     return polished.path.duration <= task.duration * slack and max(shares.values(), default=0.0) <= slack
-
-
-def _program(task: Reorientation, basis: SplineBasis, method: str) -> CollocationProgram | ReducedProgram:
-    return CollocationProgram(task, basis) if method == "collocation" else ReducedProgram(task, basis)
 
 
 def failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Attempt | None, stopped: str) -> str:

@@ -13,16 +13,12 @@ from ..errors import AccuracyNotReached, unknown_name
 from ..shape_space.body_path import route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
-from ._gauss import gauss_tableau
+from ._spline_basis import gauss_tableau
 
-# Gauss nodes of a panel: exact for the rate cost of a cubic spline, and far beyond what smooth paths need.
-_NODES = 12
-# Panels between two breaks: of the first value, and of those that have to confirm it.
-_FIRST_PANELS = 2
-_PANELS = (4, 8, 16, 32, 64, 128)
-# Relative change of the cost from one subdivision to the next at which it is taken as converged: below the accuracy
-# that plans are compared at, well above the rounding of the body's matrices.
-_CONVERGED = 1e-10
+_NODES = 12  # Gauss nodes of a panel: exact for the rate cost of a cubic spline, ample for smooth paths
+_FIRST_PANELS = 2  # between two breaks, for the first value
+_PANELS = (4, 8, 16, 32, 64, 128)  # for the values that have to confirm it
+_CONVERGED = 1e-10  # relative change between subdivisions: 100 roundings of the body's matrices
 
 
 def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:

@@ -14,16 +14,11 @@ from ._spline_basis import SplineBasis
 from .plan_options import Limits
 from .task import Reorientation
 
-TIMES = 4001
-"""At which efforts are compared with their limits, at least."""
-LIMIT_SLACK = 1e-7
-"""Limits may be exceeded by this share of them, which the solver leaves."""
-# A program's limits of efforts are made this much tighter than what is exceeded asks for, doubled each time.
-_MARGIN = 5e-5
-# A power above one, as peaks move to where there is more room: what was beyond by 4 % is taken back by 6 %.
-_HASTE = 1.5
-# Joints that a warning names.
-_MOST_NAMED = 8
+TIMES = 4001  # least number of even times at which efforts are compared with their limits
+LIMIT_SLACK = 1e-7  # share by which the solver may exceed limits
+_MARGIN = 5e-5  # by which efforts are limited tighter than their excess asks for; doubled each round
+_HASTE = 1.5  # exponent above 1, since peaks move to where there is more room: 4 % too much takes back 6 %
+_MOST_NAMED = 8  # joints in a warning
 
 
 def derivative_shares(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> dict[str, float]:

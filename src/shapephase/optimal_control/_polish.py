@@ -13,34 +13,21 @@ from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.body_path import route_along
 from ..shape_space.shape_path import ShapePath
-from ._gauss import gauss_tableau
 from ._plan_limits import derivative_limits, shortest_duration
-from ._spline_basis import SplineBasis
-from ._via_rows import via_rows
+from ._spline_basis import SplineBasis, gauss_tableau
+from ._via_points import via_rows
 from .task import Reorientation
 
-# Accuracy of the reconstruction that plans are judged by [rad]: well below what they have to reach.
-_RECONSTRUCTION_TOLERANCE = 1e-10
-# Goal error that counts as reached [rad]: a hundred times the reconstruction's.
-GOAL_TOLERANCE = 1e-8
-# Goal error at which Newton's method ends [rad]: its next step would be lost in the reconstruction's error.
-_CONVERGED = 5e-10
-# The most Newton steps: it converges quadratically, so more do not help.
-_STEPS = 8
-# Newton's method does not start further from the goal [rad]: the linear model is no guide there.
-_TOO_FAR = 1.0
-# Gauss nodes of a piece, for the derivative of the end: of order sixteen, so that the quadrature does not limit it.
-_NODES = 8
-# A coordinate or rate this close to its limit, relative to the range, is held where it is: an interior-point solution
-# ends a little inside its active limits.
-_ACTIVE = 1e-6
-# The least range of a coordinate, so that a coordinate without any does not divide by zero [rad or m].
-_LEAST_RANGE = 1e-300
-# How often a correction is found anew because it would take rates beyond their limits.
-_ROUNDS = 6
-# Singular values of the correction's equations below this share of the largest come from held rates that depend on
-# each other, and are left out.
-_RANK = 1e-10
+_RECONSTRUCTION_TOLERANCE = 1e-10  # [rad]: a hundredth of what plans have to reach
+GOAL_TOLERANCE = 1e-8  # [rad], goal error that counts as reached: a hundred times the reconstruction's
+_CONVERGED = 5e-10  # [rad], goal error at which the next Newton step is lost in the reconstruction's error
+_STEPS = 8  # Newton steps at most: it converges quadratically
+_TOO_FAR = 1.0  # [rad], goal error from which on the linear model is no guide
+_NODES = 8  # Gauss nodes of a piece for the derivative of the end: order 16
+_ACTIVE = 1e-6  # share of the range within which a limit is active: interior-point solutions end inside it
+_LEAST_RANGE = 1e-300  # [rad or m], of a fixed coordinate, to divide by
+_ROUNDS = 6  # corrections found anew because they would take rates beyond their limits
+_RANK = 1e-10  # share of the largest singular value below which held rates depend on each other
 
 
 @dataclass(frozen=True, eq=False)

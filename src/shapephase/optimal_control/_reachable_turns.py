@@ -20,24 +20,16 @@ from ..shape_space.reach.holonomy_algebra import carried_curvature
 from ..shape_space.shape_path import ShapePath
 from .task import Reorientation
 
-# Random shapes within the limits: an analytic function that vanishes at all of them vanishes everywhere.
-_SHAPES = 6
+_SHAPES = 6  # random shapes within the limits: an analytic function that vanishes at all of them is zero
 _SEED = 54
-# Relative to the terms of the curvature, or to the connection: exact symmetries leave 1e-14, and what is less than this
-# would need 1e9 rounds of a loop.
-_NOISE = 1e-10
-# [rad for a stroke, or its square] that rounding leaves of motions that turn nothing.
-_NOTHING = 1e-13
-# [rad] by which a goal must be missed: rounding of what the user computed is left to the search.
-_LEAST_MISS = 1e-6
-# Places on a curve of attitudes, and its length [strokes] up to which they are close.
-_PLACES = 1001
-_LONGEST = 60.0
+_NOISE = 1e-10  # relative to the curvature's terms: exact symmetries leave 1e-14; less needs 1e9 loops
+_NOTHING = 1e-13  # [rad per stroke, or its square] of rounding in motions that turn nothing
+_LEAST_MISS = 1e-6  # [rad] by which a goal must be missed: rounding of user input is left to the search
+_PLACES = 1001  # on a curve of attitudes, which are close up to a length of
+_LONGEST = 60.0  # strokes
 _MOST_PLACES = 100_000
-# Sampled maxima of slopes are exceeded between samples by less than this.
-_BETWEEN = 1.5
-# Radius [strokes] about the start in which shapes are drawn where limits are wider.
-_RADIUS = np.pi
+_BETWEEN = 1.5  # factor by which a slope may exceed its sampled maximum
+_RADIUS = np.pi  # [strokes] about the start, where shapes are drawn if limits are wider
 
 
 @dataclass(frozen=True, eq=False)

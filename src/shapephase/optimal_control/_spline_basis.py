@@ -1,4 +1,4 @@
-"""The splines of plans: linear in their control points, which bound them."""
+"""Splines of plans, linear in their control points, which bound them; and Gauss quadrature and collocation."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..shape_space.shape_path import ShapePath
 
-# Cubic: twice differentiable, so that the acceleration cost is finite, and what `ShapePath.spline` reads back.
-_DEGREE = 3
+_DEGREE = 3  # twice differentiable: the acceleration cost is finite, and `ShapePath.spline` reads it back
 
 
 @dataclass(frozen=True)
@@ -130,3 +129,13 @@ class SplineBasis:
         """The spline as a path of the joints: control points (k, n)."""
         values = self.matrix(self.nodes) @ control
         return ShapePath.spline(self.nodes * duration, values, periodic=False, joint_names=joint_names)
+
+
+def gauss_tableau(stages: int) -> tuple[Array, Array, Array]:
+    """Gauss nodes and weights on [0, 1], and the integrals from 0 to each node of the polynomials through the nodes."""
+    nodes, weights = np.polynomial.legendre.leggauss(stages)
+    places = 0.5 * (nodes + 1.0)
+    powers = np.arange(stages)
+    values = places[:, None] ** powers
+    integrals = places[:, None] ** (powers + 1) / (powers + 1)
+    return places, 0.5 * weights, np.asarray(np.linalg.solve(values.T, integrals.T).T, dtype=np.float64)

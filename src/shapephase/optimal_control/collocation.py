@@ -4,49 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._gauss import gauss_tableau
 from ._polish import end_conditions
-from ._spline_basis import SplineBasis
-from ._via_rows import open_points, symbolic_via_rows
-from .nodes.limit_rows import DerivativeRows, EffortTerms
-from .nodes.node_functions import node_functions
-from .nodes.unknowns import scipy_sparse, seen_at, sparse_matrix
+from ._spline_basis import SplineBasis, gauss_tableau
+from ._via_points import open_points, symbolic_via_rows
+from .nodes.limit_rows import EffortTerms, derivative_rows
+from .nodes.node_functions import node_functions, scipy_sparse, seen_at, sparse_matrix
 from .solver_callback import BestIterate, IterationCallback, ipopt_callback
 from .symbolic import symbolic_body
 from .task import Reorientation
 
-STAGES = 3
-"""Gauss nodes of a piece: order six.
-
-On 12 pieces plans of the cat are off by some 1e-4 rad, which the Newton corrections remove."""
-# Dual residual, scaled, above which IPOPT's success is reported as degenerate: it converges to 1e-8, so this is no
-# rounding.
-_DEGENERATE = 1e-3
-# Accuracy that IPOPT is run to, scaled.
-_TOLERANCE = 1e-8
-# The shortest duration as a share of the longest, for the cost "time": only to keep the division by T away from 0.
-_SHORTEST = 1e-3
-# Long motions may end where the cost has settled: their last digits take hundreds of iterations, as strokes slide along
-# themselves. Accuracy that they have to have, scaled;
-_SETTLED_TOLERANCE = 1e-3
-# relative change of the cost in an iteration;
-_SETTLED_CHANGE = 3e-4
-# iterations for which it changes by no more;
-_SETTLED_ITERATIONS = 3
-# and what IPOPT takes for no bound.
-_UNBOUNDED = 1e10
-# What IPOPT reports of a local optimum.
-GOOD_STATUS = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
-# CasADi handles Ctrl-C itself: in the middle of an iteration IPOPT then returns this status,
-_INTERRUPTED = "NonIpopt_Exception_Thrown"
-# and between iterations this one, which a callback that stops the search causes too.
-_STOPPED = "User_Requested_Stop"
+STAGES = 3  # Gauss nodes of a piece, order six: 12 pieces of the cat are off by 1e-4 rad, which the polish removes
+_DEGENERATE = 1e-3  # scaled dual residual of a degenerate success: beyond rounding, as IPOPT converges to 1e-8
+_TOLERANCE = 1e-8  # scaled, of IPOPT
+_SHORTEST = 1e-3  # least duration as a share of the longest, cost "time": keeps the division by T from zero
+# Long motions may end where the cost has settled: strokes slide along themselves for hundreds of iterations.
+_SETTLED_TOLERANCE = 1e-3  # scaled accuracy then
+_SETTLED_CHANGE = 3e-4  # relative change of the cost, during at least
+_SETTLED_ITERATIONS = 3  # iterations
+_UNBOUNDED = 1e10  # no bound, for IPOPT
+GOOD_STATUS = ("Solve_Succeeded", "Solved_To_Acceptable_Level")  # IPOPT's, for a local optimum
+_INTERRUPTED = "NonIpopt_Exception_Thrown"  # IPOPT's, after Ctrl-C within an iteration, which CasADi handles
+_STOPPED = "User_Requested_Stop"  # after Ctrl-C between iterations, or a callback that stops the search
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,40 +108,44 @@ class CollocationProgram:
             task, unknown[duration_place - task.dimension : duration_place], unknown[core - 4 : core]
         )
         via, via_low, via_high = symbolic_via_rows(task, basis, unknown[:duration_place], unknown[self._open])
-        final = casadi.vertcat(end, via)
-        further: list[DerivativeRows | EffortTerms] = [DerivativeRows(task, basis, unknown)]
+        bends = derivative_rows(task, basis, unknown)
+        efforts = None
         if task.efforts_limited or task.cost == "effort":
-            further.append(EffortTerms(task, basis, self.places, panels, unknown))
-        groups = [linear @ unknown - from_turning @ casadi.vec(turning), final, *(part.values for part in further)]
+            efforts = EffortTerms(task, basis, self.places, panels, unknown)
+        effort_rows, effort_jacobian = (
+            (casadi.MX(0, 1), casadi.MX(0, unknown.shape[0])) if efforts is None else (efforts.values, efforts.jacobian)
+        )
+        # Rows of no particular structure, which CasADi differentiates itself.
+        others = casadi.vertcat(end, via, bends)
+        groups = [linear @ unknown - from_turning @ casadi.vec(turning), others, effort_rows]
         rows = casadi.vertcat(*groups)
         slopes = casadi.diagcat(*casadi.horzsplit(node.jacobian.map(count)(at_node), width))
         jacobian = casadi.vertcat(
             linear - from_turning @ (slopes @ seen),
-            casadi.jacobian(final, unknown),
-            *(part.jacobian for part in further),
+            casadi.jacobian(others, unknown),
+            effort_jacobian,
         )
         multipliers, cost_factor = casadi.MX.sym("multipliers", rows.shape[0]), casadi.MX.sym("cost_factor")
-        of_linear, of_final, *of_further = casadi.vertsplit(
+        of_linear, of_others, of_efforts = casadi.vertsplit(
             multipliers, np.cumsum([0, *(group.shape[0] for group in groups)]).tolist()
         )
         turning_multipliers = casadi.reshape(-from_turning.T @ of_linear, 4, count)
         density_factor = 0.0 if task.cost == "time" else cost_factor
         blocks = node.hessian.map(count)(at_node, turning_multipliers, density_factor * shares.T)
         hessian = seen.T @ (casadi.diagcat(*casadi.horzsplit(blocks, width)) @ seen)
-        for part, its_multipliers in zip(further, of_further, strict=True):
-            hessian = hessian + part.hessian(its_multipliers, cost_factor)
-        # What of the Lagrangian is no sum over nodes, left to CasADi's own differentiation.
-        others = casadi.dot(final, of_final)
+        if efforts is not None:
+            hessian = hessian + efforts.hessian(of_efforts, cost_factor)
+        lagrangian = casadi.dot(others, of_others)
         if task.cost == "time":
             cost = unknown[duration_place]
         elif task.cost == "acceleration":
             cost = self._acceleration_cost(unknown)
-            others = others + cost_factor * cost
-        elif task.cost == "effort":
-            cost = cast("EffortTerms", further[-1]).cost
+            lagrangian = lagrangian + cost_factor * cost
+        elif efforts is not None and task.cost == "effort":
+            cost = efforts.cost
         else:
             cost = casadi.dot(density.T, shares)
-        hessian = hessian + casadi.hessian(others, unknown)[0]
+        hessian = hessian + casadi.hessian(lagrangian, unknown)[0]
         none = casadi.MX.sym("p", 0, 1)
         self._cost_function = casadi.Function("cost", [unknown], [cost])
         self.program = {"x": unknown, "p": none, "f": cost, "g": rows}
@@ -167,7 +155,7 @@ class CollocationProgram:
         }
         # The third row of a pointed axis is a cosine, which only has to be positive.
         final_high = np.zeros(3) if task.target is not None else np.array([0.0, 0.0, np.inf])
-        room = np.ones(sum(part.values.shape[0] for part in further))
+        room = np.ones(bends.shape[0] + effort_rows.shape[0])
         self._low = np.concatenate([low, np.zeros(3), via_low, -room])
         self._high = np.concatenate([high, final_high, via_high, room])
 

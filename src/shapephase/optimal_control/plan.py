@@ -9,51 +9,21 @@ import numpy as np
 
 from ..arrays import Array
 from ..body.body import Body
-from ..display import card_html, card_text, short_repr
+from ..card_pictures import MOST_POINTS, curves_picture
+from ..display import Card, angle_text, card_html, card_text, momentum_text, numbers, short_repr
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
-from ._card import plan_card
+from ..so3 import angle
 from .plan_options import Goal
 
+# Radians; metres stand for them where joints slide.
 COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "effort": "s", "time": "s"}
-"""Of each cost; metres stand for radians where joints slide."""
 
 PLAN_STATUS = ("found", "not found", "stopped", "out of time")
 """How a search ended: after all starts, with a local optimum that reaches the goal or without, or before."""
 
-AGREEMENT = 1e-3
-"""Relative difference of costs up to which starts have come to the same."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """The state of a search after an iteration of the solver.
-
-    Attributes
-    ----------
-    stage : "guesses", each improved on a coarse spline, or "search"
-    start, starts : which of how many, from 1
-    iteration : of the solver, from 0
-    cost : so far [unit of the plan's cost]
-    infeasibility : the largest violation of a constraint so far, scaled: the equations of motion, the goal, the limits
-    goal_error : angle between the solver's own attitude at the end and the goal so far [rad]
-
-    Examples
-    --------
-    >>> said = sp.optimal_control.Progress("search", 1, 1, 12, 0.09, 1e-9, 1e-10)
-    >>> said.iteration, said.cost
-    (12, 0.09)
-    """
-
-    stage: str
-    start: int
-    starts: int
-    iteration: int
-    cost: float
-    infeasibility: float
-    goal_error: float
-
-    __repr__ = short_repr
+_SECOND_ORDER = {True: "a minimum among paths near by", False: "not met", None: "not known"}
+AGREEMENT = 1e-3  # relative difference of costs up to which starts have come to the same
 
 
 @dataclass(frozen=True)
@@ -108,10 +78,9 @@ class Plan:
     goal_error : angle between the reconstructed attitude at the end and the goal [rad]
     transcription_gap : the same before the Newton corrections: the error of the discretisation [rad]
     polish_steps : Newton corrections of the path's coefficients that removed it
-    kkt_residual : of the discrete optimum before the corrections, scaled; for a motion of many strokes that of the
-        optimum among motions of so many equal ones
+    kkt_residual : of the discrete optimum before the corrections, scaled; up to 1e-3 for a motion of
+        many strokes, whose search ends where the cost has settled
     coefficients : (pieces + 1, m) control points of the free coordinates [rad or m]
-    method : that found it
     iterations : over all starts
     seconds : over all starts
     starts : one for each start, in their order
@@ -148,7 +117,6 @@ class Plan:
     polish_steps: int
     kkt_residual: float
     coefficients: Array
-    method: str
     iterations: int
     seconds: float
     starts: tuple[Start, ...]
@@ -171,4 +139,25 @@ class Plan:
         return COST_UNITS[self.cost_name]
 
     __repr__, _repr_html_ = card_text, card_html
-    _card = plan_card
+
+    def _card(self) -> Card:
+        """What turns by how much at which cost, how far off the goal, and how it was found; with its joints in time."""
+        converged = sum(start.converged for start in self.starts)
+        rows = [
+            ("duration", f"{numbers(self.path.duration, 's')}, rates at the ends: {self.rates_at_ends}"),
+            ("momentum", momentum_text(self.motion.momentum)),
+            ("turned", angle_text(angle(self.motion.final_attitude))),
+            ("off the goal", f"{self.goal_error:.1e} rad"),
+            ("cost", f"{numbers(self.cost, self.cost_unit)} ({self.cost_name})"),
+            ("of the limits", ", ".join(f"{name} {share:.1%}" for name, share in self.limit_shares.items())),
+            ("found by", f"{self.iterations} iterations, {self.seconds:.3g} s"),
+            ("starts", f"{len(self.starts)}, {converged} of them converged, {self.agreeing_starts} to this cost"),
+            ("KKT residual", f"{self.kkt_residual:.1e}"),
+            ("second order", _SECOND_ORDER[self.second_order]),
+        ]
+        if len(self.waypoint_times):
+            rows.append(("waypoints passed at", numbers(self.waypoint_times, "s")))
+        if self.hamiltonian_spread is not None:
+            rows.append(("Hamiltonian", f"constant to {self.hamiltonian_spread:.1e}"))
+        shapes = self.path.shape(np.linspace(0.0, self.path.duration, MOST_POINTS))
+        return Card(f"Plan for {self.body.name}", rows, curves_picture(shapes, "joints in time"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +15,7 @@ from ..arrays import Array, finite_array, real_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..letters import what_came
-from ._symmetry import different, symmetry_argument
 
-METHODS = ("collocation", "reduced")
 RATES_AT_ENDS = ("zero", "periodic", "free")
 LIMIT_UNITS = {
     "rate_limits": ("rad/s or m/s", True),
@@ -26,14 +25,12 @@ LIMIT_UNITS = {
 }
 """Of what `Limits` bounds, and whether a body's file may state it."""
 
-# Pieces of the spline: with fewer, not-a-knot ends leave too few control points for a loop.
-_LEAST_PIECES = 6
-# A plan of three joints takes half a MiB for each piece, and no path needs so many.
-_MOST_PIECES = 2000
-# The guesses of all starts are kept at once.
-_MOST_STARTS = 1000
-# What the solver's own counter holds.
-_MOST_ITERATIONS = 2**31 - 1
+_SAME = 1e-7  # difference of entries of equal rotations: rounding of user input
+_MOST_ROTATIONS = 120  # of a group: the icosahedron's has 60, larger ones have an axis of revolution instead
+_LEAST_PIECES = 6  # of the spline: with fewer, not-a-knot ends leave too few control points for a loop
+_MOST_PIECES = 2000  # a plan of three joints takes half a MiB for each
+_MOST_STARTS = 1000  # the guesses of all starts are kept at once
+_MOST_ITERATIONS = 2**31 - 1  # the solver's own counter
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +98,7 @@ class Goal:
         if self.link is not None and (self.pointing is None or not isinstance(self.link, str)):
             raise ShapeError(f"link: the name of the one whose axis `pointing` has, got {what_came(self.link)}")
         if self.symmetry is not None:
-            self._keep("symmetry", symmetry_argument(self.symmetry))
+            self._keep("symmetry", _symmetry_argument(self.symmetry))
             if self.winds or (self.pointing is not None and np.ndim(self.symmetry) == 1):
                 raise ShapeError("symmetry: an axis goes with rotation, rotations go with rotation or pointing")
         axis = finite_array(self.twist_axis, "twist_axis", (3,))
@@ -131,7 +128,7 @@ class Goal:
         rotations = np.asarray(self.rotation).reshape(-1, 3, 3)
         if turns.ndim == 1:
             return tuple(Goal(pointing=(turns, rotation @ turns)) for rotation in rotations)
-        return tuple(Goal(rotation=one) for one in different((rotations[:, None] @ turns).reshape(-1, 3, 3)))
+        return tuple(Goal(rotation=one) for one in _different((rotations[:, None] @ turns).reshape(-1, 3, 3)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,21 +190,60 @@ class Limits:
         object.__setattr__(self, name, _read_only(limits))
 
 
-@dataclass(frozen=True)
-class Search:
-    """How a plan is searched for.
+@dataclass(frozen=True, eq=False)
+class Waypoint:
+    """A posture that a plan passes through, without stopping there.
 
     Attributes
     ----------
-    method : "collocation", the attitude by Gauss collocation, the whole a sparse program with exact second derivatives
-        for IPOPT; or "reduced", the path's coefficients alone, with the exact derivative of the integrator's attitude
-        (not for the costs "time" and "effort", nor with limits of efforts). On equal splines both come to the same
-        costs within 1.5 %, of the cat in 14 and 11 s; the first leaves a KKT residual of 1e-9, the second of some 1e-6,
-        and for the astronaut it may need more than 300 iterations: so the first is the default
+    shape : (n,) of all joints [rad or m]; or name -> coordinate of some, the others being as the plan likes
+    time : when [s]; None: whenever it suits, between the waypoints before and after it in their list
+
+    Raises
+    ------
+    ShapeError, TrajectoryError
+        For numbers that are not finite, no joints, a time that is not above 0.
+
+    Examples
+    --------
+    >>> sp.optimal_control.Waypoint({"waist_pitch": 0.5}, time=0.4).time
+    0.4
+    """
+
+    shape: ArrayLike | Mapping[str, float]
+    time: float | None = None
+
+    __repr__ = short_repr
+
+    def __post_init__(self) -> None:
+        """Check what is given and keep it as numbers."""
+        if isinstance(self.shape, Mapping):
+            if not self.shape or not all(isinstance(name, str) for name in self.shape):
+                raise ShapeError(f"waypoint: names of joints with their coordinates are needed, got {self.shape}")
+            kept = {name: finite_array(value, f"waypoint: {name}", ()).item() for name, value in self.shape.items()}
+            object.__setattr__(self, "shape", kept)
+        else:
+            shape = np.array(finite_array(self.shape, "waypoint"))
+            if shape.ndim != 1 or not len(shape):
+                raise ShapeError(
+                    f"waypoint: one coordinate for each joint, or names with coordinates, got {what_came(self.shape)}"
+                )
+            shape.flags.writeable = False
+            object.__setattr__(self, "shape", shape)
+        if self.time is not None:
+            object.__setattr__(self, "time", positive_argument(self.time, "time of a waypoint"))
+
+
+@dataclass(frozen=True)
+class Search:
+    """Effort of the search for a plan: by Gauss collocation of the attitude, a sparse program for IPOPT.
+
+    Attributes
+    ----------
     starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. For up to eight
         free joints, and for up to twelve with several starts, they are the best of more guesses, up to sixteen, by a
         coarse search. Where none leads to a plan of up to eight, two further guesses are tried, and then a motion of
-        many equal strokes; at once where two joints cannot turn the body so far in four rounds
+        many strokes; at once where two joints cannot turn the body so far in four rounds
     seed : of the random guesses; the same seed gives the same plan
     pieces : of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and "rate",
         else 40 for up to eight, 20 for more, and up to four times as many where the path that was found misses the
@@ -217,8 +253,6 @@ class Search:
 
     Raises
     ------
-    UnknownNameError
-        For another method.
     ShapeError
         For counts that are not whole numbers, too small or too large.
 
@@ -228,7 +262,6 @@ class Search:
     4
     """
 
-    method: str = "collocation"
     starts: int = 1
     seed: int = 0
     pieces: int | None = None
@@ -239,8 +272,6 @@ class Search:
 
     def __post_init__(self) -> None:
         """Check what is given."""
-        if not isinstance(self.method, str) or self.method not in METHODS:
-            raise unknown_name("method", self.method, METHODS)
         if self.pieces is not None:
             _check_count(self.pieces, "pieces", _LEAST_PIECES, _MOST_PIECES)
         _check_count(self.starts, "starts", 1, _MOST_STARTS)
@@ -283,3 +314,48 @@ def _read_only(array: Array) -> Array:
     kept = array.copy()
     kept.flags.writeable = False
     return kept
+
+
+def _symmetry_argument(value: ArrayLike) -> Array:
+    """A unit axis (3,), or all rotations (k, 3, 3) of the group that some of them make, the identity first.
+
+    Raises ShapeError.
+    """
+    array = finite_array(value, "symmetry")
+    if array.shape == (3,) and array.any():
+        return so3.normalised(array)
+    if array.ndim not in (2, 3) or array.shape[-2:] != (3, 3) or not len(array):
+        raise ShapeError(
+            "symmetry: an axis (3,) that is not zero, or rotations of the body, (3, 3) or (k, 3, 3), are needed, got "
+            f"{what_came(value)}"
+        )
+    return _group(so3.rotation_argument(array, "symmetry").reshape(-1, 3, 3))
+
+
+def _different(rotations: Array) -> Array:
+    """Rotations (k, 3, 3) without those that come again, in their order."""
+    kept: list[Array] = []
+    for rotation in rotations:
+        if not _among(kept, rotation):
+            kept.append(rotation)
+    return np.array(kept)
+
+
+def _group(generators: Array) -> Array:
+    """All products of rotations."""
+    found = [np.eye(3)]
+    # The list grows while it is gone through.
+    for rotation in found:
+        for product in rotation @ generators:
+            if not _among(found, product):
+                found.append(product)
+        if len(found) > _MOST_ROTATIONS:
+            raise ShapeError(
+                f"symmetry: the rotations make a group of more than {_MOST_ROTATIONS}; for a body that looks the same "
+                "after any turn about an axis give this axis, (3,)"
+            )
+    return np.array(found)
+
+
+def _among(rotations: list[Array], rotation: Array) -> bool:
+    return bool(rotations) and bool(np.any(np.abs(np.array(rotations) - rotation).max(axis=(1, 2)) < _SAME))

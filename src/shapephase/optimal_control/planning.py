@@ -6,7 +6,7 @@ import math
 import pickle
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,60 +16,48 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import so3
 from ..arguments import check_executor, check_object
+from ..arrays import Array
 from ..body.body import Body
 from ..errors import PlanNotFound
-from ._certificates import hamiltonian_spread
-from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes, polished_path
+from ..run_progress import ProgressCallback, check_progress
+from ..shape_space.connection import mechanical_connection
+from ._local_search import Attempt, LocalSearch, failure_message, guessed_attitudes
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
+from ._polish import panel_nodes
 from ._reachable_turns import check_reachable
-from ._reduced import check_reducible
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
-from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
-from .plan import Plan, Progress
-from .plan_options import Goal, Limits, Search, goal_argument
-from .solver_callback import IterationCallback, heard_interrupts, stopping_interrupts
+from .plan import Plan
+from .plan_options import Goal, Limits, Search, Waypoint, goal_argument
+from .solver_callback import STOP_REQUESTED, IterationCallback
 from .task import Reorientation, reorientation
-from .waypoints import Waypoint
 
-# Few free joints: each piece is so cheap that the spline can be as fine as an extremal needs.
-_FEW_JOINTS = 4
-# Many free joints: the spline is coarse and no coarse search comes first.
-_MANY_JOINTS = 8
-# Pieces of the spline for few joints: paths of so many obey Wong's equations to 1e-4. For the acceleration cost they
-# would lose digits, as second derivatives of the basis grow with the square of the pieces; and from rest the joints
-# start within a piece, which is to be no shorter than a machine can do.
+_FEW_JOINTS = 4  # free joints so cheap that the spline can be as fine as an extremal needs
+_MANY_JOINTS = 8  # free joints beyond which the spline is coarse and no coarse search comes first
+# For few joints: such paths obey Wong's equations to 1e-4. The acceleration cost would lose digits, as second
+# derivatives grow with the square of the pieces; and from rest, joints start within a piece.
 _PIECES_OF_FEW = 160
-# Pieces up to `_MANY_JOINTS`, and beyond.
-_PIECES = 40
-_PIECES_OF_MANY = 20
-# Pieces of the coarse search that ranks the guesses, for few joints and for more: enough for a loop to bend.
-_COARSE_PIECES = 10
-_COARSE_PIECES_OF_MORE = 20
-# Guesses that it ranks for each start, and at most unless there are more starts; for few joints, where they are cheap,
-# not fewer than eight.
-_RANKED = 4
-_MOST_RANKED = 16
-_LEAST_OF_FEW = 8
-# Joints up to which guesses are ranked for several starts; for one, up to `_MANY_JOINTS`.
-_RANKED_JOINTS = 12
-# How often a loop that starts as a circle may go round: it bends into some rounds more than it starts with.
-_ROUNDS_OF_LOOPS = 4
-# Further guesses that are gone on with where none of those asked for leads to a plan: near a degenerate optimum
-# rounding decides whether a search comes to it.
-_SPARE = 2
-# The most iterations for each: those that have not ended by then are near enough to be ranked.
-_COARSE_ITERATIONS = 40
-# Its accuracy, scaled: it has to find the right basin, not the optimum.
-_COARSE_TOLERANCE = 1e-4
-# The same before "reduced", which without second derivatives does not get along a flat valley: it starts at its end.
-_COARSE_ITERATIONS_OF_REDUCED = 100
-_COARSE_TOLERANCE_OF_REDUCED = 1e-6
-# Constraint violation, scaled, up to which its end is gone on with; else the guess itself is, after all others.
-_COARSE_INFEASIBILITY = 1e-2
+_PIECES = 40  # up to `_MANY_JOINTS`
+_PIECES_OF_MANY = 20  # beyond
+_COARSE_PIECES = 10  # of the coarse search that ranks the guesses for few joints: enough for a loop to bend
+_COARSE_PIECES_OF_MORE = 20  # for more joints
+_RANKED = 4  # guesses that it ranks for each start
+_MOST_RANKED = 16  # at most, unless there are more starts
+_LEAST_OF_FEW = 8  # at least for few joints, where they are cheap
+_RANKED_JOINTS = 12  # up to which guesses are ranked for several starts; for one, up to `_MANY_JOINTS`
+_ROUNDS_OF_LOOPS = 4  # that a loop which starts as a circle may take: it bends into some more rounds
+_SPARE = 2  # further guesses where no start led to a plan: near a degenerate optimum rounding decides that
+_COARSE_ITERATIONS = 40  # of the coarse search: what has not ended then is near enough to be ranked
+_COARSE_TOLERANCE = 1e-4  # scaled: it has to find the right basin, not the optimum
+_COARSE_INFEASIBILITY = 1e-2  # scaled violation beyond which the guess itself is taken, after all others
+_ENDS = 3  # pieces at both ends that are left out: from rest a spline takes some to come to its speed
+_AT_LIMIT = 1.0 - 1e-5  # share of a rate limit that counts as being at it
+_STAGES = {"guesses": (0.0, 0.3), "search": (0.3, 1.0)}  # shares of the whole between which each is reported
+_USUAL_ITERATIONS = 50  # iterations after which half of a start is reported as done
 
 
 def plan_reorientation(
@@ -87,7 +75,7 @@ def plan_reorientation(
     symmetric: Mapping[str, tuple[str, float]] | None = None,
     limits: Limits | None = None,
     search: Search | None = None,
-    iteration_callback: Callable[[Progress], Any] | None = None,
+    progress: ProgressCallback | None = None,
     executor: Executor | None = None,
 ) -> Plan:
     """The cheapest motion of the joints that turns a free body to a goal: the falling cat's problem, for any body.
@@ -118,13 +106,14 @@ def plan_reorientation(
     limits : of positions, rates, accelerations, jerks and efforts; None: `Limits()`, positions and rates as the body's
         file has them
     search : method, starts, resolution; None: `Search()`
-    iteration_callback : called with a `Progress` after each iteration; if it returns something true, the search stops
-        there, as it does when its time is over (`Search.time_limit`): with the cheapest plan of the starts that had
-        ended, or else PlanNotFound with the best so far. Ctrl-C is raised as KeyboardInterrupt, and
-        nothing is kept
+    progress : called after each iteration as `progress(share, text)`: the share of the search that is done, from 0 to
+        1, which never falls, and a text such as "search 2 of 3: iteration 12, off the goal by 2.0e-02 rad, cost 0.125".
+        A true return stops the search, as its time limit does (`Search.time_limit`): the cheapest plan of the starts
+        that had ended is returned, or else PlanNotFound raised with the best so far. Ctrl-C is raised as
+        KeyboardInterrupt, and nothing is kept
     executor : of `concurrent.futures` or of a cluster (`distributed.Client.get_executor()`), whose processes search
-        from several starts (`Search.starts`) side by side; `iteration_callback` then hears of a start when it has
-        ended. None: one start after the other, here. Plans do not depend on it
+        from several starts (`Search.starts`) side by side; `progress` is then called when a start has ended.
+        None: one start after the other, here. Plans do not depend on it
 
     Raises
     ------
@@ -133,8 +122,8 @@ def plan_reorientation(
     UnreachableGoalError
         If no motion can reach the goal, as the holonomy algebra (`reachable`) or a plane of symmetry shows at once.
     PlanNotFound
-        If no start came to a local optimum that reaches the goal, or `iteration_callback` or its time limit stopped
-        the search before; it carries the best attempt.
+        If no start came to a local optimum that reaches the goal, or `progress` or its time limit stopped the search
+        before; it carries the best attempt.
 
     Warns
     -----
@@ -156,6 +145,7 @@ def plan_reorientation(
     """
     check_object(body, "Body", "body")
     check_executor(executor)
+    check_progress(progress)
     chosen = Search() if search is None else search
     goals = goal_argument(goal).members
     tasks = [
@@ -175,27 +165,23 @@ def plan_reorientation(
         )
         for member in goals
     ]
-    if chosen.method == "reduced":
-        check_reducible(tasks[0])
     check_reachable(tasks)
     warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
-    reporter = _ProgressReporter(iteration_callback, chosen.time_limit)
+    reporter = _SearchMonitor(progress, chosen.time_limit)
     attempts: list[Attempt] = []
-    with heard_interrupts():
-        for searched in _searches(tasks, chosen, reporter, executor):
-            for attempt in searched:
-                attempts.append(attempt)
-                if reporter.stopped:
-                    break
-            if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+    for searched in _searches(tasks, chosen, reporter, executor):
+        for attempt in searched:
+            attempts.append(attempt)
+            if reporter.stopped:
                 break
+        if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+            break
     seconds = time.perf_counter() - began
+    reporter.finish()
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=Attempt.rank, default=None)
     plan = (
-        None
-        if best is None
-        else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, chosen.method, seconds, reporter.stopped)
+        None if best is None else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, seconds, reporter.stopped)
     )
     if best is None or plan is None or not best.report.converged:
         raise PlanNotFound(failure_message(tasks[0], attempts, best, reporter.stopped), plan)
@@ -212,7 +198,7 @@ class _Job:
 
 
 def _searches(
-    tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
+    tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor, executor: Executor | None
 ) -> Iterator[Iterator[Attempt]]:
     """What is tried until something leads to a plan: loops first, unless none can turn the body so far."""
     near, far = [], []
@@ -227,7 +213,7 @@ def _searches(
 
 
 def _searched_by_loops(
-    tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter, executor: Executor | None
+    tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor, executor: Executor | None
 ) -> Iterator[Attempt]:
     """From loops, and from some more where none of those asked for leads to a plan."""
     first, spare = _jobs(tasks, search, reporter)
@@ -243,7 +229,7 @@ def _searched_by_loops(
                 break
 
 
-def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _ProgressReporter) -> tuple[list[_Job], list[_Job]]:
+def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor) -> tuple[list[_Job], list[_Job]]:
     """The local searches for each of several tasks, and those to go on with if none of them leads to a plan."""
     first: list[_Job] = []
     spare: list[_Job] = []
@@ -256,7 +242,7 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _ProgressRep
     return first, spare
 
 
-def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter) -> Iterator[Attempt]:
+def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
     """The local searches, one after the other."""
     local = None
     for number, job in enumerate(jobs):
@@ -265,29 +251,21 @@ def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _ProgressRepo
         yield local.attempt(job.guess, reporter.solver_callback("search", number + 1, len(jobs)))
 
 
-def _searched_by_strokes(task: Reorientation, search: Search, reporter: _ProgressReporter) -> Iterator[Attempt]:
-    """Motions of many strokes, for few joints: equal ones, and from there any."""
-    if task.dimension > _MANY_JOINTS or search.method != "collocation":
-        return
-    stroked = guess_of_strokes(task, search.seed, search.pieces)
+def _searched_by_strokes(task: Reorientation, search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
+    """Local search from a motion of many strokes, for few joints."""
+    stroked = guess_of_strokes(task, search.seed, search.pieces) if task.dimension <= _MANY_JOINTS else None
     if stroked is None:
         return
-    (layout, control), callback = stroked, reporter.solver_callback("search", 1, 1)
-    if strokes_suffice(task):
-        began = time.perf_counter()
-        solution = StrokeProgram(task, layout).solve_strokes(control, callback)
-        equal = corrected_attempt(task, layout.basis, solution, polished_path(task, layout.basis, solution), began)
-        yield equal
-        if equal.report.converged or reporter.stopped:
-            return
+    layout, control = stroked
     guess = guess_of_control(task, layout.basis, control)
     if guess is not None:
         few = replace(search, pieces=layout.basis.pieces)
-        yield LocalSearch.of(task, layout.basis, few, settles=True).attempt(guess, callback)
+        local = LocalSearch.of(task, layout.basis, few, settles=True)
+        yield local.attempt(guess, reporter.solver_callback("search", 1, 1))
 
 
 def _searched_by(
-    executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _ProgressReporter
+    executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _SearchMonitor
 ) -> Iterator[Attempt]:
     """The local searches by an executor, in their order."""
     recipes = {job.task: pickle.dumps((job.task, job.basis.pieces, search)) for job in jobs}
@@ -301,46 +279,54 @@ def _searched_by(
         yield replace(attempt, task=job.task)
 
 
-# What a thread of an executor has made of the last recipe that came: a program takes as long as some starts.
-_KEPT = threading.local()
+_KEPT = threading.local()  # the last program of a thread of an executor: it takes as long as some starts
 
 
 def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> Attempt:
-    """One of them, in another process or thread, until Ctrl-C there or the time `end` [s since 1970]."""
-    with stopping_interrupts() as stopped:
-        if getattr(_KEPT, "recipe", None) != recipe:
-            task, pieces, search = pickle.loads(recipe)
-            _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
-            _KEPT.recipe = recipe
-        return _KEPT.local.attempt(guess, lambda *_: stopped() or time.time() > end)
+    """A local search in another process or thread, until `STOP_REQUESTED` is set there or the time `end` [s, Unix]."""
+    if getattr(_KEPT, "recipe", None) != recipe:
+        task, pieces, search = pickle.loads(recipe)
+        _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
+        _KEPT.recipe = recipe
+    return _KEPT.local.attempt(guess, lambda *_: STOP_REQUESTED.is_set() or time.time() > end)
 
 
-class _ProgressReporter:
-    """Passes the progress of a search on to the user's callback, and ends it in time.
+class _SearchMonitor:
+    """Reports the progress of a search to the user's callback, and stops it on request or at its time limit.
 
     Attributes
     ----------
-    end : when the time is over [s since 1970]: a clock that other processes have, too
-    stopped : what has stopped the search, one of `PLAN_STATUS`; empty: nothing
+    end : when the time limit is reached [s since 1970]: a clock that other processes share
+    stopped : reason why the search was stopped, one of `PLAN_STATUS`; empty: none
     """
 
-    def __init__(self, callback: Callable[[Progress], Any] | None, time_limit: float | None) -> None:
-        self._callback = callback
+    def __init__(self, progress: ProgressCallback | None, time_limit: float | None) -> None:
+        self._progress = progress
+        self._share = 0.0
         self.end = math.inf if time_limit is None else time.time() + time_limit
         self.stopped = ""
 
     def solver_callback(self, stage: str, start: int, starts: int) -> IterationCallback:
-        """The solver's callback during one start."""
+        """Return the solver's callback during one start."""
+        first, last = _STAGES[stage]
+        which = f" {start} of {starts}" if starts > 1 else ""
 
-        def report(iteration: int, cost: float, infeasibility: float, goal_error: float) -> bool:
-            now = Progress(stage, start, starts, iteration, cost, infeasibility, goal_error)
-            if not self.stopped and self._callback is not None and self._callback(now):
+        def report(iteration: int, cost: float, infeasibility: float, goal_error: float) -> bool:  # noqa: ARG001
+            done = (start - 1 + iteration / (iteration + _USUAL_ITERATIONS)) / starts
+            self._share = max(self._share, first + (last - first) * done)
+            text = f"{stage}{which}: iteration {iteration}, off the goal by {goal_error:.1e} rad, cost {cost:.6g}"
+            if not self.stopped and self._progress is not None and self._progress(self._share, text):
                 self.stopped = "stopped"
             if not self.stopped and time.time() > self.end:
                 self.stopped = "out of time"
             return bool(self.stopped)
 
         return report
+
+    def finish(self) -> None:
+        """Report the end of a search that was not stopped."""
+        if self._progress is not None and not self.stopped:
+            self._progress(1.0, "done")
 
 
 def _default_pieces(task: Reorientation) -> int:
@@ -350,7 +336,7 @@ def _default_pieces(task: Reorientation) -> int:
 
 
 def _starting_points(
-    task: Reorientation, basis: SplineBasis, search: Search, reporter: _ProgressReporter
+    task: Reorientation, basis: SplineBasis, search: Search, reporter: _SearchMonitor
 ) -> tuple[list[Guess], list[Guess]]:
     """The guesses to start from, and those to go on with if none of them leads to a plan.
 
@@ -364,9 +350,6 @@ def _starting_points(
     ranked = max(count, min(_RANKED * count, _MOST_RANKED), _LEAST_OF_FEW if few else 1)
     candidates = guesses(task, coarse, search.seed, ranked)
     program = CollocationProgram(task, coarse)
-    most, tolerance = _COARSE_ITERATIONS, _COARSE_TOLERANCE
-    if search.method == "reduced":
-        most, tolerance = _COARSE_ITERATIONS_OF_REDUCED, _COARSE_TOLERANCE_OF_REDUCED
     found: list[tuple[float, int, Guess]] = []
     for number, candidate in enumerate(candidates):
         if reporter.stopped and found:
@@ -375,8 +358,8 @@ def _starting_points(
             candidate.control,
             task.duration,
             guessed_attitudes(task, candidate),
-            iterations=min(most, int(search.iterations)),
-            tolerance=tolerance,
+            iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
+            tolerance=_COARSE_TOLERANCE,
             via_places=candidate.via_places,
             iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
         )
@@ -392,7 +375,6 @@ def _plan(
     goals: Mapping[Reorientation, Goal],
     best: Attempt,
     attempts: Sequence[Attempt],
-    method: str,
     seconds: float,
     stopped: str,
 ) -> Plan | None:
@@ -415,7 +397,6 @@ def _plan(
         polish_steps=best.polished.steps,
         kkt_residual=best.report.kkt_residual,
         coefficients=best.polished.control,
-        method=method,
         iterations=sum(attempt.report.iterations for attempt in attempts),
         seconds=seconds,
         starts=tuple(attempt.report for attempt in attempts),
@@ -424,3 +405,31 @@ def _plan(
         limit_shares=position_share(task, best.basis, best.polished.control)
         | limit_shares(task, best.basis, best.polished.control, best.polished.motion),
     )
+
+
+def hamiltonian_spread(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> float | None:
+    """Largest less least mean of Pontryagin's Hamiltonian over a piece, relative to its mean; None where undefined.
+
+    Without momentum the cost's density L is quadratic in the rates, and what the holonomy adds to it is linear in them,
+    so that H = L; and H is constant as nothing depends on time. A limit of positions does not change that, a limit of
+    rates does, and so does a waypoint with a time; with limits of accelerations, jerks or efforts it is another
+    Hamiltonian.
+
+    Source: theory.md B6; Pontryagin's principle.
+    """
+    timed = any(point.place is not None for point in task.via)
+    if task.cost not in ("kinetic", "rate") or task.momentum.any() or task.limits_beyond_rates or timed:
+        return None
+    places, _ = panel_nodes(basis)
+    coordinates = basis.matrix(places) @ control
+    rates = basis.matrix(places, 1) @ control / duration
+    joints = rates @ task.coupling.T
+    if task.cost == "rate":
+        density = 0.5 * np.sum(joints**2, axis=1)
+    else:
+        shapes = task.shapes(coordinates)
+        density = task.body.kinetic_energy(shapes, joints, -so3.apply(mechanical_connection(task.body, shapes), joints))
+    limited = np.any(np.abs(basis.rate_control @ control) > _AT_LIMIT * task.rate_limit * duration, axis=1)
+    free = ~np.any(basis.rate_reaches & limited, axis=1)[_ENDS:-_ENDS]
+    means = density.reshape(basis.pieces, -1).mean(axis=1)[_ENDS:-_ENDS][free]
+    return float(np.ptp(means) / means.mean()) if means.any() else None

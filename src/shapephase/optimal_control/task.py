@@ -17,22 +17,15 @@ from ..body.couplings.coordinate_map import check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ._ball_chart import BallChart
 from ._via_points import ViaPoint, via_points
-from .plan_options import RATES_AT_ENDS, Goal, Limits, goal_argument
-from .waypoints import Waypoint
+from .plan_options import RATES_AT_ENDS, Goal, Limits, Waypoint, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "effort", "time")
 
-# How far from its start a joint without limits may go [rad or m]: no plan goes 160 turns, and finite bounds keep the
-# guesses and the solver's interior point finite.
-_FARTHEST = 1e3
-# By how much an end posture may break a coupling between joints [rad or m]: rounding of what the user computed.
-_COUPLING_TOLERANCE = 1e-9
-# By how much an end posture may lie beyond a joint limit [rad or m]: rounding of degrees or of a file's digits.
-_LIMIT_TOLERANCE = 1e-9
-# Joints that an error names.
-_MOST_NAMED = 8
-# Cosine of the angle between momentum and twist axis that still counts as a right angle: rounding of the user's axes.
-_RIGHT_ANGLE_TOLERANCE = 1e-9
+_FARTHEST = 1e3  # [rad or m] from the start, of joints without limits: keeps guesses and solver finite
+_COUPLING_TOLERANCE = 1e-9  # [rad or m] of an end posture: rounding of user input
+_LIMIT_TOLERANCE = 1e-9  # [rad or m] of an end posture: rounding of degrees or of a file's digits
+_MOST_NAMED = 8  # joints in an error
+_RIGHT_ANGLE_TOLERANCE = 1e-9  # cosine of momentum and twist axis: rounding of user input
 
 
 @dataclass(frozen=True, eq=False)

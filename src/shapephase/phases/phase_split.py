@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..arguments import made_by
 from ..arrays import Array, Mask
 from ..display import card_html, card_text, short_repr
 from ..plain_data import plain
@@ -42,6 +43,7 @@ class SplitMotion:
     __repr__ = short_repr
 
 
+@made_by("split(motion)")
 @dataclass(frozen=True, eq=False)
 class PhaseSplit:
     """What turned a free body: its shape, its angular momentum, and what its wheels store of that.

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,7 +21,7 @@ from ..letters import what_came
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
-from ..run_progress import RunProgress, watched
+from ..run_progress import ProgressCallback, watched
 from ._curve_errors import arc_errors, running_errors, split_errors
 from ._deferred import Deferred
 from ._motion_parts import array_by_parts, by_parts
@@ -36,14 +35,12 @@ CLOSINGS = ("start", "reference")
 
 
 @overload
-def split(
-    motion: Motion, gauge: Gauge = "horizontal", *, progress: Callable[[RunProgress], Any] | None = None
-) -> PhaseSplit: ...
+def split(motion: Motion, gauge: Gauge = "horizontal", *, progress: ProgressCallback | None = None) -> PhaseSplit: ...
 
 
 @overload
 def split(
-    motion: ForcedMotion, gauge: Gauge = "horizontal", *, progress: Callable[[RunProgress], Any] | None = None
+    motion: ForcedMotion, gauge: Gauge = "horizontal", *, progress: ProgressCallback | None = None
 ) -> ForcedSplit: ...
 
 
@@ -51,7 +48,7 @@ def split(
     motion: Motion | ForcedMotion,
     gauge: Gauge = "horizontal",
     *,
-    progress: Callable[[RunProgress], Any] | None = None,
+    progress: ProgressCallback | None = None,
 ) -> PhaseSplit | ForcedSplit:
     """Split the rotation of a motion into shape holonomy and Montgomery phase.
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_executor, check_object, direction_argument, magnitude_argument
+from ..arguments import check_executor, check_object, direction_argument, made_by, magnitude_argument
 from ..arrays import Array, Integers
 from ..deformation.deformation import Deformation
 from ..display import card_html, card_text, short_repr
@@ -92,6 +92,7 @@ class ReturnMap:
         return np.trace(self.derivative, axis1=-2, axis2=-1)[()]
 
 
+@made_by("fixed_points(deformation, magnitude)")
 @dataclass(frozen=True, eq=False)
 class FixedPoints:
     """Directions of the body momentum that come back to themselves after one loop of shapes.

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from ..arguments import check_object
 from ..arrays import Array
+from ..errors import RunStopped
 from ..phases.phases import PhaseSplit
 from ..reconstruction.reconstruction import Motion
+from ..run_progress import ProgressCallback, check_progress
 from ..shape_space.shape_path import ShapePath
 from ._report_text import (
     CONVENTIONS,
@@ -32,6 +34,12 @@ from .viewer import scene_and_data
 _MOVING = ("momentum", "phases", "attitude", "shape")  # figures that the page's scripts draw
 
 
+def _report_to(progress: ProgressCallback | None, share: float, text: str) -> None:
+    """Report progress. Raises RunStopped where the callback returns something true."""
+    if progress is not None and progress(share, text):
+        raise RunStopped(f"stopped on request while {text}")
+
+
 def figure_rows(figures: Sequence[Any]) -> list[Sequence[Any]]:
     """Figures in rows that are all full: two each, and three in the last one of an odd number."""
     last = max(len(figures) - 3, 0) if len(figures) % 2 else len(figures)
@@ -51,7 +59,7 @@ def report(
     error_bars: Sequence[str] = (),
     recording: Sequence[str] = (),
     noise: Array | None = None,
-    begin: Callable[[str], object] = lambda _: None,
+    progress: ProgressCallback | None = None,
 ) -> Page:
     """Page about a motion and its split: words, the moving body beside its curves, figures, numbers and inputs.
 
@@ -71,7 +79,7 @@ def report(
     recording : lines about a recording and its processing, as `split` prints them
     noise : of the samples of the joints, rms (n,) [rad or m], for bars of rates and torques; None: that for which a
         recording was smoothed
-    begin : called with a few words before each longer step
+    progress : called with the share that is done and what is being done; a true return stops the report
 
     Raises
     ------
@@ -89,19 +97,20 @@ def report(
     check_object(result, "PhaseSplit", "result")
     if shape_path is not None:
         check_object(shape_path, "ShapePath", "shape_path")
-    begin("recording the animation")
+    check_progress(progress)
+    _report_to(progress, 0.0, "recording the animation")
     scene, data = scene_and_data(motion, speed=None, frames=None, trail=trail, ghost=True, up=up, fall={})
     beside = report_data(motion, scene.times, result.gauge, scene.body, scene.shapes)
     has_joints = shape_path is not None and shape_path.n_shape > 0
+    kinds = [kind for kind, figure in FIGURES.items() if kind not in _MOVING]
+    kinds = [kind for kind in kinds if result.has_phase or not FIGURES[kind].with_momentum]
+    kinds = [kind for kind in kinds if has_joints or not FIGURES[kind].with_path]
+    kinds = [kind for kind in kinds if not (FIGURES[kind].of_change and is_rigid(motion))]
     figures = []
-    for kind, figure in FIGURES.items():
-        if kind in _MOVING or (figure.with_momentum and not result.has_phase) or (figure.with_path and not has_joints):
-            continue
-        if figure.of_change and is_rigid(motion):
-            continue
-        begin(f"drawing {kind.replace('_', ' ')}")
+    for done, kind in enumerate(kinds, start=1):
+        _report_to(progress, done / (len(kinds) + 1), f"drawing {kind.replace('_', ' ')}")
         image = base64.b64encode(figure_image(kind, motion, shape_path, result.gauge)).decode()
-        figures.append({"caption": figure.caption, "image": image})
+        figures.append({"caption": FIGURES[kind].caption, "image": image})
     torques = [torque_words(motion, noise)] if scene.body is not None and scene.body.n_shape else []
     return page_from(
         "report.html",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import initial_state_arguments, times_argument
+from ..arguments import initial_state_arguments, made_by, times_argument
 from ..arrays import Array, Integers, lock_arrays
 from ..deformation.deformation import DeformationFamily
 from ..display import short_repr
@@ -21,6 +21,7 @@ from .reconstruction import Motion
 _METHODS = ("auto", "spectral")
 
 
+@made_by(Motion="take one of its motions, family[0]")
 @dataclass(frozen=True, eq=False)
 class MotionFamily(Sequence[Motion]):
     """How N bodies turn: a sequence of motions, made by `reconstruct` of a family.

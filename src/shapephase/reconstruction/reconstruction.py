@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from ..arguments import (
     check_file_name,
     check_object,
     initial_state_arguments,
+    made_by,
     threads_argument,
     times_argument,
     tolerance_argument,
@@ -30,7 +31,7 @@ from ..integrator.interpolant import Interpolant
 from ..integrator.lift import Lift, error_turns, lift_along
 from ..integrator.many_rotations import GroupedRotations, assembled
 from ..integrator.stepped import SteppedRotation
-from ..run_progress import RunProgress, watched
+from ..run_progress import ProgressCallback, watched
 from ._motion_views import MotionViews
 from ._solvers import METHODS, SOLVERS, Solution, check_pieces
 from .motion_record import MotionRecord, read_motion_record, write_motion_record
@@ -67,6 +68,12 @@ class Sensitivity:
     __repr__ = short_repr
 
 
+@made_by(
+    "reconstruct(deformation, momentum), where articulated(body, path) makes a deformation, or load_motion(file)",
+    Body="of one made by articulated, it is motion.deformation.description.body",
+    ShapePath="of one made by articulated, it is motion.deformation.description.path",
+    Deformation="it is motion.deformation",
+)
 @copied_when_read("initial_attitude")
 @dataclass(frozen=True, eq=False, repr=False)
 class Motion(MotionViews):
@@ -334,7 +341,7 @@ def reconstruct(
     tolerance: float = 1e-9,
     method: str = "auto",
     threads: int | None = None,
-    progress: Callable[[RunProgress], Any] | None = None,
+    progress: ProgressCallback | None = None,
     torque: None = None,
 ) -> Motion: ...
 
@@ -348,7 +355,7 @@ def reconstruct(
     tolerance: float = 1e-9,
     method: str = "auto",
     threads: int | None = None,
-    progress: Callable[[RunProgress], Any] | None = None,
+    progress: ProgressCallback | None = None,
     torque: ExternalTorque | Callable[[TorqueState], ArrayLike],
 ) -> ForcedMotion: ...
 
@@ -362,7 +369,7 @@ def reconstruct(
     tolerance: float = 1e-9,
     method: str = "auto",
     threads: int | None = None,
-    progress: Callable[[RunProgress], Any] | None = None,
+    progress: ProgressCallback | None = None,
 ) -> MotionFamily: ...
 
 
@@ -374,7 +381,7 @@ def reconstruct(
     tolerance: float = 1e-9,
     method: str = "auto",
     threads: int | None = None,
-    progress: Callable[[RunProgress], Any] | None = None,
+    progress: ProgressCallback | None = None,
     torque: ExternalTorque | Callable[[TorqueState], ArrayLike] | None = None,
 ) -> Motion | MotionFamily | ForcedMotion:
     """The motion of a free body with a known change of shape and a given angular momentum.
@@ -392,8 +399,8 @@ def reconstruct(
         by a Runge-Kutta method of order 8), "closed_form" (of a rigid body, by elliptic functions:
         `rigid_body.EulerTop`), or "dop853" (SciPy's integrator on the deformation itself, an independent check)
     threads : at most, for many momenta; None: one for each processor. Results do not depend on it
-    progress : called with a `RunProgress` some two hundred times in a long run: the share that is done, which never
-        falls, and what is being done; if it returns something true, the run stops
+    progress : called some two hundred times in a long run as `progress(share, text)`: the share that is done, from 0
+        to 1, which never falls, and what is being done; a true return stops the run
     torque : from outside, an `ExternalTorque` or a function of a `TorqueState` in base axes [N m]; None: none. With
         one, attitude and momentum are integrated together, by SciPy's DOP853, to a `ForcedMotion`
 

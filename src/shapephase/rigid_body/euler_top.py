@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic, so3
-from ..arguments import inertia_argument
+from ..arguments import inertia_argument, made_by
 from ..arrays import Array, finite_array
 from ..display import card_html
 from ..errors import ShapeError
@@ -37,6 +37,7 @@ _BLOCK = 16_384
 """Times evaluated together: the arrays of so many (half a megabyte each) stay in a processor's cache."""
 
 
+@made_by("EulerTop(inertia, momentum)")
 class EulerTop:
     """A free rigid body with a given inertia, angular momentum and initial attitude.
 

@@ -15,6 +15,7 @@ from ..arguments import (
     check_flag,
     check_function,
     check_time_steps,
+    made_by,
     names_argument,
     positive_argument,
     times_argument,
@@ -62,6 +63,7 @@ class PathOrigin(Protocol):
         ...
 
 
+@made_by("read_shape_path(file, body), or ShapePath.fourier, spline, waypoints or function")
 @dataclass(frozen=True, eq=False)
 class ShapePath:
     """A motion of the joints, r(t) on [0, duration].

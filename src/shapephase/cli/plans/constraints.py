@@ -16,8 +16,7 @@ from ..options import option
 if TYPE_CHECKING:
     from ...arrays import Array
     from ...body.body import Body
-    from ...optimal_control.plan_options import Limits
-    from ...optimal_control.waypoints import Waypoint
+    from ...optimal_control.plan_options import Limits, Waypoint
 
 _STATED = "body"  # stands for the limits that a body's file states
 
@@ -180,7 +179,7 @@ def _posture(body: Body, words: tuple[str, ...], option: str, *, first: bool) ->
 
 def _waypoint(body: Body, text: str) -> Waypoint:
     """Return a posture to pass, from JOINT=VALUE with or without a time behind @, or from a motion file at a time."""
-    from ...optimal_control.waypoints import Waypoint
+    from ...optimal_control.plan_options import Waypoint
 
     posture, timed, at = text.rpartition("@") if "@" in text else (text, "", "")
     time = _time(at) if timed else None

@@ -88,7 +88,7 @@ def plan_command(
         raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(html, "--html", ".html") or aside
-    with steps(7 if html else 2) as work:
+    with steps(3 if html else 2) as work:
         work.begin("loading")
         loaded = load_body(body, **floating.loading)
         arguments, within = joints.arguments(loaded), limits.limits(loaded)
@@ -104,7 +104,7 @@ def plan_command(
                     rates_at_ends=rates_at_ends,
                     limits=within,
                     search=settings,
-                    iteration_callback=search.report,
+                    progress=search.report,
                     executor=executor,
                     **arguments,
                 )
@@ -117,6 +117,7 @@ def plan_command(
             write_shape_path(plan.path, out, comment=plan_comment(loaded, plan))
             say_written(out)
         if html is not None:
+            work.begin("making the report")
             from ...phases.phases import split
             from ...plots.report_page import report
 
@@ -126,7 +127,7 @@ def plan_command(
                 shape_path=plan.path,
                 title=f"{loaded.name} turns itself",
                 purpose=plan_purpose(plan),
-                begin=work.begin,
+                progress=work.watch,
             ).write(html)
             say_written(html)
     return Outcome(

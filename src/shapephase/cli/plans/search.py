@@ -19,9 +19,9 @@ from cyclopts import Parameter
 from ...errors import ShapeError
 from ..options import option
 from ..progress import Steps
+from ..start import stop_searches_on_ctrl_c
 
 if TYPE_CHECKING:
-    from ...optimal_control.plan import Progress
     from ...optimal_control.plan_options import Search
 
 
@@ -87,14 +87,10 @@ class InterruptibleSearch:
         self.reported, self.stopped = in_parallel, False
         self.processes: list[int] = []
 
-    def report(self, now: Progress) -> bool:
+    def report(self, share: float, text: str) -> bool:
         """Show the progress of the search; return whether to stop it."""
-        which = f" {now.start} of {now.starts}" if now.starts > 1 else ""
         left = "" if self._end == math.inf else f", {max(self._end - time.monotonic(), 0.0):.0f} s left"
-        self._work.say(
-            f"{now.stage}{which}: iteration {now.iteration}, off the goal by {now.goal_error:.1e} rad, "
-            f"cost {now.cost:.6g}{left}"
-        )
+        self._work.watch(share, f"{text}{left}")
         self.reported = True
         return self.stopped
 
@@ -141,11 +137,9 @@ def _executor(workers: int | None, search: InterruptibleSearch) -> Iterator[Exec
     if workers is None:
         yield None
         return
-    from ...optimal_control.solver_callback import keep_interrupts
-
     # A process that was forked beside threads of the solver may hang.
     spawned = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=keep_interrupts) as processes:
+    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=stop_searches_on_ctrl_c) as processes:
         # They ignore Ctrl-C until their own handler is installed.
         with _handler(signal.SIG_IGN):
             processes.submit(int)

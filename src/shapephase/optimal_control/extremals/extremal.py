@@ -11,19 +11,19 @@ from numpy.typing import ArrayLike
 from scipy.integrate import OdeSolution
 
 from ... import so3
-from ...arguments import check_object, positive_argument, times_argument, tolerance_argument, vector_argument
+from ...arguments import check_object, made_by, positive_argument, times_argument, tolerance_argument, vector_argument
 from ...arrays import Array, check_reach
 from ...body.body import Body
 from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
 from ...shape_space.shape_path import ShapePath
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from .hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales
 
-# Of the series of rates on a step of order 8, whose error is that of the step.
-_DEGREE = 12
+_DEGREE = 12  # of the series of rates on a step of order 8: its error is that of the step
 
 
+@made_by("optimal_control.extremal(...)")
 @dataclass(frozen=True, eq=False)
 class Extremal:
     """A motion with zero momentum that solves Wong's equations, as a function of time.

@@ -19,16 +19,11 @@ from ...body.couplings.coordinate_map import check_no_balls, check_smooth
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, unknown_name
 from ...shape_space.connection import mechanical_connection
-from ..casadi_calls import call_casadi
-from ..symbolic import solve_linear, symbolic_body
+from ..symbolic import call_casadi, solve_linear, symbolic_body
 
-# Costs that are the integral of a metric, which is what the equations need.
-_COSTS = ("kinetic", "rate")
-# Least eigenvalue of the metric, each joint in its own unit, at which the rates are still determined: rounding of the
-# mass matrix is 1e-15, and the equations divide by it.
-_LEAST_METRIC = 1e-12
-# Evaluations after which an integration is given up: a charge that turns the motion too fast would take forever.
-_MOST = 200_000
+_COSTS = ("kinetic", "rate")  # the integrals of a metric
+_LEAST_METRIC = 1e-12  # eigenvalue that still determines rates: the mass matrix is rounded to 1e-15
+_MOST = 200_000  # evaluations, after which the charge turns the motion too fast
 
 _built: WeakKeyDictionary[Body, dict[str, Hamiltonian]] = WeakKeyDictionary()
 _building = Lock()

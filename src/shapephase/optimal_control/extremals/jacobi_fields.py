@@ -15,32 +15,21 @@ from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError
 from ...shape_space.connection import mechanical_connection
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from .extremal import Extremal
 from .hamiltonian import hamiltonian, initial_state, integrated, natural_scales
 
-# Times at which the fields are sampled for zeros: neighbouring conjugate times of a loop are a good part of it apart.
-_SCAN = 600
-# Every so many of those samples balance the basis.
-_BALANCING_STRIDE = 10
-# Rounds of balancing, by rows and columns in turn: a fixed number, as an approximate balance is enough.
-_BALANCING_ROUNDS = 8
-# Directions whose mean square effect, as singular value, is below this share of the largest have none.
-_NO_EFFECT = 1e-9
-# A singular value below this share of the largest over all times is a zero: well above the accuracy of the fields.
-_ZERO = 1e-6
-# Zeros closer than this share of the time looked through are the same one.
-_SAME_TIME = 1e-6
-# The most Newton steps to a zero: from a sample they converge quadratically.
-_REFINEMENTS = 8
-# Relative change of time at which they end: the accuracy of the fields allows no more.
-_REFINED = 1e-12
-# Interval of the difference quotient, as a share of the distance that the zero may still move: small against it.
-_DIFFERENCE = 1e-3
-# The least such distance, as a share of the sampling step, so that the quotient is not lost in rounding.
-_LEAST_REACH = 1e-6
-# By default an extremal is examined this far beyond its end, so that a conjugate time at the end is found.
-_BEYOND_END = 1.05
+_SCAN = 600  # times that are searched for zeros: conjugate times of a loop are a good part of it apart
+_BALANCING_STRIDE = 10  # every so many of those samples balance the basis
+_BALANCING_ROUNDS = 8  # by rows and columns in turn; an approximate balance is enough
+_NO_EFFECT = 1e-9  # share of the largest mean effect below which a direction has none
+_ZERO = 1e-6  # share of the largest singular value below which one is zero: above the fields' accuracy
+_SAME_TIME = 1e-6  # share of the span within which two zeros are one
+_REFINEMENTS = 8  # Newton steps to a zero: quadratic from a sample on
+_REFINED = 1e-12  # relative change of time at which they end: the accuracy of the fields
+_DIFFERENCE = 1e-3  # interval of the difference quotient, as a share of how far the zero may still move
+_LEAST_REACH = 1e-6  # least such distance in sampling steps, above rounding
+_BEYOND_END = 1.05  # durations that are examined by default, so that a conjugate time at the end is found
 
 
 @dataclass(frozen=True, eq=False)

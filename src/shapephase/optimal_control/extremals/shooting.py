@@ -15,39 +15,25 @@ from ...errors import AccuracyNotReached, ShapeError
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import horizontal_lift
 from ...shape_space.shape_path import ShapePath
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from .extremal import Extremal, extremal
 from .hamiltonian import Hamiltonian, hamiltonian, initial_state, integrated, natural_scales
 from .jacobi_fields import inverse_scale, jacobi_fields
 from .wong_residual import wong_residual
 
-# The most Newton steps at each accuracy: damped steps along a weakly curved valley converge slowly.
-_STEPS = 40
-# Gap that Newton's method first has to reach [rad or m], by rough integrations, which take a fraction of the time.
-_ROUGH_GAP = 1e-6
-# Relative accuracy of those integrations: a hundredth of the gap.
-_ROUGH_ACCURACY = 1e-8
-# The tightest accuracy of an integration, some hundred times rounding.
-_FINEST_ACCURACY = 1e-13
-# Accuracy of the integrations as a share of the gap that is to be reached.
-_ACCURACY_SHARE = 0.01
-# Damping of the first step, relative to the gap: nearly a plain Newton step, as the path is nearly optimal.
-_FIRST_DAMPING = 1e-5
-# A step that helps divides the damping by this.
-_RELAXATION = 4.0
-# A step that does not help multiplies it by this: in few trials to where the linear model holds.
-_TIGHTENING = 64.0
-# Damping at which the steps are too short to go on.
-_LAST_DAMPING = 1e5
-# Singular values, relative to the largest, below this many times the integration's accuracy count as zero: they belong
-# to symmetries.
-_SYMMETRY = 10.0
-# Shares of a step that are tried before the damping rises.
-_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)
-# The least relative decrease of the gap by a whole step, as in Armijo's rule; shares of a step have to give that share.
-_DECREASE = 0.1
-# Evaluations after which a trial is given up: its extremal turns so fast that its end is no guide.
-_MOST_EVALUATIONS = 20_000
+_STEPS = 40  # Newton steps at each accuracy: damped steps along a weakly curved valley converge slowly
+_ROUGH_GAP = 1e-6  # [rad or m] first reached by rough integrations, which take a fraction of the time,
+_ROUGH_ACCURACY = 1e-8  # a hundredth of the gap
+_FINEST_ACCURACY = 1e-13  # some hundred roundings
+_ACCURACY_SHARE = 0.01  # of the gap to be reached
+_FIRST_DAMPING = 1e-5  # relative to the gap: nearly a plain Newton step, as the path is nearly optimal
+_RELAXATION = 4.0  # divides the damping after a step that helps
+_TIGHTENING = 64.0  # multiplies it after one that does not: few trials to where the linear model holds
+_LAST_DAMPING = 1e5  # at which the steps are too short to go on
+_SYMMETRY = 10.0  # integration accuracies below which a relative singular value belongs to a symmetry
+_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of a step, tried before the damping rises
+_DECREASE = 0.1  # least relative decrease of the gap by a whole step, as in Armijo's rule
+_MOST_EVALUATIONS = 20_000  # of a trial, whose extremal then turns too fast to be a guide
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,28 +17,21 @@ from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
 from ...shape_space.shape_path import ShapePath
-from ..casadi_calls import call_casadi
+from ..symbolic import call_casadi
 from ..task import joint_coupling
 from .hamiltonian import Hamiltonian, checked_metric, hamiltonian
 
-# Gauss nodes of a panel: the residual of a smooth path is then exact to rounding on few panels.
-_STAGES = 12
+_STAGES = 12  # Gauss nodes of a panel: exact to rounding on few panels of a smooth path
 _GAUSS = np.polynomial.legendre.leggauss(_STAGES)
 _NODES = _GAUSS[0]
 _WEIGHTS = _GAUSS[1]
-# Panels between two breaks of a path, refined until the residual has converged.
-_PANELS = (2, 4, 8, 16, 32, 64)
-# A residual that changes by this much has converged: the attitude along the path is no more accurate.
-_CONVERGED = 1e-9
-# So has one that changes by this share of itself: it is read as an order of magnitude.
-_CONVERGED_SHARE = 1e-3
-# A combination of charges whose effect is below this share of all charges' is not felt by the motion, and set to 0.
-_LEAST_FELT = 1e-9
+_PANELS = (2, 4, 8, 16, 32, 64)  # between two breaks, until the residual has converged
+_CONVERGED = 1e-9  # change of a converged residual: the accuracy of the attitude along the path
+_CONVERGED_SHARE = 1e-3  # relative change, which suffices too: it is read as an order of magnitude
+_LEAST_FELT = 1e-9  # share of all charges' effect below which a combination is set to 0
 
-# Times at which a path is compared with how its joints are said to move.
-_LOOKS = 65
-# [rad or m] by which it may differ: rounding of what the user computed.
-_FOLLOWS = 1e-9
+_LOOKS = 65  # times at which a path is compared with `joints` and `symmetric`, to
+_FOLLOWS = 1e-9  # [rad or m]: rounding of user input
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,35 +14,22 @@ from ...reconstruction.reconstruction import Motion, reconstruct
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import curvature, mechanical_connection
 from .._spline_basis import SplineBasis
-from .._via_rows import bent_through, nearest_places
+from .._via_points import bent_through, nearest_places
 from ..symbolic import symbolic_body
 from ..task import Reorientation
 
-# Where guesses are sampled along [0, 1]: dense enough for two rounds of a loop on any spline.
-PLACES = np.linspace(0.0, 1.0, 101)
-# Radii of the circles, relative to the one that turns far enough in a constant curvature: the curvature may be smaller
-# or larger away from the start.
-_RADIUS_FACTORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)
-# Directions in which a circle leaves the start: 60 degrees apart.
-_DIRECTIONS = 6
-# Rounds of a circle: two small ones may stay within limits that one large one would exceed.
-_ROUNDS = (1, 2)
-# Lengths of a straight motion to a free end, relative to the one that turns far enough to first order.
-_STRAIGHT_FACTORS = (0.5, 1.0)
-# Random loops tried for each one that is needed: some cannot be reconstructed.
-_ATTEMPTS = 10
-# Accuracy of the reconstruction [rad]: guesses are off by far more.
-_RECONSTRUCTION_TOLERANCE = 1e-6
-# A guess that turns the body by less than this share of the way is ranked as if by this share: its price diverges.
-_LEAST_SHARE = 1e-3
-# Curvature in units of the metric below which loops turn the body by less than rounding.
-_FLAT = 1e-9
-# Ridge on the kinetic metric, as a share of its mean eigenvalue, so that motions without energy have a finite length.
-_RIDGE = 1e-9
-# Singular values below this share of the largest are directions that the connection does not turn to.
-_RANK = 1e-8
-# Guesses closer than this are the same [rad or m]: clipping to the limits can make them equal.
-_SAME = 1e-6
+PLACES = np.linspace(0.0, 1.0, 101)  # samples of a guess: dense enough for two rounds on any spline
+_RADIUS_FACTORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)  # of the radius that a constant curvature would need
+_DIRECTIONS = 6  # in which a circle leaves the start: 60 degrees apart
+_ROUNDS = (1, 2)  # two small circles may stay within limits that one large one would exceed
+_STRAIGHT_FACTORS = (0.5, 1.0)  # of the way to a free end that turns far enough to first order
+_ATTEMPTS = 10  # random loops for each one that is needed: some cannot be reconstructed
+_RECONSTRUCTION_TOLERANCE = 1e-6  # [rad]: guesses are off by far more
+_LEAST_SHARE = 1e-3  # of the way that a guess counts as turning, so that its price is finite
+_FLAT = 1e-9  # curvature in units of the metric below which loops turn the body by rounding alone
+_RIDGE = 1e-9  # on the metric, share of its mean eigenvalue: motions without energy get a finite length
+_RANK = 1e-8  # share of the largest singular value below which the connection does not turn
+_SAME = 1e-6  # [rad or m] between guesses that clipping to limits has made equal
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,52 +10,21 @@ from ...arrays import Array
 from .._spline_basis import SplineBasis
 from ..task import Reorientation
 from .node_efforts import node_efforts
-from .unknowns import scipy_sparse, seen_at, sparse_matrix
+from .node_functions import scipy_sparse, seen_at, sparse_matrix
 
 
-class DerivativeRows:
-    """Second and third derivatives of the coordinates at their control points, between which they lie.
+def derivative_rows(task: Reorientation, basis: SplineBasis, unknown: Any) -> Any:
+    """Second and third derivatives of the coordinates by time, at their control points, as shares of limits: (j,)."""
+    import casadi
 
-    Attributes
-    ----------
-    values, jacobian : expressions of the unknowns, (j,) and (j, N)
-    """
-
-    def __init__(self, task: Reorientation, basis: SplineBasis, unknown: Any) -> None:
-        import casadi
-
-        sparse, count, place = scipy_sparse(), unknown.shape[0], task.dimension * basis.dimension
-        self._unknown, self._duration = unknown, unknown[place]
-        self._by_duration = casadi.DM(casadi.Sparsity.triplet(1, count, [0], [place]), 1.0)
-        self._bare: dict[int, Any] = {}
-        for order, limit in ((2, task.acceleration_limit), (3, task.jerk_limit)):
-            limited = np.flatnonzero(np.isfinite(limit))
-            chosen = sparse.eye(task.dimension).tocsr()[limited] / limit[limited, None]
-            rows = sparse.kron(basis.derivative_control(order), sparse.csr_matrix(chosen))
-            rest = sparse.csr_matrix((rows.shape[0], count - place))
-            self._bare[order] = sparse_matrix(sparse.hstack([rows, rest]))
-        scaled = [(order, rows, self._duration**-order) for order, rows in self._bare.items()]
-        self.values = casadi.vertcat(*((rows @ unknown) * scale for _, rows, scale in scaled))
-        slopes = [
-            rows * scale - (order / self._duration) * scale * ((rows @ unknown) @ self._by_duration)
-            for order, rows, scale in scaled
-        ]
-        self.jacobian = casadi.vertcat(*slopes)
-
-    def hessian(self, multipliers: Any, cost_factor: Any) -> Any:  # noqa: ARG002 (they cost nothing)
-        """Second derivatives of the weighted sum of the rows: (j,) -> (N, N)."""
-        import casadi
-
-        count, first = self._unknown.shape[0], 0
-        found = casadi.MX(count, count)
-        for order, rows in self._bare.items():
-            weighted = rows.T @ multipliers[first : first + rows.shape[0]]
-            first += rows.shape[0]
-            scale = self._duration ** -(order + 1)
-            across = -order * scale * (weighted @ self._by_duration)
-            alone = (order * (order + 1) / self._duration) * scale * casadi.dot(weighted, self._unknown)
-            found = found + across + across.T + alone * (self._by_duration.T @ self._by_duration)
-        return found
+    sparse, place = scipy_sparse(), task.dimension * basis.dimension
+    rows = []
+    for order, limit in ((2, task.acceleration_limit), (3, task.jerk_limit)):
+        limited = np.flatnonzero(np.isfinite(limit))
+        chosen = sparse.csr_matrix(sparse.eye(task.dimension).tocsr()[limited] / limit[limited, None])
+        matrix = sparse_matrix(sparse.kron(basis.derivative_control(order), chosen))
+        rows.append(matrix @ unknown[:place] / unknown[place] ** order)
+    return casadi.vertcat(*rows)
 
 
 class EffortTerms:

@@ -33,8 +33,7 @@ from ...body.joint_chain import JointChain
 from ..symbolic import joint_frames, joint_screw
 from .spatial import Inertia, Twist
 
-SIZE = 16
-"""Of z."""
+SIZE = 16  # numbers in z
 _INERTIA_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 

@@ -33,7 +33,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_function, number_argument
+from ...arguments import check_function, made_by, number_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
@@ -62,6 +62,7 @@ _CONSTANT_CURVATURE = 1e-10
 """Range of the curvature, in parts of its largest value, that is rounding."""
 
 
+@made_by("geodesics.spheroid(...) or surface_of_metric(...)")
 @dataclass(frozen=True, eq=False)
 class SurfaceOfRevolution:
     """A surface d phi^2 + m(phi) d theta^2 by its stretch; made by `surface_of_stretch` and the functions that call it.

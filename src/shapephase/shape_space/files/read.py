@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_choice, check_file_name, check_object, check_text, positive_argument
+from ...arguments import check_choice, check_file_name, check_object, check_text, made_by, positive_argument
 from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...body.joint_orders import WORDS
@@ -54,6 +54,7 @@ _MOST_SAMPLES = 2_000_000
 """Memory: samples of a path that is resampled, as lines of a table."""
 
 
+@made_by(ShapePath="it is recorded.path")
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
     """A joint motion as it was recorded, and the path made of it.

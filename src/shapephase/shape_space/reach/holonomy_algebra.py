@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_object, number_argument, whole_argument
+from ...arguments import check_object, made_by, number_argument, whole_argument
 from ...arrays import Array, finite_array, lock_arrays
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_smooth
@@ -98,6 +98,7 @@ class PairTurn:
         return float(np.degrees(self.rate))
 
 
+@made_by("reachable(body, shape)")
 @dataclass(frozen=True, eq=False)
 class Reach:
     """The rotations that loops of the joints reach from a shape. Made by `reachable`.
