@@ -60,7 +60,7 @@ LOWEST_TESTS ?= $(addprefix tests/, body/test_body.py cli/test_main.py deformati
 lowest:
 	$(OLDEST) -m venv --clear $(LOWEST)
 	$(LOWEST)/bin/pip install --quiet --prefer-binary hypothesis mpmath pytest pytest-xdist xarray \
-		$$($(OLDEST) tests/support/lowest_versions.py data plot robots ros viz)
+		$$($(OLDEST) tests/support/lowest_versions.py bodies data plot)
 	$(LOWEST)/bin/pip install --quiet --no-deps .
 	$(LOWEST)/bin/pytest -n auto -m "not full" -W default -p no:cacheprovider $(LOWEST_TESTS)
 

@@ -45,7 +45,7 @@ def robots_command(*, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # no
     lines += ["", "Motions"]
     lines += [f"  {name:<{width}}  {item['body']}: {item['about']}" for name, item in motions.items()]
     lines += ["", "Bodies of example-robot-data"]
-    lines += [f"  example:{name}" for name in examples] or ["  none installed: pip install 'shapephase[robots]'"]
+    lines += [f"  example:{name}" for name in examples] or ["  none installed: pip install 'shapephase[bodies]'"]
     listed = {
         name: {"joints": list(body.joint_names), "units": list(body.joint_units), "mass": body.mass}
         for name, body in bodies.items()
