@@ -8,27 +8,14 @@ from .options import PRINT_DEFAULTS, PrintOptions
 from .outcome import Outcome
 from .progress import steps
 
-_PACKAGES = (
-    ("shapephase", "numpy", "scipy", "pin", "casadi", "numba", "cyclopts", "rich"),
-    (
-        "matplotlib",
-        "trimesh",
-        "pycollada",
-        "playwright",
-        "pillow",
-        "imageio-ffmpeg",
-        "example-robot-data",
-        "mujoco",
-        "rosbags",
-        "pyyaml",
-    ),
+_PACKAGES = ("shapephase", "numpy", "scipy", "pin", "casadi", "numba", "cyclopts", "rich")
+_OPTIONAL_PACKAGES = (
+    *("matplotlib", "trimesh", "pycollada", "playwright", "pillow", "imageio-ffmpeg", "example-robot-data", "mujoco"),
+    *("rosbags", "pyyaml"),
 )
-"""What is needed, and what may be there."""
-_FEATURES = ("WITH_URDFDOM", "WITH_COLLISION", "WITH_OPENMP", "WITH_SDFORMAT", "WITH_CPPAD")
-"""Of Pinocchio's wheel."""
+_FEATURES = ("WITH_URDFDOM", "WITH_COLLISION", "WITH_OPENMP", "WITH_SDFORMAT", "WITH_CPPAD")  # of Pinocchio's wheel
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "firefox", "xdg-open")
-_COMPILER_TIMEOUT = 10.0
-"""For the compiler to say its version [s]."""
+_COMPILER_TIMEOUT = 10.0  # [s] for the compiler to print its version
 
 
 def robots_command(*, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # noqa: ARG001
@@ -74,8 +61,8 @@ def doctor_command(*, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # no
     data: dict[str, Any] = {
         "system": f"{platform.system()} {platform.release()} {platform.machine()}",
         "python": platform.python_version(),
-        "packages": _versions(_PACKAGES[0]),
-        "optional_packages": _versions(_PACKAGES[1]),
+        "packages": _versions(_PACKAGES),
+        "optional_packages": _versions(_OPTIONAL_PACKAGES),
         "pinocchio_features": _features(),
         "compiler": _compiler(),
         "machine_code": _machine_code(),
@@ -83,7 +70,7 @@ def doctor_command(*, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # no
         "browser": _browser(),
         "film_browser": _film_browser(),
     }
-    width = max(len(name) for names in _PACKAGES for name in names)
+    width = max(map(len, _PACKAGES + _OPTIONAL_PACKAGES))
     lines = [f"{'system':<{width}}  {data['system']}", f"{'python':<{width}}  {data['python']}"]
     for kind in ("packages", "optional_packages"):
         lines += [f"{name:<{width}}  {found or 'not installed'}" for name, found in data[kind].items()]
@@ -115,7 +102,7 @@ def _features() -> dict[str, bool]:
 
 
 def _compiler() -> str | None:
-    """The first line of what the C compiler says of its version."""
+    """Return the C compiler and the first line of its version."""
     import os
     import shutil
     import subprocess
@@ -126,13 +113,13 @@ def _compiler() -> str | None:
     try:
         done = subprocess.run([*command, "--version"], capture_output=True, text=True, timeout=_COMPILER_TIMEOUT)
     except (OSError, subprocess.SubprocessError):
-        return f"{' '.join(command)}, which does not answer"
-    said = done.stdout.strip().splitlines()
-    return f"{' '.join(command)}: {said[0] if said else 'version unknown'}"
+        return f"{' '.join(command)}, which does not run"
+    lines = done.stdout.strip().splitlines()
+    return f"{' '.join(command)}: {lines[0] if lines else 'version unknown'}"
 
 
 def _machine_code() -> str:
-    """Whether the innermost loops can be machine code."""
+    """Return whether the innermost loops can be machine code, and why not."""
     import warnings
 
     from ..errors import CompiledCodeWarning
@@ -145,7 +132,7 @@ def _machine_code() -> str:
 
 
 def _cache() -> str | None:
-    """The folder of compiled functions, and how many it holds."""
+    """Return the folder of compiled functions, and their number."""
     from ..integrator.kept_code import code_folder
 
     try:
@@ -164,7 +151,7 @@ def _browser() -> str | None:
 
 
 def _film_browser() -> str | None:
-    """The Chromium that would draw a film."""
+    """Return the Chromium that draws films."""
     from ..errors import MissingExtraError
     from ..plots.pages.video import chromium
 

@@ -26,7 +26,7 @@ from .check import check_command
 from .installation import compile_command, doctor_command, robots_command
 from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
-from .outcome import ExitCode, Outcome, exit_code_list, exit_code_of
+from .outcome import ExitCode, Outcome, exit_code_of
 from .pictures import explore_command, plot_command, view_command
 from .plans.plan import plan_command
 from .reach import reach_command
@@ -46,7 +46,7 @@ _RENAMED = {
     "--trim": "--flight FIRST LAST",
     "--timestep": "--step",
 }
-_EXIT_CODES = f"Exit codes:\n\n{exit_code_list()}"
+_EXIT_CODES = "\n".join(["Exit codes:", "", *(f"- {code.value}: {code.meaning}" for code in ExitCode)])
 _WHERE_EXIT_CODES = "Exit codes: `shapephase --help`"
 app = App(
     name="shapephase",

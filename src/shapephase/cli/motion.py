@@ -33,15 +33,12 @@ from .options import BODY_DEFAULTS, RECORDING_DEFAULTS, BodyOptions, RecordingOp
 if TYPE_CHECKING:
     from ..error_bars.recorded_momentum import RecordedMomentum
 
-_STANDARD_INPUT = "-"
-"""Instead of the name of a file."""
-DEFAULT_TOLERANCE = 1e-9
-"""Of the attitude where a command has no option for it [rad]: that of `reconstruct`."""
+_STANDARD_INPUT = "-"  # instead of a file name
+DEFAULT_TOLERANCE = 1e-9  # [rad] that of `reconstruct`, for commands without the option
 
 # Endings of files that hold motions, and never bodies.
 _OF_MOTIONS = (".csv", ".tsv", ".mot", ".sto", ".npz", ".npy", ".mat", ".parquet", ".xlsx", ".c3d", ".bag", ".mcap")
-# Characters of a name that an error repeats.
-_LONGEST_SHOWN = 80
+_LONGEST_SHOWN = 80  # characters of a name that an error repeats
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,17 +34,15 @@ def _print_rare(console: Console, options: ConsoleOptions, panel: HelpPanel) -> 
 RARE = Group("More options", sort_key=1, help_formatter=_print_rare)
 
 
-def option(text: str, *, rare: bool = False, several: bool = False, **more: Any) -> Parameter:
-    """Return an option with its help.
-
-    Parameters
-    ----------
-    rare : whether only `--help-all` shows it
-    several : whether all words up to the next option are its values
-    """
+def option(text: str, *, several: bool = False, **more: Any) -> Parameter:
+    """Return an option with its help; of several values, which are all words up to the next option."""
     more |= {"negative_iterable": "", "consume_multiple": True} if several else {}
-    more |= {"group": RARE} if rare else {}
     return Parameter(help=text, show_default=False, **more)
+
+
+def rare(text: str, **more: Any) -> Parameter:
+    """Return an option that only `--help-all` shows."""
+    return option(text, group=RARE, **more)
 
 
 BodyArgument = Annotated[
@@ -135,27 +133,25 @@ Degrees = Annotated[
 ]
 SampleStep = Annotated[
     float | None,
-    option("Time between samples, in s, for a file without times; for example `--step 0.01`.", rare=True),
+    rare("Time between samples, in s, for a file without times; for example `--step 0.01`."),
 ]
 JointOrder = Annotated[
     str | None,
-    option(
+    rare(
         "Order of unnamed joints in MuJoCo's qpos or Isaac's joint_pos: mujoco, isaac, isaac-by-name or body; default: "
         "by the poses of bodies in the file, else mujoco. For example `--joint-order isaac`.",
-        rare=True,
     ),
 ]
 RestMissing = Annotated[
     bool,
-    option(
+    rare(
         "Keep joints without a column at zero, or at their limit next to it; for example `--rest-missing`.",
-        rare=True,
         negative="",
     ),
 ]
 IgnoreExtra = Annotated[
     bool,
-    option("Ignore columns that match no joint; for example `--ignore-extra`.", rare=True, negative=""),
+    rare("Ignore columns that match no joint; for example `--ignore-extra`.", negative=""),
 ]
 FlightTimes = Annotated[
     tuple[str, ...],
@@ -168,18 +164,16 @@ FlightTimes = Annotated[
 ]
 FillOption = Annotated[
     str | None,
-    option(
+    rare(
         "Fill gaps (empty cells, NaN) of up to this length by splines, in s or with a unit; gaps at the ends are cut "
         "off. Default: a gap is an error. For example `--fill 0.1s` or `--fill 100ms`.",
-        rare=True,
     ),
 ]
 ResampleOption = Annotated[
     float | None,
-    option(
+    rare(
         "Resample evenly at this rate, in 1/s; uneven samples are resampled before --lowpass. For example "
         "`--resample 100`.",
-        rare=True,
     ),
 ]
 LowPassOption = Annotated[
@@ -191,35 +185,31 @@ LowPassOption = Annotated[
 ]
 BaseOrder = Annotated[
     str | None,
-    option(
+    rare(
         "Order in which the recorded angles of the base turn about their axes; default: zxy for OpenSim's tilt, list "
         "and rotation, zyx for roll, pitch and yaw. For example `--base-order yxz`.",
-        rare=True,
     ),
 ]
 BaseAxes = Annotated[
     str | None,
-    option(
+    rare(
         "Directions of the base's x, y and z axes in the axes whose attitude was recorded, or estimate, with "
         "--flight; default: x,-z,y for OpenSim's pelvis, else x,y,z. For example `--base-axes x,y,z`.",
-        rare=True,
     ),
 ]
 Calibration = Annotated[
     str | None,
-    option(
+    rare(
         "How recorded segments lie in the body's links: a time of the zero pose, in s or the unit of the file, the "
         "name of such a pose in the file, or links if segments have the axes of the links; default: as the file "
         "states. For example `--calibration 0.5`.",
-        rare=True,
     ),
 ]
 LengthTolerance = Annotated[
     float | None,
-    option(
+    rare(
         "Largest relative difference between recorded segment lengths and the body's, as a fraction; default: 0.1. "
         "For example `--length-tolerance 0.2`.",
-        rare=True,
     ),
 ]
 
@@ -245,55 +235,49 @@ class BodyOptions:
 
     root: Annotated[
         str | None,
-        option(
+        rare(
             "For URDF, xacro, MJCF: free removes all joints between the world, or a massless root, and the body; "
             "default: a single such joint is an error, several are the free base. For example `--root free`.",
-            rare=True,
         ),
     ] = None
     root_body: Annotated[
         str | None,
-        option(
+        rare(
             "For MJCF, OpenSim, bioMod: the body that floats, with everything attached to it; needed where the file "
             "has several. For example `--root-body torso`.",
-            rare=True,
         ),
     ] = None
     packages: Annotated[
         tuple[str, ...],
-        option(
+        rare(
             "For URDF, xacro: folders that are searched for the packages it names, before those around the file. For "
             "example `--packages ~/ros/src`.",
-            rare=True,
             several=True,
         ),
     ] = ()
     xacro: Annotated[
         tuple[str, ...],
-        option(
+        rare(
             "For xacro: values of its arguments, NAME:=VALUE; for example `--xacro payload:=true`.",
-            rare=True,
             several=True,
         ),
     ] = ()
     on_unphysical: Annotated[
         str | None,
-        option(
+        rare(
             "For links with impossible inertias: error, or warn to use them as they are; for example "
             "`--on-unphysical warn`.",
-            rare=True,
         ),
     ] = None
     length_unit: Annotated[
         float | None,
-        option(
+        rare(
             "For BVH, which states none: the unit of length, in m; for example `--length-unit 0.01` for centimetres.",
-            rare=True,
         ),
     ] = None
     person_mass: Annotated[
         float | None,
-        option("For BVH: mass of the person, in kg; default: 70. For example `--person-mass 62`.", rare=True),
+        rare("For BVH: mass of the person, in kg; default: 70. For example `--person-mass 62`."),
     ] = None
 
     @property
@@ -320,10 +304,9 @@ class StartOptions:
     momentum: Momentum = None
     attitude: Annotated[
         tuple[float, float, float, float] | None,
-        option(
+        rare(
             "Attitude of the base at the start, a quaternion x y z w; default: as recorded, or as a motion of the "
             "library begins, else 0 0 0 1. For example `--attitude 1 0 0 0`.",
-            rare=True,
             negative_iterable="",
         ),
     ] = None
@@ -348,27 +331,24 @@ class RecordingOptions:
     up: UpAxis = None
     time_unit: Annotated[
         str | None,
-        option(
+        rare(
             "Unit of the times: s, ms, us, ns or min; default: as the file states. For example `--time-unit ms`.",
-            rare=True,
         ),
     ] = None
     step: SampleStep = None
     topic: Annotated[
         str | None,
-        option(
+        rare(
             "Topic of a ROS bag, sheet of a workbook, or structure of a .mat file, where there are several; for "
             "example `--topic /joint_states`.",
-            rare=True,
         ),
     ] = None
     joint_order: JointOrder = None
     rest: Annotated[
         tuple[str, ...],
-        option(
+        rare(
             "Values of joints without a column: JOINT=VALUE, in rad or m or with a unit; for example "
             "`--rest neck=0.1 left_elbow=30deg`.",
-            rare=True,
             several=True,
         ),
     ] = ()
@@ -378,36 +358,32 @@ class RecordingOptions:
     fill: FillOption = None
     smooth_penalty: Annotated[
         float | None,
-        option(
+        rare(
             "Penalty of --smooth, in s^5; default: for each joint the likeliest for its noise. For example "
             "`--smooth-penalty 1e-9`.",
-            rare=True,
         ),
     ] = None
     close: Annotated[
         str | None,
-        option(
+        rare(
             "Close a cycle whose ends differ by at most this, in rad or m or with units; for example `--close 3deg` or "
             "`--close 3deg,5mm`.",
-            rare=True,
         ),
     ] = None
     close_by: Annotated[
         str | None,
-        option(
+        rare(
             "How it is closed: drift (the gap is subtracted evenly in time), smooth (a periodic smoother, with "
             "--smooth) or geodesic (the shortest way back is appended); for example `--close-by geodesic`.",
-            rare=True,
         ),
     ] = None
     base_order: BaseOrder = None
     base_axes: BaseAxes = None
     gravity: Annotated[
         float | None,
-        option(
+        rare(
             "Acceleration of the fall in flight, in m/s^2; default: 9.81. Another fall is an error: a unit of length "
             "or the frame rate is wrong. For example `--gravity 3.7`.",
-            rare=True,
         ),
     ] = None
     calibration: Calibration = None
@@ -428,39 +404,35 @@ class ErrorOptions:
     ] = None
     mass_error: Annotated[
         float | None,
-        option(
+        rare(
             "Standard deviation of each link's mass, as a fraction of it; for example `--mass-error 0.05`.", rare=True
         ),
     ] = None
     centre_error: Annotated[
         float | None,
-        option(
+        rare(
             "Standard deviation of each link's centre of mass along each axis, as a fraction of the link's radius of "
             "gyration; for example `--centre-error 0.1`.",
-            rare=True,
         ),
     ] = None
     inertia_error: Annotated[
         float | None,
-        option(
+        rare(
             "Standard deviation of each link's rotational inertia, as a fraction of it; for example "
             "`--inertia-error 0.05`.",
-            rare=True,
         ),
     ] = None
     momentum_error: Annotated[
         float | None,
-        option(
+        rare(
             "Standard deviation of each component of the momentum, in kg m^2/s; for example `--momentum-error 0.001`.",
-            rare=True,
         ),
     ] = None
     attitude_error: Annotated[
         float | None,
-        option(
+        rare(
             "Standard deviation of the attitude at the start about each axis, in rad; for example "
             "`--attitude-error 0.01`.",
-            rare=True,
         ),
     ] = None
 

@@ -25,69 +25,48 @@ _STANDARD_OUTPUT = 1
 
 
 class ExitCode(enum.IntEnum):
-    """What the shell receives."""
+    """Exit code of the program: number and meaning, in the help and in docs/howto/command_line.md."""
 
-    DONE = 0
-    INTERNAL = 1
-    USAGE = 2
-    MODEL = 3
-    TRAJECTORY = 4
-    NUMERICS = 5
-    OUTPUT = 6
-    NOT_FOUND = 7
-    STUDY = 8
-    CLUSTER = 9
-    WRONG = 10
-    FAILED_CASES = 11
-    OUT_OF_TIME = 124
-    """As the command `timeout` ends."""
-    STOPPED = 130
-    """By Ctrl-C: 128 and the number of the signal, as shells have it."""
-    BROKEN_PIPE = 141
-    """128 and the number of SIGPIPE."""
+    meaning: str
 
+    def __new__(cls, number: int, meaning: str) -> ExitCode:
+        """Return a member with its meaning."""
+        code = int.__new__(cls, number)
+        code._value_, code.meaning = number, meaning
+        return code
 
-MEANINGS = {
-    ExitCode.DONE: "done",
-    ExitCode.INTERNAL: "a bug of shapephase; -v shows where",
-    ExitCode.USAGE: "usage: arguments, options, names, missing files",
-    ExitCode.MODEL: "the body's file",
-    ExitCode.TRAJECTORY: "the motion's file, or a motion that does not fit the body",
-    ExitCode.NUMERICS: "numerics: singular inertia, accuracy not reached",
-    ExitCode.OUTPUT: "output cannot be written",
-    ExitCode.NOT_FOUND: "nothing found; the best try is written",
-    ExitCode.STUDY: "a study's file, or a store of another study",
-    ExitCode.CLUSTER: "no connection to the cluster; stored cases are kept",
-    ExitCode.WRONG: "audit: the trajectory is wrong; the explanation is printed",
-    ExitCode.FAILED_CASES: "failed cases in a study; the others are stored",
-    ExitCode.OUT_OF_TIME: "time limit reached; the best result is written",
-    ExitCode.STOPPED: "stopped by Ctrl-C; the best result of plan is written",
-    ExitCode.BROKEN_PIPE: "the reader closed the pipe (SIGPIPE)",
-}
-"""One line for each code, in the help and in docs/howto/command_line.md."""
+    DONE = 0, "done"
+    INTERNAL = 1, "a bug of shapephase; -v shows where"
+    USAGE = 2, "usage: arguments, options, names, missing files"
+    MODEL = 3, "the body's file"
+    TRAJECTORY = 4, "the motion's file, or a motion that does not fit the body"
+    NUMERICS = 5, "numerics: singular inertia, accuracy not reached"
+    OUTPUT = 6, "output cannot be written"
+    NOT_FOUND = 7, "nothing found; the best try is written"
+    STUDY = 8, "a study's file, or a store of another study"
+    CLUSTER = 9, "no connection to the cluster; stored cases are kept"
+    WRONG = 10, "audit: the trajectory is wrong; the explanation is printed"
+    FAILED_CASES = 11, "failed cases in a study; the others are stored"
+    OUT_OF_TIME = 124, "time limit reached; the best result is written"
+    STOPPED = 130, "stopped by Ctrl-C; the best result of plan is written"
+    BROKEN_PIPE = 141, "the reader closed the pipe (SIGPIPE)"
 
 
-def exit_code_list() -> str:
-    """Return the codes and their meanings as a list in Markdown."""
-    return "\n".join(f"- {code.value}: {meaning}" for code, meaning in MEANINGS.items())
+# The first of these that fits an error of the library gives the code.
+_CODES: tuple[tuple[type[Exception] | tuple[type[Exception], ...], ExitCode], ...] = (
+    (OutputFileError, ExitCode.OUTPUT),
+    (StudyError, ExitCode.STUDY),
+    (SchedulerLostError, ExitCode.CLUSTER),
+    (PlanNotFound, ExitCode.NOT_FOUND),
+    (TrajectoryError, ExitCode.TRAJECTORY),
+    (ModelFileError, ExitCode.MODEL),
+    ((ValueError, FileNotFoundError, ImportError, CompilerError), ExitCode.USAGE),
+)
 
 
 def exit_code_of(error: ShapePhaseError) -> ExitCode:
     """Return the code for an error of the library."""
-    if isinstance(error, OutputFileError):
-        return ExitCode.OUTPUT
-    if isinstance(error, StudyError):
-        return ExitCode.STUDY
-    if isinstance(error, SchedulerLostError):
-        return ExitCode.CLUSTER
-    if isinstance(error, PlanNotFound):
-        return ExitCode.NOT_FOUND
-    if isinstance(error, TrajectoryError):
-        return ExitCode.TRAJECTORY
-    if isinstance(error, ModelFileError):
-        return ExitCode.MODEL
-    of_the_caller = ValueError | FileNotFoundError | ImportError | CompilerError
-    return ExitCode.USAGE if isinstance(error, of_the_caller) else ExitCode.NUMERICS
+    return next((code for kinds, code in _CODES if isinstance(error, kinds)), ExitCode.NUMERICS)
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ from typing import Any
 
 from .terminal import Verbosity, say, verbosity
 
-# [s] Work that takes longer shows a progress bar; what is done sooner leaves the terminal alone.
-_PATIENCE = 2.0
+_PATIENCE = 2.0  # [s] shorter work shows no progress bar
 
 
 class Steps:

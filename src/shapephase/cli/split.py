@@ -22,6 +22,7 @@ from .options import (
     StartOptions,
     Tolerance,
     option,
+    rare,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -46,18 +47,16 @@ def split_command(
     ] = None,
     samples: Annotated[
         Path | None,
-        option(
+        rare(
             "Write base and joints at 201 even times to this file (.csv, .parquet, .nc, .mat, .h5), in SI units; for "
             "example `--samples fall.nc`.",
-            rare=True,
         ),
     ] = None,
     phases: Annotated[
         Path | None,
-        option(
+        rare(
             "Write the phases in time, in degrees and in radians, to this CSV file, whose last row is the table's; for "
             "example `--phases phases.csv`.",
-            rare=True,
         ),
     ] = None,
     floating: BodyOptions = BODY_DEFAULTS,

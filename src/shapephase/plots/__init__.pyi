@@ -3,7 +3,7 @@ from .explorer import explore
 from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
-from .named_figures import FIGURES, Figure, figure_image, write_figure
+from .named_figures import FIGURES, Figure, write_figure
 from .page import Page
 from .pages.poinsot_page import rolling_ellipsoid
 from .plot_style import column_axes
@@ -22,7 +22,6 @@ __all__ = [
     "Page",
     "column_axes",
     "explore",
-    "figure_image",
     "moving_scene",
     "plot_attitude",
     "plot_bounds",

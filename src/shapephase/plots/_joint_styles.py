@@ -9,8 +9,7 @@ from typing import Any
 from ..letters import printable
 from .plot_style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SERIES, VERMILION
 
-# In an order in which neighbours differ in grey, too.
-_COLOURS = (BLUE, ORANGE, BLACK, GREEN, VERMILION, PURPLE)
+_COLOURS = (BLUE, ORANGE, BLACK, GREEN, VERMILION, PURPLE)  # neighbours differ in grey, too
 _MARKERS = ("o", "s", "^", "D", "v", "P")
 # The side that a joint's name tells: whole words, or letters set off by the end of the name or an underline.
 _SIDES = {"left": "right", "right": "left", "l": "r", "r": "l"}

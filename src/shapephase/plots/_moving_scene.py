@@ -24,14 +24,10 @@ from ..inertia_tensor import principal_axes, second_moment
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 
-# Frames of a scene: five minutes at 30 a second; a page of more would be too large for a browser.
-_MAX_FRAMES = 10_000
-# Shortest edge of the box of an inertia, of its longest: the box of a flat body stays visible.
-_MIN_THICKNESS = 0.01
-# Of the boxes around the shapes of a node: of more, those inside are left out.
-_FEW_CORNERS = 64
-# Radius of the heaviest particle, of the largest distance from the centre of mass.
-_PARTICLE_RADIUS = 0.06
+_MAX_FRAMES = 10_000  # five minutes at 30 a second: a larger page is too slow for a browser
+_MIN_THICKNESS = 0.01  # of the longest edge: the inertia box of a flat body stays visible
+_FEW_CORNERS = 64  # of boxes around the shapes of a node: with more, inner ones are left out
+_PARTICLE_RADIUS = 0.06  # of the heaviest particle, over the largest distance from the centre of mass
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,12 +38,9 @@ CONVENTIONS = (
         "total rotation = exp(Montgomery phase about the momentum) closing tilt holonomy, in the horizontal gauge",
     ),
 )
-# [rad] A smaller turn has no axis worth showing.
-_NO_TURN = 1e-12
-# [rad or m] A limit beyond this is none: some models write the largest number there is.
-_NO_LIMIT = 1e6
-# Of the joints' works one by one: all together that is less is rounding, or the quadrature's.
-_NO_WORK = 1e-9
+_NO_TURN = 1e-12  # [rad] a smaller turn has no axis worth showing
+_NO_LIMIT = 1e6  # [rad or m] some models write the largest number there is for no limit
+_NO_WORK = 1e-9  # of the joints' absolute works: a smaller sum is rounding or quadrature error
 
 Row = tuple[str, str, str]
 

@@ -9,18 +9,12 @@ import numpy as np
 from .. import so3, sphere
 from ..arrays import Array, Integers
 
-# Strips between meridians: limits the drawing of curves with many corners to some seconds.
-_MAX_STRIPS = 1500
-# Strips in any case, three degrees each, so that their chords stay within a line's width of the sphere's circles.
-_MIN_STRIPS = 120
-# Length of a cell's side along a meridian [rad]: likewise.
-_MAX_SIDE = 0.05
-# Azimuths nearer than this [rad] are the same meridian.
-_SAME_MERIDIAN = 1e-12
-# Winding numbers that have a shade of their own; more are shown as this.
-MAX_WINDING = 3
-# Decimals by which corners are told apart: a side that two cells share differs by rounding.
-_SAME_CORNER = 9
+_MAX_STRIPS = 1500  # between meridians: curves with many corners are drawn within seconds
+_MIN_STRIPS = 120  # three degrees each: chords stay within a line's width of the circles
+_MAX_SIDE = 0.05  # [rad] of a cell along a meridian, likewise
+_SAME_MERIDIAN = 1e-12  # [rad]
+MAX_WINDING = 3  # larger winding numbers have the shade of this one
+_SAME_CORNER = 9  # decimals: a side that two cells share differs by rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,23 +14,15 @@ from .plot_style import SMALL, finish
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Opacity of curves and points on the far side.
-_FAR_OPACITY = 0.25
-# Shades of areas by winding number 1, 2, 3: blue counterclockwise, orange clockwise.
-_POSITIVE = ("#BFDFF2", "#8CC4E6", "#5BA7D3")
+_FAR_OPACITY = 0.25  # of curves and points on the far side
+_POSITIVE = ("#BFDFF2", "#8CC4E6", "#5BA7D3")  # counterclockwise areas by winding number 1, 2, 3: blue
 _NEGATIVE = ("#FBDDB0", "#F3BE73", "#E29C3C")
-# Hatching of clockwise areas, on the near side or not.
-_HATCH = {True: "#B36A00", False: "#E0BC88"}
-# Strength of an area's shade on the far side.
-_FAR_SHADE = 0.55
-# Of the order in depth: background curves are that much below the others of their side, and above those of the other.
-_BEHIND = 0.3
-# Distance between texts [radii of the sphere] at which they do not touch.
-_TEXT_ROOM = 0.17
-# Area [sr] below which a winding number is not in the legend: it is hardly visible.
-_VISIBLE_AREA = 5e-3
-# Height over the plane of the limb [1] that is rounding: points on the limb are on the near side.
-_LIMB = -1e-9
+_HATCH = {True: "#B36A00", False: "#E0BC88"}  # of clockwise areas, on the near side or not
+_FAR_SHADE = 0.55  # strength of an area's shade on the far side
+_BEHIND = 0.3  # order in depth of background curves, below the others of their side
+_TEXT_ROOM = 0.17  # [radii of the sphere] between texts
+_VISIBLE_AREA = 5e-3  # [sr] a winding number of less is not in the legend
+_LIMB = -1e-9  # [1] height over the limb's plane: rounding on the limb is on the near side
 
 
 class ParallelAxes:

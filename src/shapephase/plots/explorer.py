@@ -22,18 +22,13 @@ from .pages.motion_data import body_data, frame_nodes, up_axis
 from .pages.plane_series import PlaneSeries, least_perturbation_turns, plane_series
 from .pages.templates import SCENE_SCRIPTS, page_from
 
-# Points of the map of the curvature along each joint.
-_MAP = 101
-# Where the map ends for a joint without a limit [rad, m], and from where on a limit is none.
-_END = {"rad": np.pi, "m": 1.0}
+_MAP = 101  # points of the curvature map along each joint
+_END = {"rad": np.pi, "m": 1.0}  # [rad, m] of the map for a joint without a limit
 _NO_LIMIT = 100.0
-# How far the series reaches beyond the map on either side, of its width: a spline swings beyond its points.
-_MARGIN = 0.06
-# Frames of the moving body, and how long a loop takes [s].
-_FRAMES = 241
+_MARGIN = 0.06  # of the map's width, on either side: a spline swings beyond its points
+_FRAMES = 241  # of the moving body
 _DURATION = 4.0
-# Shapes of the plane, along each joint, at which the size of the body is taken.
-_SIZES = 5
+_SIZES = 5  # shapes along each joint at which the size of the body is taken
 
 
 def explore(body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None, up: str | None = None) -> Page:

@@ -27,10 +27,8 @@ from .plot_style import BLACK, BLUE, GREY, SERIES, SKY, SMALL, check_axes, check
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_POINTS = 400
-"""Of a curve: no corner is seen at the width of a page."""
-_NEAREST = 2e-3
-"""The last p of a locus, in parts of the way from the separatrix' p, where theta is infinite, to the equator's."""
+_POINTS = 400  # of a curve: no corner is seen at the width of a page
+_NEAREST = 2e-3  # last p of a locus, from the separatrix' (theta infinite) to the equator's
 _FAINT: dict[str, Any] = {"color": GREY, "linewidth": 0.6, "alpha": 0.7, "zorder": 1.0}
 
 
@@ -62,8 +60,7 @@ def plot_conjugate_locus(
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> len(sp.plots.plot_conjugate_locus(ax, [3.0, 2.0, 1.0], geodesics=4).lines) > 4
     True
     """
@@ -137,8 +134,7 @@ def plot_ellipsoid_locus(
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> len(sp.plots.plot_ellipsoid_locus(ax, 0.8, geodesics=4).lines) >= 2
     True
     """

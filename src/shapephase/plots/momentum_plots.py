@@ -34,39 +34,26 @@ _KINDS: dict[str, dict[str, Any]] = {
     "inverse hyperbolic": {"marker": "D", "color": ORANGE, "markersize": 5.5},
     "parabolic": {"marker": "s", "color": GREEN, "markersize": 5.5},
 }
-# Angle between neighbouring points of the curve [rad]: its chords then stay within a line's width of the arc.
-_MAX_ANGLE = 0.02
-# Parts of one step that show how far the curve bends in it; two where there are many, so that there are not many more.
-_FIRST_PARTS = 8
-_MANY_POINTS = 30_000
-# Parts of one step, so that a curve that is very fast somewhere does not fill the memory.
-_MAX_PARTS = 40
-# Length of a curve on the unit sphere [1], some six revolutions, from which on it is drawn in a finer line.
-_LONG = 40.0
-# Angle between start and end [rad] that is none, and [of the curve's size, at most a radian] that nobody sees.
-_CLOSED = 1e-6
-_UNSEEN = 0.03
-# Solid angle [sr] that is rounding.
-_NO_AREA = 1e-12
-# Half the size of a curve on the screen [radii of the sphere] below which it is enlarged, and what is none.
-_SMALL_CURVE = 0.13
-_NOTHING = 1e-6
-# Middles and side of the places where it may be, in the corners beside the sphere [radii].
+_MAX_ANGLE = 0.02  # [rad] between points: chords stay within a line's width of the arc
+_FIRST_PARTS = 8  # of a step, to find how far the curve bends in it
+_MANY_POINTS = 30_000  # of a curve: its steps then have two parts
+_MAX_PARTS = 40  # of a step: a very fast curve must not fill the memory
+_LONG = 40.0  # [1] length of a curve, some six revolutions, that is drawn in a finer line
+_CLOSED = 1e-6  # [rad] between start and end: a smaller gap is none
+_UNSEEN = 0.03  # of the curve's size: a smaller gap is not seen
+_NO_AREA = 1e-12  # [sr] rounding
+_SMALL_CURVE = 0.13  # [radii of the sphere] half the size of a curve that is enlarged in an inset
+_NOTHING = 1e-6  # [radii of the sphere] half the size of a point
+# [radii of the sphere] middles and side of the places for an inset, in the corners beside the sphere.
 _INSET_CORNERS = np.array([[0.98, 0.9], [-0.98, 0.9], [0.98, -0.8], [-0.98, -0.8]])
 _INSET_SIDE = 0.78
-# Between points of a curve that keep text away [radii], and how many there are at most.
-_FREE = 0.1
-_MOST_FREE = 200
-# Relative difference of two moments that is rounding.
-_EQUAL = 1e-9
-# Elevation and azimuth of the eye [degrees] where no direction is preferred: no axis points to it or stands upright.
-_DEFAULT_VIEW = (24.0, 32.0)
-# Elevation and azimuth of the eye beside the middle of a curve [degrees].
-_VIEW_OFFSET = (12.0, 18.0)
-# Highest elevation of the eye [degrees]: nearer to the pole the azimuth means little.
-_MAX_ELEVATION = 65.0
-# Length of the mean direction below which a curve has no side of the sphere that it prefers.
-_SPREAD = 0.2
+_FREE = 0.1  # [radii] between points of a curve that keep text away
+_MOST_FREE = 200  # such points
+_EQUAL = 1e-9  # relative difference of moments that is rounding
+_DEFAULT_VIEW = (24.0, 32.0)  # [degrees] elevation, azimuth: no axis points to the eye or stands upright
+_VIEW_OFFSET = (12.0, 18.0)  # [degrees] elevation, azimuth of the eye beside the middle of a curve
+_MAX_ELEVATION = 65.0  # [degrees] nearer to the pole the azimuth means little
+_SPREAD = 0.2  # length of the mean direction below which a curve prefers no side
 
 
 def plot_momentum_curve(
@@ -105,8 +92,7 @@ def plot_momentum_curve(
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> len(sp.plots.plot_momentum_curve(ax, motion, "base").lines) > 3
     True
@@ -165,14 +151,9 @@ def plot_fixed_points(
     inertia : (3, 3) of a rigid body whose portrait is drawn behind, the deformation's frame [kg m^2]; None: none
     view : as for `plot_momentum_curve`
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError. Source: theory.md section 2.
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> points = sp.fixed_points(sp.articulated(cat, loop), 0.005)
     >>> len(sp.plots.plot_fixed_points(ax, points).lines) >= 2

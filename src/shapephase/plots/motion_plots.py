@@ -17,23 +17,8 @@ from ..phases.momentum_curve import Gauge
 from ..phases.phases import RunningPhases, running_phases
 from ..phases.split_text import CLOSED_GAP
 from ..reconstruction.reconstruction import Motion
+from . import plot_style as style
 from ._joint_styles import plain_text
-from .plot_style import (
-    BLACK,
-    GREY,
-    ORANGE,
-    SERIES,
-    SKY,
-    SMALL,
-    VERMILION,
-    check_flat_axes,
-    degrees_first,
-    even_times,
-    in_time,
-    inset_where_free,
-    motion_times,
-    one_motion,
-)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,22 +28,15 @@ if TYPE_CHECKING:
 ATTITUDES = ("rotation_vector", "quaternion")
 INERTIAS = ("principal", "entries")
 _ENTRIES = ((0, 0, "xx"), (1, 1, "yy"), (2, 2, "zz"), (0, 1, "xy"), (1, 2, "yz"), (0, 2, "xz"))
-_TOTAL: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 1.5)), "linewidth": 1.6}
-_JUMPED: dict[str, Any] = {"color": GREY, "linestyle": (0, (1, 1.5)), "linewidth": 1.2, "zorder": 1.4}
-# Change between neighbouring points [rad, or 1 for a quaternion] that is a jump and not a curve.
-_JUMP = 1.0
-# Angle short of a half turn [rad] that counts as one.
-_HALF_TURN = 1e-6
-# Of the other phases' range: a geometric phase within it looks like a flat line.
-_FLAT = 0.06
-# Phase [rad] that is zero up to rounding.
-_NOTHING = 1e-9
-# Of the axis: the least that the energy and the two nearest curves are to have of it.
-_PRESSED = 0.3
-# Of the energy: a band of this breadth is rounding, as between equal moments.
-_NO_BAND = 1e-9
-# Of the range of the energies, beyond its ends.
-_ROOM = 0.05
+_TOTAL: dict[str, Any] = {"color": style.BLACK, "linestyle": (0, (4, 1.5)), "linewidth": 1.6}
+_JUMPED: dict[str, Any] = {"color": style.GREY, "linestyle": (0, (1, 1.5)), "linewidth": 1.2, "zorder": 1.4}
+_JUMP = 1.0  # [rad, or 1 for a quaternion] between neighbouring points: a jump, no curve
+_HALF_TURN = 1e-6  # [rad] short of a half turn that counts as one
+_FLAT = 0.06  # of the other phases' range: a geometric phase within it seems flat
+_NOTHING = 1e-9  # [rad] rounding
+_PRESSED = 0.3  # least share of the axis for the energy and its two nearest curves
+_NO_BAND = 1e-9  # of the energy: a narrower band is rounding, as between equal moments
+_ROOM = 0.05  # of the range of the energies, beyond its ends
 # Energies that bound the regimes, as the legend names them.
 _LEAST = r"$\ell^2\!/2I_1$"
 _SEPARATRIX = r"$\ell^2\!/2I_2$, separatrix"
@@ -89,36 +67,31 @@ def plot_phases(
     times : (N,) where to draw [s]; None: several in each step of the integrator
     closing : as for `running_phases`
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError, and as `running_phases`. Source: Cabrera 2006, equation (12).
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> sp.plots.plot_phases(ax, motion, "base").get_xlabel()
     '$t$ [s]'
     """
     check_object(motion, "Motion", "motion")
-    check_flat_axes(ax)
-    one_motion(motion)
-    t = motion_times(motion, times)
+    style.check_flat_axes(ax)
+    style.one_motion(motion)
+    t = style.motion_times(motion, times)
     found = running_phases(motion, t, gauge, closing=closing)
     jumps = np.flatnonzero(np.diff(found.jumps))
     for values, name, look in (
-        (found.dynamic_phase, r"dynamic $\theta_\mathrm{D}$", SERIES[0]),
-        (found.geometric_phase, r"geometric $\theta_\mathrm{G}$", SERIES[1]),
+        (found.dynamic_phase, r"dynamic $\theta_\mathrm{D}$", style.SERIES[0]),
+        (found.geometric_phase, r"geometric $\theta_\mathrm{G}$", style.SERIES[1]),
         (found.montgomery_phase, r"total $\theta_\mathrm{M}$", _TOTAL),
     ):
-        at_jumps = jumps if look is not SERIES[0] else jumps[:0]
+        at_jumps = jumps if look is not style.SERIES[0] else jumps[:0]
         ax.plot(*_broken(t, values, at_jumps), label=f"{name} = {_degrees(values[-1])}", **look)
         for k in at_jumps:
             ax.plot(t[k : k + 2], values[k : k + 2], **_JUMPED)
-    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
-    in_time(ax, (t[0], t[-1]), "", title=_phase_title(found, len(jumps)))
-    degrees_first(ax, "phase")
+    ax.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
+    style.in_time(ax, (t[0], t[-1]), "", title=_phase_title(found, len(jumps)))
+    style.degrees_first(ax, "phase")
     _enlarged(ax, t, found)
     return ax
 
@@ -137,44 +110,39 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
     kind : "rotation_vector" [rad] or "quaternion"
     times : as for `plot_phases`
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError, UnknownNameError.
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> len(sp.plots.plot_attitude(ax, motion, "quaternion").lines) >= 4
     True
     """
     check_object(motion, "Motion", "motion")
-    check_flat_axes(ax)
-    one_motion(motion)
+    style.check_flat_axes(ax)
+    style.one_motion(motion)
     if not isinstance(kind, str) or kind not in ATTITUDES:
         raise unknown_name("kind of attitude", kind, ATTITUDES)
-    t = motion_times(motion, times)
+    t = style.motion_times(motion, times)
     if kind == "quaternion":
         values = motion.quat_xyzw(t)
         values[1:] *= np.cumprod(np.where(np.sum(values[1:] * values[:-1], axis=-1) < 0.0, -1.0, 1.0))[:, None]
-        _pieces(ax, t, values, [(f"$q_{name}$", SERIES[k]) for k, name in enumerate("xyzw")])
+        _pieces(ax, t, values, [(f"$q_{name}$", style.SERIES[k]) for k, name in enumerate("xyzw")])
         ax.set_ylim(-1.08, 1.08)
         label, title = "quaternion [1]", "attitude, base to inertial axes: quaternion of one sign"
     else:
         values = motion.rotation_vector(t)
-        _pieces(ax, t, values, [(rf"$\theta_{name}$", SERIES[k]) for k, name in enumerate("xyz")])
+        _pieces(ax, t, values, [(rf"$\theta_{name}$", style.SERIES[k]) for k, name in enumerate("xyz")])
         size = np.linalg.norm(values, axis=-1)
-        ax.plot(t, size, label=r"$|\theta|$", color=GREY, linewidth=2.2, zorder=1.5)
+        ax.plot(t, size, label=r"$|\theta|$", color=style.GREY, linewidth=2.2, zorder=1.5)
         for turn in np.arange(np.pi, size.max() + _HALF_TURN, np.pi):
-            ax.axhline(turn, color=GREY, linewidth=0.5, linestyle=(0, (1, 2)), zorder=1)
+            ax.axhline(turn, color=style.GREY, linewidth=0.5, linestyle=(0, (1, 2)), zorder=1)
         label, title = "", "attitude, base to inertial axes: rotation vector"
         title += "; dots: half turns" if size.max() > np.pi - _HALF_TURN else ""
-    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+    ax.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
     above = {"ncols": 4, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-    in_time(ax, (t[0], t[-1]), label, loops=motion.deformation.loops, title=title, **above)
+    style.in_time(ax, (t[0], t[-1]), label, loops=motion.deformation.loops, title=title, **above)
     if kind != "quaternion":
-        degrees_first(ax, "rotation vector")
+        style.degrees_first(ax, "rotation vector")
     return ax
 
 
@@ -189,38 +157,33 @@ def plot_inertia(
     kind : "principal" or "entries"
     times : (N,) where to draw [s]; None: evenly between the breaks
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError, UnknownNameError.
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> len(sp.plots.plot_inertia(ax, motion.deformation).lines)  # one for each principal moment
     3
     """
     check_object(deformation, "Deformation", "deformation")
-    check_flat_axes(ax)
+    style.check_flat_axes(ax)
     if not isinstance(kind, str) or kind not in INERTIAS:
         raise unknown_name("kind of inertia", kind, INERTIAS)
-    t = even_times(deformation, times)
+    t = style.even_times(deformation, times)
     inertia = deformation.inertia(t)
     if kind == "principal":
         for k, moment in enumerate(np.linalg.eigvalsh(inertia).T):
-            ax.plot(t, moment, label=f"$I_{k + 1}$", **SERIES[k])
+            ax.plot(t, moment, label=f"$I_{k + 1}$", **style.SERIES[k])
         ax.set_ylim(bottom=0.0)
     else:
         for k, (i, j, name) in enumerate(_ENTRIES):
-            ax.plot(t, inertia[:, i, j], label=f"$I_{{{name}}}$", **SERIES[k])
-        ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+            ax.plot(t, inertia[:, i, j], label=f"$I_{{{name}}}$", **style.SERIES[k])
+        ax.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
     label, title = {
         "principal": ("principal moments [kg m²]", "locked inertia, about the centre of mass"),
         "entries": ("locked inertia [kg m²]", "locked inertia in the deformation's frame"),
     }[kind]
     above = {"ncols": 3, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-    in_time(ax, (t[0], t[-1]), label, loops=deformation.loops, title=title, **above)
+    style.in_time(ax, (t[0], t[-1]), label, loops=deformation.loops, title=title, **above)
     return ax
 
 
@@ -232,28 +195,23 @@ def plot_internal_momentum(ax: Axes, deformation: Deformation, *, times: ArrayLi
     ax : flat axes
     times : as for `plot_inertia`
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError.
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> sp.plots.plot_internal_momentum(ax, motion.deformation).get_xlabel()
     '$t$ [s]'
     """
     check_object(deformation, "Deformation", "deformation")
-    check_flat_axes(ax)
-    t = even_times(deformation, times)
+    style.check_flat_axes(ax)
+    t = style.even_times(deformation, times)
     internal = deformation.internal_momentum(t)
     for k, name in enumerate("xyz"):
-        ax.plot(t, internal[:, k], label=f"$L_{{o,{name}}}$", **SERIES[k])
-    ax.plot(t, np.linalg.norm(internal, axis=-1), label="$|L_o|$", color=GREY, linewidth=2.2, zorder=1.5)
-    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+        ax.plot(t, internal[:, k], label=f"$L_{{o,{name}}}$", **style.SERIES[k])
+    ax.plot(t, np.linalg.norm(internal, axis=-1), label="$|L_o|$", color=style.GREY, linewidth=2.2, zorder=1.5)
+    ax.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
     above = {"ncols": 4, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "loops": deformation.loops}
-    in_time(ax, (t[0], t[-1]), "$L_o$ [kg m²/s]", title="momentum of the joints, the base at rest", **above)
+    style.in_time(ax, (t[0], t[-1]), "$L_o$ [kg m²/s]", title="momentum of the joints, the base at rest", **above)
     return ax
 
 
@@ -290,8 +248,7 @@ def plot_energy(
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> sp.plots.plot_energy(ax, motion).get_xlabel()
     '$t$ [s]'
@@ -299,36 +256,38 @@ def plot_energy(
     if certificate is not None:
         check_object(certificate, "RegimeCertificate", "certificate")
     check_object(motion, "Motion", "motion")
-    check_flat_axes(ax)
-    one_motion(motion)
+    style.check_flat_axes(ax)
+    style.one_motion(motion)
     magnitude = float(np.linalg.norm(motion.momentum))
     if not magnitude:
         raise ShapeError("a motion without angular momentum has E_t = 0 and no regimes")
-    t = motion_times(motion, times)
+    t = style.motion_times(motion, times)
     top, middle, bottom = (0.5 * magnitude * magnitude / np.linalg.eigvalsh(motion.deformation.inertia(t))).T
     bands: tuple[tuple[Array, Array, str, dict[str, Any]], ...] = (
-        (middle, top, "about smallest moment", {"facecolor": "#CBE5F5", "edgecolor": SKY}),
-        (bottom, middle, "about largest moment", {"facecolor": "#FBE8C8", "edgecolor": ORANGE, "hatch": "///"}),
+        (middle, top, "about smallest moment", {"facecolor": "#CBE5F5", "edgecolor": style.SKY}),
+        (bottom, middle, "about largest moment", {"facecolor": "#FBE8C8", "edgecolor": style.ORANGE, "hatch": "///"}),
     )
     for low, high, label, look in bands:
         if (high - low).max() > _NO_BAND * high.max():
             ax.fill_between(t, low, high, linewidth=0.0, label=label, zorder=1, **look)
     energy = energy_along(motion, t)
     low, high, beyond = _energy_range(energy, bottom, middle, top)
-    limits = {"color": GREY, "linewidth": 0.8, "zorder": 1.5}
+    limits = {"color": style.GREY, "linewidth": 0.8, "zorder": 1.5}
     seen = [label for label, values in ((_LEAST, top), (_MOST, bottom)) if np.any((values >= low) & (values <= high))]
     ax.plot(t, top, label=", ".join(seen) if seen else None, **limits)
     ax.plot(t, bottom, **limits)
-    ax.plot(t, middle, label=_SEPARATRIX, color=VERMILION, linestyle=(0, (5, 1.5)), linewidth=1.3)
+    ax.plot(t, middle, label=_SEPARATRIX, color=style.VERMILION, linestyle=(0, (5, 1.5)), linewidth=1.3)
     if certificate is not None:
         known = certificate.bounds
         edges = known.enclosure.edges
         for values, label in ((known.lower, "certain bounds"), (known.upper, None)):
-            ax.stairs(values, edges, baseline=None, color=BLACK, linestyle=(0, (1, 1)), linewidth=1.2, label=label)
-    ax.plot(t, energy, label="$E$", color=BLACK, linewidth=1.7)
+            ax.stairs(
+                values, edges, baseline=None, color=style.BLACK, linestyle=(0, (1, 1)), linewidth=1.2, label=label
+            )
+    ax.plot(t, energy, label="$E$", color=style.BLACK, linewidth=1.7)
     ax.set_ylim(low, high)
     title = "\n".join(["energy, and the axis that the momentum circles", *beyond])
-    in_time(ax, (t[0], t[-1]), "energy [J]", loops=motion.deformation.loops, title=title)
+    style.in_time(ax, (t[0], t[-1]), "energy [J]", loops=motion.deformation.loops, title=title)
     return ax
 
 
@@ -356,14 +315,14 @@ def _enlarged(ax: Any, t: Array, found: RunningPhases) -> None:
     """The geometric phase in an inset, where it would be a flat line beside the others."""
     reach = float(np.ptp(found.geometric_phase))
     whole = float(np.ptp(np.concatenate([found.dynamic_phase, found.montgomery_phase, np.zeros(1)])))
-    inset = inset_where_free(ax, (0.27, 0.22), (0.19, 0.1, 0.09)) if _NOTHING < reach < _FLAT * whole else None
+    inset = style.inset_where_free(ax, (0.27, 0.22), (0.19, 0.1, 0.09)) if _NOTHING < reach < _FLAT * whole else None
     if inset is not None:
-        inset.plot(t, np.degrees(found.geometric_phase), **SERIES[1])
-        inset.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
+        inset.plot(t, np.degrees(found.geometric_phase), **style.SERIES[1])
+        inset.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
         inset.set_xlim(t[0], t[-1])
         inset.locator_params(nbins=3)
-        inset.tick_params(labelsize=SMALL - 2, length=2.0, pad=1.5)
-        inset.set_title(r"$\theta_\mathrm{G}$ [deg]", fontsize=SMALL - 1, pad=2.0)
+        inset.tick_params(labelsize=style.SMALL - 2, length=2.0, pad=1.5)
+        inset.set_title(r"$\theta_\mathrm{G}$ [deg]", fontsize=style.SMALL - 1, pad=2.0)
 
 
 def _phase_title(found: RunningPhases, jumps: int) -> str:

@@ -64,55 +64,34 @@ def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
 
 FIGURES: Mapping[str, Figure] = {
     "momentum": Figure(
-        caption="The momentum in the frame of the gauge, and the area it encloses",
-        height=3.9,
-        draw=lambda ax, motion, _, gauge: plot_momentum_curve(ax, motion, gauge),
+        "The momentum in the frame of the gauge, and the area it encloses",
+        3.9,
+        lambda ax, motion, _, gauge: plot_momentum_curve(ax, motion, gauge),
         with_momentum=True,
     ),
     "phases": Figure(
-        caption="The phases in time",
-        height=2.8,
-        draw=lambda ax, motion, _, gauge: plot_phases(ax, motion, gauge),
-        with_momentum=True,
+        "The phases in time", 2.8, lambda ax, motion, _, gauge: plot_phases(ax, motion, gauge), with_momentum=True
     ),
-    "attitude": Figure(
-        caption="The attitude as a rotation vector",
-        height=2.8,
-        draw=lambda ax, motion, *_: plot_attitude(ax, motion),
-    ),
+    "attitude": Figure("The attitude as a rotation vector", 2.8, lambda ax, motion, *_: plot_attitude(ax, motion)),
     "shape": Figure(
-        caption="The joints",
-        height=2.8,
-        draw=lambda ax, motion, path, _: _draw_shape(ax, motion, path),
-        with_path=True,
-        of_change=True,
+        "The joints", 2.8, lambda ax, motion, path, _: _draw_shape(ax, motion, path), with_path=True, of_change=True
     ),
     "torques": Figure(
-        caption="The torques of the joints",
-        height=2.8,
-        draw=lambda ax, motion, *_: plot_torques(ax, motion),
-        with_path=True,
+        "The torques of the joints", 2.8, lambda ax, motion, *_: plot_torques(ax, motion), with_path=True
     ),
     "inertia": Figure(
-        caption="Principal moments of the locked inertia",
-        height=2.8,
-        draw=lambda ax, motion, *_: plot_inertia(ax, motion.deformation),
+        "Principal moments of the locked inertia", 2.8, lambda ax, motion, *_: plot_inertia(ax, motion.deformation)
     ),
     "internal_momentum": Figure(
-        caption="Internal momentum",
-        height=2.8,
-        draw=lambda ax, motion, *_: plot_internal_momentum(ax, motion.deformation),
-        of_change=True,
+        "Internal momentum", 2.8, lambda ax, motion, *_: plot_internal_momentum(ax, motion.deformation), of_change=True
     ),
     "energy": Figure(
-        caption="The energy, and the axis that the momentum circles",
-        height=2.8,
-        draw=lambda ax, motion, *_: plot_energy(ax, motion),
+        "The energy, and the axis that the momentum circles",
+        2.8,
+        lambda ax, motion, *_: plot_energy(ax, motion),
         with_momentum=True,
     ),
 }
-
-
 RIGID_FIGURES: Mapping[str, tuple[float, Callable[[Axes, EulerTop, float], object]]] = {
     "polhodes": (3.8, lambda ax, top, _: plot_polhodes(ax, top)),
     "herpolhode": (3.8, lambda ax, top, _: plot_herpolhode(ax, top)),
@@ -125,7 +104,7 @@ RIGID_FIGURES: Mapping[str, tuple[float, Callable[[Axes, EulerTop, float], objec
 def motion_figure(
     motion: Motion, kind: str | None = None, *, ax: Axes | None = None, gauge: Gauge = "horizontal"
 ) -> Axes:
-    """One of `FIGURES` as axes: `Motion.plot`, which says the rest."""
+    """Return one of `FIGURES` as axes; see `Motion.plot`."""
     check_object(motion, "Motion", "motion")
     named = kind or ("phases" if motion.momentum.any() else "attitude")
     axes = column_axes(_figure_of(named, motion).height) if ax is None else ax
@@ -134,7 +113,7 @@ def motion_figure(
 
 
 def _figure_of(kind: str, motion: Motion) -> Figure:
-    """A kind of figure that this motion has. Raises UnknownNameError, ShapeError."""
+    """Return a kind of figure that this motion has. Raises UnknownNameError, ShapeError."""
     if not isinstance(kind, str) or kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
     if FIGURES[kind].with_momentum and not motion.momentum.any():
@@ -145,31 +124,7 @@ def _figure_of(kind: str, motion: Motion) -> Figure:
 def figure_image(
     kind: str, motion: Motion, path: ShapePath | None = None, gauge: Gauge = "horizontal", *, ending: str = "svg"
 ) -> bytes:
-    """One of `FIGURES` as an image.
-
-    Parameters
-    ----------
-    path : of the joints, for "shape"
-    ending : "svg", "pdf" or "png"
-
-    Raises
-    ------
-    UnknownNameError
-        For another kind, or another ending.
-    ShapeError
-        For a kind that needs a momentum or a path, if there is none; or if the motion is a batch.
-    MissingExtraError
-        Without Matplotlib.
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
-    >>> sp.plots.figure_image("energy", motion)[:5]
-    b'<?xml'
-    """
-    check_object(motion, "Motion", "motion")
-    if path is not None:
-        check_object(path, "ShapePath", "path")
+    """Return one of `FIGURES` as an image: "svg", "pdf" or "png"."""
     figure = _figure_of(kind, motion)
     if not isinstance(ending, str) or ending not in ("svg", "pdf", "png"):
         raise unknown_name("kind of image", ending, ("svg", "pdf", "png"))
@@ -185,7 +140,20 @@ def write_figure(
     path: ShapePath | None = None,
     gauge: Gauge = "horizontal",
 ) -> None:
-    """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all. Raises as `figure_image`.
+    """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all.
+
+    Parameters
+    ----------
+    path : of the joints, for "shape"
+
+    Raises
+    ------
+    UnknownNameError
+        For another kind, or another ending.
+    ShapeError
+        For a kind that needs a momentum or a path, if there is none; or if the motion is a batch.
+    MissingExtraError
+        Without Matplotlib.
 
     Examples
     --------
@@ -209,10 +177,6 @@ def write_rigid_figure(kind: str, top: EulerTop, out: str | os.PathLike[str], ti
     Parameters
     ----------
     time : at which the ellipsoid or the cones are shown [s]
-
-    Notes
-    -----
-    Raises UnknownNameError, ShapeError, MissingExtraError.
     """
     if kind not in RIGID_FIGURES:
         raise unknown_name("kind of figure", kind, RIGID_FIGURES)

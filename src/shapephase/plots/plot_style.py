@@ -36,12 +36,9 @@ VERMILION = "#D55E00"
 ORANGE = "#E69F00"
 GREEN = "#009E73"
 PURPLE = "#CC79A7"
-# Not of that palette: for what is in the background.
-GREY = "#999999"
-SMALL = 8
-"""Size of text [pt]; readable in a figure one column wide."""
-COLUMN = 3.4
-"""Width of a figure [in]: one column of most journals."""
+GREY = "#999999"  # not of that palette: background
+SMALL = 8  # [pt] readable in a figure one column wide
+COLUMN = 3.4  # [in] one column of most journals
 SERIES: tuple[dict[str, Any], ...] = (
     {"color": BLUE, "linestyle": "-", "linewidth": 1.6},
     {"color": VERMILION, "linestyle": (0, (5, 2)), "linewidth": 1.5},
@@ -51,27 +48,18 @@ SERIES: tuple[dict[str, Any], ...] = (
     {"color": PURPLE, "linestyle": (0, (3, 1.5, 1, 1.5, 1, 1.5)), "linewidth": 1.5},
 )
 """One style for each curve of a figure, the first three for x, y and z."""
-# The letters of symbols: in the sans-serif of the other text, I and l are the same bar.
-_SYMBOLS = "dejavuserif"
-# Dots per inch of raster images: what journals ask for.
-_RESOLUTION = 300
-# Between an inset and the edge of the axes or the next line [their widths and heights].
-_EDGE = 0.05
-# Points of a line that is a mark or a zero line, and no curve to be kept free.
-_FEW = 2
-# Powers of ten of an axis in time that its numbers show as they are.
-_PLAIN_POWERS = (-4, 4)
+_SYMBOLS = "dejavuserif"  # in sans-serif I and l are the same bar
+_RESOLUTION = 300  # [dots per inch] of raster images: what journals ask for
+_EDGE = 0.05  # [widths and heights] between an inset and the axes' edge or the next line
+_FEW = 2  # points of a line that is a mark or a zero line
+_PLAIN_POWERS = (-4, 4)  # of ten that the numbers of a time axis show as they are
 # Loops of a path up to which its lines have their whole breadth, and the least part of it.
 _MANY_LOOPS = 12
 _FINEST = 0.35
-# Points of a curve that are drawn as an image in one piece.
-_RASTER_PIECE = 5_000
-# Points of a curve in time: more than one column has pixels at 200 dpi.
-_MIN_POINTS = 800
-# Points of a curve in time for each loop of a repeated path.
-_POINTS_PER_LOOP = 200
-# Points from which on a curve is an image within a figure of vectors: ten in each dot of a column's width.
-_MAX_VECTOR_POINTS = 10_000
+_RASTER_PIECE = 5_000  # points of a curve that are drawn as an image in one piece
+_MIN_POINTS = 800  # of a curve in time: more than one column has pixels at 200 dpi
+_POINTS_PER_LOOP = 200  # of a curve in time
+_MAX_VECTOR_POINTS = 10_000  # ten in each dot of a column's width; longer curves are images
 
 
 def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:

@@ -30,19 +30,14 @@ _SMALLEST = {"color": VERMILION, "linestyle": (0, (4, 1.5)), "linewidth": 0.9}
 _SEPARATRIX = {"color": BLACK, "linestyle": "-", "linewidth": 1.6}
 _AT_REST = {"color": ORANGE, "linestyle": (0, (1, 1)), "linewidth": 2.4}
 _OWN = {"color": GREEN, "linestyle": "-", "linewidth": 2.8}
-# Along a separatrix [its length]: arrowheads that tell where the momentum goes.
-_HEADS = np.array([0.25, 0.7])
-# Time from its crest [1/rate] at which a herpolhode of the separatrix is within a line's width of the foot: exp(-10).
-_TAIL = 10.0
-# Of the amplitude on the separatrix [rad], short of a quarter turn, where the elliptic integral is infinite.
-_SEPARATRIX_END = 1e-5
-# Phase between points of a herpolhode [rad]: its chords then stay within a line's width of the curve.
-_PHASE_STEP = 0.02
+_HEADS = np.array([0.25, 0.7])  # [length of a separatrix] arrowheads along it
+_TAIL = 10.0  # [1/rate] from its crest: exp(-10) is within a line's width of the foot
+_SEPARATRIX_END = 1e-5  # [rad] short of a quarter turn, where the elliptic integral is infinite
+_PHASE_STEP = 0.02  # [rad] between points: chords stay within a line's width of the curve
 # Points of a herpolhode: smooth at the least, and at the most some two hundred turns, which cannot be told apart.
 _MIN_POINTS = 400
 _MAX_POINTS = 60_000
-# I3/I1 at the top of the chart: a little above 2, which no rigid body exceeds, to show the line of double roots.
-_LARGEST_RATIO = 2.2
+_LARGEST_RATIO = 2.2  # I3/I1 at the top: a little above 2, the most of a rigid body
 
 
 def plot_polhodes(
@@ -68,8 +63,7 @@ def plot_polhodes(
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> len(sp.plots.plot_polhodes(ax, [1.0, 2.0, 3.0]).lines) > 6
     True
     """
@@ -134,8 +128,7 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
     >>> len(sp.plots.plot_herpolhode(ax, top, 2).lines) >= 1
     True
@@ -190,8 +183,7 @@ def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float =
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> sp.plots.plot_heavy_top_stability(ax).get_ylabel()
     '$I_3 / I_1$ [1]'
     """

@@ -20,18 +20,12 @@ from .plot_style import BLACK, BLUE, SKY, SMALL, VERMILION, check_flat_axes, one
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Points of the raster of the crown across the sphere: one is 0.01 in wide.
-_POINTS = 241
-# Of the half sphere that is seen: a smaller crown is not.
-_VISIBLE = 1e-3
-# Points of the motion's curve.
-_TIMES = 800
-# Angle between eye and axis [degrees] in the default view, where the axis would be too near to the pole.
-_OFF_AXIS = 40.0
-# Elevation of an axis [degrees] from which on it is too near to the pole.
-_NEAR_POLE = 50.0
-# Elevation of the eye, and its azimuth from that of the axis [degrees], otherwise.
-_ELEVATION = 24.0
+_POINTS = 241  # of the crown's raster across the sphere: one is 0.01 in wide
+_VISIBLE = 1e-3  # of the half sphere that is seen: a smaller crown is not
+_TIMES = 800  # points of the motion's curve
+_OFF_AXIS = 40.0  # [degrees] between eye and axis where the axis would be too near to the pole
+_NEAR_POLE = 50.0  # [degrees] elevation of such an axis
+_ELEVATION = 24.0  # [degrees] of the eye otherwise
 _AZIMUTH_OFFSET = 35.0
 
 
@@ -57,8 +51,7 @@ def plot_crown(
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> crown = sp.bounds.crown_region(motion.deformation, [0.1, 0.2, 2.0])
     >>> len(sp.plots.plot_crown(ax, crown).lines) > 1
@@ -112,8 +105,7 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
     >>> len(sp.plots.plot_bounds(ax, sp.bounds.bounds(motion)).patches) > 3
     True

@@ -26,29 +26,20 @@ _PRINCIPAL: dict[str, Any] = {"color": "#555555", "linestyle": (0, (4, 1.5)), "l
 _OMEGA: dict[str, Any] = {"color": GREEN, "linestyle": "-", "linewidth": 2.0}
 _MU: dict[str, Any] = {"color": BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.4}
 _AXIS: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.4}
-# Points of a closed curve: its chords stay within a line's width of it.
-_AROUND = 181
+_AROUND = 181  # points of a closed curve: chords stay within a line's width of it
 # Lines of the ellipsoid's grid from pole to pole, and around.
 _MERIDIANS = 6
 _PARALLELS = 5
-# Generators of a cone that are drawn.
-_GENERATORS = 24
-# Of the farthest point of a figure: the margin around it, and what of the plane is beyond.
-_MARGIN = 0.08
-# Half the side of the plane: of the herpolhode's radius, and at least of the half width of the ellipsoid above it.
-_PLANE = 1.15
+_GENERATORS = 24  # of a cone that are drawn
+_MARGIN = 0.08  # of the farthest point of a figure
+_PLANE = 1.15  # half the plane's side, over the herpolhode's radius
 _UNDER = 0.85
-# Of the longest semi-axis: how far a direction reaches beyond it, for its name.
-_BEYOND = 1.22
-# Of the height over the plane: how far the momentum reaches below the centre.
-_BELOW = 1.4
-# Elevation of the eye over cones [degrees], and its azimuth from the axis of symmetry: mu, omega and e are then apart.
-_ABOVE_CONES = 16.0
+_BEYOND = 1.22  # of the longest semi-axis: reach of a direction, for its name
+_BELOW = 1.4  # of the height over the plane: reach of the momentum
+_ABOVE_CONES = 16.0  # [degrees] elevation of the eye over cones
 _BESIDE_CONES = 65.0
-# Height over the tangent [of the curve's size] that is rounding: points on the limb are seen.
-_LIMB = -1e-9
-# Above the plane: the invariable plane is drawn as a floor, so that its normal, the momentum, points down.
-_DOWNWARDS = np.array([[1.0], [-1.0], [-1.0]])
+_LIMB = -1e-9  # [curve's size] height over the tangent: rounding on the limb is seen
+_DOWNWARDS = np.array([[1.0], [-1.0], [-1.0]])  # the invariable plane is a floor, its normal, the momentum, points down
 
 
 def plot_rolling_ellipsoid(
@@ -79,8 +70,7 @@ def plot_rolling_ellipsoid(
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
     >>> sp.plots.plot_rolling_ellipsoid(ax, top, time=1.0).get_legend().get_texts()[0].get_text()
     'polhode'
@@ -148,8 +138,7 @@ def plot_cones(ax: Axes, top: EulerTop, time: float = 0.0, *, view: tuple[float,
 
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> top = sp.EulerTop.principal([1.0, 1.0, 2.0], [3.0, 0.0, 4.0])
     >>> sp.plots.plot_cones(ax, top).get_legend().get_title().get_text().split("\\n")[0]
     'oblate: the space cone is inside the body cone'

@@ -17,46 +17,22 @@ from ..shape_space.body_path import in_joint_order
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
+from . import plot_style as style
 from ._joint_styles import both_sides, joint_styles, plain_text
-from .plot_style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    SMALL,
-    check_flat_axes,
-    degrees_first,
-    even_times,
-    finer,
-    finish,
-    in_time,
-    label_ordinate,
-    power_of_ten,
-)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Range of a joint [rad or m] below which it does not move.
-_AT_REST = 1e-9
-# Joints with a style of their own and a name in the legend; more could not be told apart.
-_MAX_NAMED = 6
-# Letters of the longest name in a legend of two columns; longer ones would reach beyond the figure.
-_MAX_BESIDE = 26
-# Lines of equal curvature, about so many.
-_LEVELS = 8
-# Points of the plane along each joint: smooth under shading, and a second of computation.
-_COUNT = 61
-# Of the range of a path: room around it in the plane.
-_MARGIN = 0.25
-# Level over the largest value [1] that is zero up to rounding.
-_ZERO_LEVEL = 1e-9
-# Units of joints as the legend has them: what turns is read in degrees.
-_SHOWN = {"rad": "deg", "m": "m", "1": "1", "rad or m": "rad or m"}
-# Of the range of the joints drawn: limits farther than that from where a joint goes are not in the figure.
-_NEAR_LIMIT = 0.3
-# Of the height of the figure: a band beyond a limit.
-_BAND = 0.035
+_AT_REST = 1e-9  # [rad or m] range of a joint that does not move
+_MAX_NAMED = 6  # joints with a style and a name: more are not distinguishable
+_MAX_BESIDE = 26  # letters of a name in a legend of two columns
+_LEVELS = 8  # about so many lines of equal curvature
+_COUNT = 61  # points along each joint: smooth under shading, a second of computation
+_MARGIN = 0.25  # of the range of a path: room around it in the plane
+_ZERO_LEVEL = 1e-9  # of the largest value: rounding
+_SHOWN = {"rad": "deg", "m": "m", "1": "1", "rad or m": "rad or m"}  # units in the legend
+_NEAR_LIMIT = 0.3  # of the joints' range: farther limits are not in the figure
+_BAND = 0.035  # of the figure's height: a band beyond a limit
 _AXES = "xyz"
 
 
@@ -81,22 +57,17 @@ def plot_shape_path(
         are grey
     times : (N,) where to draw [s]; None: evenly between the breaks
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> len(sp.plots.plot_shape_path(ax, sp.examples.kane_scher(0.0, 0.5)).lines)  # one for each joint
     3
     """
     if body is not None:
         check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
-    check_flat_axes(ax)
-    t = even_times(path, times)
+    style.check_flat_axes(ax)
+    t = style.even_times(path, times)
     route, names, units = _named(path, body)
     values = route.shape(t)
     span = np.ptp(values, axis=0)
@@ -120,7 +91,8 @@ def plot_shape_path(
         own = "" if len(scales) == 1 else f" [{_SHOWN[units[k]]}]"
         texts.append(plain_text(names[k]) + own)
     others = [
-        places[units[k]].plot(t, values[:, k], color=GREY, linewidth=0.6, zorder=1.5)[0] for k in chosen[_MAX_NAMED:]
+        places[units[k]].plot(t, values[:, k], color=style.GREY, linewidth=0.6, zorder=1.5)[0]
+        for k in chosen[_MAX_NAMED:]
     ]
     if others:
         handles.append(others[0])
@@ -129,16 +101,16 @@ def plot_shape_path(
         handles.append(_band_patch())
         texts.append("beyond a limit")
     for unit, twin in list(places.items())[1:]:
-        finer(twin, route.loops)
-        label_ordinate(twin, f"joints [{unit}]", max(map(abs, twin.get_ylim())))
-        twin.tick_params(labelsize=SMALL)
+        style.finer(twin, route.loops)
+        style.label_ordinate(twin, f"joints [{unit}]", max(map(abs, twin.get_ylim())))
+        twin.tick_params(labelsize=style.SMALL)
     columns = 1 if max(map(len, texts)) > _MAX_BESIDE else 2
     above = {"ncols": columns, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
     title = "joints in time; dashes: the right side" if both_sides(shown) else "joints in time"
     named_by = {"handles": handles, "labels": texts, "title": title, **above}
-    in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", loops=route.loops, **named_by)
+    style.in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", loops=route.loops, **named_by)
     if scales[0] == "rad":
-        degrees_first(ax, "joints", radians=len(scales) == 1)
+        style.degrees_first(ax, "joints", radians=len(scales) == 1)
     return ax
 
 
@@ -158,14 +130,9 @@ def plot_shape_plane(
     joints : the names or indices of the two; the first is the abscissa
     body, times : as for `plot_shape_path`
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError.
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> path = sp.examples.kane_scher(0.0, 0.5)
     >>> len(sp.plots.plot_shape_plane(ax, path, (0, 1)).lines) >= 1
     True
@@ -173,15 +140,15 @@ def plot_shape_plane(
     if body is not None:
         check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
-    check_flat_axes(ax)
-    t = even_times(path, times)
+    style.check_flat_axes(ax)
+    t = style.even_times(path, times)
     route, names, units = _named(path, body)
     i, j = _pair(joints, names)
     points = route.shape(t)[:, [i, j]]
     _loop(ax, points)
-    ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=SMALL)
-    ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=SMALL)
-    finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=style.SMALL)
+    ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=style.SMALL)
+    style.finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return ax
 
 
@@ -210,14 +177,9 @@ def plot_curvature(
     shape : (n,) positions of the other joints; None: neutral
     path : to be drawn; its other joints may move
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError, UnknownNameError, TrajectoryError. Source: theory.md B6.
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> cat = sp.load_body("cat_two_halves")
     >>> sp.plots.plot_curvature(ax, cat, ("waist_pitch", "waist_yaw"), axis="x").get_xlabel()
     'waist_pitch [rad]'
@@ -225,12 +187,12 @@ def plot_curvature(
     if path is not None:
         check_object(path, "ShapePath", "path")
     check_object(body, "Body", "body")
-    check_flat_axes(ax)
+    style.check_flat_axes(ax)
     names, units = body.joint_names, body.joint_units
     i, j = _pair(joints, names)
     points = None
     if path is not None:
-        points = in_joint_order(body, path).shape(even_times(path, None))[:, [i, j]]
+        points = in_joint_order(body, path).shape(style.even_times(path, None))[:, [i, j]]
     rows = [
         _row(values, body, k, None if points is None else points[:, n], label)
         for n, (values, k, label) in enumerate(((first, i, "first"), (second, j, "second")))
@@ -238,22 +200,22 @@ def plot_curvature(
     field = curvature_on_plane(body, (i, j), rows[0], rows[1], shape)
     direction, name = _direction(axis, field)
     values = (field @ direction).T
-    power, scale = power_of_ten(float(np.abs(values).max()))
+    power, scale = style.power_of_ten(float(np.abs(values).max()))
     values = values * 10.0**-power
     largest = float(np.abs(values).max()) or 1.0
     mesh = _coloured(ax, rows, values, largest)
     _contours(ax, rows, values, largest)
     if points is not None:
         _loop(ax, points)
-        finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+        style.finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     ax.set(xlim=(rows[0][0], rows[0][-1]), ylim=(rows[1][0], rows[1][-1]))
-    ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=SMALL)
-    ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=SMALL)
-    ax.tick_params(labelsize=SMALL)
+    ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=style.SMALL)
+    ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=style.SMALL)
+    ax.tick_params(labelsize=style.SMALL)
     bar = ax.figure.colorbar(mesh, ax=ax)
     per = f"{units[i]}²" if units[i] == units[j] else f"({units[i]} {units[j]})"
-    bar.set_label(f"curvature, {name}\n[{scale}rad/{per}]", fontsize=SMALL)
-    bar.ax.tick_params(labelsize=SMALL)
+    bar.set_label(f"curvature, {name}\n[{scale}rad/{per}]", fontsize=style.SMALL)
+    bar.ax.tick_params(labelsize=style.SMALL)
     return ax
 
 
@@ -268,10 +230,6 @@ def plot_reach(ax: Axes, found: Reach, count: int = 10) -> Axes:
     found : what `reachable` gives
     count : of pairs, 1 or more
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError.
-
     Examples
     --------
     >>> from matplotlib.figure import Figure
@@ -280,25 +238,31 @@ def plot_reach(ax: Axes, found: Reach, count: int = 10) -> Axes:
     3
     """
     check_object(found, "Reach", "found")
-    check_flat_axes(ax)
+    style.check_flat_axes(ax)
     shown = found.pairs[: whole_argument(count, "count", 1)]
     if not shown:
         raise ShapeError("found: there are no pairs of joints to draw; the body has one joint or none")
     for place, pair in enumerate(shown):
         about = int(np.argmax(np.abs(pair.axis)))
-        look = {"color": (BLUE, GREEN, GREY)[about], "hatch": (None, "////", "....")[about], "edgecolor": "white"}
+        look = {
+            "color": (style.BLUE, style.GREEN, style.GREY)[about],
+            "hatch": (None, "////", "....")[about],
+            "edgecolor": "white",
+        }
         ax.barh(place, pair.degrees, label=f"about {_AXES[about]}", **look)
     ax.set_yticks(range(len(shown)), [plain_text(" × ".join(pair.joints)) for pair in shown])
     ax.set_ylim(len(shown) - 0.5, -0.5)
     units = {pair.units for pair in shown}
-    ax.set_xlabel("turn [deg/rad²]" if units == {"rad^2"} else "turn [deg/rad², deg/(rad m), deg/m²]", fontsize=SMALL)
-    ax.tick_params(labelsize=SMALL)
+    ax.set_xlabel(
+        "turn [deg/rad²]" if units == {"rad^2"} else "turn [deg/rad², deg/(rad m), deg/m²]", fontsize=style.SMALL
+    )
+    ax.tick_params(labelsize=style.SMALL)
     handles, labels = ax.get_legend_handles_labels()
     named = dict(zip(labels, handles, strict=True))
     order = sorted(named)
     # It reaches to the left, over the names of the joints, where there is room.
     place = {"ncols": 3, "loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
-    finish(ax, handles=[named[one] for one in order], labels=order, **place)
+    style.finish(ax, handles=[named[one] for one in order], labels=order, **place)
     return ax
 
 
@@ -337,22 +301,22 @@ def _limit_bands(
 def _band_patch() -> Any:
     from matplotlib.patches import Patch
 
-    return Patch(facecolor=GREY, alpha=0.5, linewidth=0.0)
+    return Patch(facecolor=style.GREY, alpha=0.5, linewidth=0.0)
 
 
 def _loop(ax: Any, points: Array) -> None:
     """Draw a path in a plane with its start, and arrowheads along it."""
-    ax.plot(*points.T, color=BLACK, linewidth=1.6, label="path")
+    ax.plot(*points.T, color=style.BLACK, linewidth=1.6, label="path")
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points / _extent(points), axis=0), axis=1))])
     for k in np.searchsorted(length, length[-1] * np.array([0.15, 0.4, 0.65, 0.9])):
         after = min(k + 1, len(points) - 1)
         if length[after] > length[after - 1]:
-            style = {"arrowstyle": "-|>", "color": BLACK, "mutation_scale": 10.0, "linewidth": 0.0}
-            ax.annotate("", points[after], points[after - 1], arrowprops=style)
-    start = {"marker": "*", "color": GREEN, "markersize": 10.0, "markeredgecolor": "white", "linestyle": "none"}
+            arrow = {"arrowstyle": "-|>", "color": style.BLACK, "mutation_scale": 10.0, "linewidth": 0.0}
+            ax.annotate("", points[after], points[after - 1], arrowprops=arrow)
+    start = {"marker": "*", "color": style.GREEN, "markersize": 10.0, "markeredgecolor": "white", "linestyle": "none"}
     ax.plot(*points[:1].T, label="start", **start)
     if np.abs(points[-1] - points[0]).max() > _AT_REST:
-        ax.plot(*points[-1:].T, marker="s", color=BLUE, markersize=5.0, linestyle="none", label="end")
+        ax.plot(*points[-1:].T, marker="s", color=style.BLUE, markersize=5.0, linestyle="none", label="end")
 
 
 def _coloured(ax: Any, rows: list[Array], values: Array, largest: float) -> Any:
@@ -374,7 +338,7 @@ def _contours(ax: Any, rows: list[Array], values: Array, largest: float) -> None
         styles = ["-" if level >= 0.0 else "--" for level in levels]
         widths = [1.5 if abs(level) < _ZERO_LEVEL * largest else 0.7 for level in levels]
         lines = ax.contour(*rows, values, levels=levels, colors="#333333", linestyles=styles, linewidths=widths)
-        ax.clabel(lines, fmt=lambda level: f"{level:.2g}".replace("-", "−"), fontsize=SMALL - 2, inline_spacing=2)
+        ax.clabel(lines, fmt=lambda level: f"{level:.2g}".replace("-", "−"), fontsize=style.SMALL - 2, inline_spacing=2)
 
 
 def _direction(axis: str | ArrayLike | None, field: Array) -> tuple[Array, str]:

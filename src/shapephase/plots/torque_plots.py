@@ -18,12 +18,9 @@ from .plot_style import GREY, SMALL, check_flat_axes, in_time, motion_times, one
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Joints with a style of their own and a name in the legend; more could not be told apart.
-_MAX_NAMED = 6
-# Letters of the longest name in a legend of two columns; longer ones would reach beyond the figure.
-_MAX_BESIDE = 26
-# Of the largest torque (or force): what stays below it is that of a joint which does nothing.
-_IDLE = 1e-9
+_MAX_NAMED = 6  # joints with a style and a name: more are not distinguishable
+_MAX_BESIDE = 26  # letters of a name in a legend of two columns
+_IDLE = 1e-9  # of the largest torque or force: a joint that does nothing
 _SHOWN = {"rad": "N m", "m": "N"}
 _LABELS = {"rad": "torques [N m]", "m": "forces [N]"}
 
@@ -41,14 +38,9 @@ def plot_torques(
         are grey
     times : (N,) where to draw [s]; None: several in each step of the integrator
 
-    Notes
-    -----
-    Raises MissingExtraError, ShapeError, UnknownNameError, and as `joint_torques`.
-
     Examples
     --------
-    >>> from matplotlib.figure import Figure
-    >>> ax = Figure().subplots()
+    >>> ax = sp.plots.column_axes()
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
     >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
     >>> len(sp.plots.plot_torques(ax, motion).lines)  # one for each joint

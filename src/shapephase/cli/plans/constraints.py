@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from ...errors import ShapeError
 from ..joint_values import joint_values, value_in_si
-from ..options import option
+from ..options import option, rare
 
 if TYPE_CHECKING:
     from ...arrays import Array
@@ -63,9 +63,8 @@ class JointOptions:
     ] = None
     mirror: Annotated[
         str | None,
-        option(
+        rare(
             "Joints that follow others, or with a minus move against them; for example `--mirror hip_left=-hip_right`.",
-            rare=True,
         ),
     ] = None
 
@@ -96,28 +95,25 @@ class LimitOptions:
     ] = ()
     acceleration_limit: Annotated[
         tuple[str, ...],
-        option(
+        rare(
             "Largest acceleration, likewise, in rad/s^2 or m/s^2; default: none. For example "
             "`--acceleration-limit 20`.",
-            rare=True,
             several=True,
         ),
     ] = ()
     jerk_limit: Annotated[
         tuple[str, ...],
-        option(
+        rare(
             "Largest jerk, likewise, in rad/s^3 or m/s^3; default: none. With one, joints that start from rest start "
             "without acceleration. For example `--jerk-limit 100`.",
-            rare=True,
             several=True,
         ),
     ] = ()
     effort: Annotated[
         str | None,
-        option(
+        rare(
             "Largest torque or force of every joint, in N m or N, or body for the limits that the body's file states; "
             "default: none. For example `--effort body`.",
-            rare=True,
         ),
     ] = None
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...errors import ShapeError
-from ..options import option
+from ..options import option, rare
 
 if TYPE_CHECKING:
     from ...arrays import Array
@@ -51,10 +51,9 @@ class GoalOptions:
     ] = None
     symmetry: Annotated[
         str | None,
-        option(
+        rare(
             "Symmetry of the body, or of the link of --point: how often it repeats about an axis of the base, or an "
             'axis alone for all turns about it. For example `--symmetry "4 about x"`.',
-            rare=True,
             allow_leading_hyphen=True,
         ),
     ] = None

@@ -17,6 +17,7 @@ from ..options import (
     PrintOptions,
     ReportFile,
     option,
+    rare,
 )
 from ..outcome import ExitCode, Outcome, check_writable
 from ..progress import steps
@@ -58,10 +59,9 @@ def plan_command(
     ] = "kinetic",
     rates_at_ends: Annotated[
         str,
-        option(
+        rare(
             "Rates of the joints: zero, periodic (equal at both ends, for gaits) or free; default: zero. For example "
             "`--rates-at-ends free`.",
-            rare=True,
         ),
     ] = "zero",
     limits: LimitOptions = _NO_LIMITS,

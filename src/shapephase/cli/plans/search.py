@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ...errors import ShapeError
-from ..options import option
+from ..options import option, rare
 from ..progress import Steps
 from ..start import stop_searches_on_ctrl_c
 
@@ -41,17 +41,16 @@ class SearchOptions:
         float | None,
         option("Longest time of the search, in s; the best result is written. For example `--time-limit 60`."),
     ] = None
-    seed: Annotated[int, option("Seed of the random guesses; for example `--seed 7`.", rare=True)] = 0
+    seed: Annotated[int, rare("Seed of the random guesses; for example `--seed 7`.")] = 0
     pieces: Annotated[
         int | None,
-        option(
+        rare(
             "Pieces of the motion's spline, six or more; default: 20 to 160, by the number of joints. For example "
             "`--pieces 12`.",
-            rare=True,
         ),
     ] = None
     iterations: Annotated[
-        int, option("Most iterations of the solver for each start; for example `--iterations 1000`.", rare=True)
+        int, rare("Most iterations of the solver for each start; for example `--iterations 1000`.")
     ] = 300
 
     def search(self) -> Search:

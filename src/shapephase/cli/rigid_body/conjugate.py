@@ -12,8 +12,7 @@ from ..outcome import Outcome, check_writable
 from ..terminal import say_written
 
 _ENDINGS = (".svg", ".pdf", ".png")
-_PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
-"""The p listed without --momenta, in parts of the way from the separatrix' p to the largest."""
+_PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)  # of the way from the separatrix' p to the largest: the p without --momenta
 
 
 def conjugate_command(

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 
-# Largest momentum [kg m^2/s] and angular velocity [rad/s], and one over its least: pages hold it in 32 bits.
-_LARGEST = 1e30
+_LARGEST = 1e30  # [kg m^2/s, rad/s] and one over the least: pages hold numbers in 32 bits
 
 
 def rigid_command(

@@ -21,10 +21,8 @@ if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
     from ...error_bars.recorded_momentum import RecordedMomentum
 
-# Digits of a bar that are shown; the number before it ends where the bar does.
-_DIGITS = 2
-# Of the angle, or of a degree: a bar below is rounding.
-_NO_BAR = 1e-12
+_DIGITS = 2  # of a bar; the number before it ends where the bar does
+_NO_BAR = 1e-12  # [of the angle, or of a degree] a smaller bar is rounding
 
 
 def error_bars(

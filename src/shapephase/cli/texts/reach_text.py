@@ -14,8 +14,7 @@ _WORDS = {
     1: "rotations about one axis",
     3: "every rotation",
 }
-# [strokes] the loops of the table, for what they turn the body by.
-_STROKE = 0.1
+_STROKE = 0.1  # [strokes] size of the loops in the table
 
 
 def reach_lines(found: Reach, most_pairs: int) -> list[str]:

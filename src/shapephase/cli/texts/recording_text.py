@@ -24,16 +24,11 @@ if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
     from ...error_bars.recorded_momentum import RecordedMomentum
 
-_MOST_NAMES = 8
-"""Names that one line lists."""
-_MOST_PARTS = 10
-"""Stretches of a flight of which the table has a column."""
-_BAR_DIGITS = 2
-"""Digits of a bar that are shown."""
-_WIDER = 1.1
-"""By which bars have to be longer than those of white noise for that to be printed."""
-_ROUNDING = 1e-12
-"""[rad or m] from samples to the path that goes through them."""
+_MOST_NAMES = 8  # in one line
+_MOST_PARTS = 10  # columns of the table of residuals in time
+_BAR_DIGITS = 2  # of a bar
+_WIDER = 1.1  # over the bars of white noise: a smaller ratio is not printed
+_ROUNDING = 1e-12  # [rad or m] from samples to the path through them
 
 
 def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:

@@ -205,12 +205,9 @@ def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple
     return [text], {"recorded_base_difference_rad": angle, "recorded_base_difference_time_s": when}
 
 
-# Joints that a warning names.
-_MOST_NAMED = 4
-# After the point of a direction.
-_DIRECTION_DIGITS = 7
-_FIRST_OF_FOUR = ".x"
-"""The end of the name of a ball joint's first number, in whose row it is shown."""
+_MOST_NAMED = 4  # joints in a warning
+_DIRECTION_DIGITS = 7  # after the point
+_FIRST_OF_FOUR = ".x"  # end of the name of a ball joint's first number, in whose row it is shown
 _PATH_KEYS = {"joints_beyond_limits": "beyond", "joints_beyond_rates": "too_fast", "still_joints": "resting"}
 """JSON keys that are shorter than the names of the fields."""
 

@@ -17,8 +17,7 @@ from ...reconstruction.reconstruction import Motion
 from ...shape_space.files.read import RecordedMotion
 from .result_text import split_heading
 
-# Of a limit, that is still printed.
-_LEAST_SHARE = 1e-3
+_LEAST_SHARE = 1e-3  # of a limit that is printed
 _EFFORTS = {"rad": "N m", "m": "N"}
 
 

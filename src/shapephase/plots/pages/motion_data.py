@@ -18,11 +18,9 @@ from ...errors import unknown_name
 from ...shape_space.ball_columns import ball_columns, neighbours_signs
 from .._moving_scene import MovingNode, MovingScene
 
-# Where a slider ends for a joint without a limit [rad or m], and from where on a limit is none.
-_SLIDER_END = math.pi
+_SLIDER_END = math.pi  # [rad or m] for a joint without a limit
 _NO_LIMIT = 100.0
-# Cells of the floor along the largest extent of a motion.
-_CELLS = 8
+_CELLS = 8  # of the floor along the largest extent of a motion
 AXES = {
     "x": (1.0, 0.0, 0.0),
     "y": (0.0, 1.0, 0.0),

@@ -13,14 +13,10 @@ from ...chebyshev import chebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
 from ...inertia_tensor import inverse_inertia
 
-# Degrees that are tried, along each joint.
-_DEGREES = (8, 12, 16, 24, 32, 48)
-# Largest difference from the connection at which a series is good [rad per unit of joint].
-_GOOD = 1e-10
-# Points between the nodes at which a series is compared with the connection, along each joint.
-_CHECKED = 41
-# The largest difference may lie between them.
-_SAFETY = 2.0
+_DEGREES = (8, 12, 16, 24, 32, 48)  # tried along each joint
+_GOOD = 1e-10  # [rad per unit of joint] difference from the connection of a good series
+_CHECKED = 41  # points between the nodes, along each joint
+_SAFETY = 2.0  # the largest difference may lie between them
 # A recurrence for Chebyshev polynomials of degree n is off by n^2 of this at the edges, in each of two variables.
 _ROUNDING = 2.0 * float(np.finfo(float).eps)
 # Degree of the turns by which the frame of least perturbation differs from the base, and how often they are improved.

@@ -18,22 +18,14 @@ from ...rigid_body.poinsot import Poinsot
 from ..page import Page, frame_count, playing_speed
 from .templates import SCENE_SCRIPTS, page_from
 
-# Periods of the body momentum that are shown, where there are any.
-_PERIODS = 3.0
-# Without a period: turns at the rate of the angular velocity at the start.
-_TURNS = 6.0
-# Points of a polhode: its chords are then within a line's width of it.
-_POLHODE = 361
-# Radius of the part of the plane that is drawn, over the largest of the ellipsoid and the herpolhode.
-_PLANE = 1.15
-# Length of the arrow of the momentum, over the distance of the plane: it ends beyond.
-_ARROW = 1.35
-# Lines of the plane in each direction.
-_LINES = 13
-# Of the ellipsoid; what is inside is seen through it.
-_COLOUR = (0.337, 0.706, 0.914, 0.62)
-# Times at which the outermost of the ellipsoid is taken, so that none of it is ever out of the picture.
-_OUTERMOST = 61
+_PERIODS = 3.0  # of the body momentum that are shown
+_TURNS = 6.0  # shown without a period, at the rate of the angular velocity at the start
+_POLHODE = 361  # points: chords are within a line's width of the curve
+_PLANE = 1.15  # radius of the drawn plane, over that of ellipsoid and herpolhode
+_ARROW = 1.35  # length of the momentum's arrow, over the distance of the plane
+_LINES = 13  # of the plane in each direction
+_COLOUR = (0.337, 0.706, 0.914, 0.62)  # of the ellipsoid, which is transparent
+_OUTERMOST = 61  # times at which the ellipsoid's extent is taken, to keep it in the picture
 
 
 def rolling_ellipsoid(

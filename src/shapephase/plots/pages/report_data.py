@@ -13,10 +13,8 @@ from ...phases.momentum_curve import Gauge, momentum_curve
 from ...phases.phases import running_phases
 from ...reconstruction.reconstruction import Motion
 
-# Joints that are drawn, those that move most.
-_MOST_JOINTS = 8
-# [rad] A smaller turn has no axis.
-_NO_TURN = 1e-9
+_MOST_JOINTS = 8  # those that move most
+_NO_TURN = 1e-9  # [rad] a smaller turn has no axis
 
 
 def report_data(motion: Motion, times: Array, gauge: Gauge, body: Body | None, shapes: Array | None) -> dict[str, Any]:

@@ -21,29 +21,20 @@ from ...arrays import Array
 from ...errors import MissingExtraError, OutputFileError, ShapeError, unknown_name
 from ...files import write_whole
 
-FILM_SIZE = (640, 480)
-"""Width and height of a frame of a film, unless they are given [px]."""
-# Frames in a second, by the file's ending [1/s]: a GIF counts in hundredths of a second.
-_RATES = {".gif": 25, ".mp4": 30}
-VIDEO_ENDINGS = (".gif", ".mp4", ".png")
-"""Of films, and of strips of pictures."""
-# Pictures of a strip.
-_PICTURES = 6
-# Colours of a GIF, which has 256, and frames of which they are taken.
-_COLOURS = 255
+FILM_SIZE = (640, 480)  # [px] width and height of a frame
+_RATES = {".gif": 25, ".mp4": 30}  # [1/s] frames; a GIF counts in hundredths of a second
+VIDEO_ENDINGS = (".gif", ".mp4", ".png")  # films, and strips of pictures
+_PICTURES = 6  # of a strip
+_COLOURS = 255  # a GIF has 256
 _PALETTE_FRAMES = 5
-# Constant quality of an MP4, of 51: lower is better and larger; at 20 one sees no difference.
-_QUALITY = 20
+_QUALITY = 20  # of 51 for MP4: lower is better and larger, at 20 one sees no difference
 # Browsers that can draw without a window, in the order in which they are looked for.
 _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # By software, so that all machines draw the same.
 _FLAGS = ("--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars")
-# A browser that has not answered in this time never will [ms].
-_NEVER = 180_000.0
-# Between two looks whether the page is there [ms].
-_LOOK = 50.0
-# Of a film [px]: MP4 wants even numbers.
-_SMALLEST = 64
+_NEVER = 180_000.0  # [ms] the browser hangs
+_LOOK = 50.0  # [ms] between checks of whether the page is there
+_SMALLEST = 64  # [px] MP4 wants even numbers
 _LARGEST = 4096
 
 
