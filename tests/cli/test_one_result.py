@@ -146,5 +146,5 @@ def test_a_report_says_what_it_was_made_of(capfd, tmp_path, monkeypatch):
     assert page.count(f'<td class="number">{masses[0]:.6g}</td>') >= 1
     story = html.unescape(" ".join(re.findall(r'<p class="story">(.*?)</p>', page)))
     for words in ("The shape alone turned it by ", "the angular momentum of ", "Both together turned it by ",
-                  "the attitude is off by ", "stands under error bars"):  # fmt: skip
+                  "The numerical error of the attitude is at most ", "stand under error bars"):  # fmt: skip
         assert words in story

@@ -71,7 +71,7 @@ def test_what_was_done_is_on_the_card(take, capsys):
         "momentum, fitted",
         "71 attitudes with 0.5",
         "deg rms from this one",
-        "± of the recorded base  alone; the noise of the joints is not stated",
+        "± of the recorded base  only; give --joint-noise",
         "pelvis_tilt, pelvis_list, pelvis_rotation, turning in the order z x y; the usual order, --base-order",
         "x -z y of the recorded ones; the usual ones of a pelvis, --base-axes",
         "71 of 220 samples, 0.5 to 1.2 s",

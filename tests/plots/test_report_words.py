@@ -15,14 +15,16 @@ from shapephase.plots._report_text import joint_rows, torque_words
 def test_joints_that_give_out_what_they_take_back_do_no_work():
     """From rest to rest; a motion that ends faster than it begins changes its energy by the work said."""
     cat = sp.load_body("cat")
-    assert "do no work" in torque_words(sp.reconstruct(sp.articulated(cat, cat_righting()), np.zeros(3)))
+    assert "The net work of all joints is zero" in torque_words(
+        sp.reconstruct(sp.articulated(cat, cat_righting()), np.zeros(3))
+    )
     pair = sp.load_body("cat_two_halves")
     path = sp.ShapePath.spline(
         [0.0, 0.3, 0.6, 1.0], [[0.0, 0.0, 0.0], [0.1, 0.0, 0.1], [0.2, 0.1, 0.4], [0.6, 0.2, 1.0]]
     )
     motion = sp.reconstruct(sp.articulated(pair, path), [0.0, 0.0, 0.005])
     first, last = motion.deformation.kinetic_energy(np.array([0.0, 1.0]), motion.angular_velocity(np.array([0.0, 1.0])))
-    said = float(torque_words(motion).split("a work of ")[1].split(" J")[0])
+    said = float(torque_words(motion).split("work of all joints: ")[1].split(" J")[0])
     assert said == pytest.approx(last - first, rel=5e-3)
 
 
@@ -36,7 +38,7 @@ def test_of_a_recording_no_torque_or_rate_stands_without_its_bar():
     for smooth, torque, rate in (
         (
             0.005,
-            r"N m at .* s, [\d.]+ ± [\d.]+ % of its limit.*a work of [-\d.]+ ± [\d.]+ J",
+            r"N m at .* s, [\d.]+ ± [\d.]+ % of its limit.*work of all joints: [-\d.]+ ± [\d.]+ J",
             r"\([\d.]+ ± [\d.]+\)°/s",
         ),
         (None, "most of a torque may be noise", r"[\d.]+°/s ± unknown"),

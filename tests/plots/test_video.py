@@ -81,7 +81,7 @@ def test_an_mp4_is_read_back_frame_by_frame(tmp_path):
 def test_what_ffmpeg_says_is_said(monkeypatch):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
     monkeypatch.setattr(ffmpeg, "get_ffmpeg_exe", lambda: "false")
-    with pytest.raises(OutputFileError, match="ffmpeg, which makes the film, failed: it said nothing"):
+    with pytest.raises(OutputFileError, match="ffmpeg, which makes the film, failed: without a message"):
         video._mp4(painted(3), 3)
 
 

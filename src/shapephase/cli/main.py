@@ -35,7 +35,7 @@ from .rigid_body.rigid import rigid_command
 from .split import split_command
 from .start import forget, was_pressed
 from .sweep import plot_study_command, sweep_app
-from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
+from .terminal import Verbosity, abandon, one_line, put, say, verbosity, verbosity_from
 from .torques import torques_command
 
 # Options that had a second name.
@@ -89,7 +89,7 @@ app.register_install_completion_command(
 
 @dataclass(frozen=True, kw_only=True)
 class _Failure:
-    """Why a command came to no result."""
+    """Failure of a command: message, exit code, kind."""
 
     message: str
     code: ExitCode
@@ -97,18 +97,18 @@ class _Failure:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; a fault ends it with one line on stderr and one of `ExitCode`.
+    """Run the command line; an error ends it with one line on stderr and one of `ExitCode`.
 
     Warnings are lines on stderr too, and a list in what `--json` prints.
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     SHOWS_ALL.set(HELP_ALL in tokens)
     tokens = ["--help" if token == HELP_ALL else token for token in tokens]
-    with spoken(tokens), command_line(tokens), as_command():
+    with verbosity_from(tokens), command_line(tokens), as_command():
         try:
             code = _ran(tokens, as_json="--json" in tokens)
         except BrokenPipeError:
-            # What reads the output wants no more of it.
+            # The reader closed the pipe.
             for stream in (sys.stdout, sys.stderr):
                 abandon(stream)
             code = ExitCode.BROKEN_PIPE
@@ -121,7 +121,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _ran(tokens: list[str], *, as_json: bool) -> int:
-    """Run a command, print what it gives, and return the exit code."""
+    """Run a command, print its result, and return the exit code."""
     with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")
         outcome = _outcome(tokens)
@@ -138,7 +138,7 @@ def _ran(tokens: list[str], *, as_json: bool) -> int:
     data["provenance"] = provenance(made_from)
     if outcome.with_verdict:
         many = "1 warning" if len(messages) == 1 else f"{len(messages)} warnings"
-        verdict = f"usable, with {many}" if messages else "no fault found"
+        verdict = f"OK, {many}" if messages else "OK"
         listed = "".join(f"\nwarning: {message}" for message in messages)
         data, text = data | {"verdict": verdict}, f"{text}\n{listed}\nverdict: {verdict}"
     try:
@@ -150,7 +150,7 @@ def _ran(tokens: list[str], *, as_json: bool) -> int:
 
 
 def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
-    """What a command gives, or why it gives nothing."""
+    """Return the result of a command, or its failure."""
     try:
         return app(tokens, exit_on_error=False, print_error=False)
     except CycloptsError as error:
@@ -171,7 +171,7 @@ def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
             traceback.print_exc()
         place = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {one_line(error)} ({place.filename}:{place.lineno})"
-        hint = "this is a fault of shapephase, please report it"
+        hint = "this is a bug of shapephase, please report it"
         return _Failure(message=f"{hint}: {message}", code=ExitCode.INTERNAL, kind=type(error).__name__)
 
 

@@ -1,4 +1,4 @@
-"""The body and the motion that a command is given, loaded and reconstructed."""
+"""Body and motion of a command, loaded and reconstructed."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ _LONGEST_SHOWN = 80  # characters of a name that an error repeats
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """A reconstructed motion and what it is made of.
+    """A reconstructed motion, its body, path and recording.
 
     Attributes
     ----------
     recorded : None where the joints are not from a file
     fitted : its momentum, where it was fitted to the recorded base
-    momentum_by : "fit", "given", or "nothing" of a recording that does not say it
+    momentum_by : "fit", "given", or "nothing" for a recording without a turning base
     """
 
     motion: Motion
@@ -61,7 +61,7 @@ class Flight:
 
     @property
     def beginning(self) -> str:
-        """What the first line of output says of a recording: its flight, or that its momentum is not known."""
+        """Text about a recording for the first line: its flight, or why its momentum is zero."""
         if self.recorded is None:
             return ""
         if self.momentum_by == "nothing":
@@ -78,7 +78,7 @@ class Flight:
 
     @property
     def up(self) -> str | None:
-        """The axis that is up in the recording, where its fall says so."""
+        """Axis that points up in the recording, by its fall; None without one."""
         fall = None if self.recorded is None or self.recorded.flight is None else self.recorded.flight.fall
         return None if fall is None else fall.up.removeprefix("+")
 
@@ -95,11 +95,7 @@ def flight(
     trail: str | None = None,
     floating: BodyOptions = BODY_DEFAULTS,
 ) -> Flight:
-    """The motion that the arguments and options of a command describe.
-
-    What needs no motion to be checked is checked before: also the gauge, and the link of a trail, that the command is
-    to use later.
-    """
+    """Return the motion of a command. Gauge, tolerance and trail are checked before the motion is read."""
     start = _start(motion, options)
     goal = tolerance_argument(tolerance)
     momentum = None if options.momentum is None else finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
@@ -128,24 +124,24 @@ def flight(
 
 
 def _start(motion: str, options: StartOptions) -> Array | None:
-    """The attitude at the start (3, 3): the one that is given, or that with which a motion of the library begins."""
+    """Return the attitude at the start (3, 3): as given, or that of a motion of the library."""
     if options.attitude is not None:
         return so3.quat_argument(options.attitude, "attitude")
     return so3.matrix_from_quat(np.array(MOTIONS[motion].attitude)) if _is_named(motion) else None
 
 
 def _is_named(motion: str) -> bool:
-    """Whether it is a motion of the library, and no file of that name."""
+    """True for a motion of the library, if no file has its name."""
     return motion in MOTIONS and not os.path.isfile(motion)
 
 
 def is_without_momentum(motion: str, options: StartOptions) -> bool:
-    """Whether the momentum is known to be zero before the motion is read: a recorded base may still show one."""
+    """True where the momentum is zero for sure; a recorded base may still give one."""
     return _is_named(motion) if options.momentum is None else not any(options.momentum)
 
 
 def body_argument(body: str, floating: BodyOptions) -> Body:
-    """The body that a command names. Raises what `load_body` raises, and ShapeError for what is rather a motion."""
+    """Return the body of a command. Raises as `load_body`, and ShapeError for a motion in its place."""
     is_file = os.path.isfile(body)
     if (body in MOTIONS and not is_file) or (is_file and Path(body).suffix.lower() in _OF_MOTIONS):
         raise ShapeError(
@@ -157,9 +153,9 @@ def body_argument(body: str, floating: BodyOptions) -> Body:
 def joint_motion(
     motion: str, body: Body, recording: RecordingOptions = RECORDING_DEFAULTS, *, given: bool | None = None
 ) -> tuple[ShapePath, RecordedMotion | None]:
-    """The path of a motion, and its record if it comes from a file.
+    """Return the path of a motion, and its recording if it comes from a file.
 
-    given : whether its momentum is given, and not to be found from the base; None: no momentum is needed
+    given : whether its momentum is given; False: it is fitted to the base; None: none is needed
     """
     if _is_named(motion):
         for field in fields(recording):
@@ -190,7 +186,7 @@ def joint_motion(
 
 
 def column_names(words: tuple[str, ...]) -> dict[str, str | None]:
-    """The mapping of `--names`: pairs, files of pairs, or the names of all columns of a table without a header.
+    """Return the mapping of `--names`: pairs, files of pairs, or the names of all columns of a table without a header.
 
     Raises ShapeError for a column that stands twice.
     """

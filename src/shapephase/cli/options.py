@@ -404,9 +404,7 @@ class ErrorOptions:
     ] = None
     mass_error: Annotated[
         float | None,
-        rare(
-            "Standard deviation of each link's mass, as a fraction of it; for example `--mass-error 0.05`.", rare=True
-        ),
+        rare("Standard deviation of each link's mass, as a fraction of it; for example `--mass-error 0.05`."),
     ] = None
     centre_error: Annotated[
         float | None,

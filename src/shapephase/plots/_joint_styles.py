@@ -11,7 +11,7 @@ from .plot_style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SERIES, VERMILION
 
 _COLOURS = (BLUE, ORANGE, BLACK, GREEN, VERMILION, PURPLE)  # neighbours differ in grey, too
 _MARKERS = ("o", "s", "^", "D", "v", "P")
-# The side that a joint's name tells: whole words, or letters set off by the end of the name or an underline.
+# Sides in names of joints: whole words, or letters set off by the end of the name or an underline.
 _SIDES = {"left": "right", "right": "left", "l": "r", "r": "l"}
 _SIDE = re.compile(
     r"(?<![A-Za-z])(left|right|l|r)(?![A-Za-z])|(?<![a-z])(left|right)(?=[A-Z])|(?<=[a-z])(left|right)\b", re.IGNORECASE
@@ -43,12 +43,12 @@ def other_side(name: str) -> str | None:
 
 
 def both_sides(names: Sequence[str]) -> bool:
-    """Whether a left joint and its like on the right are among them."""
+    """True where a left joint and its right one are among the names."""
     return any(other_side(name) in names for name in names)
 
 
 def joint_styles(names: Sequence[str]) -> list[dict[str, Any]]:
-    """A look for each of at most six joints: as `SERIES`, unless there are both sides of a joint among them."""
+    """Line styles of at most six joints: `SERIES`, or for both sides of a joint one colour and marker."""
     if not both_sides(names):
         return list(SERIES[: len(names)])
     groups: dict[str, int] = {}

@@ -52,7 +52,7 @@ class MovingNode:
 
 @dataclass(frozen=True, eq=False)
 class MovingScene:
-    """All that moves, at F frames; lengths in m, in inertial axes unless stated otherwise.
+    """Moving shapes of a motion at F frames; lengths in m, in inertial axes unless stated otherwise.
 
     Attributes
     ----------

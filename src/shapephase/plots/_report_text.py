@@ -1,4 +1,4 @@
-"""What a report says in words and tables: what happened, the split, the joints and masses, and where all comes from."""
+"""Words and tables of a report: story, split, joints, masses, inputs and provenance."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def lead(motion: Motion) -> str:
 
 
 def is_rigid(motion: Motion) -> bool:
-    """Whether the body keeps its shape."""
+    """True where the body keeps its shape."""
     description = motion.deformation.description
     path = getattr(description, "path", None)
     rests = path is not None and not np.ptp(path.shape(path.sample_times), axis=0).any()
@@ -60,7 +60,7 @@ def is_rigid(motion: Motion) -> bool:
 
 
 def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
-    """What happened, in sentences."""
+    """Sentences about the motion and its split."""
     name = f"The body ({body.name}, {body.n_joints} joints, {body.mass:.4g} kg)" if body else "The body"
     loop = "and ends in the shape it began with" if result.is_loop else "and ends in another shape than it began with"
     words = [f"{name} changes its shape for {motion.duration:g} s {loop}."]
@@ -107,7 +107,7 @@ def story(motion: Motion, result: PhaseSplit, body: Body | None) -> list[str]:
 
 
 def torque_words(motion: Motion, noise: Array | None = None) -> str:
-    """Which joint bears most, in sentences, of a recording with bars. Raises as `joint_torques`.
+    """Sentences about the largest torque and the work, with bars for a recording. Raises as `joint_torques`.
 
     noise : of the samples of a recording (n,), where it is known
     """
@@ -128,31 +128,31 @@ def torque_words(motion: Motion, noise: Array | None = None) -> str:
                 f"the largest {kind} is that of {loads.joint_names[most]}, "
                 f"{_bar_text(loads.peak_torque[most], off, '.3g')} {effort} at {loads.peak_time[most]:.3g} s{limit}"
             )
-    words = f"Of the joints {'; '.join(parts)}. " if parts else ""
+    words = f"Joints: {'; '.join(parts)}. " if parts else ""
     whole = float(loads.work.sum())
     if abs(whole) <= _NO_WORK * float(np.abs(loads.work).sum()):
-        rest = "All joints together do no work: the kinetic energy is at the end what it was at the start."
+        rest = "The net work of all joints is zero: the kinetic energy ends as it began."
     else:
         work = _bar_text(whole, None if bars is None else bars.total_work, ".3g")
-        rest = f"All joints together do a work of {work} J, the change of the kinetic energy."
+        rest = f"Net work of all joints: {work} J, the change of the kinetic energy."
     return f"{words}{rest}{doubt}"
 
 
 def _load_bars(motion: Motion, loads: JointLoads, noise: Array | None) -> tuple[LoadErrors | None, str]:
-    """Bars of what the joints of a recording do, and what is to be said where they are not known."""
+    """Bars of the loads of a recording, and a sentence where they are unknown."""
     found = body_and_path(motion)
     assert found is not None
     if noise is None and found[1].record is None:
         return None, ""
     if noise is None and stated_noise(found[1]) is None:
         return None, (
-            " How far these are off is not known: the noise of the recording is not stated (--smooth 0.3deg), and most "
-            "of a torque may be noise."
+            " Their errors are unknown: give the noise of the recording (--smooth 0.3deg); most of a torque may be "
+            "noise."
         )
     try:
         return load_errors(motion, loads, noise), ""
     except WrongObjectError as error:
-        return None, f" How far these are off is not known: {error}."
+        return None, f" Their errors are unknown: {error}."
 
 
 def _bar_text(value: float, bar: float | None, usual: str) -> str:
@@ -160,18 +160,18 @@ def _bar_text(value: float, bar: float | None, usual: str) -> str:
 
 
 def accuracy(motion: Motion, error_bars: Sequence[str]) -> str:
-    """How far all that may be off, in sentences."""
+    """Sentences about the errors of the numbers."""
     words = (
-        f"As computed, the attitude is off by {float(motion.error_estimate):.1e} rad at most, at all times: an "
+        f"The numerical error of the attitude is at most {float(motion.error_estimate):.1e} rad at all times: an "
         "estimate, not a bound."
     )
     if error_bars:
-        words += " What the inputs leave open is far more, and stands under error bars."
+        words += " The errors due to the inputs are far larger, and stand under error bars."
     return words
 
 
 def split_rows(result: PhaseSplit) -> list[Row]:
-    """The split as a table."""
+    """Rows of the split."""
     errors = result.error_estimates
     rows = [
         _rotation("Total rotation", result.total_rotation, errors.total_rotation),
@@ -202,7 +202,7 @@ def split_rows(result: PhaseSplit) -> list[Row]:
 
 
 def joint_rows(body: Body, path: ShapePath, noise: Array | None = None) -> list[tuple[str, ...]]:
-    """Of each joint: name, range, limits and largest rate, of a recording with its bar; `noise` as for
+    """Rows of the joints: name, range, limits and largest rate, with its bar for a recording; `noise` as for
     `torque_words`."""
     found = path_summary(body, path)
     bars = _rate_bars(body, path, found.fastest_at, noise)
@@ -224,7 +224,7 @@ def joint_rows(body: Body, path: ShapePath, noise: Array | None = None) -> list[
 
 
 def _rate_bars(body: Body, path: ShapePath, times: Array, noise: Array | None) -> Array | None:
-    """Of each joint's rate at its own time: (n,); None where they are not known."""
+    """Bars of each joint's rate at its own time (n,); None where they are unknown."""
     route = in_joint_order(body, path)
     if noise is None and stated_noise(route) is None:
         return None
@@ -235,7 +235,7 @@ def _rate_bars(body: Body, path: ShapePath, times: Array, noise: Array | None) -
 
 
 def part_rows(body: Body) -> list[tuple[str, ...]]:
-    """Of each rigid part with mass: its first link, mass, centre of mass and principal moments."""
+    """Rows of the rigid parts with mass: first link, mass, centre of mass and principal moments."""
     return [
         (
             part.links[0] if len(part.links) == 1 else f"{part.links[0]} +{len(part.links) - 1}",
@@ -249,7 +249,7 @@ def part_rows(body: Body) -> list[tuple[str, ...]]:
 
 
 def input_rows(motion: Motion, gauge: str, body: Body | None) -> list[Row]:
-    """How good the numbers are, what they were computed from, and how."""
+    """Rows of accuracy, inputs and method."""
     quaternion = ", ".join(f"{x:z.9f}" for x in motion.quat_xyzw(motion.duration))
     rows = [
         ("Final attitude", "", f"quaternion x y z w ({quaternion})"),
@@ -265,7 +265,7 @@ def input_rows(motion: Motion, gauge: str, body: Body | None) -> list[Row]:
 
 
 def _origin_rows(made_from: Mapping[str, Any]) -> list[Row]:
-    """The joints, the recording and what was done to it, and when, how and by what all was computed."""
+    """Rows of joints, recording and provenance."""
     found = provenance()
     record = dict(made_from.get("recording", {}))
     rows = [("Joints", "", ", ".join(made_from.get("joints", ())))] if made_from.get("joints") else []
@@ -287,7 +287,7 @@ def _plain_text(value: Any) -> str:
 
 
 def _turn(rotation: Array) -> str:
-    """For a sentence: angle and axis."""
+    """Angle and axis of a rotation for a sentence."""
     vector = so3.log(rotation)
     angle = float(np.linalg.norm(vector))
     if np.degrees(angle) < 0.005:
@@ -311,7 +311,7 @@ def _phase(name: str, phase: Array, error: Array, remark: str) -> Row:
 
 
 def _with_error(angle: float, error: Array) -> tuple[str, str]:
-    """An angle in degrees, and in radians with its error; with the digits that this leaves."""
+    """An angle in degrees, and in radians with its error; with the digits that the error leaves."""
     off = float(error)
     in_degrees = digits_left(float(np.degrees(off)), DEGREE_DIGITS)
     in_radians = digits_left(off, RADIAN_DIGITS)

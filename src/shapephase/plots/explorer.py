@@ -1,4 +1,4 @@
-"""One offline page to draw loops of two joints on, and to see what they turn the body by."""
+"""Page to draw loops of two joints on, with the turn of the body along them."""
 
 from __future__ import annotations
 
@@ -131,13 +131,13 @@ def _plane_data(
 
 
 def _largest_momentum(series: PlaneSeries) -> float:
-    """Where the sliders of the momentum end: about one turn in a round of the loop, two digits [kg m^2/s]."""
+    """Largest momentum of the sliders: about one turn in a round of the loop, two digits [kg m^2/s]."""
     mean = float(np.trace(series.inertia[0, 0])) / 3.0
     return float(f"{2.0 * np.pi * mean / _DURATION:.1e}")
 
 
 def _still_motion(body: Body, places: tuple[int, int], shown: Array, rest: Array, up: Array) -> dict[str, Any]:
-    """The body at rest, as the page's scripts take a motion; they put the motion along a loop in its place."""
+    """Data of the body at rest, in whose place the page's scripts put the motion along a loop."""
     grid = np.meshgrid(*(np.linspace(ends[0], ends[1], _SIZES) for ends in shown), indexing="ij")
     shapes = np.tile(rest, (_SIZES**2, 1))
     shapes[:, places[0]], shapes[:, places[1]] = (values.ravel() for values in grid)

@@ -176,7 +176,7 @@ def plot_fixed_points(
 def _draw_curve(
     drawn: SphereAxes, points: Array, closing: Array, cells: AreaCells | None, look: dict[str, Any], scale: float = 1.0
 ) -> None:
-    """The curve, where it begins and ends, which way it goes, what closes it, and the area inside."""
+    """Draw the curve with its ends, direction, closing arc and area."""
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     drawn.curve(points, r"$\Pi/|\Pi|$", **look)
     places = np.searchsorted(length, length[-1] * np.array([0.125, 0.375, 0.625, 0.875]))
@@ -268,7 +268,7 @@ def _great_circle(start: Array, end: Array) -> Array:
 
 
 def _view_of(points: Array) -> tuple[float, float]:
-    """A view from a little beside the middle of a curve, so that the sphere still looks round."""
+    """View from beside the middle of a curve, which keeps the sphere round."""
     middle = points.mean(axis=0)
     if float(np.linalg.norm(middle)) < _SPREAD:
         return _DEFAULT_VIEW

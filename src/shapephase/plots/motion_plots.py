@@ -54,7 +54,7 @@ def plot_phases(
     """The dynamic, geometric and total (Montgomery) phase in time, in degrees and in radians.
 
     Each ends in the number of `split`, which the legend has: at every time the momentum's curve so far is closed by
-    the great circle back to its start. Where it stays open by more than a degree, the legend says how much the circle
+    the great circle back to its start. Where it stays open by more than a degree, the legend has what the circle
     adds at the end. Where the great circle passes over the region that is not counted, the lines jump by a whole
     sphere, 720 degrees, which dots mark. A geometric phase too small to be seen beside the others is enlarged in an
     inset, in degrees.
@@ -227,7 +227,7 @@ def plot_energy(
     With l the momentum's norm, the energy lies between l²/(2 I₃) and l²/(2 I₁). Above l²/(2 I₂), the energy on the
     separatrix, the frozen polhode circles the axis of the smallest moment, below it that of the largest. Where the
     farthest of these three would press the energy into a small part of the axis, the axis ends before it, and the
-    legend says up to where it goes.
+    legend has its end.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ def _enlarged(ax: Any, t: Array, found: RunningPhases) -> None:
 
 
 def _phase_title(found: RunningPhases, jumps: int) -> str:
-    """The gauge, and what closes the curve: how far it is open at the last time drawn, and what that adds."""
+    """Title with the gauge, the gap of the curve at the last time drawn, and the phase that closing it adds."""
     lines = [f"{plain_text(found.gauge)} gauge"]
     gap, added = float(found.momentum_gap[-1]), float(found.closing_phase[-1])
     if gap > CLOSED_GAP and found.closing == "start":
@@ -337,7 +337,7 @@ def _phase_title(found: RunningPhases, jumps: int) -> str:
 
 
 def _degrees(angle: float, *, sign: bool = False) -> str:
-    """An angle in degrees with two digits after the point, with a minus sign that is one."""
+    """An angle in degrees with two digits after the point and a typographic minus sign."""
     return f"{np.degrees(angle):{'+' if sign else ''}z.2f}°".replace("-", "−")
 
 

@@ -1,4 +1,4 @@
-"""The figures of a motion by name, one column wide, as images in files or in memory."""
+"""Figures of a motion or a rigid body by name, one column wide, as images in files or in memory."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Figure:
     ----------
     caption : one line
     height : [in]
-    draw : draws into axes, from a motion, the path of the joints and a gauge
+    draw : function of axes, motion, path of the joints and gauge
     with_momentum, with_path : whether it needs a momentum, a path of the joints
     of_change : whether it shows nothing but zero of a rigid body
 
@@ -98,7 +98,7 @@ RIGID_FIGURES: Mapping[str, tuple[float, Callable[[Axes, EulerTop, float], objec
     "rolling": (3.6, lambda ax, top, time: plot_rolling_ellipsoid(ax, top, time)),
     "cones": (3.6, lambda ax, top, time: plot_cones(ax, top, time)),
 }
-"""Figures of a free rigid body by name: the height of each [in], and what draws it at a time [s]."""
+"""Figures of a free rigid body by name: the height of each [in], and the function that draws it at a time [s]."""
 
 
 def motion_figure(

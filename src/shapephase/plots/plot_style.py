@@ -1,4 +1,4 @@
-"""The style of all figures: colours, lines and sizes; and the argument checks that drawing functions share.
+"""Style of all figures: colours, lines and sizes; and argument checks that drawing functions share.
 
 The colours are those of Okabe and Ito, which people with any colour vision can tell apart; lines also differ by their
 dashes and points by their markers, so that nothing is lost in black and white. Sizes are for figures one column wide,
@@ -116,7 +116,7 @@ def write_axes(ax: Any, out: str | os.PathLike[str]) -> None:
 
 
 def _is_long(artist: Any) -> bool:
-    """Whether an artist has more points than a figure of vectors should hold."""
+    """True where an artist has more points than a figure of vectors should hold."""
     if hasattr(artist, "get_xdata"):
         return len(artist.get_xdata(orig=True)) > _MAX_VECTOR_POINTS
     if hasattr(artist, "get_patch_transform"):
@@ -157,7 +157,7 @@ def one_motion(motion: Motion) -> None:
 
 
 def motion_times(motion: Motion, times: ArrayLike | None) -> Array:
-    """The times to draw at: those given, or every integrator step cut into so many parts that no turn is missed."""
+    """Times to draw at: as given, or so many in each integrator step that no turn is missed."""
     if times is not None:
         return given_times(times, motion.duration)
     steps = motion.solution.times
@@ -166,7 +166,7 @@ def motion_times(motion: Motion, times: ArrayLike | None) -> Array:
 
 
 def even_times(of: Deformation | ShapePath, times: ArrayLike | None) -> Array:
-    """The times to draw at: those given, or evenly spaced ones between the breaks."""
+    """Times to draw at: as given, or evenly spaced between the breaks."""
     if times is not None:
         return given_times(times, of.duration)
     count = max(_MIN_POINTS, _POINTS_PER_LOOP * of.loops)
@@ -207,7 +207,7 @@ def finish(ax: Any, **place: Any) -> Any:
 
 
 def with_symbols(ax: Any) -> None:
-    """Let the symbols in labels, legend and texts of some axes have serifs, by which l, I and 1 are told apart."""
+    """Let the symbols in labels, legend and texts of some axes have serifs, which distinguish l, I and 1."""
     legend = ax.get_legend()
     named = [*legend.get_texts(), legend.get_title()] if legend else []
     for text in (ax.xaxis.label, ax.yaxis.label, *ax.texts, *named):

@@ -34,7 +34,7 @@ _HEADS = np.array([0.25, 0.7])  # [length of a separatrix] arrowheads along it
 _TAIL = 10.0  # [1/rate] from its crest: exp(-10) is within a line's width of the foot
 _SEPARATRIX_END = 1e-5  # [rad] short of a quarter turn, where the elliptic integral is infinite
 _PHASE_STEP = 0.02  # [rad] between points: chords stay within a line's width of the curve
-# Points of a herpolhode: smooth at the least, and at the most some two hundred turns, which cannot be told apart.
+# Points of a herpolhode: smooth at the least, and at the most some two hundred turns, which are not distinguishable.
 _MIN_POINTS = 400
 _MAX_POINTS = 60_000
 _LARGEST_RATIO = 2.2  # I3/I1 at the top: a little above 2, the most of a rigid body
@@ -160,7 +160,7 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
 
 
 def plot_heavy_top_stability(ax: Axes, tops: ArrayLike = (), *, fastest: float = 4.0) -> Axes:
-    """Where the upright Lagrange top is stable: I3/I1 against Pi3/sqrt(M g l I1), both without unit.
+    """Stability of the upright Lagrange top: I3/I1 against Pi3/sqrt(M g l I1), both without unit.
 
     Stable for Pi3² >= 4 M g l I1, whatever I3, at equality too: the verdict of `sleeping_top`. At I3 = 2 I1 eigenvalues
     are double for every Pi3; beyond the threshold they are imaginary there as elsewhere. No top with weight reaches

@@ -1,4 +1,4 @@
-"""Figures of what is certain before a motion is computed: the reachable part of the momentum sphere, and bounds."""
+"""Figures of certain bounds of a motion: the reachable part of the momentum sphere, and tightness of bounds."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def plot_crown(
 
 
 def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
-    """How near each bound is to the value it bounds: a bar of `Bound.tightness`, 1 where they are equal.
+    """Tightness of each bound: a bar of `Bound.tightness`, 1 where it equals the value it bounds.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""One HTML file about a motion: what happened, the body moving beside its curves, figures, numbers and inputs."""
+"""Page about a motion and its split: story, moving body beside its curves, figures, numbers and inputs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _report_to(progress: ProgressCallback | None, share: float, text: str) -> No
 
 
 def figure_rows(figures: Sequence[Any]) -> list[Sequence[Any]]:
-    """Figures in rows that are all full: two each, and three in the last one of an odd number."""
+    """Rows of two figures, and of an odd number three in the last row."""
     last = max(len(figures) - 3, 0) if len(figures) % 2 else len(figures)
     rows = [figures[k : k + 2] for k in range(0, last, 2)]
     return rows + ([figures[last:]] if len(figures) % 2 else [])

@@ -188,22 +188,22 @@ class _Ellipsoid:
         self.shrink = axes / semi_axes
 
     def points(self, directions: Array) -> Array:
-        """Of points of the unit sphere: (..., 3) -> (..., 3)."""
+        """Image of points of the unit sphere: (..., 3) -> (..., 3)."""
         return directions @ self.stretch.T
 
     def faces(self, points: Array, eye: Array) -> Mask:
-        """Whether points (N, 3) of the surface are on the side of the eye."""
+        """True where points (N, 3) of the surface are on the side of the eye."""
         return (points @ self.shrink) @ (eye @ self.shrink) >= _LIMB
 
     def hides(self, points: Array, eye: Array) -> Mask:
-        """Whether the ellipsoid is between points (N, 3) outside it and the eye."""
+        """True where the ellipsoid is between points (N, 3) outside it and the eye."""
         start, towards = points @ self.shrink, eye @ self.shrink
         along = start @ towards / (towards @ towards)
         nearest = np.sum(start**2, axis=-1) - along**2 * (towards @ towards)
         return (along < 0.0) & (nearest < 1.0)
 
     def outline(self, eye: Array) -> Array:
-        """What is seen of it as its edge: (N, 3)."""
+        """Visible edge: (N, 3)."""
         return self.points(_circle(so3.normalised(eye @ self.shrink)))
 
     def box(self) -> Array:
@@ -213,7 +213,7 @@ class _Ellipsoid:
 
 
 def _draw_ellipsoid(space: ParallelAxes, ellipsoid: _Ellipsoid) -> None:
-    """Its outline, the ellipses in its principal planes, and a grid about the axis of the largest moment."""
+    """Draw the outline, the ellipses in the principal planes, and a grid about the axis of the largest moment."""
     if not space.solid:
         _filled(space, ellipsoid.outline(space.eye), "#DDEAF3", BLACK, depth=2.5)
     angles = np.linspace(0.0, np.pi, _MERIDIANS, endpoint=False)
@@ -233,7 +233,7 @@ def _draw_ellipsoid(space: ParallelAxes, ellipsoid: _Ellipsoid) -> None:
 def _draw_cone(
     space: ParallelAxes, axis: Array, slant: float, half: float, label: str, face: str, line: dict[str, Any]
 ) -> None:
-    """A cone from the origin: its rim, some of its generators, and its sides as a shade."""
+    """Draw a cone from the origin: its rim, some of its generators, and its sides as a shade."""
     rim = _rim(axis, slant, half)
     _filled(space, np.vstack([np.zeros((1, 3)), rim]), face, "none", depth=1.5, hull=True)
     outwards = (rim - slant * np.cos(half) * axis) * np.cos(half) - slant * np.sin(half) ** 2 * axis
@@ -258,7 +258,7 @@ def _circle(normal: Array, count: int = _AROUND) -> Array:
 
 
 def _filled(space: ParallelAxes, corners: Array, face: str, edge: str, *, depth: float, hull: bool = False) -> None:
-    """A polygon (N, 3), or what is seen of a convex body of which these are the corners."""
+    """Fill a polygon (N, 3), or the outline of a convex body with these corners."""
     look = {"facecolor": face, "edgecolor": edge, "linewidth": 0.8, "alpha": 0.6, "zorder": depth}
     if space.solid:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -302,7 +302,7 @@ def _write(space: ParallelAxes, point: Array, text: str) -> None:
 
 
 def _finish(space: ParallelAxes, reach: Array, title: str) -> None:
-    """Limits around all that is drawn, and the legend below it."""
+    """Set limits around all that is drawn, and the legend below it."""
     if space.solid:
         middle, half = 0.5 * (reach.min(axis=0) + reach.max(axis=0)), 0.5 * float(np.ptp(reach, axis=0).max())
         for name, centre in zip("xyz", middle, strict=True):

@@ -222,7 +222,7 @@ def plot_curvature(
 def plot_reach(ax: Axes, found: Reach, count: int = 10) -> Axes:
     """The pairs of joints whose small loops turn the body most, in degrees per square radian.
 
-    The colour says which base axis the turn is mostly about.
+    The colour is that of the base axis nearest to the turn's.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def plot_reach(ax: Axes, found: Reach, count: int = 10) -> Axes:
 def _limit_bands(
     places: dict[str, Any], units: Sequence[str], limits: Array, values: Array, named: Any, looks: list[dict[str, Any]]
 ) -> bool:
-    """Bands beyond the limits of joints that are near to what is drawn; whether there is one."""
+    """Draw bands beyond limits that are near to what is drawn; return True if there is one."""
     drawn = False
     for unit, ax in places.items():
         own = [(k, look) for k, look in zip(named, looks, strict=True) if units[k] == unit]

@@ -91,7 +91,7 @@ def rigid_command(
 
 
 def _top(moments: Vector, momentum: Vector) -> EulerTop:
-    """The body, if it turns at a rate that can be drawn. Raises ShapeError."""
+    """Return the body. Raises ShapeError for rates that cannot be drawn."""
     from ...rigid_body.euler_top import EulerTop
 
     largest = max(map(abs, momentum))

@@ -17,7 +17,7 @@ _ENDINGS = {
 
 
 def plan_lines(body: Body, plan: Plan) -> list[str]:
-    """Return the table."""
+    """Return the table of a plan."""
     momentum = " ".join(f"{value:g}" for value in plan.motion.momentum)
     passed = " ".join(f"{time:.6g}" for time in plan.waypoint_times)
     searches = "one search" if len(plan.starts) == 1 else f"{len(plan.starts)} searches"
@@ -40,7 +40,7 @@ def plan_lines(body: Body, plan: Plan) -> list[str]:
 
 
 def plan_data(body: Body, plan: Plan) -> dict[str, object]:
-    """Return the same for programs."""
+    """Return a plan for programs."""
     return {
         "body": body.name,
         "status": plan.status,

@@ -35,7 +35,7 @@ _ALIKE, _ASTRAY = 0.02, 0.03
 
 
 def motion_data(scene: MovingScene, *, speed: float, ghost: bool, up: Array) -> dict[str, Any]:
-    """What the page needs to show a scene, with the numbers that move as 32-bit floats."""
+    """Data of a page that shows a scene, with moving numbers as 32-bit floats."""
     meshes: dict[int, int] = {}
     stored: list[dict[str, Any]] = []
     data: dict[str, Any] = {
@@ -103,7 +103,7 @@ def _curved_joint(joint: CurvedJoint) -> dict[str, Any]:
 def frame_nodes(
     body: Body, shapes: Mapping[str, Sequence[Visual]], meshes: dict[int, int], stored: list[dict[str, Any]]
 ) -> list[dict[str, Any]]:
-    """What is drawn of a body, by link, each with the frame of the body's chain that moves it.
+    """Shapes of a body by link, each with the frame of the body's chain that moves it.
 
     Meshes are added to those that are stored, `meshes` knows the place of each by its vertices.
     """

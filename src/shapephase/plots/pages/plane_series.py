@@ -60,7 +60,7 @@ class PlaneSeries:
 
 
 def plane_series(body: Body, joints: tuple[int, int], box: Array, rest: Array) -> PlaneSeries:
-    """A series of the degree that is needed, up to 48; its errors say how good that is."""
+    """Series of the degree that is needed, up to 48, with its errors."""
     between = [np.linspace(ends[0], ends[1], _CHECKED + 2)[1:-1] for ends in box]
     exact = _sampled(body, joints, between, rest)
     connection = inverse_inertia(exact[0]) @ exact[1]
@@ -168,7 +168,7 @@ def _summed(terms: list[Array], coefficients: Array) -> Array:
 
 
 def _largest_difference(shown: Array, exact: Array) -> float:
-    """Of columns, doubled; of a square matrix of all of it, which bounds its columns together."""
+    """Largest norm, doubled: of columns, or of a whole square matrix, which bounds its columns together."""
     axes = (-2, -1) if exact.shape[-1] == 3 else (-2,)
     return _SAFETY * float(np.sqrt(np.sum((shown - exact) ** 2, axis=axes)).max())
 

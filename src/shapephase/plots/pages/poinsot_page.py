@@ -94,7 +94,7 @@ def _duration(top: EulerTop, duration: float | None) -> float:
 
 
 def _motion(rolling: Poinsot, times: Array, speed: float) -> dict[str, Any]:
-    """The ellipsoid as what moves in a scene: data as those of `motion_data`."""
+    """Data of the moving ellipsoid, as `motion_data` has them."""
     top, still = rolling.top, np.zeros((len(times), 3), dtype=np.float32)
     whole = np.zeros((len(times), 4), dtype=np.float32)
     whole[:, 3] = 1.0
@@ -137,7 +137,7 @@ def _extent(rolling: Poinsot, times: Array) -> Array:
     around = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)[:, None]
     rim = rolling.distance * normal + _plane_radius(rolling) * (np.cos(around) * across + np.sin(around) * along)
     some = times[:: max(1, len(times) // _OUTERMOST)]
-    # Of an ellipsoid w.S w = 2K the highest point along n is at sqrt(2K n.S^-1 n).
+    # The ellipsoid w.S w = 2K reaches sqrt(2K n.S^-1 n) along n.
     inverse = inverse_inertia(rolling.ellipsoid(some))
     heights = np.sqrt(twice_energy * np.einsum("i,nij,j->n", normal, inverse, normal))
     return np.concatenate([rim, -heights.max() * normal[None]])
@@ -148,7 +148,7 @@ def _plane_radius(rolling: Poinsot) -> float:
 
 
 def _rolling(rolling: Poinsot, times: Array) -> dict[str, Any]:
-    """What is drawn beside the ellipsoid, in rad/s: curves, and the plane as lines."""
+    """Curves beside the ellipsoid, and the plane as lines, in rad/s."""
     top = rolling.top
     across, along = rolling.plane_axes
     foot, radius = rolling.distance * rolling.normal, _plane_radius(rolling)
@@ -193,7 +193,7 @@ def _plot(title: str, unit: str, series: dict[str, Array]) -> dict[str, Any]:
 
 
 def rolling_facts(top: EulerTop) -> list[tuple[str, str, str]]:
-    """Of a top with momentum: names, numbers and what they mean."""
+    """Names, numbers and meanings for a top with momentum."""
     rolling = Poinsot(top)
     inner, outer = rolling.annulus
     rows = [

@@ -1,4 +1,4 @@
-"""What the scripts of a report draw beside the moving body: curves in time, and the momentum on its sphere."""
+"""Curves beside the moving body of a report: in time, and the momentum on its sphere."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _NO_TURN = 1e-9  # [rad] a smaller turn has no axis
 
 
 def report_data(motion: Motion, times: Array, gauge: Gauge, body: Body | None, shapes: Array | None) -> dict[str, Any]:
-    """At the frames of the scene: (F,) [s]; `shapes` (F, n) are those of the body."""
+    """Data of the curves at the frames (F,) [s]; `shapes` (F, n) are those of the body."""
     plots = [_turn_plot(motion, times)]
     data: dict[str, Any] = {"plots": plots, "directions": None}
     if motion.momentum.any():

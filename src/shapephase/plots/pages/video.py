@@ -1,4 +1,4 @@
-"""The page of a motion as a film: frames drawn by a Chromium without a window, as GIF, MP4 or a strip of pictures."""
+"""Films of pages: frames drawn by a Chromium without a window, as GIF, MP4 or a strip of pictures."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-sta
 # By software, so that all machines draw the same.
 _FLAGS = ("--headless=new", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars")
 _NEVER = 180_000.0  # [ms] the browser hangs
-_LOOK = 50.0  # [ms] between checks of whether the page is there
+_POLL = 50.0  # [ms] between checks of whether the page is there
 _SMALLEST = 64  # [px] MP4 wants even numbers
 _LARGEST = 4096
 
 
 def check_video(path: str | os.PathLike[str], pixels: Sequence[int]) -> str:
-    """The ending of a film's file, after a look at what is needed to make it.
+    """Return the ending of a film's file, after a check of what is needed to make it.
 
     Raises
     ------
@@ -72,7 +72,7 @@ def check_video(path: str | os.PathLike[str], pixels: Sequence[int]) -> str:
 
 
 def chromium() -> str:
-    """The browser that draws: that of the environment variable CHROMIUM, or the first that is found.
+    """Return the browser that draws: that of the environment variable CHROMIUM, or the first that is found.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def write_video(page: str, path: str | os.PathLike[str], times: Array, pixels: t
 
 
 def _outside_a_loop(work: Callable[[], bytes]) -> bytes:
-    """Playwright refuses to run where events are handled already, as in a notebook: there in a thread."""
+    """Run Playwright's work, in a thread where an event loop runs already, as in a notebook."""
     try:
         asyncio.get_running_loop()
     except RuntimeError:
@@ -138,14 +138,14 @@ def _frames(page: str, times: Array, pixels: tuple[int, int], path: str) -> Iter
                 shown = context.new_page()
                 shown.goto(file.as_uri())
                 while not shown.evaluate("window.page !== undefined"):
-                    shown.wait_for_timeout(_LOOK)
+                    shown.wait_for_timeout(_POLL)
                 shown.evaluate("page.film()")
                 for t in times.tolist():
                     shown.evaluate("time => { page.clock.show(time); page.scene.draw(); }", t)
                     yield Image.open(io.BytesIO(shown.screenshot(type="png"))).convert("RGB")
                 browser.close()
         except Error as error:
-            said = str(error).strip().splitlines() or ["it said nothing"]
+            said = str(error).strip().splitlines() or ["without a message"]
             raise OutputFileError(f"{path}: the browser that draws it, {chromium()}, failed: {said[0]}") from error
 
 
@@ -190,14 +190,14 @@ def _mp4(frames: Iterator[Any], _: int) -> bytes:
             subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said) as ffmpeg,
         ):
             assert ffmpeg.stdin is not None
-            # A process that has ended says why below.
+            # The error of a process that has ended is reported below.
             with contextlib.suppress(BrokenPipeError):
                 for picture in itertools.chain([first], frames):
                     ffmpeg.stdin.write(picture.tobytes())
                 ffmpeg.stdin.close()
             if ffmpeg.wait() or not file.exists():
                 said.seek(0)
-                lines = said.read().decode(errors="replace").strip().splitlines() or ["it said nothing"]
+                lines = said.read().decode(errors="replace").strip().splitlines() or ["without a message"]
                 raise OutputFileError(f"ffmpeg, which makes the film, failed: {lines[-1]}")
         return file.read_bytes()
 
