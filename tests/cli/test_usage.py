@@ -19,7 +19,11 @@ SHALL = {
     "split": ["parameter BODY requires an argument", SPLIT],
     "split cat": ["parameter MOTION requires an argument", SPLIT],
     "plot cat cat_righting": ["parameter MOTION requires an argument", "KIND BODY MOTION"],
-    "conjugate 1 2": ["parameter I3 requires an argument", "shapephase conjugate [OPTIONS] I1 I2 I3"],
+    "conjugate 1 2": [
+        "MOMENTS requires 3 positional arguments",
+        "Only got 2",
+        "shapephase conjugate [OPTIONS] MOMENTS",
+    ],
     "rigid 1 2 3": ["--momentum requires 3 positional arguments", "For example `--momentum 0.6 0.9 0.5`"],
     "plan cat_two_halves 90": ["Unused Tokens: ['90']", "shapephase plan [OPTIONS] BODY"],
     "check cat circle kg": ["Unused Tokens: ['kg']", "shapephase check [OPTIONS] BODY"],

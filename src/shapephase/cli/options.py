@@ -60,6 +60,10 @@ MotionArgument = Annotated[
         "qpos), `-` for standard input, or a name from `shapephase robots`; for example `fall.csv` or `cat_righting`.",
     ),
 ]
+Moments = Annotated[
+    tuple[float, float, float],
+    Parameter(help="The three principal moments, in kg m^2; for example `1 2 3`."),
+]
 Momentum = Annotated[
     tuple[float, float, float] | None,
     option(

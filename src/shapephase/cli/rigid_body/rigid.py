@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from ...errors import ShapeError
-from ..options import PRINT_DEFAULTS, FilmFile, OptionalFigureFile, PageFile, PrintOptions
+from ..options import PRINT_DEFAULTS, FilmFile, Moments, OptionalFigureFile, PageFile, PrintOptions
 from ..outcome import Outcome, check_writable
 from ..pictures import check_page_files, deliver
 from ..terminal import say_written
@@ -22,9 +22,7 @@ _LARGEST = 1e30  # [kg m^2/s, rad/s] and one over the least: pages hold numbers 
 
 
 def rigid_command(
-    i1: float,
-    i2: float,
-    i3: float,
+    moments: Moments,
     /,
     *,
     momentum: Annotated[
@@ -46,12 +44,6 @@ def rigid_command(
 
     Parameters
     ----------
-    i1
-        Principal moment about axis 1, in kg m^2; for example `1`.
-    i2
-        Principal moment about axis 2, in kg m^2; for example `2`.
-    i3
-        Principal moment about axis 3, in kg m^2; for example `3`.
     figure
         What `--out` draws: polhodes, herpolhode, rolling (the ellipsoid on its plane) or, with two equal moments,
         cones (of the body and of space); for example `--figure rolling`.
@@ -68,7 +60,7 @@ def rigid_command(
         raise ShapeError(f"--time: a number is needed, got {time}")
     aside = check_writable(out, "--out", ".svg", ".pdf", ".png")
     aside = check_page_files(html, video) or aside
-    top = _top((i1, i2, i3), momentum)
+    top = _top(moments, momentum)
     facts = rolling_facts(top)
     written: dict[str, str] = {}
     if out is not None:
@@ -78,7 +70,7 @@ def rigid_command(
     if html is not None or video is not None:
         written |= deliver(rolling_ellipsoid(top), html, video)[1]
     data = {
-        "moments_kg_m2": [i1, i2, i3],
+        "moments_kg_m2": list(moments),
         "momentum_kg_m2_s": list(momentum),
         "energy_J": top.energy,
         "regime": top.regime,

@@ -87,8 +87,8 @@ def error_bar_lines(
             lines.append(f"{name:24}{_with_bar(float(phase), bar)} deg")
     elif result.has_phase:
         lines.append("phases: error bars need the horizontal gauge (--gauge horizontal)")
-    is_flight = recorded is not None and recorded.flight is not None and recorded.base_attitude is not None
-    if is_flight and recorded.smoothing is None and options.joint_noise is None:
+    flown = recorded if recorded is not None and recorded.flight is not None else None
+    if flown is not None and flown.base_attitude is not None and not (flown.smoothing or options.joint_noise):
         lines.append(f"{'± of the recorded base':24}only; give --joint-noise (0.3deg) for the noise of the joints")
     if found.smoothing_bias:
         lines.append(f"{'smoothing bias':24}at most {found.smoothing_bias:.2g} sigma, in the bars")
