@@ -1,4 +1,4 @@
-"""Checks of what a user passes in: each takes an argument as it came and returns it ready for use, or raises."""
+"""Checks of user input: each takes an argument as given and returns it ready for use, or raises."""
 
 from __future__ import annotations
 
@@ -25,39 +25,28 @@ from .inertia_tensor import inverse_inertia
 from .letters import article, what_came
 
 Made = TypeVar("Made")
-TIGHTEST_TOLERANCE = 1e-13
-"""[rad]; a few hundred roundings, below which no attitude of many steps can be promised."""
-LOOSEST_TOLERANCE = 1e-4
-"""[rad]; the error estimates are first order and hold for small errors only."""
-LEAST_SIZE = 1e-60
-"""Of times [s], masses [kg] and the like: fifth powers of smaller ones vanish."""
-LARGEST_SIZE = 1e60
-"""Of times [s], masses [kg] and the like: fifth powers of larger ones overflow."""
-_BY_VALUE = frozenset({"cloudpickle", "dill"})
-"""Packages that pickle a function with its code, not by its name."""
+TIGHTEST_TOLERANCE = 1e-13  # [rad]; a few hundred roundings, which many steps add up to
+LOOSEST_TOLERANCE = 1e-4  # [rad]; the error estimates are first order and hold for small errors only
+LEAST_SIZE = 1e-60  # times [s], masses [kg] and the like: fifth powers of smaller ones vanish
+LARGEST_SIZE = 1e60  # fifth powers of larger ones overflow
+_BY_VALUE = frozenset({"cloudpickle", "dill"})  # packages that pickle a function with its code, not by its name
 ON_UNPHYSICAL = ("allow", "warn", "error")
 
-# How far outside [0, T] a time may lie, relative to T: rounding of a user's own arithmetic.
-_TIME_SLACK = 1e-9
-# Entries of a tensor that mirror each other may differ by this much, relative to the largest: printed digits.
-_ASYMMETRY = 1e-9
-# The least ratio of two principal moments: below it the inverse has no correct digits left.
-_LEAST_MOMENT_RATIO = 1e-12
-
-_LARGEST_MOMENTUM = 1e100
-"""[kg m^2/s]; squares of larger ones overflow."""
+_TIME_SLACK = 1e-9  # relative to T, of a time outside [0, T]: rounding of a user's own arithmetic
+_ASYMMETRY = 1e-9  # of a tensor, relative to its largest entry: printed digits
+_LEAST_MOMENT_RATIO = 1e-12  # of principal moments: below it the inverse has no correct digits left
+_LARGEST_MOMENTUM = 1e100  # [kg m^2/s]; squares of larger ones overflow
 _MADE_BY: dict[str, str] = {}  # class -> the call that makes one of it
 _INSIDE: dict[tuple[str, str], str] = {}  # (class of an object that came, class needed) -> where the one has the other
-OF_A_FALL = ("start", "velocity", "gravity")
-"""Keywords of `Motion.base_position`, which what writes or shows a motion hands on."""
+OF_A_FALL = ("start", "velocity", "gravity")  # keywords for `Motion.base_position` that writers and viewers forward
 _IDENTITY = np.eye(3)
 _IDENTITY.flags.writeable = False
 
 
 def made_by(call: str = "", **inside: str) -> Callable[[type[Made]], type[Made]]:
-    """Return a decorator of a class that says, in messages, which call makes an object of it.
+    """Return a decorator that registers, for messages, the call that makes an object of a class.
 
-    inside : name of another class -> where an object of this class has one of that
+    inside : name of another class -> attribute of this class that holds an object of it
     """
 
     def registered(cls: type[Made]) -> type[Made]:
@@ -71,7 +60,7 @@ def made_by(call: str = "", **inside: str) -> Callable[[type[Made]], type[Made]]
 def check_object(value: object, kind: str, name: str, *, or_kind: str = "", call: str = "") -> None:
     """Raise WrongObjectError where an argument is not of our class `kind`, nor of `or_kind`.
 
-    The message says how to make one: with `call`, or as `made_by` of the class has it.
+    The message ends with the way to make one: `call`, or what `made_by` has registered.
     """
     names = [parent.__name__ for parent in type(value).__mro__]
     if kind in names or or_kind in names:
@@ -83,13 +72,13 @@ def check_object(value: object, kind: str, name: str, *, or_kind: str = "", call
 
 
 def check_function(value: object, name: str, what: str) -> None:
-    """Raise WrongObjectError where an argument cannot be called; `what` says in words what is needed."""
+    """Raise WrongObjectError where an argument is not a function; `what` describes the function."""
     if not callable(value) or isinstance(value, type):
         raise WrongObjectError(f"{name}: {what} is needed, got {what_came(value)}")
 
 
 def check_executor(value: object) -> None:
-    """Raise WrongObjectError for what is no executor of `concurrent.futures`, nor None."""
+    """Raise WrongObjectError where an argument is neither an executor of `concurrent.futures` nor None."""
     if value is not None and not (callable(getattr(value, "map", None)) and callable(getattr(value, "submit", None))):
         raise WrongObjectError(
             "executor: one of concurrent.futures, or of a cluster (client.get_executor()), is needed, got "
@@ -98,10 +87,10 @@ def check_executor(value: object) -> None:
 
 
 def check_keywords(given: Iterable[str], function: Callable[..., object], others: Iterable[str] = OF_A_FALL) -> None:
-    """Raise WrongObjectError for a keyword that a public function which hands keywords on does not have.
+    """Raise WrongObjectError for an unknown keyword of a public function that forwards keywords.
 
-    given : the keywords that it hands on
-    others : those of them that are known
+    given : the keywords that it forwards
+    others : valid ones among them
     """
     own = [name for name, part in list(signature(function).parameters.items())[1:] if part.kind != part.VAR_KEYWORD]
     for name in given:
@@ -110,9 +99,8 @@ def check_keywords(given: Iterable[str], function: Callable[..., object], others
 
 
 def check_choice(value: object, kind: str, choices: Collection[str]) -> None:
-    """Raise UnknownNameError where an argument is none of some words; `kind` says of what."""
+    """Raise UnknownNameError where an argument is not one of some words; `kind` describes the argument."""
     if not isinstance(value, str) or value not in choices:
-        # Whatever came is shown, and whatever it is.
         raise unknown_name(kind, value, choices)  # type: ignore[arg-type]
 
 
@@ -124,31 +112,31 @@ def check_flag(value: object, name: str, *, allow_none: bool = False) -> None:
 
 
 def check_pair(value: object, name: str, what: str) -> None:
-    """Raise ShapeError where an argument is no two things; `what` says in words which."""
+    """Raise ShapeError where an argument is not a pair; `what` describes its entries."""
     if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
         raise ShapeError(f"{name}: {what} are needed, got {what_came(value)}")
 
 
 def check_file_name(value: object, name: str) -> None:
-    """Raise WrongObjectError where an argument is no name of a file."""
+    """Raise WrongObjectError where an argument is not the name of a file."""
     if not isinstance(value, str | os.PathLike):
         raise WrongObjectError(f"{name}: the name of a file is needed, got {what_came(value)}")
 
 
 def check_text(value: object, name: str, what: str) -> None:
-    """Raise WrongObjectError where an argument is no text; `what` says in words which is needed."""
+    """Raise WrongObjectError where an argument is not a text; `what` describes the text."""
     if not isinstance(value, str):
         raise WrongObjectError(f"{name}: {what} is needed, got {what_came(value)}")
 
 
 def check_mapping(value: object, name: str, what: str) -> None:
-    """Raise ShapeError where an argument is no mapping; `what` says in words from what to what."""
+    """Raise ShapeError where an argument is not a mapping; `what` describes keys and values."""
     if not isinstance(value, Mapping):
         raise ShapeError(f"{name}: a mapping, {what}, is needed, got {what_came(value)}")
 
 
 def names_argument(value: object, name: str, what: str) -> tuple[str, ...]:
-    """A user's names, as a tuple. Raises ShapeError for one text alone, and for what holds no texts."""
+    """Return a user's names as a tuple. Raises ShapeError for a single text, and for other entries than texts."""
     names = None if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
     if names is None or not all(isinstance(one, str) for one in names):
         raise ShapeError(f"{name}: {what} are needed, got {what_came(value)}")
@@ -156,14 +144,14 @@ def names_argument(value: object, name: str, what: str) -> tuple[str, ...]:
 
 
 def whole_argument(value: object, name: str, least: int) -> int:
-    """A whole number of a user, `least` or more. Raises ShapeError."""
+    """Return a user's whole number, `least` or more. Raises ShapeError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {what_came(value)}")
     return int(value)
 
 
 def number_argument(value: ArrayLike, name: str, unit: str = "") -> float:
-    """One finite number of a user. Raises ShapeError."""
+    """Return a user's finite number. Raises ShapeError."""
     number = finite_array(value, name, unit=unit)
     if number.ndim:
         raise ShapeError(f"{name}: one number{f' [{unit}]' if unit else ''} is needed, got shape {number.shape}")
@@ -171,7 +159,7 @@ def number_argument(value: ArrayLike, name: str, unit: str = "") -> float:
 
 
 def times_argument(t: ArrayLike, duration: float) -> Array:
-    """A user's times, checked to lie in [0, duration] (to rounding): (...) -> (...) [s]. Raises TrajectoryError."""
+    """Return a user's times, within [0, duration] to rounding: (...) -> (...) [s]. Raises TrajectoryError."""
     times = finite_array(t, "t", unit="s")
     slack = _TIME_SLACK * duration
     if times.size and (times.min() < -slack or times.max() > duration + slack):
@@ -181,7 +169,7 @@ def times_argument(t: ArrayLike, duration: float) -> Array:
 
 
 def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
-    """A user's interior breaks with the two ends added: (M,) -> (M + 2,) ascending [s]. Raises TrajectoryError."""
+    """Return a user's interior breaks and the two ends: (M,) -> (M + 2,) ascending [s]. Raises TrajectoryError."""
     inner = finite_array(breaks, "breaks", (None,), unit="s")
     if inner.ndim != 1:
         raise ShapeError(f"breaks: (M,) times are needed, got shape {inner.shape}")
@@ -191,7 +179,7 @@ def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
 
 
 def positive_argument(value: float, name: str = "duration", unit: str = "a time in s") -> float:
-    """A user's number, checked to be above 0 and no size that overflows. Raises TrajectoryError, ShapeError."""
+    """Return a user's number above 0, of a size that does not overflow. Raises TrajectoryError, ShapeError."""
     number = finite_array(value, name)
     if number.ndim or number <= 0.0:
         raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {what_came(value)}")
@@ -213,7 +201,7 @@ def check_time_steps(times: Array, where: str = "") -> None:
 
 
 def tolerance_argument(tolerance: float) -> float:
-    """A user's tolerance of an attitude [rad]. Raises ShapeError outside 1e-13 to 1e-4."""
+    """Return a user's tolerance of an attitude [rad]. Raises ShapeError outside 1e-13 to 1e-4."""
     if type(tolerance) is float and TIGHTEST_TOLERANCE <= tolerance <= LOOSEST_TOLERANCE:
         return tolerance
     goal = finite_array(tolerance, "tolerance", unit="rad")
@@ -226,9 +214,9 @@ def tolerance_argument(tolerance: float) -> float:
 
 
 def check_picklable(function: object, what: str) -> None:
-    """Raise LocalFunctionError for a function that pickle cannot find by its name; `what` is made of it.
+    """Raise LocalFunctionError for a function that pickle cannot find by its name; `what` holds it.
 
-    Picklers that take functions by value (cloudpickle, which joblib uses, and dill) may have it.
+    Picklers that take functions by value (cloudpickle, which joblib uses, and dill) accept it.
     """
     name = getattr(function, "__qualname__", "")
     if "<" not in name:
@@ -244,7 +232,7 @@ def check_picklable(function: object, what: str) -> None:
 
 
 def threads_argument(threads: int | None) -> int | None:
-    """A number of threads, at least one; None: as many as there are processors. Raises ShapeError."""
+    """Return a user's number of threads, at least one; None: one for each processor. Raises ShapeError."""
     if threads is None:
         return None
     if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
@@ -253,7 +241,7 @@ def threads_argument(threads: int | None) -> int | None:
 
 
 def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
-    """A user's tensors (N, 3, 3), made exactly symmetric. Raises UnphysicalInertiaError, SingularInertiaError."""
+    """Return a user's tensors (N, 3, 3), made symmetric. Raises UnphysicalInertiaError, SingularInertiaError."""
     skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max(initial=0.0)
     if skew > _ASYMMETRY * np.abs(tensors).max(initial=0.0):
         raise UnphysicalInertiaError(f"an inertia tensor must be symmetric; its entries differ by {skew:.3g} kg m^2")
@@ -263,7 +251,7 @@ def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
 
 
 def moments_argument(moments: ArrayLike) -> Array:
-    """Three positive principal moments, checked: (3,) [kg m^2].
+    """Return a user's three positive principal moments: (3,) [kg m^2].
 
     Raises
     ------
@@ -282,7 +270,7 @@ def moments_argument(moments: ArrayLike) -> Array:
 
 
 def inverse_inertia_argument(inertia: ArrayLike) -> Array:
-    """The inverse of a user's inertia tensor: (..., 3, 3) -> (..., 3, 3).
+    """Return the inverse of a user's inertia tensor: (..., 3, 3) -> (..., 3, 3).
 
     Raises
     ------
@@ -297,13 +285,13 @@ def inverse_inertia_argument(inertia: ArrayLike) -> Array:
 
 
 def on_unphysical_argument(value: str) -> str:
-    """One of "allow", "warn" and "error". Raises UnknownNameError."""
+    """Return a user's "allow", "warn" or "error". Raises UnknownNameError."""
     check_choice(value, "value of on_unphysical", ON_UNPHYSICAL)
     return value
 
 
 def magnitude_argument(magnitude: float, *, allow_zero: bool = False) -> float:
-    """A user's magnitude of the momentum [kg m^2/s]. Raises ShapeError."""
+    """Return a user's magnitude of the momentum [kg m^2/s]. Raises ShapeError."""
     number = finite_array(magnitude, "magnitude", unit="kg m^2/s")
     if number.ndim or number < 0.0 or (number == 0.0 and not allow_zero):
         allowed = "0 or more" if allow_zero else "above 0"
@@ -312,7 +300,7 @@ def magnitude_argument(magnitude: float, *, allow_zero: bool = False) -> float:
 
 
 def magnitudes_argument(magnitudes: ArrayLike) -> Array:
-    """A user's magnitudes of the momentum, all growing or all falling: (N,) [kg m^2/s]. Raises ShapeError."""
+    """Return a user's magnitudes of the momentum, all growing or all falling: (N,) [kg m^2/s]. Raises ShapeError."""
     values = finite_array(magnitudes, "magnitudes", (None,), unit="kg m^2/s")
     steps = np.diff(values)
     if values.ndim != 1 or not len(values) or values.min() < 0.0 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
@@ -324,7 +312,7 @@ def magnitudes_argument(magnitudes: ArrayLike) -> Array:
 
 
 def direction_argument(value: ArrayLike, name: str) -> Array:
-    """A user's directions, made unit vectors: (..., 3) -> (..., 3). Raises ShapeError."""
+    """Return a user's directions as unit vectors: (..., 3) -> (..., 3). Raises ShapeError."""
     directions = finite_array(value, name, (3,))
     largest = np.max(np.abs(directions), axis=-1, keepdims=True)
     if np.any(largest == 0.0):
@@ -334,7 +322,7 @@ def direction_argument(value: ArrayLike, name: str) -> Array:
 
 
 def vector_argument(value: ArrayLike, name: str, length: int = 3, unit: str = "") -> Array:
-    """One vector of this length, a copy. Raises ShapeError."""
+    """Return a copy of a user's vector of this length. Raises ShapeError."""
     vector = finite_array(value, name, (length,), unit=unit).copy()
     if vector.ndim != 1:
         raise ShapeError(f"{name}: one vector ({length},) is needed, got {vector.shape}")
@@ -342,9 +330,9 @@ def vector_argument(value: ArrayLike, name: str, length: int = 3, unit: str = ""
 
 
 def initial_state_arguments(momentum: ArrayLike, attitude: ArrayLike | None) -> tuple[Array, Array]:
-    """A user's momenta and attitudes at the start, broadcast: batch + (3,) [kg m^2/s], batch + (3, 3).
+    """Return a user's momenta and attitudes at the start, broadcast: batch + (3,) [kg m^2/s], batch + (3, 3).
 
-    Without an attitude it is the identity. Raises ShapeError.
+    The default attitude is the identity. Raises ShapeError.
     """
     spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s").copy()
     if spatial.size and np.abs(spatial).max() > _LARGEST_MOMENTUM:
@@ -359,7 +347,7 @@ def initial_state_arguments(momentum: ArrayLike, attitude: ArrayLike | None) -> 
 
 
 def body_momentum_argument(momentum: ArrayLike, attitude: ArrayLike | None) -> Array:
-    """One body angular momentum at the start, Pi = R^T momentum: (3,) [kg m^2/s]. Raises ShapeError for a batch."""
+    """Body angular momentum at the start, Pi = R^T momentum: (3,) [kg m^2/s]. Raises ShapeError for a batch."""
     body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     if attitude is not None:
         body = so3.apply(so3.transpose(so3.rotation_argument(attitude, "attitude")), body)
@@ -371,7 +359,7 @@ def body_momentum_argument(momentum: ArrayLike, attitude: ArrayLike | None) -> A
 
 
 def interval_argument(interval: tuple[float, float] | None, duration: float) -> tuple[float, float]:
-    """Start and end of a stretch of [0, duration]; None: all of it. Raises ShapeError for anything else."""
+    """Return start and end of a part of [0, duration]; None: all of it. Raises ShapeError."""
     if interval is None:
         return 0.0, duration
     try:

@@ -8,22 +8,15 @@ import numpy as np
 
 from .arrays import Array
 
-# Of a picture, in pixels.
-_WIDTH = 200.0
-_HEIGHT = 90.0
-# Between its edge and what is drawn, in pixels.
-_MARGIN = 6.0
-# Colours of Okabe and Ito.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-# Dashes of the same, for print in black and white.
-_DASHES = ("", "6 3", "6 2 1 2", "2 2", "9 4", "1 2")
-# Curves of a picture, and points of a curve.
+_WIDTH, _HEIGHT, _MARGIN = 200.0, 90.0, 6.0  # pixels
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # of Okabe and Ito
+_DASHES = ("", "6 3", "6 2 1 2", "2 2", "9 4", "1 2")  # for print in black and white
 _MOST_CURVES = len(_COLOURS)
-MOST_POINTS = 80
+MOST_POINTS = 80  # of a curve
 
 
 def curves_picture(values: Array, about: str) -> str:
-    """Curves in time, those that move most: (N, k)."""
+    """Return a picture of curves in time (N, k), those that move most."""
     chosen = np.argsort(-np.ptp(values, axis=0), kind="stable")[:_MOST_CURVES]
     rows = values[:, np.sort(chosen)]
     low, high = (float(rows.min()), float(rows.max())) if rows.size else (0.0, 0.0)
@@ -39,7 +32,7 @@ def curves_picture(values: Array, about: str) -> str:
 
 
 def bars_picture(values: Sequence[float], about: str) -> str:
-    """Bars to both sides of zero."""
+    """Return a picture of bars to both sides of zero."""
     low, high = min(0.0, *values), max(0.0, *values)
     scale = (_WIDTH - 2.0 * _MARGIN) / (high - low if high > low else 1.0)
     thick = (_HEIGHT - 2.0 * _MARGIN) / len(values)
@@ -53,7 +46,7 @@ def bars_picture(values: Sequence[float], about: str) -> str:
 
 
 def sphere_picture(points: Array, kinds: Sequence[int], about: str) -> str:
-    """Directions (N, 3) on the unit sphere, seen from a side; those behind are hollow. `kinds` choose their colours."""
+    """Return a picture of directions (N, 3) on the unit sphere; those behind are hollow, `kinds` choose colours."""
     eye, screen = _side_view()
     middle, radius = 0.5 * _HEIGHT, 0.5 * _HEIGHT - _MARGIN
     dots = [
@@ -68,7 +61,7 @@ def sphere_picture(points: Array, kinds: Sequence[int], about: str) -> str:
 
 
 def sticks_picture(starts: Array, ends: Array, about: str) -> str:
-    """Sticks between points of space, seen from a side: (N, 3), (N, 3) [m]."""
+    """Return a picture of sticks between points of space: (N, 3), (N, 3) [m]."""
     _, screen = _side_view()
     points = np.stack([starts, ends]) @ screen.T * (1.0, -1.0)
     low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
@@ -84,7 +77,7 @@ def sticks_picture(starts: Array, ends: Array, about: str) -> str:
 
 
 def _side_view() -> tuple[Array, Array]:
-    """Where the eye is, and what is to the right and above it: (3,), (2, 3)."""
+    """Direction to the eye, and axes to the right and up: (3,), (2, 3)."""
     rise, turn = np.radians([20.0, 35.0])
     eye = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
     right = np.array([-np.sin(turn), np.cos(turn), 0.0])

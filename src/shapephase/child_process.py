@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 _ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1")
 
@@ -25,7 +25,8 @@ def start_python(
     """
     path = os.pathsep.join(entry or os.getcwd() for entry in sys.path if entry or folder)
     environment = {**os.environ, **_ONE_THREAD, "PYTHONPATH": path}
-    return subprocess.Popen([sys.executable, "-P", "-c", source, *words], env=environment, **options)
+    command = [sys.executable, "-P", "-c", source, *words]
+    return cast("subprocess.Popen[bytes]", subprocess.Popen(command, env=environment, **options))
 
 
 def run_alone(source: str, words: tuple[str, ...], data: bytes, seconds: float) -> subprocess.CompletedProcess[bytes]:

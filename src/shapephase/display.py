@@ -1,4 +1,4 @@
-"""How results show themselves: in a few lines of text, and as cards of HTML with a small picture.
+"""Display of results: a few lines of text, and cards of HTML with a small picture.
 
 A card has a title and rows of a name and a value with its unit; `repr` prints it as text and notebooks show it as HTML.
 Results without a card of their own print their fields by `short_repr`. Neither is ever longer than nine lines.
@@ -17,14 +17,10 @@ import numpy as np
 from .arrays import Array
 from .letters import printable, shortened
 
-MOST_LINES = 9
-"""Of a `repr`."""
-# Of a line.
-_WIDTH = 100
-# Letters of a value, a name, a title.
-_LONGEST_VALUE = 60
-# Entries of an array or a tuple that are shown one by one.
-_FEW = 4
+MOST_LINES = 9  # of a `repr`
+_WIDTH = 100  # characters of a line
+_LONGEST_VALUE = 60  # characters of a value, a name, a title
+_FEW = 4  # entries of an array or a tuple that are shown one by one
 _STYLE = (
     "display:inline-flex;flex-wrap:wrap;gap:1em;align-items:center;font-size:90%;border:1px solid #8886;"
     "border-radius:6px;padding:0.5em 0.8em"
@@ -33,7 +29,7 @@ _STYLE = (
 
 @dataclass(frozen=True)
 class Card:
-    """What is shown of an object.
+    """Summary of an object.
 
     Attributes
     ----------
@@ -47,13 +43,13 @@ class Card:
     picture: str = ""
 
     def text(self) -> str:
-        """The title and the rows in lines."""
+        """Return title and rows as lines."""
         shown = [(name, shortened(printable(value), _LONGEST_VALUE)) for name, value in self.rows[: MOST_LINES - 1]]
         width = max((len(name) for name, _ in shown), default=0)
         return "\n".join([_title(self.title), *(f"  {name:<{width}}  {value}" for name, value in shown)])
 
     def html(self) -> str:
-        """Title, rows and picture as HTML; names are escaped."""
+        """Return title, rows and picture as HTML; names are escaped."""
         left = 'style="text-align:left"'
         cells = "".join(
             f"<tr><th {left}>{_escaped(name)}</th><td {left}>{_escaped(value)}</td></tr>" for name, value in self.rows
@@ -70,17 +66,17 @@ class HasCard(Protocol):
 
 
 def card_text(self: HasCard) -> str:
-    """The `repr` of an object with a card."""
+    """Return the `repr` of an object with a card."""
     return self._card().text()
 
 
 def card_html(self: HasCard) -> str:
-    """What a notebook shows of an object with a card."""
+    """Return the HTML of an object with a card, for notebooks."""
     return self._card().html()
 
 
 def short_repr(self: Any) -> str:
-    """The fields of a dataclass in a few lines: arrays by their shapes, other objects by their kinds."""
+    """Return the fields of a dataclass in a few lines: arrays by shape, other objects by class."""
     parts = [f"{field.name}={_value(getattr(self, field.name))}" for field in fields(self) if field.repr]
     name = type(self).__name__
     whole = f"{name}({', '.join(parts)})"
@@ -98,14 +94,14 @@ def short_repr(self: Any) -> str:
 
 
 def numbers(values: Any, unit: str = "") -> str:
-    """A few numbers in brackets, one alone without, with their unit."""
+    """Return a few numbers in brackets, a single one without, with their unit."""
     entries = np.atleast_1d(values)
     shown = " ".join(f"{value + 0.0:.6g}" for value in entries.ravel())
     return f"{shown if np.ndim(values) == 0 else f'({shown})'}{f' {unit}' if unit else ''}"
 
 
 def angle_text(angle: Any) -> str:
-    """An angle in degrees and radians; of a batch its spread, in degrees."""
+    """Return an angle in degrees and radians; for a batch the range in degrees."""
     if np.ndim(angle):
         spread = np.degrees([np.min(angle), np.max(angle)]) if np.size(angle) else np.zeros(2)
         return f"{spread[0]:.4f} to {spread[1]:.4f} deg"
@@ -113,13 +109,13 @@ def angle_text(angle: Any) -> str:
 
 
 def error_text(error: Any) -> str:
-    """An error estimate; of a batch its largest."""
+    """Return an error estimate; for a batch the largest."""
     most = float(np.max(error)) if np.size(error) else 0.0
     return f"{most:.1e} rad{' at most' if np.ndim(error) else ''}"
 
 
 def number_with_bar(value: float, bar: float) -> str:
-    """A number and its bar, of which two digits are shown; both end at the same digit.
+    """Return a number and its error bar with two digits; both end at the same digit.
 
     Examples
     --------
@@ -135,7 +131,7 @@ def number_with_bar(value: float, bar: float) -> str:
 
 
 def momentum_text(momentum: Array) -> str:
-    """One angular momentum; of a batch how many there are, and their sizes."""
+    """Return an angular momentum; for a batch the number and the range of magnitudes."""
     if momentum.ndim == 1:
         return numbers(momentum, "kg m^2/s")
     sizes = np.linalg.norm(momentum, axis=-1)
@@ -152,7 +148,7 @@ def _escaped(text: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """An entry of a `short_repr`."""
+    """Text of an entry of a `short_repr`."""
     if isinstance(value, np.ndarray) and value.ndim:
         if value.ndim == 1 and value.size <= _FEW and value.dtype.kind in "fiub":
             return f"[{', '.join(_number(entry) for entry in value)}]"

@@ -1,24 +1,22 @@
-"""Names of users, and what else they gave, as they are shown: letter by letter, whatever they are."""
+"""Texts of user input for messages: printable, short, in one line."""
 
 from __future__ import annotations
 
 from typing import Any
 
-# Letters of a value that a message repeats.
-_LONGEST_GIVEN = 80
-# What is shown by its value; anything else by its kind.
-_PLAIN = (str, bytes, bool, int, float, complex, list, tuple, dict, set, type(None))
+_LONGEST_GIVEN = 80  # characters of a value in a message
+_PLAIN = (str, bytes, bool, int, float, complex, list, tuple, dict, set, type(None))  # shown by value, others by class
 
 
 def printable(name: str) -> str:
-    """A text with what cannot be printed, or changes the direction of writing, written out."""
+    """Return a text with characters that are not printable, or change the direction of writing, escaped."""
     if name.isprintable():
         return name
     return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in name)
 
 
 def shortened(name: str, longest: int) -> str:
-    """A text of at most so many letters, without its middle where it is longer."""
+    """Return a text of at most so many characters, without its middle where it is longer."""
     if len(name) <= longest:
         return name
     half = (longest - 1) // 2
@@ -26,7 +24,7 @@ def shortened(name: str, longest: int) -> str:
 
 
 def what_came(value: Any) -> str:
-    """What came instead of what was wanted, in one line: a plain value itself, of anything else the kind."""
+    """Describe a wrong argument in one line: a plain value itself, any other object by its class."""
     if isinstance(value, type):
         return f"the class {value.__name__} itself"
     if isinstance(value, _PLAIN) or type(value).__module__ == "numpy":
@@ -36,5 +34,5 @@ def what_came(value: Any) -> str:
 
 
 def article(name: str) -> str:
-    """The article that goes before a name."""
+    """Return the article before a name."""
     return "an" if name[:1].lower() in "aeiou" else "a"

@@ -1,7 +1,7 @@
-"""What objects of lower rooms can do by means of higher ones, as `motion.plot()`: which function does it.
+"""Methods of classes in lower folders that functions of higher folders implement, such as `motion.plot()`.
 
-A folder imports only from folders on lower lines, so a method of a motion cannot import what draws it. The package,
-which is above all rooms, offers the functions by name when it is imported; they are loaded when they are first called.
+A folder imports only from folders on lower lines, so a method of a motion cannot import plotting. The package, which
+is above all folders, registers the functions by name when it is imported; they are loaded at their first call.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ _OFFERS: dict[str, tuple[str, str]] = {}
 
 
 def offer(method: str, module: str, function: str) -> None:
-    """Let a method, "Class.method", be done by a function of a module, which need not be loaded yet."""
+    """Register the function of a module that implements a method, "Class.method"."""
     _OFFERS[method] = module, function
 
 
 def offered(method: str) -> Callable[..., Any]:
-    """The function that does it, loaded now."""
+    """Return the function that implements a method, loaded now."""
     module, function = _OFFERS[method]
     return getattr(importlib.import_module(module), function)

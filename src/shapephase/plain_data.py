@@ -8,7 +8,7 @@ from typing import Any
 
 
 def plain(result: Any) -> dict[str, Any]:
-    """The fields of a dataclass that are shown: arrays become lists, dataclasses dictionaries, infinite limits null."""
+    """Return the shown fields of a dataclass: arrays become lists, dataclasses dictionaries, infinite limits null."""
     return {field.name: _as_json(getattr(result, field.name)) for field in fields(result) if field.repr}
 
 

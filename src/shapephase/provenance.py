@@ -1,4 +1,4 @@
-"""Where a result comes from: when, by which versions and which command line it was computed, and of what."""
+"""Provenance of a result: date, versions, command line and inputs."""
 
 from __future__ import annotations
 
@@ -15,15 +15,13 @@ from typing import Any
 from . import __version__
 
 _COMMAND: ContextVar[str | None] = ContextVar("command line", default=None)
-_PACKAGES = ("numpy", "scipy", "pin")
-"""That a result stands on."""
-_EPOCH = "SOURCE_DATE_EPOCH"
-"""Variable of the environment with the date that is to be said, in seconds since 1970: for files that do not change."""
+_PACKAGES = ("numpy", "scipy", "pin")  # that determine a result
+_EPOCH = "SOURCE_DATE_EPOCH"  # environment variable with the date [s since 1970], for reproducible files
 
 
 @contextmanager
 def command_line(words: Sequence[str]) -> Iterator[None]:
-    """What is computed inside is the result of this command line, without the program's name."""
+    """Record a command line, without the program's name, for results computed inside."""
     token = _COMMAND.set(shlex.join(["shapephase", *words]))
     try:
         yield
@@ -32,15 +30,15 @@ def command_line(words: Sequence[str]) -> Iterator[None]:
 
 
 def provenance(made_from: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Where a result comes from, as JSON can hold it.
+    """Return the provenance of a result, as JSON can hold it.
 
     Parameters
     ----------
-    made_from : the body and its joints, the recording and what was done to it, files with their SHA-256
+    made_from : the body and its joints, the recording and its processing, files with their SHA-256
 
     Returns
     -------
-    `date` (UTC), `command` (None in Python), `versions`, and what was given
+    `date` (UTC), `command` (None in Python), `versions`, and `made_from`
     """
     return {
         "date": _date(),
@@ -55,7 +53,7 @@ def provenance(made_from: Mapping[str, Any] | None = None) -> dict[str, Any]:
 
 
 def _version(name: str) -> str | None:
-    """Of an installed package; None where it was installed under another name."""
+    """Version of an installed package; None where it is not known under this name."""
     try:
         return version(name)
     except PackageNotFoundError:
@@ -63,8 +61,8 @@ def _version(name: str) -> str | None:
 
 
 def _date() -> str:
-    said = os.environ.get(_EPOCH, "")
+    seconds = os.environ.get(_EPOCH, "")
     now = datetime.datetime.now(datetime.UTC)
-    if said.isascii() and said.isdigit() and len(said) < 12:
-        now = datetime.datetime.fromtimestamp(int(said), datetime.UTC)
+    if seconds.isascii() and seconds.isdigit() and len(seconds) < 12:
+        now = datetime.datetime.fromtimestamp(int(seconds), datetime.UTC)
     return now.isoformat(timespec="seconds")

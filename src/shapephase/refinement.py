@@ -1,4 +1,4 @@
-"""Results computed ever finer until they no longer change, and the least value of a function."""
+"""Refinement of results until they no longer change, and the least value of a function."""
 
 from __future__ import annotations
 
@@ -12,24 +12,19 @@ from .arrays import Array
 from .chebyshev import inside, nodes_on
 
 Result = TypeVar("Result")
-# Chebyshev points of a piece, less one: far more than the swings of a shape motion between two breaks.
-_NODES = 64
-# Each of more pieces than these has fewer points, so that their number stays bounded.
-_MOST_PIECES_FINE = 32
-# Minima around which the search continues.
-_LOWEST = 16
-# Each divides the interval by four: together by 7e7, beyond which the value no longer changes.
-_ZOOMS = 13
-# Times evaluated at once: the arrays of many particles stay small.
-_CHUNK = 4096
+_NODES = 64  # Chebyshev points of a piece, less one: far more than the swings of a motion between two breaks
+_MOST_PIECES_FINE = 32  # beyond so many pieces each has fewer points, so that their number stays bounded
+_LOWEST = 16  # minima around which the search continues
+_ZOOMS = 13  # each divides the interval by four: together by 7e7, where the value no longer changes
+_CHUNK = 4096  # times evaluated at once: the arrays of many particles stay small
 
 
 def settled(
     results: Iterable[Result], difference: Callable[[Result, Result], float], tolerance: float
 ) -> Result | None:
-    """The first of ever finer results that differs from the one before it by at most a tolerance.
+    """Return the first of ever finer results that differs from its predecessor by at most a tolerance, or None.
 
-    None if there is no such result; `results` is only computed as far as needed.
+    `results` is only computed as far as needed.
     """
     for last, result in pairwise(results):
         if difference(last, result) <= tolerance:
@@ -38,14 +33,14 @@ def settled(
 
 
 def halved(edges: Array, count: int) -> Iterator[Array]:
-    """Edges, and the same with all intervals halved once, twice ...: `count` of them."""
+    """Yield `count` grids: the edges, then with all intervals halved once, twice ..."""
     for _ in range(count):
         yield edges
         edges = np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])]))
 
 
 def least_over(function: Callable[[Array], Array], breaks: Array) -> tuple[float, float]:
-    """The least value of a function that is smooth between breaks, and its time.
+    """Return the least value of a function that is smooth between breaks, and its time.
 
     Evaluated at up to 65 Chebyshev points of every piece (fewer, but nine at least, where pieces are many); around the
     sixteen lowest of these the search continues to some 1e-9 of the piece. A dip between the points can be missed.
@@ -67,11 +62,11 @@ def least_over(function: Callable[[Array], Array], breaks: Array) -> tuple[float
     best, when = values[piece, node], times[piece, node]
     for _ in range(_ZOOMS):
         points = np.linspace(low, high, 9, axis=1)
-        found = _in_chunks(function, points)
-        at = np.argmin(found, axis=1)
+        zoomed = _in_chunks(function, points)
+        at = np.argmin(zoomed, axis=1)
         row = np.arange(len(at))
-        better = found[row, at] < best
-        best, when = np.where(better, found[row, at], best), np.where(better, points[row, at], when)
+        better = zoomed[row, at] < best
+        best, when = np.where(better, zoomed[row, at], best), np.where(better, points[row, at], when)
         low, high = points[row, np.maximum(at - 1, 0)], points[row, np.minimum(at + 1, 8)]
     first = int(np.argmin(best))
     return float(best[first]), float(when[first])

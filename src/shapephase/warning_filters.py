@@ -1,4 +1,4 @@
-"""Warnings of other packages set aside, by one thread at a time: Python's filters belong to the process."""
+"""Warnings of other packages ignored, by one thread at a time: Python's filters belong to the process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 ONE_THREAD = threading.RLock()
-"""Held while filters are changed. A thread that changes them beside another one puts back what that one had set."""
+"""Held while filters are changed: otherwise a thread would restore the filters of another."""
 
 
 @contextmanager

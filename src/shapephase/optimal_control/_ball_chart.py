@@ -1,4 +1,4 @@
-"""Three coordinates for each ball joint of a plan: the turn from its start, by the tangent of half the angle."""
+"""Three coordinates for each ball joint of a plan: its turn from the start, axis times tangent of half the angle."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ _NO_TURN = 1e-9  # cosine of half the turn to an end that is half a turn away
 
 @dataclass(frozen=True, eq=False)
 class BallChart:
-    """Some of the coordinates of a plan, four at a time, as three: p = start (s, 1), a product of quaternions.
+    """Chart of ball joints about the start of a plan: three coordinates s for four, quaternion p = start (s, 1).
 
-    The shape is affine in s, and every turn but those of half a turn has one s: a chart of the group about the start.
+    The shape is affine in s, and every turn but those of half a turn has one s.
 
     Attributes
     ----------
-    starts : each ball joint, the place of its first number among the coordinates, and its quaternion at the start
+    starts : each ball joint, the index of its first number among the coordinates, and its quaternion at the start
     """
 
     starts: tuple[tuple[BallJoint, int, Array], ...]
 
     @classmethod
     def of(cls, body: Body, start: Array, leaders: Sequence[int]) -> BallChart | None:
-        """For coordinates that are those of some joints (m,), from a shape (n,); None: no ball joint moves."""
-        found = [
+        """Return the chart for the coordinates of some joints (m,), from a shape (n,); None if no ball joint moves."""
+        starts = [
             (ball, list(leaders).index(ball.column), ball.quaternions(start[None])[0])
             for ball in body.chain.follows.balls
             if ball.column in leaders
         ]
-        return cls(starts=tuple(found)) if found else None
+        return cls(starts=tuple(starts)) if starts else None
 
     def shapes(self, coupling: Array, offset: Array) -> tuple[Array, Array]:
-        """What makes a shape of the coordinates, by the new ones: (n, m), (n,) -> (n, m - balls), (n,)."""
+        """Return coupling and offset for the new coordinates: (n, m), (n,) -> (n, m - balls), (n,)."""
         coupling, offset = coupling.copy(), offset.copy()
         for _, first, quaternion in self.starts:
-            # Of joints that are its mirror images, too.
+            # The rows include joints that mirror it.
             four = coupling[:, first : first + 4]
             offset += four @ quaternion
             coupling[:, first : first + 3] = four @ vector_part(quaternion[None])[0].T
         return np.delete(coupling, self._left_out, axis=1), offset
 
     def coordinates(self, values: Array, name: str) -> Array:
-        """The new of the old, those of a shape called so: (m,) -> (m - balls,). Raises TrajectoryError."""
-        found = values.copy()
+        """Return the new coordinates of a shape called `name`: (m,) -> (m - balls,). Raises TrajectoryError."""
+        charted = values.copy()
         for ball, first, quaternion in self.starts:
             four = values[first : first + 4]
             along = float(quaternion @ four)
@@ -60,16 +60,16 @@ class BallChart:
                     f"{name}: ball joint {ball.name} is half a turn from its start, which a plan does not reach; go "
                     "there in two plans"
                 )
-            found[first : first + 3] = vector_part(quaternion[None])[0] @ four / along
-        return np.delete(found, self._left_out)
+            charted[first : first + 3] = vector_part(quaternion[None])[0] @ four / along
+        return np.delete(charted, self._left_out)
 
     def limits(self, lower: Array, upper: Array, rates: Array) -> tuple[Array, Array, Array]:
-        """Of the new coordinates; ball joints have none of their own."""
+        """Return limits of the new coordinates; ball joints have none of their own."""
         lower, upper = lower.copy(), upper.copy()
         for _, first, _ in self.starts:
             lower[first : first + 3], upper[first : first + 3] = -_FARTHEST, _FARTHEST
-        gone = self._left_out
-        return np.delete(lower, gone), np.delete(upper, gone), np.delete(rates, gone)
+        dropped = self._left_out
+        return np.delete(lower, dropped), np.delete(upper, dropped), np.delete(rates, dropped)
 
     @property
     def _left_out(self) -> list[int]:

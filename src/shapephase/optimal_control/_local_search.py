@@ -1,4 +1,4 @@
-"""The local search from a guess of a plan, and its path corrected and compared with the goal and the limits."""
+"""Local search from a guess of a plan; its path is corrected and compared with the goal and the limits."""
 
 from __future__ import annotations
 
@@ -33,16 +33,15 @@ _WINDING_SAMPLES = 50  # attitudes per piece: so close together that unwrapping 
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """One local search.
+    """Result of one local search.
 
     Attributes
     ----------
-    task : whose it is
-    report : what the user sees of it
+    report : its summary for the user
     polished : its path, corrected; None where that could not be reconstructed
-    cost : of the corrected path; infinite where there is none
+    cost : cost of the corrected path; infinite where there is none
     reaches_goal : whether the corrected path reaches the goal within the limits
-    basis : of its spline
+    basis : spline of the path
     """
 
     task: Reorientation
@@ -53,19 +52,19 @@ class Attempt:
     basis: SplineBasis
 
     def rank(self) -> tuple[bool, bool, float]:
-        """The best has the least: first local optima, then paths that reach the goal by cost, then others by error."""
+        """Sorting key: first local optima, then paths that reach the goal by cost, then others by error."""
         if self.polished is None:
             return True, True, np.inf
         return not self.report.converged, not self.reaches_goal, self.cost if self.reaches_goal else self.goal_error
 
     @property
     def goal_error(self) -> float:
-        """Of the corrected path [rad]."""
+        """Goal error of the corrected path [rad]."""
         return np.inf if self.polished is None else self.polished.goal_error
 
 
 def guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Array]:
-    """Attitudes at places of [0, 1] that a solver starts from: (N,) -> (N, 4)."""
+    """Return the attitudes at places of [0, 1] from which a solver starts: (N,) -> (N, 4)."""
     if task.windings is not None:
         return task.uniform_winding
     turn = task.turn_to_goal(guess.motion.final_attitude, guess.control[-1])
@@ -74,14 +73,14 @@ def guessed_attitudes(task: Reorientation, guess: Guess) -> Callable[[Array], Ar
 
 @dataclass(frozen=True, eq=False)
 class LocalSearch:
-    """What finds the local optimum next to a guess.
+    """Search for the local optimum next to a guess.
 
     Attributes
     ----------
-    basis : of the path's spline at first
-    program : for this basis
-    halvings : how often its pieces may be halved; never where the user gave their number
-    settles : whether the solver may end where the cost changes no more, as that of a long motion
+    basis : spline of the path at first
+    program : program for this basis
+    halvings : how often pieces may be halved; never where the user gave their number
+    settles : whether the solver may end where the cost of a long motion has settled
     """
 
     task: Reorientation
@@ -97,22 +96,22 @@ class LocalSearch:
         return cls(task, basis, CollocationProgram(task, basis), int(search.iterations), halvings, settles)
 
     def attempt(self, guess: Guess, callback: IterationCallback) -> Attempt:
-        """The local optimum, its path corrected to reach the goal; on finer pieces where these are too coarse."""
-        found, control = self._on(self.basis, self.program, guess, callback)
+        """Return the local optimum, its path corrected to reach the goal; on finer pieces where these do not."""
+        best, control = self._on(self.basis, self.program, guess, callback)
         for _ in range(self.halvings):
-            solved = found.report.status in GOOD_STATUS
-            if not solved or found.reaches_goal:
+            solved = best.report.status in GOOD_STATUS
+            if not solved or best.reaches_goal:
                 break
-            finer = SplineBasis(2 * found.basis.pieces)
-            onward = guess_of(self.task, finer, found.basis.matrix(PLACES) @ control)
+            finer = SplineBasis(2 * best.basis.pieces)
+            onward = guess_of(self.task, finer, best.basis.matrix(PLACES) @ control)
             if onward is None:
                 break
             program = CollocationProgram(self.task, finer)
             following, control = self._on(finer, program, onward, callback)
-            found = min(found, following, key=Attempt.rank)
-            if found is not following:
+            best = min(best, following, key=Attempt.rank)
+            if best is not following:
                 break
-        return found
+        return best
 
     def _on(
         self,
@@ -121,7 +120,7 @@ class LocalSearch:
         guess: Guess,
         callback: IterationCallback,
     ) -> tuple[Attempt, Array]:
-        """The attempt on some basis, and the control points that the solver found."""
+        """Return the attempt on a basis, and the control points that the solver found."""
         task, began = self.task, time.perf_counter()
         solution, polished = self._optimum(basis, program, guess, callback)
         return corrected_attempt(task, basis, solution, polished, began), solution.control
@@ -133,9 +132,9 @@ class LocalSearch:
         guess: Guess,
         callback: IterationCallback,
     ) -> tuple[NlpSolution, PolishedPath | None]:
-        """What the solver found, with the iterations of all its rounds, and its path corrected.
+        """Return the solver's optimum, with the iterations of all rounds, and its path corrected.
 
-        Where efforts are beyond their limits between the nodes, they are given less room there, and it goes on.
+        Where efforts exceed their limits between the nodes, they get less room there in a further round.
         """
         task, room, iterations = self.task, None, 0
         control, duration, attitudes = guess.control, task.duration, guessed_attitudes(task, guess)
@@ -166,8 +165,7 @@ class LocalSearch:
 def corrected_attempt(
     task: Reorientation, basis: SplineBasis, solution: NlpSolution, polished: PolishedPath | None, began: float
 ) -> Attempt:
-    """What a solver's path, searched for since some time, comes to when it is corrected."""
-    # A path that cannot be reconstructed is ranked last, and only the solver's numbers describe it.
+    """Return the attempt of a solver's path and its correction, whose search began at a time [s]."""
     cost = np.inf if polished is None else _cost(task, basis, polished)
     reaches_goal = (
         polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
@@ -187,7 +185,7 @@ def corrected_attempt(
 
 
 def polished_path(task: Reorientation, basis: SplineBasis, solution: NlpSolution) -> PolishedPath | None:
-    """The path that the solver found, corrected to reach the goal; None where it has no motion."""
+    """Return the solver's path, corrected to reach the goal; None where it has no motion."""
     try:
         return polish(task, basis, solution.control, solution.duration, solution.via_places)
     except ShapePhaseError:
@@ -195,7 +193,7 @@ def polished_path(task: Reorientation, basis: SplineBasis, solution: NlpSolution
 
 
 def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
-    """The cost of a corrected path, by quadrature."""
+    """Cost of a corrected path, by quadrature."""
     if task.cost == "effort":
         places, weights = panel_nodes(basis)
         torque = joint_torques(polished.motion, places * polished.duration).torque
@@ -210,7 +208,7 @@ def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> fl
 
 
 def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> bool:
-    """Whether duration, rates, windings and waypoints are as asked for; the correction keeps positions in limits."""
+    """True where duration, rates, windings and waypoints are within limits; the correction keeps positions there."""
     if task.windings is not None:
         times = np.linspace(0.0, polished.path.duration, _WINDING_SAMPLES * basis.pieces)
         counted = task.counted_windings(polished.motion.attitude(times))
@@ -225,7 +223,7 @@ def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPa
 
 
 def failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Attempt | None, stopped: str) -> str:
-    """Why no plan is returned, start by start, and what the best attempt reached."""
+    """Message of a search without a plan: each start, the best attempt, and what to change."""
     name = task.body.name
     summary = "; ".join(
         f"start {number + 1}: {attempt.report.status}, off by {attempt.report.goal_error:.3g} rad, KKT residual "

@@ -1,4 +1,4 @@
-"""The cost of a joint path, by quadrature with the body's own matrices: independent of how a plan was found."""
+"""Cost of a joint path by quadrature with the body's own matrices, independent of how a plan was found."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _CONVERGED = 1e-10  # relative change between subdivisions: 100 roundings of the
 
 
 def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
-    """The cost "kinetic" or "rate" of a path, as `plan_reorientation` counts it, with the body's own matrices.
+    """Cost "kinetic" or "rate" of a path (see `plan_reorientation`), with the body's own matrices.
 
     By Gauss quadrature with twelve nodes a panel; the panels between two breaks of the path are halved until the cost
     changes by no more than 1e-10 of itself.
@@ -58,7 +58,7 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
 
 
 def _quadrature(body: Body, route: ShapePath, cost: str, panels: int) -> float:
-    """The integral of the cost's density over the path, on this many panels between two breaks."""
+    """Integral of the cost's density over the path, with so many panels between two breaks."""
     inside, weights, _ = gauss_tableau(_NODES)
     ends = np.concatenate([np.linspace(a, b, panels + 1)[:-1] for a, b in pairwise(route.breaks)] + [route.breaks[-1:]])
     steps = np.diff(ends)

@@ -1,4 +1,4 @@
-"""How near a path comes to its limits, between the nodes of a program, too."""
+"""Shares of limits that a path takes up, between the nodes of a program, too."""
 
 from __future__ import annotations
 
@@ -22,53 +22,53 @@ _MOST_NAMED = 8  # joints in a warning
 
 
 def derivative_shares(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> dict[str, float]:
-    """How much of their limits rates, accelerations and jerks take up at most, by their control points.
+    """Largest shares of their limits that rates, accelerations and jerks take up, by their control points.
 
-    Those of the rate bound it from outside; accelerations and jerks are largest at theirs.
+    Control points bound the rate from outside; accelerations and jerks are largest at theirs.
     """
     bounds = derivative_limits(task, duration)
-    found: dict[str, float] = {}
+    shares: dict[str, float] = {}
     for order, (name, limit) in enumerate(bounds.items(), start=1):
         if np.isfinite(limit).any():
-            found[name] = float((np.abs(basis.derivative_control(order) @ control) / limit).max(initial=0.0))
-    return found
+            shares[name] = float((np.abs(basis.derivative_control(order) @ control) / limit).max(initial=0.0))
+    return shares
 
 
 def derivative_limits(task: Reorientation, duration: float) -> dict[str, Array]:
-    """Of the first three derivatives by place, (m,) each."""
+    """Limits of the first three derivatives by place, (m,) each."""
     limits = {"rate": task.rate_limit, "acceleration": task.acceleration_limit, "jerk": task.jerk_limit}
     return {name: limit * duration**order for order, (name, limit) in enumerate(limits.items(), start=1)}
 
 
 def shortest_duration(task: Reorientation, basis: SplineBasis, control: Array) -> float:
-    """In which a path keeps to its limits of rates, accelerations and jerks."""
+    """Least duration in which a path keeps to its limits of rates, accelerations and jerks [s]."""
     shares = derivative_shares(task, basis, control, 1.0)
     orders = {"rate": 1, "acceleration": 2, "jerk": 3}
     return max(share ** (1.0 / orders[name]) for name, share in shares.items())
 
 
 def effort_shares(task: Reorientation, basis: SplineBasis, motion: Motion) -> Array:
-    """How much of their measure efforts take up at most, in each piece of the spline: (pieces, l).
+    """Largest shares of their measure that efforts take up in each piece of the spline: (pieces, l).
 
-    By `joint_torques`, which has nothing of the program's own mechanics, at 4,001 even places or more.
+    By `joint_torques`, independent of the program's own mechanics, at 4,001 even places or more.
     """
-    looks = -(-(TIMES - 1) // basis.pieces)
-    places = np.linspace(0.0, 1.0, looks * basis.pieces + 1)
+    samples = -(-(TIMES - 1) // basis.pieces)
+    places = np.linspace(0.0, 1.0, samples * basis.pieces + 1)
     measured = np.isfinite(task.effort_measure)
     torque = joint_torques(motion, np.minimum(places * motion.duration, motion.duration)).torque[:, measured]
     shares = np.abs(torque) / task.effort_measure[measured]
-    inner = shares[:-1].reshape(basis.pieces, looks, -1).max(axis=1)
-    return np.maximum(inner, shares[looks::looks])
+    inner = shares[:-1].reshape(basis.pieces, samples, -1).max(axis=1)
+    return np.maximum(inner, shares[samples::samples])
 
 
 def tightened(room: Array | None, shares: Array, stages: int, rounds: int) -> Array:
-    """What efforts may take up at the places of a program, where a path took up too much between them.
+    """Shares of limits for efforts at the places of a program, where a path took up too much between them.
 
     Parameters
     ----------
     room : at the nodes, `stages` a piece, and the ends of pieces (places, l); None: all of their limits
-    shares : (pieces, l) that the path took up
-    rounds : how often this has been done before
+    shares : (pieces, l) of the path
+    rounds : number of earlier calls
     """
     pieces, count = shares.shape
     most = (1.0 - _MARGIN * 2.0**rounds) / np.maximum(shares, 1.0) ** _HASTE
@@ -81,7 +81,7 @@ def tightened(room: Array | None, shares: Array, stages: int, rounds: int) -> Ar
 
 
 def position_share(task: Reorientation, basis: SplineBasis, control: Array) -> dict[str, float]:
-    """How far the coordinates that move come from the middle of their limits to those, at most."""
+    """Largest distance of moving coordinates from the middle of their limits, as a share of half the range."""
     moves = task.movable
     middle, half = 0.5 * (task.lower + task.upper)[moves], 0.5 * (task.upper - task.lower)[moves]
     path = basis.matrix(np.linspace(0.0, 1.0, TIMES)) @ control[:, moves]
@@ -89,15 +89,15 @@ def position_share(task: Reorientation, basis: SplineBasis, control: Array) -> d
 
 
 def limit_shares(task: Reorientation, basis: SplineBasis, control: Array, motion: Motion) -> dict[str, float]:
-    """What a path takes up of each kind of limit that it has beside those of positions, at most: 1 is all of it."""
-    found = derivative_shares(task, basis, control, motion.duration)
+    """Largest shares that a path takes up of each kind of limit but that of positions: 1 is all of it."""
+    shares = derivative_shares(task, basis, control, motion.duration)
     if task.efforts_limited:
-        found["effort"] = float(effort_shares(task, basis, motion).max(initial=0.0))
-    return found
+        shares["effort"] = float(effort_shares(task, basis, motion).max(initial=0.0))
+    return shares
 
 
 def warn_of_unstated(task: Reorientation, limits: Limits) -> None:
-    """UnstatedLimitWarning to the caller of the caller, where limits are those of a file that states none."""
+    """Warn the caller's caller of limits taken from a file that does not state them (UnstatedLimitWarning)."""
     body, moves = task.body, np.abs(task.coupling).sum(axis=1) > 0.0
     unstated = {
         "rate": (limits.rate_limits, np.isinf(body.rate_limits) & moves, "they may move at any rate"),

@@ -1,4 +1,4 @@
-"""The exact derivative of the attitude at the end by the path, and the Newton corrections that use it."""
+"""Exact derivative of the attitude at the end by the path, and Newton corrections that use it."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ _RANK = 1e-10  # share of the largest singular value below which held rates depe
 
 @dataclass(frozen=True, eq=False)
 class PolishedPath:
-    """A path corrected to reach the goal, as far as it could be.
+    """A path corrected to reach the goal as far as possible.
 
     Attributes
     ----------
     control : (k, m) control points
     duration : [s]
-    path, motion : of all joints, and its reconstruction
+    path, motion : path of all joints, and its reconstruction
     first_goal_error, goal_error : before the corrections, and after them [rad]
     steps : corrections made
     via_places : (v,) where `path` passes the waypoints
@@ -56,7 +56,7 @@ class PolishedPath:
 
 @dataclass(frozen=True, eq=False)
 class _Iterate:
-    """A path of Newton's method, reconstructed."""
+    """Reconstructed path of a Newton step."""
 
     control: Array
     duration: float
@@ -73,14 +73,14 @@ def panel_nodes(basis: SplineBasis) -> tuple[Array, Array]:
 
 
 def end_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, motion: Motion) -> Array:
-    """The exact derivative of the attitude at the end by each control point: (3, k, m).
+    """Exact derivative of the attitude at the end by each control point: (3, k, m).
 
     A change d of the control points turns the end to exp(hat(e)) R(T), e = sum of the entries times d, inertial axes.
     With eta(t) the change of R(t) as a rotation vector, inertial axes,
 
         eta' = R I^-1 R^T (mu x eta) - R I^-1 (J dr' + (dI/dr_k omega + dJ/dr_k r') dr_k).
 
-    Source: theory.md B2 varied; `holonomy_derivative` is the same for loops without momentum.
+    Source: theory.md B2 varied; for loops without momentum equal to `holonomy_derivative`.
     """
     body, momentum = task.body, task.momentum
     places, weights = panel_nodes(basis)
@@ -100,14 +100,14 @@ def end_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, mot
     by_shape = (spatial @ gradient @ task.coupling) * (weights * duration)[:, None, None]
     by_rate = (spatial @ matrix @ task.coupling) * weights[:, None, None]
     values, slopes = basis.sparse_matrix(places), basis.sparse_matrix(places, 1)
-    felt = values.T @ by_shape.reshape(len(places), -1) + slopes.T @ by_rate.reshape(len(places), -1)
-    return np.swapaxes(felt.reshape(basis.dimension, 3, -1), 0, 1)
+    by_point = values.T @ by_shape.reshape(len(places), -1) + slopes.T @ by_rate.reshape(len(places), -1)
+    return np.swapaxes(by_point.reshape(basis.dimension, 3, -1), 0, 1)
 
 
 def goal_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, motion: Motion, control: Array) -> Array:
-    """The exact derivative of what has to reach the goal by each control point, where it is constrained: (j, k, m).
+    """Exact derivative of the constrained part of the end by each control point: (j, k, m).
 
-    For a link that is pointed the last control point turns it against the base, too.
+    The last control point also turns a pointed link against the base.
     """
     slopes = end_derivative(task, basis, path, motion)
     slopes[:, -1] += motion.final_attitude @ task.pointed_turn(control[-1])
@@ -117,16 +117,16 @@ def goal_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, mo
 def polish(
     task: Reorientation, basis: SplineBasis, control: Array, duration: float, via_places: Array | None = None
 ) -> PolishedPath:
-    """The nearest control points whose reconstructed motion reaches the goal, by Newton's method.
+    """Return the nearest control points whose reconstructed motion reaches the goal, by Newton's method.
 
     Nearest in the integral of the squared change of rates. Coordinates at their limits, and rates where the duration is
-    given, stay there; a path of least time is stretched instead by what its rates exceed their limits. Waypoints are
+    given, stay there; a path of least time is stretched instead until its rates are within their limits. Waypoints are
     passed at their places.
 
     Raises
     ------
     AccuracyNotReached, SingularInertiaError
-        As `reconstruct`.
+        See `reconstruct`.
     """
     first = now = best = _reconstructed(task, basis, control, duration)
     steps_to_best = 0
@@ -157,7 +157,7 @@ def polish(
 
 
 def _reconstructed(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _Iterate:
-    """The path of control points, and its motion."""
+    """Return the path of control points, and its motion."""
     path = basis.path(task.shapes(control), duration, task.body.joint_names)
     along = deformation_along(task.body, route_along(task.body, path))
     motion = reconstruct(along, task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
@@ -173,24 +173,24 @@ def _reconstructed(task: Reorientation, basis: SplineBasis, control: Array, dura
 def _corrected(
     task: Reorientation, basis: SplineBasis, control: Array, duration: float, slopes: Array, missing: Array
 ) -> tuple[Array, float]:
-    """The least change of the control points by which `slopes` (j, k m) change by `missing` (j,), within the limits."""
+    """Return the control points after the least change by which slopes @ points change by `missing`, within limits."""
     roots = _roots(basis, _free(task, basis, control))
     conditions = np.kron(end_conditions(task, basis), np.eye(task.dimension))
     rows, right = np.concatenate([slopes, conditions]), np.concatenate([missing, np.zeros(len(conditions))])
-    held = _Held.at_limits(task, basis, control, duration)
+    held = _ActiveSet.at_limits(task, basis, control, duration)
     moved = control
     for _ in range(_ROUNDS):
         every, all_right = np.concatenate([rows, held.rows]), np.concatenate([right, held.changes])
         every = every.reshape(-1, *control.shape)
         # With C C^T the inverse of the norm, the least change is C times the shortest x of rows C x = right.
-        seen = [every[:, points, place] @ root for place, (points, root) in enumerate(roots)]
-        shortest = np.linalg.lstsq(np.concatenate(seen, axis=1), all_right, rcond=_RANK)[0]
+        scaled = [every[:, points, place] @ root for place, (points, root) in enumerate(roots)]
+        shortest = np.linalg.lstsq(np.concatenate(scaled, axis=1), all_right, rcond=_RANK)[0]
         change, last = np.zeros_like(control), 0
         for place, (points, root) in enumerate(roots):
             change[points, place] = root @ shortest[last : last + len(root)]
             last += len(root)
         moved = np.clip(control + change, task.lower, task.upper)
-        further = held.and_those_beyond(task, control, moved)
+        further = held.with_violated(task, control, moved)
         if further is held:
             break
         held = further
@@ -202,10 +202,7 @@ def _corrected(
 
 
 def _roots(basis: SplineBasis, free: Mask) -> list[tuple[Mask, Array]]:
-    """Of each coordinate its free points, and C with C C^T the inverse of the norm of their changes, at those points.
-
-    Coordinates with the same free points share it.
-    """
+    """Return the free points of each coordinate, and C with C C^T the inverse norm of their changes there."""
     inverse = basis.inverse_norm
     roots: dict[bytes, Array] = {}
     for points in free.T:
@@ -215,25 +212,25 @@ def _roots(basis: SplineBasis, free: Mask) -> list[tuple[Mask, Array]]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Held:
-    """Control points of rates, accelerations and jerks that a correction does not choose.
+class _ActiveSet:
+    """Limits of rates, accelerations and jerks that a correction holds as equations.
 
     Attributes
     ----------
-    bounding : (j, k) all that have limits, by place, from control points of the path
+    bounding : (j, k) rows of all bounded derivatives, by place, from control points of the path
     limits : (j, m)
-    chosen : (j, m) which
-    targets : (j, m) what they become less what they are
+    active : (j, m) which of them are held
+    targets : (j, m) change of each that is held
     """
 
     bounding: Array
     limits: Array
-    chosen: Mask
+    active: Mask
     targets: Array
 
     @classmethod
-    def at_limits(cls, task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _Held:
-        """Those at their limits, which stay; for a path of least time, which is stretched instead, none."""
+    def at_limits(cls, task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _ActiveSet:
+        """Return those at their limits, which stay there; none for a path of least time, which is stretched instead."""
         bounding, limits = np.zeros((0, basis.dimension)), np.zeros((0, task.dimension))
         for order, limit in enumerate(derivative_limits(task, duration).values(), start=1):
             if np.isfinite(limit).any():
@@ -241,35 +238,35 @@ class _Held:
                 bounding = np.concatenate([bounding, rows])
                 limits = np.concatenate([limits, np.tile(limit, (len(rows), 1))])
         now = bounding @ control
-        chosen = np.abs(now) > limits * (1.0 - _ACTIVE)
-        return cls(bounding, limits, chosen & (task.cost != "time"), np.zeros_like(now))
+        active = np.abs(now) > limits * (1.0 - _ACTIVE)
+        return cls(bounding, limits, active & (task.cost != "time"), np.zeros_like(now))
 
-    def and_those_beyond(self, task: Reorientation, control: Array, moved: Array) -> _Held:
-        """Those too that a correction would take beyond their limits, which become their limits; itself if none."""
+    def with_violated(self, task: Reorientation, control: Array, moved: Array) -> _ActiveSet:
+        """Return this set with those that a correction violates, put at their limits; itself if there are none."""
         after = self.bounding @ moved
-        beyond = (np.abs(after) > self.limits) & ~self.chosen
+        beyond = (np.abs(after) > self.limits) & ~self.active
         if task.cost == "time" or not beyond.any():
             return self
         targets = np.where(beyond, np.copysign(self.limits, after) - self.bounding @ control, self.targets)
-        return _Held(self.bounding, self.limits, self.chosen | beyond, targets)
+        return _ActiveSet(self.bounding, self.limits, self.active | beyond, targets)
 
     @property
     def changes(self) -> Array:
-        """Of each: (h,)."""
-        return self.targets[self.chosen]
+        """Change of each that is held: (h,)."""
+        return self.targets[self.active]
 
     @property
     def rows(self) -> Array:
-        """From the control points of the path: (h, k m)."""
-        where = np.argwhere(self.chosen)
-        rows = np.zeros((len(where), self.bounding.shape[1], self.chosen.shape[1]))
+        """Rows of the equations, by the control points of the path: (h, k m)."""
+        where = np.argwhere(self.active)
+        rows = np.zeros((len(where), self.bounding.shape[1], self.active.shape[1]))
         for row, (point, coordinate) in enumerate(where):
             rows[row, :, coordinate] = self.bounding[point]
-        return rows.reshape(len(where), self.bounding.shape[1] * self.chosen.shape[1])
+        return rows.reshape(len(where), self.bounding.shape[1] * self.active.shape[1])
 
 
 def movable_points(task: Reorientation, basis: SplineBasis) -> Mask:
-    """(k, m) which control points may move: not those of the ends."""
+    """Mask (k, m) of control points that may move: not those of the ends."""
     free = np.tile(task.movable, (basis.dimension, 1))
     fixed = list(range(task.equal_points))
     free[fixed] = False
@@ -279,14 +276,14 @@ def movable_points(task: Reorientation, basis: SplineBasis) -> Mask:
 
 
 def end_conditions(task: Reorientation, basis: SplineBasis) -> Array:
-    """Rows (j, k) that are zero on the control points of each coordinate, beside those that are fixed."""
+    """Rows (j, k) whose product with the control points of each coordinate is zero, besides the fixed points."""
     return basis.end_conditions(
         task.equal_points, end_moves=task.end is None, periodic=task.rates_at_ends == "periodic"
     )
 
 
 def _free(task: Reorientation, basis: SplineBasis, control: Array) -> Mask:
-    """(k, m) which of the movable ones are not at their limits either."""
+    """Mask (k, m) of movable control points that are not at their limits."""
     reach = _ACTIVE * np.maximum(task.upper - task.lower, _LEAST_RANGE)
     return movable_points(task, basis) & (control > task.lower + reach) & (control < task.upper - reach)
 

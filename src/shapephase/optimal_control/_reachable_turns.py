@@ -1,4 +1,4 @@
-"""Goals that no motion reaches, found before anything is searched for."""
+"""Goals that no motion reaches, found before the search."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _RADIUS = np.pi  # [strokes] about the start, where shapes are drawn if limits a
 
 @dataclass(frozen=True, eq=False)
 class _ReachableTurns:
-    """Attitudes that include all those that a motion can end in: exp(angle axis) attitudes[k], inertial axes.
+    """Superset of the attitudes in which a motion can end: exp(angle axis) attitudes[k], inertial axes.
 
     Attributes
     ----------
@@ -42,10 +42,10 @@ class _ReachableTurns:
     links : (k, 3, 3) attitude of the link that is pointed against the base
     axis : (3,) unit vector; None: the angle is 0
     angles : (least, most) [rad]; None: any
-    counted : (2,) somersault and twist of the motion [rad], NaN where they are free
+    counted : (2,) somersault and twist of the motion [rad], NaN where free
     slack : largest distance of an attitude of the set from those listed [rad]
-    reason : what restricts the motion
-    remedy : what to change
+    reason : restriction of the motion, in words
+    remedy : advice, in words
     """
 
     attitudes: Array
@@ -61,10 +61,10 @@ class _ReachableTurns:
         """Least distance of a goal from all these attitudes [rad]: a lower bound."""
         counted = 0.0
         if task.windings is not None:
-            seen = np.full(2, np.nan) if self.counted is None else self.counted.copy()
+            windings = np.full(2, np.nan) if self.counted is None else self.counted.copy()
             if self.angles is not None:
-                seen[0] = np.clip(task.windings[0], *self.angles)
-            counted = float(np.nanmax(np.abs(seen - task.windings), initial=0.0))
+                windings[0] = np.clip(task.windings[0], *self.angles)
+            counted = float(np.nanmax(np.abs(windings - task.windings), initial=0.0))
         if task.target is None:
             axis, direction = task.pointing_axes()
             pointed = so3.apply(self.attitudes @ self.links, axis)
@@ -80,7 +80,7 @@ class _ReachableTurns:
         return max(counted, float(gaps.min())) - self.slack
 
     def nearest_turn(self, task: Reorientation) -> Array | None:
-        """Rotation vector of the attitude that is nearest to a goal (3,); None for an axis that is pointed."""
+        """Rotation vector of the attitude nearest to a goal (3,); None for a pointed axis."""
         if task.target is None:
             return None
         apart = task.target @ np.swapaxes(self.attitudes, -1, -2)
@@ -89,7 +89,7 @@ class _ReachableTurns:
         return so3.log(so3.exp(self._nearest_angles(apart, task)[0] * self.axis) @ self.attitudes[0])
 
     def _nearest_angles(self, apart: Array, task: Reorientation) -> Array:
-        """Angles about the axis that come nearest to some rotations: (k, 3, 3) -> (k,)."""
+        """Angles about the axis nearest to some rotations: (k, 3, 3) -> (k,)."""
         if self.axis is None:
             return np.zeros(len(apart))
         free = np.asarray(so3.angle_about(apart, self.axis))
@@ -130,21 +130,21 @@ def check_reachable(tasks: Sequence[Reorientation]) -> None:
 
 
 def _reachable_turns(task: Reorientation) -> _ReachableTurns | None:
-    """The smallest set that is certain to hold all attitudes at the end; None where nothing is certain."""
+    """Return the smallest known superset of the attitudes at the end; None where none is known."""
     body, moves = task.body, np.flatnonzero(task.movable)
     if not len(moves):
-        return _of_a_rigid_body(task)
+        return _rigid_turns(task)
     still = not task.momentum.any()
     if still and task.end is not None:
-        found = _of_loops(task, moves)
-        if found is not None:
-            return found
+        turns = _loop_turns(task, moves)
+        if turns is not None:
+            return turns
     elif still and len(moves) == 1 and (task.upper - task.lower)[moves[0]] < _LONGEST * _strokes(task)[moves[0]]:
-        return _of_one_joint(task, moves[0])
-    return _of_a_plane(task, moves) if _is_analytic(body) else None
+        return _one_joint_turns(task, moves[0])
+    return _planar_turns(task, moves) if _is_analytic(body) else None
 
 
-def _of_a_rigid_body(task: Reorientation) -> _ReachableTurns | None:
+def _rigid_turns(task: Reorientation) -> _ReachableTurns | None:
     shape = task.shapes(task.start)
     links = _link_attitudes(task, shape[None])
     remedy = "let joints move: leave out joints (--joints), or widen their limits, Limits(joint_limits=False)"
@@ -167,8 +167,8 @@ def _of_a_rigid_body(task: Reorientation) -> _ReachableTurns | None:
     return _ReachableTurns(attitudes[-1:], links, reason, remedy, counted=counted)
 
 
-def _of_loops(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
-    """Without momentum between two given shapes: the straight path, after loops at the start."""
+def _loop_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
+    """Attitudes without momentum between two given shapes: loops at the start, then the straight path."""
     axes = np.zeros((0, 3)) if len(moves) == 1 else _holonomy_axes(task, moves)
     if axes is None:
         return None
@@ -218,15 +218,15 @@ def _holonomy_axes(task: Reorientation, moves: Integers) -> Array | None:
 
 
 def _axes(vectors: Array, magnitude: float) -> Array:
-    """Directions that vectors span beyond noise: (N, 3) -> (rank, 3)."""
+    """Directions spanned by vectors, beyond noise: (N, 3) -> (rank, 3)."""
     _, values, right = np.linalg.svd(vectors, full_matrices=False)
-    found = right[values > _NOISE * magnitude + _NOTHING]
-    largest = np.take_along_axis(found, np.argmax(np.abs(found), axis=1)[:, None], axis=1)
-    return found * np.sign(largest)
+    axes = right[values > _NOISE * magnitude + _NOTHING]
+    largest = np.take_along_axis(axes, np.argmax(np.abs(axes), axis=1)[:, None], axis=1)
+    return axes * np.sign(largest)
 
 
-def _of_one_joint(task: Reorientation, column: int) -> _ReachableTurns:
-    """Without momentum to a free end: the attitudes along the way of one joint between its limits."""
+def _one_joint_turns(task: Reorientation, column: int) -> _ReachableTurns:
+    """Attitudes without momentum at a free end of one joint, along its way between its limits."""
     body, start = task.body, task.shapes(task.start)
     attitudes, shapes, slack = [np.eye(3)[None]], [start[None]], 0.0
     for limit in (task.lower[column], task.upper[column]):
@@ -255,15 +255,15 @@ def _of_one_joint(task: Reorientation, column: int) -> _ReachableTurns:
     )
 
 
-def _of_a_plane(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
-    """Where all turns are about one axis, as are the momentum and a principal axis of inertia at all shapes."""
+def _planar_turns(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
+    """Attitudes where all turns, the momentum and a principal axis of inertia at all shapes have one axis."""
     body, coordinates = task.body, _drawn(task)
     shapes, strokes = task.shapes(coordinates), _strokes(task)[moves]
     connection, frame = mechanical_connection(body, shapes), task.coupling[:, moves] * strokes
     vectors = np.swapaxes(connection @ frame, -1, -2).reshape(-1, 3)
     magnitude = float((np.abs(connection) @ np.abs(frame)).max())
     if task.link is not None:
-        turned = [task.pointed_turn(each)[:, moves].T * strokes[:, None] for each in coordinates]
+        turned = [task.pointed_turn(row)[:, moves].T * strokes[:, None] for row in coordinates]
         vectors, magnitude = np.concatenate([vectors, *turned]), max(magnitude, 1.0)
     size = float(np.linalg.norm(task.momentum))
     if size:
@@ -299,7 +299,7 @@ def _of_a_plane(task: Reorientation, moves: Integers) -> _ReachableTurns | None:
 
 
 def _with_angles(task: Reorientation, moves: Integers, plane: _ReachableTurns) -> _ReachableTurns:
-    """How far a momentum turns a planar body of one joint: the connection integrates to its value at the end."""
+    """Plane with the angles to which a momentum turns a planar body of one joint."""
     column, axis, body = int(moves[0]), plane.axis, task.body
     lower, upper = task.lower[column], task.upper[column]
     mover = int(np.argmax(np.abs(task.coupling[:, column])))
@@ -342,12 +342,12 @@ def _drawn(task: Reorientation) -> Array:
 
 
 def _is_analytic(body: Body) -> bool:
-    """Whether what holds at shapes drawn at random holds at all: not so for functions with knots."""
+    """True where a property of random shapes holds for all: not for functions with knots."""
     return not any(len(function.knots) for joint in body.chain.follows.curved for _, function in joint.terms)
 
 
 def _strokes(task: Reorientation) -> Array:
-    """What counts as a stroke of 1: a radian, and for what slides the body's radius of gyration (m,)."""
+    """Length of one stroke: a radian, or the body's radius of gyration for coordinates that slide (m,)."""
     body = task.body
     radius = float(np.sqrt(0.5 * np.trace(body.locked_inertia(task.shapes(task.start))) / body.mass))
     slides = np.array([unit == "m" for unit in body.joint_units])
@@ -355,7 +355,7 @@ def _strokes(task: Reorientation) -> Array:
 
 
 def _link_attitudes(task: Reorientation, shapes: Array) -> Array:
-    """Attitude of the link that is pointed, base axes: (N, n) -> (N, 3, 3); the identity where that is the base."""
+    """Attitude of the pointed link, base axes: (N, n) -> (N, 3, 3); the identity for the base."""
     if task.link is None:
         return np.broadcast_to(np.eye(3), (len(shapes), 3, 3))
     return task.body.link_pose(shapes, task.link)[:, :3, :3]
@@ -367,7 +367,7 @@ def _angle_from(axis: Array, vectors: Array) -> Array:
 
 
 def _more_joints(task: Reorientation) -> str:
-    """What to do about the joints."""
+    """Advice about the joints."""
     if np.abs(task.coupling).any(axis=1).all() and task.movable.all() and task.dimension == task.body.n_shape:
         return "all joints move already: choose another goal"
     return "let other joints move (joints, --joints)"
@@ -381,6 +381,6 @@ def _names(task: Reorientation, columns: Integers) -> str:
 
 
 def _text(vector: Array) -> str:
-    """A vector for a message, as a list that can be typed."""
+    """Text of a vector, as a list that can be typed."""
     rounded = np.where(np.abs(vector) < 1e-9, 0.0, vector)
     return f"[{', '.join(f'{value:.6g}' for value in rounded)}]"

@@ -18,8 +18,8 @@ _DEGREE = 3  # twice differentiable: the acceleration cost is finite, and `Shape
 class SplineBasis:
     """C2 cubic splines on `pieces` equal pieces of [0, 1], with not-a-knot ends.
 
-    They are the functions that `ShapePath.spline(..., periodic=False)` makes of their values at the ends of the pieces.
-    A spline lies between the least and the largest of its control points, its rate between those of the rate.
+    The functions that `ShapePath.spline(..., periodic=False)` makes of values at the ends of the pieces. A spline lies
+    between the least and the largest of its control points, its rate between those of the rate.
 
     Attributes
     ----------
@@ -30,17 +30,17 @@ class SplineBasis:
 
     @property
     def dimension(self) -> int:
-        """k, the number of control points, which is the dimension of the spline space."""
+        """Number k of control points, the dimension of the spline space."""
         return self.pieces + 1
 
     @cached_property
     def nodes(self) -> Array:
-        """The ends of the pieces: (pieces + 1,)."""
+        """Ends of the pieces: (pieces + 1,)."""
         return np.linspace(0.0, 1.0, self.pieces + 1)
 
     @cached_property
     def knots(self) -> Array:
-        """With the ends fourfold, the second node and the last but one left out."""
+        """Knots: the nodes without the second and the last but one, the ends fourfold."""
         return np.concatenate([np.zeros(_DEGREE + 1), self.nodes[2:-2], np.ones(_DEGREE + 1)])
 
     def matrix(self, places: Array, order: int = 0) -> Array:
@@ -51,7 +51,7 @@ class SplineBasis:
         return np.asarray(spline.derivative(order)(places) if order else spline(places))
 
     def sparse_matrix(self, places: Array, order: int = 0) -> Any:
-        """The same as a sparse matrix, for long splines; order 0 or 1, places within [0, 1]."""
+        """Sparse `matrix` for long splines; order 0 or 1, places within [0, 1]."""
         from scipy.interpolate import BSpline
         from scipy.sparse import csr_matrix
 
@@ -70,21 +70,21 @@ class SplineBasis:
 
     @cached_property
     def rate_control(self) -> Array:
-        """From control points to those of the derivative by place: (k - 1, k)."""
+        """Matrix from control points to those of the derivative by place: (k - 1, k)."""
         return self.derivative_control(1)
 
     def derivative_control(self, order: int) -> Array:
-        """From control points to those of a derivative by place, the first to the third: (k - order, k)."""
-        found = np.eye(self.dimension)
+        """Matrix from control points to those of a derivative by place, the first to the third: (k - order, k)."""
+        matrix = np.eye(self.dimension)
         for past in range(order):
             degree = _DEGREE - past
             spread = self.knots[_DEGREE + 1 : -1 - past] - self.knots[1 + past : -_DEGREE - 1]
-            found = degree / spread[:, None] * np.diff(found, axis=0)
-        return found
+            matrix = degree / spread[:, None] * np.diff(matrix, axis=0)
+        return matrix
 
     @cached_property
     def rate_reaches(self) -> Mask:
-        """Into which pieces each control point of the derivative reaches: (pieces, k - 1)."""
+        """True for the pieces into which each control point of the derivative reaches: (pieces, k - 1)."""
         from scipy.interpolate import BSpline
 
         middles = 0.5 * (self.nodes[1:] + self.nodes[:-1])
@@ -95,9 +95,9 @@ class SplineBasis:
 
         Parameters
         ----------
-        equal : how many control points at the end are the same; counts only where the last of them moves
+        equal : number of equal control points at the end; counts only where the last of them moves
         end_moves : whether the end is free
-        periodic : whether the rates at both ends are the same
+        periodic : whether the rates at both ends are equal
         """
         rows = []
         if end_moves:
@@ -111,7 +111,7 @@ class SplineBasis:
         return np.array(rows).reshape(-1, self.dimension)
 
     def fitted(self, values: Array, places: Array) -> Array:
-        """Control points of the spline with the ends of a curve and nearest to its values: (N, m) -> (k, m)."""
+        """Control points of the spline nearest to the values of a curve, with its ends: (N, m) -> (k, m)."""
         weights = self.matrix(places)
         control = np.zeros((self.dimension, values.shape[1]))
         control[[0, -1]] = values[[0, -1]]
@@ -126,7 +126,7 @@ class SplineBasis:
         return np.asarray(make_interp_spline(self.nodes, values, k=_DEGREE).c)
 
     def path(self, control: Array, duration: float, joint_names: tuple[str, ...]) -> ShapePath:
-        """The spline as a path of the joints: control points (k, n)."""
+        """Return the spline with control points (k, n) as a path of the joints."""
         values = self.matrix(self.nodes) @ control
         return ShapePath.spline(self.nodes * duration, values, periodic=False, joint_names=joint_names)
 

@@ -1,4 +1,4 @@
-"""Waypoints of a task: in its coordinates, where on a guess they come, and the equations of a spline through them."""
+"""Waypoints of a task: their coordinates, their places on a guess, and the equations of a spline through them."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class ViaPoint:
 
     Attributes
     ----------
-    columns, values : (j,) which of its coordinates are told, and what they are there
-    place : the time as a share of the duration; None: open
+    columns, values : (j,) indices and values of the coordinates that it fixes
+    place : time as a share of the duration; None: open
     """
 
     columns: Integers
@@ -46,16 +46,19 @@ def via_points(
     offset: Array,
     chart: BallChart | None,
 ) -> tuple[ViaPoint, ...]:
-    """Of waypoints, by what makes shapes of coordinates (n, m), (n,), without and with ball joints' own.
+    """Return waypoints in the coordinates of a task.
 
-    duration : None: it is to be found, and no waypoint has a time
+    Parameters
+    ----------
+    duration : [s]; None: it is to be found, and no waypoint has a time
+    coupling, offset : (n, m), (n,) shapes from coordinates, before the chart of ball joints
 
     Raises
     ------
     ShapeError, TrajectoryError, UnknownNameError
         For waypoints that no path within limits and couplings passes at their times.
     """
-    found, before = [], 0.0
+    points, before = [], 0.0
     for number, waypoint in enumerate(via):
         name = f"via: waypoint {number + 1}"
         if not isinstance(waypoint, Waypoint):
@@ -77,16 +80,16 @@ def via_points(
                 raise ShapeError(f"{name}: a body with ball joints that move needs the coordinates of all joints, (n,)")
             values = chart.coordinates(values, name)
             columns = np.arange(len(values))
-        found.append(
+        points.append(
             ViaPoint(columns, values, None if waypoint.time is None or duration is None else waypoint.time / duration)
         )
-    return tuple(found)
+    return tuple(points)
 
 
 def _coordinates(
     body: Body, waypoint: Waypoint, bounds: Array, coupling: Array, offset: Array, name: str
 ) -> tuple[Integers, Array]:
-    """Which coordinates a waypoint tells, and what they are."""
+    """Return indices and values of the coordinates that a waypoint fixes."""
     if isinstance(waypoint.shape, Mapping):
         named = {body.joint_index(joint): value for joint, value in waypoint.shape.items()}
     else:
@@ -117,7 +120,7 @@ def _coordinates(
 
 
 def nearest_places(task: Reorientation, curve: Array, places: Array) -> Array:
-    """Where a curve (N, m), seen at places of [0, 1], comes nearest to the waypoints, in their order: (v,)."""
+    """Places where a curve (N, m), sampled at places of [0, 1], is nearest to the waypoints, in their order: (v,)."""
     if not task.via:
         return np.zeros(0)
     even = _even_places(task)
@@ -137,12 +140,14 @@ def nearest_places(task: Reorientation, curve: Array, places: Array) -> Array:
     chosen = [int(np.argmin(sums[-1]))]
     for back in reversed(before):
         chosen.append(int(back[max(chosen[-1] - 1, 0)]))
-    found = places[chosen[::-1]]
-    return np.array([f if point.place is None else point.place for f, point in zip(found, task.via, strict=True)])
+    nearest_ones = places[chosen[::-1]]
+    return np.array(
+        [f if point.place is None else point.place for f, point in zip(nearest_ones, task.via, strict=True)]
+    )
 
 
 def bent_through(task: Reorientation, curve: Array, places: Array, at: Array) -> Array:
-    """A curve (N, m), seen at places of [0, 1], bent so that it passes the waypoints `at` theirs (v,)."""
+    """Return a curve (N, m), sampled at places of [0, 1], bent to pass the waypoints `at` their places (v,)."""
     bent = curve.copy()
     for column in range(task.dimension):
         stops, gaps = [0.0], [0.0]
@@ -157,7 +162,7 @@ def bent_through(task: Reorientation, curve: Array, places: Array, at: Array) ->
 
 
 def via_rows(task: Reorientation, basis: SplineBasis, at: Array) -> tuple[Array, Array]:
-    """What is linear in the control points, and what it is on a path that passes the waypoints: (j, k, m), (j,)."""
+    """Rows on the control points, and their values on a path that passes the waypoints: (j, k, m), (j,)."""
     rows = [np.zeros((0, basis.dimension, task.dimension))]
     for point, weights in zip(task.via, basis.matrix(np.clip(at, 0.0, 1.0)), strict=True):
         block = np.zeros((len(point.columns), basis.dimension, task.dimension))
@@ -167,14 +172,14 @@ def via_rows(task: Reorientation, basis: SplineBasis, at: Array) -> tuple[Array,
 
 
 def open_points(task: Reorientation) -> list[int]:
-    """Which waypoints have no time of their own."""
+    """Indices of the waypoints without a time."""
     return [number for number, point in enumerate(task.via) if point.place is None]
 
 
 def symbolic_via_rows(task: Reorientation, basis: SplineBasis, control: Any, opened: Any) -> tuple[Any, Array, Array]:
-    """The same rows, and those of the waypoints' order, with bounds; of MX control points (m k,) and open places.
+    """Return `via_rows` and rows of the waypoints' order, with bounds, for MX control points (m k,) and open places.
 
-    A place that is open moves the weights of the control points: on each piece they are polynomials of it.
+    The weights of the control points are, on each piece, polynomials of an open place.
     """
     import casadi
 
@@ -194,7 +199,7 @@ def symbolic_via_rows(task: Reorientation, basis: SplineBasis, control: Any, ope
 
 
 def _weights(basis: SplineBasis, place: Any) -> Any:
-    """Of the control points at a place, (k,), by the polynomials of the piece that it is on."""
+    """Weights of the control points at a place, (k,), by the polynomials of its piece."""
     import casadi
 
     if isinstance(place, float):
@@ -210,7 +215,7 @@ def _weights(basis: SplineBasis, place: Any) -> Any:
 
 
 def _even_places(task: Reorientation) -> Array:
-    """Of waypoints by their distance along the way through them, as their times permit: (v,)."""
+    """Places of waypoints by their distance along the way through them, as their times permit: (v,)."""
     now, lengths = task.start.copy(), []
     for point in task.via:
         onward = now.copy()

@@ -1,4 +1,4 @@
-"""The optimal control problem as a nonlinear program: the attitude by Gauss collocation, the shape a spline."""
+"""Optimal control problem as a nonlinear program: the attitude by Gauss collocation, the shape a spline."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ._polish import end_conditions
 from ._spline_basis import SplineBasis, gauss_tableau
 from ._via_points import open_points, symbolic_via_rows
 from .nodes.limit_rows import EffortTerms, derivative_rows
-from .nodes.node_functions import node_functions, scipy_sparse, seen_at, sparse_matrix
+from .nodes.node_functions import node_arguments, node_functions, scipy_sparse, sparse_matrix
 from .solver_callback import BestIterate, IterationCallback, ipopt_callback
 from .symbolic import symbolic_body
 from .task import Reorientation
@@ -35,20 +35,20 @@ _STOPPED = "User_Requested_Stop"  # after Ctrl-C between iterations, or a callba
 
 @dataclass(frozen=True, eq=False)
 class NlpSolution:
-    """The final iterate of a nonlinear program.
+    """Final iterate of a nonlinear program.
 
     Attributes
     ----------
     control : (k, m) control points of the free coordinates [rad or m]
     duration : [s]
     attitude : (3, 3) at the end, by the program's own discretisation
-    cost : by the program's own quadrature
+    cost : cost by the program's own quadrature
     status : the solver's message
     converged : whether it is a local optimum to the solver's tolerance
     kkt_residual : largest remaining violation of the Karush-Kuhn-Tucker conditions, scaled
     infeasibility : largest violation of a constraint
-    iterations : number taken
-    via_places : (v,) where the path passes the waypoints
+    iterations : number of iterations
+    via_places : (v,) places of the waypoints
     second_order : whether the Hessian of the Lagrangian, projected on what the constraints leave, is positive definite
         there, by the inertia of the last factorised matrix; None where that is not known
     """
@@ -74,13 +74,13 @@ class CollocationProgram:
         dq/ds = q (T omega)/2,    T omega = T I^-1 R^T mu - A u,
 
     whose collocation keeps |q| to rounding, as it keeps all quadratic invariants; order six. Unknown are
-    x = (control points, T, q at the nodes, q at the ends of the pieces, open places of waypoints). What a node sees of
-    them is linear, y = W x with y = (r, u, q, T), so that Jacobian and Hessian are those of one node, chained on by W:
+    x = (control points, T, q at the nodes, q at the ends of the pieces, open places of waypoints). A node's arguments
+    y = (r, u, q, T) are linear in them, y = W x, so that Jacobian and Hessian are those of one node, chained by W:
     exact, banded.
 
     Attributes
     ----------
-    places : of the nodes
+    places : places of the nodes
     program : x, p, f and g as CasADi's `nlpsol` takes them
     derivatives : Jacobian of g and Hessian of the Lagrangian, as functions that `nlpsol` takes
     """
@@ -96,8 +96,8 @@ class CollocationProgram:
         core = duration_place + 1 + 4 * (count + basis.pieces + 1)
         self._open = slice(core, core + len(open_points(task)))
         unknown = casadi.MX.sym("unknown", self._open.stop)
-        seen = seen_at(task, basis, self.places, 1, unknown.shape[0])
-        at_node = casadi.reshape(seen @ unknown, width, count)
+        arguments = node_arguments(task, basis, self.places, 1, unknown.shape[0])
+        at_node = casadi.reshape(arguments @ unknown, width, count)
         node = node_functions(task)
         turning, density = node.values.map(count)(at_node)
         panels = step * np.tile(weights, basis.pieces)
@@ -121,7 +121,7 @@ class CollocationProgram:
         rows = casadi.vertcat(*groups)
         slopes = casadi.diagcat(*casadi.horzsplit(node.jacobian.map(count)(at_node), width))
         jacobian = casadi.vertcat(
-            linear - from_turning @ (slopes @ seen),
+            linear - from_turning @ (slopes @ arguments),
             casadi.jacobian(others, unknown),
             effort_jacobian,
         )
@@ -132,7 +132,7 @@ class CollocationProgram:
         turning_multipliers = casadi.reshape(-from_turning.T @ of_linear, 4, count)
         density_factor = 0.0 if task.cost == "time" else cost_factor
         blocks = node.hessian.map(count)(at_node, turning_multipliers, density_factor * shares.T)
-        hessian = seen.T @ (casadi.diagcat(*casadi.horzsplit(blocks, width)) @ seen)
+        hessian = arguments.T @ (casadi.diagcat(*casadi.horzsplit(blocks, width)) @ arguments)
         if efforts is not None:
             hessian = hessian + efforts.hessian(of_efforts, cost_factor)
         lagrangian = casadi.dot(others, of_others)
@@ -160,7 +160,7 @@ class CollocationProgram:
         self._high = np.concatenate([high, final_high, via_high, room])
 
     def _linear_rows(self, step: float, weights: Array, integrals: Array) -> tuple[Any, Any, Array, Array]:
-        """Collocation and rate limits: the linear part of the rows, how the turning enters, lower and upper bounds."""
+        """Rows of collocation and rate limits: linear part, matrix of the turning, lower and upper bounds."""
         sparse = scipy_sparse()
         task, basis = self._task, self._basis
         pieces, count = basis.pieces, len(self.places)
@@ -203,7 +203,7 @@ class CollocationProgram:
         return sparse_matrix(sparse.hstack([linear, no_places])), sparse_matrix(turning), low, high
 
     def _acceleration_cost(self, unknown: Any) -> Any:
-        """The integral of half the squared second derivative: exact by two nodes of a piece or more."""
+        """Integral of half the squared second derivative: exact with two nodes of a piece or more."""
         import casadi
 
         task, basis = self._task, self._basis
@@ -227,12 +227,13 @@ class CollocationProgram:
         room: Array | None = None,
         iteration_callback: IterationCallback | None = None,
     ) -> NlpSolution:
-        """A local optimum from a guess: control points (k, m), T, and the attitude at places (N,) -> (N, 4).
+        """Return the local optimum from a guess: control points (k, m), T, attitudes at places (N,) -> (N, 4).
 
-        Where there are waypoints, their places too, (v,).
-
-        With `settles` it may end before, where the cost changes no more. `room` is how much of their limits efforts may
-        take up at the nodes and the ends of pieces, (places, l); None: all of it.
+        Parameters
+        ----------
+        via_places : (v,) guessed places of waypoints
+        settles : whether the search may end where the cost changes no more
+        room : shares of their limits for efforts at the nodes and the ends of pieces, (places, l); None: 1
         """
         at = np.zeros(len(self._task.via)) if via_places is None else via_places
         attitudes = [quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
@@ -241,12 +242,12 @@ class CollocationProgram:
         rows_low, rows_high = self._low.copy(), self._high.copy()
         if room is not None:
             rows_low[-room.size :], rows_high[-room.size :] = -room.ravel(), room.ravel()
-        # A local name keeps it alive: CasADi does not.
+        # The local name keeps it alive: CasADi does not.
         callback = ipopt_callback(best, len(guess), rows_low, rows_high)
         solver = self._ipopt(callback, 1.0 / self._cost_scale(control, duration), iterations, tolerance, settles)
         low, high = self._bounds()
-        found = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=rows_low, ubg=rows_high)
-        return self._solution(np.array(found["x"]).ravel(), float(found["f"]), solver.stats(), best)
+        result = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=rows_low, ubg=rows_high)
+        return self._solution(np.array(result["x"]).ravel(), float(result["f"]), solver.stats(), best)
 
     def _ipopt(self, callback: Any, cost_factor: float, iterations: int, tolerance: float, settles: bool) -> Any:
         import casadi
@@ -254,7 +255,7 @@ class CollocationProgram:
         settled = {
             "acceptable_tol": _SETTLED_TOLERANCE,
             "acceptable_constr_viol_tol": _SETTLED_TOLERANCE,
-            # That of complementarity is not scaled: the tolerance above stands for it.
+            # Complementarity is not scaled: the tolerance above bounds it, too.
             "acceptable_compl_inf_tol": _UNBOUNDED,
             "acceptable_obj_change_tol": _SETTLED_CHANGE,
             "acceptable_iter": _SETTLED_ITERATIONS,
@@ -280,7 +281,7 @@ class CollocationProgram:
         )
 
     def _solution(self, values: Array, cost: float, stats: dict[str, Any], best: BestIterate) -> NlpSolution:
-        """What IPOPT returned; where it was stopped, the best iterate instead of the last."""
+        """Return IPOPT's solution; where it was stopped, the best iterate instead of the last."""
         status = str(stats["return_status"])
         if best.error is not None:
             raise best.error
@@ -312,7 +313,7 @@ class CollocationProgram:
         )
 
     def _goal_error(self, values: Array) -> float:
-        """Of unknowns [rad]."""
+        """Goal error of unknowns [rad]."""
         points = self._task.dimension * self._basis.dimension
         return self._task.goal_error(self._last_attitude(values), values[points - self._task.dimension : points])
 
@@ -320,13 +321,13 @@ class CollocationProgram:
         return so3.matrix_from_quat(so3.normalised(values[self._open.start - 4 : self._open.start]))
 
     def _via_places(self, values: Array) -> Array:
-        """Of all waypoints, whether given or found."""
+        """Places of all waypoints, given or found."""
         places = np.array([np.nan if point.place is None else point.place for point in self._task.via])
         places[open_points(self._task)] = values[self._open]
         return places
 
     def _cost_scale(self, control: Array, duration: float) -> float:
-        """The cost of a guess, or 1 where it is zero."""
+        """Cost of a guess, or 1 where it is zero."""
         rest = np.zeros(4 * (len(self.places) + self._basis.pieces + 1) + self._open.stop - self._open.start)
         value = float(self._cost_function(np.concatenate([control.ravel(), [duration], rest])))
         return value if value > 0.0 else 1.0
@@ -353,7 +354,7 @@ class CollocationProgram:
 
 
 def final_conditions(task: Reorientation, coordinates: Any, quaternion: Any) -> Any:
-    """Three rows of the last coordinates and quaternion: zero at the target; of an axis the third is the cosine."""
+    """Three rows of the last coordinates and quaternion: zero at the target; for an axis the third is the cosine."""
     import casadi
 
     if task.target is not None:
@@ -361,9 +362,13 @@ def final_conditions(task: Reorientation, coordinates: Any, quaternion: Any) -> 
         return casadi.DM([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]]) @ quaternion
     axis, direction = task.pointing_axes()
     vector, scalar = quaternion[:3], quaternion[3]
-    seen = casadi.DM(axis)
+    pointed = casadi.DM(axis)
     if task.link is not None:
         shape = casadi.DM(task.coupling) @ coordinates + casadi.DM(task.offset)
-        seen = symbolic_body(task.body).link_pose(task.link)(shape)[:3, :3] @ seen
-    turned = seen + 2.0 * scalar * casadi.cross(vector, seen) + 2.0 * casadi.cross(vector, casadi.cross(vector, seen))
+        pointed = symbolic_body(task.body).link_pose(task.link)(shape)[:3, :3] @ pointed
+    turned = (
+        pointed
+        + 2.0 * scalar * casadi.cross(vector, pointed)
+        + 2.0 * casadi.cross(vector, casadi.cross(vector, pointed))
+    )
     return casadi.DM(np.vstack([task.constrained_directions(), direction])) @ turned

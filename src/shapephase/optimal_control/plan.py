@@ -1,4 +1,4 @@
-"""What planning returns."""
+"""Result of planning."""
 
 from __future__ import annotations
 
@@ -19,28 +19,25 @@ from .plan_options import Goal
 # Radians; metres stand for them where joints slide.
 COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "effort": "s", "time": "s"}
 
-PLAN_STATUS = ("found", "not found", "stopped", "out of time")
-"""How a search ended: after all starts, with a local optimum that reaches the goal or without, or before."""
-
 _SECOND_ORDER = {True: "a minimum among paths near by", False: "not met", None: "not known"}
 AGREEMENT = 1e-3  # relative difference of costs up to which starts have come to the same
 
 
 @dataclass(frozen=True)
 class Start:
-    """The result of one start of the search.
+    """Result of one start of the search.
 
     Attributes
     ----------
     status : the solver's message
     converged : whether it is a local optimum that reaches the goal
-    cost : at its end [unit of the plan's cost]
+    cost : cost at its end [unit of the plan's cost]
     goal_error : angle between the solver's own attitude at the end and the goal [rad]
     kkt_residual, infeasibility : remaining violation of the optimality conditions and of the constraints, scaled
-    iterations : of the solver
+    iterations : iterations of the solver
     seconds : time it took
-    second_order : whether the projected Hessian of the Lagrangian is positive definite there, so that no path near by
-        is cheaper; None where the solver does not tell
+    second_order : whether the projected Hessian of the Lagrangian is positive definite there, so that no neighbour is
+        cheaper; None where unknown
 
     Examples
     --------
@@ -64,38 +61,36 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A motion of the joints that turns a body to a goal, and how it was found.
+    """Motion of the joints that turns a body to a goal, and the search that found it.
 
     Attributes
     ----------
     body : the body that turns
-    path : of all its joints; a C2 spline with not-a-knot ends, also where it closes: a file of its samples is read back
-        unchanged with `read_shape_path(..., close=False)`
+    path : path of all its joints; a C2 spline with not-a-knot ends, also where it closes: `read_shape_path(...,
+        close=False)` reads a file of its samples back unchanged
     motion : its reconstruction, to 1e-10 rad: independent of how the plan was found
     cost_name : "kinetic", "rate", "acceleration", "effort" or "time"
-    rates_at_ends : of the joints, "zero", "periodic" or "free"
-    cost : of `path`, by quadrature with the body's own matrices [J s, rad^2/s, rad^2/s^3 or s]
+    rates_at_ends : "zero", "periodic" or "free"
+    cost : cost of `path`, by quadrature with the body's own matrices [J s, rad^2/s, rad^2/s^3 or s]
     goal_error : angle between the reconstructed attitude at the end and the goal [rad]
-    transcription_gap : the same before the Newton corrections: the error of the discretisation [rad]
+    transcription_gap : goal error before the Newton corrections: the error of the discretisation [rad]
     polish_steps : Newton corrections of the path's coefficients that removed it
-    kkt_residual : of the discrete optimum before the corrections, scaled; up to 1e-3 for a motion of
-        many strokes, whose search ends where the cost has settled
+    kkt_residual : residual of the discrete optimum's KKT conditions before the corrections, scaled; up to 1e-3 for a
+        motion of many strokes, whose search ends where the cost has settled
     coefficients : (pieces + 1, m) control points of the free coordinates [rad or m]
-    iterations : over all starts
-    seconds : over all starts
-    starts : one for each start, in their order
-    second_order : as `Start.second_order`, of the start that gave the plan
-    hamiltonian_spread : by how much Pontryagin's Hamiltonian varies, relative to its mean: along an optimal path of the
-        costs "kinetic" and "rate" without momentum it is constant where no rate is at its limit. Means of the pieces of
+    iterations, seconds : of all starts
+    starts : results of the starts, in their order
+    second_order : `Start.second_order` of the start that gave the plan
+    hamiltonian_spread : variation of Pontryagin's Hamiltonian relative to its mean, which is zero along an optimal path
+        of the costs "kinetic" and "rate" without momentum where no rate is at its limit. By means over the pieces of
         the spline, without three at both ends, where the joints start and stop; None for other costs, with momentum,
-        and where all pieces are at a rate limit, or accelerations, jerks or efforts have limits, or waypoints times
-    limit_shares : what `path` takes up of each kind of limit that it has, at most, 1 being all of it: of "position",
-        half the range, from its middle; of "rate", by the spline's control points, which bound it; of "acceleration"
-        and "jerk"; of "effort", at 4,001 even times or more
-    goal : what `path` was to reach; of several, the one that costs least
-    status : "found"; of a `PlanNotFound.best`, "not found"; "stopped" or "out of time" where not all starts were gone
-        through
-    waypoint_times : (v,) when `path` passes its waypoints [s]
+        where all pieces are at a rate limit, or accelerations, jerks or efforts have limits, or waypoints times
+    limit_shares : largest share that `path` takes up of each kind of limit that it has, 1 being all of it: "position",
+        from the middle of the range; "rate", by the spline's control points, which bound it; "acceleration" and
+        "jerk"; "effort", at 4,001 even times or more
+    goal : the goal that `path` was to reach; of several, the cheapest
+    status : "found"; "not found" for a `PlanNotFound.best`; "stopped" or "out of time" before the end of all starts
+    waypoint_times : (v,) times at which `path` passes its waypoints [s]
 
     Examples
     --------
@@ -129,19 +124,19 @@ class Plan:
 
     @property
     def agreeing_starts(self) -> int:
-        """How many starts came to the least cost, within a thousandth: what is known of its being the least of all."""
+        """Number of starts that came to the least cost, within a thousandth: evidence that it is the global optimum."""
         costs = [start.cost for start in self.starts if start.converged]
         return sum(cost <= min(costs) * (1.0 + AGREEMENT) for cost in costs)
 
     @property
     def cost_unit(self) -> str:
-        """Of `cost`."""
+        """Unit of `cost`."""
         return COST_UNITS[self.cost_name]
 
     __repr__, _repr_html_ = card_text, card_html
 
     def _card(self) -> Card:
-        """What turns by how much at which cost, how far off the goal, and how it was found; with its joints in time."""
+        """Card of the turn, its cost, goal error and search, with the joints in time."""
         converged = sum(start.converged for start in self.starts)
         rows = [
             ("duration", f"{numbers(self.path.duration, 's')}, rates at the ends: {self.rates_at_ends}"),

@@ -1,4 +1,4 @@
-"""The grouped arguments of `plan_reorientation`: what to reach, within which limits, and how to search."""
+"""Grouped arguments of `plan_reorientation`: goal, waypoints, limits and search."""
 
 from __future__ import annotations
 
@@ -22,8 +22,7 @@ LIMIT_UNITS = {
     "acceleration_limits": ("rad/s^2 or m/s^2", False),
     "jerk_limits": ("rad/s^3 or m/s^3", False),
     "effort_limits": ("N m or N", True),
-}
-"""Of what `Limits` bounds, and whether a body's file may state it."""
+}  # units of `Limits`, and whether a body's file may state them
 
 _SAME = 1e-7  # difference of entries of equal rotations: rounding of user input
 _MOST_ROTATIONS = 120  # of a group: the icosahedron's has 60, larger ones have an axis of revolution instead
@@ -35,19 +34,18 @@ _MOST_ITERATIONS = 2**31 - 1  # the solver's own counter
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """The attitude that a plan has to reach, from the identity at its start. Exactly one of three ways to say it.
+    """Attitude that a plan has to reach from the identity: one of `rotation`, `pointing`, or somersaults and twists.
 
     Attributes
     ----------
-    rotation : (3, 3) attitude at the end; or several (k, 3, 3), of which the one that costs least is taken
+    rotation : (3, 3) attitude at the end; or several (k, 3, 3), of which the cheapest is taken
     pointing : an axis of the base and the inertial direction that it has to have at the end, two vectors (3,), kept as
         unit vectors (2, 3); the rotation about that direction is left free. Or several such pairs (k, 2, 3)
-    link : whose axis is pointed instead of the base's, in axes of the link's frame as it stands at the end
-    symmetry : turns after which the body looks the same, in its base's axes, so that any of them may come before the
-        goal's: an axis (3,), for all turns about it; or some rotations (k, 3, 3), kept as the group that they make
-    somersaults, half_twists : how often the body turns about its momentum and, in half turns, about its own
-        `twist_axis`, counted through the motion, whole or not; one that is left out is 0. The momentum must be at right
-        angles to the twist axis
+    link : name of the link whose axis is pointed instead of the base's, in axes of its frame at the end
+    symmetry : turns, in base axes, that leave the body unchanged, any of which may precede the goal's: an axis (3,),
+        for all turns about it; or some rotations (k, 3, 3), kept as the group that they generate
+    somersaults, half_twists : turns about the momentum, and half turns about the body's own `twist_axis`, counted
+        through the motion, whole or not; None of one: 0. The momentum must be at right angles to the twist axis
     twist_axis : (3,) base axes, of any length
 
     Raises
@@ -113,12 +111,12 @@ class Goal:
 
     @property
     def winds(self) -> bool:
-        """Whether somersaults and twists are counted."""
+        """True where somersaults and twists are counted."""
         return self.somersaults is not None or self.half_twists is not None
 
     @property
     def members(self) -> tuple[Goal, ...]:
-        """The goals of one attitude or one axis each, any of which will do."""
+        """Alternative goals of one attitude or one axis each."""
         if self.winds:
             return (self,)
         turns = np.eye(3)[None] if self.symmetry is None else np.asarray(self.symmetry)
@@ -128,24 +126,22 @@ class Goal:
         rotations = np.asarray(self.rotation).reshape(-1, 3, 3)
         if turns.ndim == 1:
             return tuple(Goal(pointing=(turns, rotation @ turns)) for rotation in rotations)
-        return tuple(Goal(rotation=one) for one in _different((rotations[:, None] @ turns).reshape(-1, 3, 3)))
+        return tuple(Goal(rotation=rotation) for rotation in _different((rotations[:, None] @ turns).reshape(-1, 3, 3)))
 
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """What the joints of a plan have to stay within.
+    """Limits of the joints of a plan.
 
     Attributes
     ----------
     joint_limits : whether the joints stay within the body's own limits
-    rate_limits : the largest rate of every joint, or one for each, (n,) [rad/s or m/s]; "body": those that the body's
-        file states, joints of which it states none being as fast as they like; None: no limit
-    acceleration_limits, jerk_limits : the same of the first and second derivative of the rate, without "body"
-        [rad/s^2 or m/s^2], [rad/s^3 or m/s^3]; with limits of the jerk joints that start from rest start without
-        acceleration, too
-    effort_limits : the same of the torque or force of every motor, of joints that are held, too [N m or N]; "body":
-        those that the body's file states, which are none for joints of which it states none. Where the cost is "effort"
-        these are also what efforts are measured by; None: no limit, and measured by the file's
+    rate_limits : largest rate of every joint, or of each, (n,) [rad/s or m/s]; "body": those stated in the body's file,
+        if any; None: no limit
+    acceleration_limits, jerk_limits : likewise for the derivatives of the rate, without "body" [rad/s^2 or m/s^2],
+        [rad/s^3 or m/s^3]; with jerk limits joints start from rest without acceleration
+    effort_limits : likewise for the torque or force of every motor, also of held joints [N m or N]; "body": those of
+        the body's file, if any. With cost "effort" they are the units of efforts; None: no limit, units of the file
 
     Raises
     ------
@@ -174,7 +170,7 @@ class Limits:
             self._check(name, unit, ("body",) if stated else ())
 
     def _check(self, name: str, unit: str, words: tuple[str, ...]) -> None:
-        """Limits of one kind, which may be some words instead of numbers."""
+        """Check limits of one kind, which may be one of some words."""
         given = getattr(self, name)
         if given is None:
             return
@@ -192,12 +188,12 @@ class Limits:
 
 @dataclass(frozen=True, eq=False)
 class Waypoint:
-    """A posture that a plan passes through, without stopping there.
+    """Posture that a plan passes through without stopping.
 
     Attributes
     ----------
-    shape : (n,) of all joints [rad or m]; or name -> coordinate of some, the others being as the plan likes
-    time : when [s]; None: whenever it suits, between the waypoints before and after it in their list
+    shape : (n,) of all joints [rad or m]; or name -> coordinate of some, the others being free
+    time : [s]; None: free, between the waypoints before and after it in the list
 
     Raises
     ------
@@ -240,16 +236,16 @@ class Search:
 
     Attributes
     ----------
-    starts : local searches from different guesses, of which the cheapest plan is returned; up to 1000. For up to eight
+    starts : number of local searches from different guesses, up to 1000; the cheapest plan is returned. For up to eight
         free joints, and for up to twelve with several starts, they are the best of more guesses, up to sixteen, by a
-        coarse search. Where none leads to a plan of up to eight, two further guesses are tried, and then a motion of
-        many strokes; at once where two joints cannot turn the body so far in four rounds
-    seed : of the random guesses; the same seed gives the same plan
-    pieces : of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and "rate",
-        else 40 for up to eight, 20 for more, and up to four times as many where the path that was found misses the
-        goal; of many strokes as many as they need, six or more for each, but no more than these
-    iterations : the most that the solver may take for each start
-    time_limit : the longest that the search may take [s], looked at after each iteration; None: as long as it takes
+        coarse search. For up to eight, two further guesses are tried where none leads to a plan, then a motion of many
+        strokes; that comes first where two joints cannot turn the body so far in four rounds
+    seed : seed of the random guesses; equal seeds give equal plans
+    pieces : pieces of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and
+        "rate", else 40 for up to eight, 20 for more, and up to four times as many where the path misses the goal; a
+        motion of many strokes has six or more for each, at most this number
+    iterations : largest number for each start
+    time_limit : longest duration of the search [s], checked after each iteration; None: no limit
 
     Raises
     ------
@@ -282,7 +278,7 @@ class Search:
 
 
 def goal_argument(value: Any) -> Goal:
-    """A user's goal: a `Goal` as it is, or a rotation (3, 3). Raises ShapeError."""
+    """Return a user's goal, a `Goal` or rotations. Raises ShapeError."""
     if isinstance(value, Goal):
         return value
     if value is not None and real_array(value, "goal").shape == (2, 3):
@@ -317,7 +313,7 @@ def _read_only(array: Array) -> Array:
 
 
 def _symmetry_argument(value: ArrayLike) -> Array:
-    """A unit axis (3,), or all rotations (k, 3, 3) of the group that some of them make, the identity first.
+    """Return a unit axis (3,), or the group (k, 3, 3) that rotations generate, the identity first.
 
     Raises ShapeError.
     """
@@ -333,7 +329,7 @@ def _symmetry_argument(value: ArrayLike) -> Array:
 
 
 def _different(rotations: Array) -> Array:
-    """Rotations (k, 3, 3) without those that come again, in their order."""
+    """Rotations (k, 3, 3) without repetitions, in their order."""
     kept: list[Array] = []
     for rotation in rotations:
         if not _among(kept, rotation):
@@ -342,19 +338,19 @@ def _different(rotations: Array) -> Array:
 
 
 def _group(generators: Array) -> Array:
-    """All products of rotations."""
-    found = [np.eye(3)]
-    # The list grows while it is gone through.
-    for rotation in found:
+    """Group of all products of rotations."""
+    group = [np.eye(3)]
+    # The list grows during the loop.
+    for rotation in group:
         for product in rotation @ generators:
-            if not _among(found, product):
-                found.append(product)
-        if len(found) > _MOST_ROTATIONS:
+            if not _among(group, product):
+                group.append(product)
+        if len(group) > _MOST_ROTATIONS:
             raise ShapeError(
-                f"symmetry: the rotations make a group of more than {_MOST_ROTATIONS}; for a body that looks the same "
-                "after any turn about an axis give this axis, (3,)"
+                f"symmetry: the rotations make a group of more than {_MOST_ROTATIONS}; for a body of revolution give "
+                "its axis, (3,)"
             )
-    return np.array(found)
+    return np.array(group)
 
 
 def _among(rotations: list[Array], rotation: Array) -> bool:

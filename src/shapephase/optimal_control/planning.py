@@ -1,4 +1,4 @@
-"""Reorientation: the cheapest motion of the joints that turns a free body to a goal."""
+"""Reorientation: cheapest motion of the joints that turns a free body to a goal."""
 
 from __future__ import annotations
 
@@ -78,10 +78,10 @@ def plan_reorientation(
     progress: ProgressCallback | None = None,
     executor: Executor | None = None,
 ) -> Plan:
-    """The cheapest motion of the joints that turns a free body to a goal: the falling cat's problem, for any body.
+    """Return the cheapest motion of the joints that turns a free body to a goal: the falling cat's problem.
 
-    The attitude is the identity at the start. The path is a C2 cubic spline; its motion is reconstructed by the
-    library's integrator, and the path corrected until that motion reaches the goal.
+    The attitude is the identity at the start. The path is a C2 cubic spline, corrected until the motion that the
+    library's integrator reconstructs from it reaches the goal.
 
     Parameters
     ----------
@@ -90,37 +90,36 @@ def plan_reorientation(
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]; 0: none
     duration : [s]; for cost "time" the longest allowed
     start : (n,) shape at the start [rad or m]; None: neutral, or as near as the limits permit
-    end : (n,) shape at the end; None: as at the start, a closed loop; "free": any
-    via : what the path passes through on its way, in this order: a `Waypoint` is a shape, or the coordinates of some
-        joints, with a time or without
-    cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy that the
-        joint motion has without angular momentum, M the mass matrix with base b and joints s: joints that undo each
-        other, as in a flat gimbal, move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
-        of 1/2 |r''|^2; "effort", that of the squared torques and forces of all joints, each as a part of its limit [s];
+    end : (n,) shape at the end; None: that at the start, a closed loop; "free": any
+    via : waypoints in their order: a `Waypoint` is a shape, or the coordinates of some joints, with or without a time
+    cost : "kinetic", the integral of 1/2 r' (M_ss - M_sb M_bb^-1 M_bs) r' over time [J s], the kinetic energy of
+        the joint motion without angular momentum, M the mass matrix with base b and joints s: joints that undo each
+        other (a flat gimbal) move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
+        of 1/2 |r''|^2; "effort", that of the squared torques and forces of all joints, each relative to its limit [s];
         "time", the duration, under rate limits
     rates_at_ends : of the joints; "zero": from rest to rest, for the cost "acceleration" without acceleration at the
-        ends, too; "periodic": the same at both ends, for gaits; "free": any, as the theory of optimal loops has it: the
+        ends, too; "periodic": equal at both ends, for gaits; "free": any, as in the theory of optimal loops: the
         body would have to be set in motion before the start, and stopped after the end
-    joints : names of those that may move, the others are held at the start; None: all
+    joints : names of those that may move; the others are held at the start; None: all
     symmetric : joints that follow others: name -> (name of the leader, factor)
-    limits : of positions, rates, accelerations, jerks and efforts; None: `Limits()`, positions and rates as the body's
-        file has them
-    search : method, starts, resolution; None: `Search()`
+    limits : limits of positions, rates, accelerations, jerks and efforts; None: `Limits()`, positions and rates of the
+        body's file
+    search : starts, resolution, time limit; None: `Search()`
     progress : called after each iteration as `progress(share, text)`: the share of the search that is done, from 0 to
         1, which never falls, and a text such as "search 2 of 3: iteration 12, off the goal by 2.0e-02 rad, cost 0.125".
         A true return stops the search, as its time limit does (`Search.time_limit`): the cheapest plan of the starts
         that had ended is returned, or else PlanNotFound raised with the best so far. Ctrl-C is raised as
         KeyboardInterrupt, and nothing is kept
-    executor : of `concurrent.futures` or of a cluster (`distributed.Client.get_executor()`), whose processes search
-        from several starts (`Search.starts`) side by side; `progress` is then called when a start has ended.
-        None: one start after the other, here. Plans do not depend on it
+    executor : executor of `concurrent.futures` or of a cluster (`distributed.Client.get_executor()`), whose processes
+        search from several starts (`Search.starts`) at a time; `progress` is then called when a start has ended.
+        None: one start after the other, in this process. Plans do not depend on it
 
     Raises
     ------
     ShapeError, TrajectoryError, UnknownNameError
-        For arguments of the wrong shape, ends beyond the limits, unknown names.
+        For wrong shapes, ends beyond the limits, unknown names.
     UnreachableGoalError
-        If no motion can reach the goal, as the holonomy algebra (`reachable`) or a plane of symmetry shows at once.
+        If no motion can reach the goal, by the holonomy algebra (`reachable`) or a plane of symmetry.
     PlanNotFound
         If no start came to a local optimum that reaches the goal, or `progress` or its time limit stopped the search
         before; it carries the best attempt.
@@ -128,7 +127,7 @@ def plan_reorientation(
     Warns
     -----
     UnstatedLimitWarning
-        If `limits` takes those of rates or efforts from the body's file, and it states none for a joint.
+        If `limits` takes rates or efforts from the body's file, which states none for a joint.
 
     Notes
     -----
@@ -168,29 +167,29 @@ def plan_reorientation(
     check_reachable(tasks)
     warn_of_unstated(tasks[0], Limits() if limits is None else limits)
     began = time.perf_counter()
-    reporter = _SearchMonitor(progress, chosen.time_limit)
+    monitor = _SearchMonitor(progress, chosen.time_limit)
     attempts: list[Attempt] = []
-    for searched in _searches(tasks, chosen, reporter, executor):
+    for searched in _searches(tasks, chosen, monitor, executor):
         for attempt in searched:
             attempts.append(attempt)
-            if reporter.stopped:
+            if monitor.stopped:
                 break
-        if reporter.stopped or any(attempt.report.converged for attempt in attempts):
+        if monitor.stopped or any(attempt.report.converged for attempt in attempts):
             break
     seconds = time.perf_counter() - began
-    reporter.finish()
+    monitor.finish()
     best = min((attempt for attempt in attempts if attempt.polished is not None), key=Attempt.rank, default=None)
     plan = (
-        None if best is None else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, seconds, reporter.stopped)
+        None if best is None else _plan(dict(zip(tasks, goals, strict=True)), best, attempts, seconds, monitor.stopped)
     )
     if best is None or plan is None or not best.report.converged:
-        raise PlanNotFound(failure_message(tasks[0], attempts, best, reporter.stopped), plan)
+        raise PlanNotFound(failure_message(tasks[0], attempts, best, monitor.stopped), plan)
     return plan
 
 
 @dataclass(frozen=True, eq=False)
 class _Job:
-    """A local search that is to be done."""
+    """Local search that is to be done."""
 
     task: Reorientation
     basis: SplineBasis
@@ -198,61 +197,61 @@ class _Job:
 
 
 def _searches(
-    tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor, executor: Executor | None
+    tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonitor, executor: Executor | None
 ) -> Iterator[Iterator[Attempt]]:
-    """What is tried until something leads to a plan: loops first, unless none can turn the body so far."""
+    """Yield the searches until one leads to a plan: loops first, unless none can turn the body so far."""
     near, far = [], []
     for task in tasks:
         beyond = float(np.linalg.norm(task.turn_to_goal())) > _ROUNDS_OF_LOOPS * most_of_a_loop(task)
         (far if beyond else near).append(task)
     if near:
-        yield _searched_by_loops(near, search, reporter, executor)
-    yield chain.from_iterable(_searched_by_strokes(task, search, reporter) for task in tasks)
+        yield _searched_by_loops(near, search, monitor, executor)
+    yield chain.from_iterable(_searched_by_strokes(task, search, monitor) for task in tasks)
     if far:
-        yield _searched_by_loops(far, search, reporter, executor)
+        yield _searched_by_loops(far, search, monitor, executor)
 
 
 def _searched_by_loops(
-    tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor, executor: Executor | None
+    tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonitor, executor: Executor | None
 ) -> Iterator[Attempt]:
-    """From loops, and from some more where none of those asked for leads to a plan."""
-    first, spare = _jobs(tasks, search, reporter)
+    """Yield local searches from loops, and from further ones where none of the first leads to a plan."""
+    first, spare = _jobs(tasks, search, monitor)
     searched = _searched_here if executor is None else partial(_searched_by, executor)
-    found = False
-    for attempt in searched(first, search, reporter):
-        found = found or attempt.report.converged
+    converged = False
+    for attempt in searched(first, search, monitor):
+        converged = converged or attempt.report.converged
         yield attempt
-    if not found:
-        for attempt in _searched_here(spare, search, reporter):
+    if not converged:
+        for attempt in _searched_here(spare, search, monitor):
             yield attempt
             if attempt.report.converged:
                 break
 
 
-def _jobs(tasks: Sequence[Reorientation], search: Search, reporter: _SearchMonitor) -> tuple[list[_Job], list[_Job]]:
-    """The local searches for each of several tasks, and those to go on with if none of them leads to a plan."""
+def _jobs(tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonitor) -> tuple[list[_Job], list[_Job]]:
+    """Return the local searches of several tasks, and spare ones if none of those leads to a plan."""
     first: list[_Job] = []
     spare: list[_Job] = []
     for task in tasks:
-        if first and reporter.stopped:
+        if first and monitor.stopped:
             break
         basis = SplineBasis(int(search.pieces or _default_pieces(task)))
-        for jobs, found in zip((first, spare), _starting_points(task, basis, search, reporter), strict=True):
-            jobs.extend(_Job(task, basis, guess) for guess in found)
+        for jobs, starts in zip((first, spare), _starting_points(task, basis, search, monitor), strict=True):
+            jobs.extend(_Job(task, basis, guess) for guess in starts)
     return first, spare
 
 
-def _searched_here(jobs: Sequence[_Job], search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
-    """The local searches, one after the other."""
+def _searched_here(jobs: Sequence[_Job], search: Search, monitor: _SearchMonitor) -> Iterator[Attempt]:
+    """Yield local searches, one after the other."""
     local = None
     for number, job in enumerate(jobs):
         if local is None or local.task is not job.task:
             local = LocalSearch.of(job.task, job.basis, search)
-        yield local.attempt(job.guess, reporter.solver_callback("search", number + 1, len(jobs)))
+        yield local.attempt(job.guess, monitor.solver_callback("search", number + 1, len(jobs)))
 
 
-def _searched_by_strokes(task: Reorientation, search: Search, reporter: _SearchMonitor) -> Iterator[Attempt]:
-    """Local search from a motion of many strokes, for few joints."""
+def _searched_by_strokes(task: Reorientation, search: Search, monitor: _SearchMonitor) -> Iterator[Attempt]:
+    """Yield the local search from a motion of many strokes, for few joints."""
     stroked = guess_of_strokes(task, search.seed, search.pieces) if task.dimension <= _MANY_JOINTS else None
     if stroked is None:
         return
@@ -261,20 +260,20 @@ def _searched_by_strokes(task: Reorientation, search: Search, reporter: _SearchM
     if guess is not None:
         few = replace(search, pieces=layout.basis.pieces)
         local = LocalSearch.of(task, layout.basis, few, settles=True)
-        yield local.attempt(guess, reporter.solver_callback("search", 1, 1))
+        yield local.attempt(guess, monitor.solver_callback("search", 1, 1))
 
 
 def _searched_by(
-    executor: Executor, jobs: Sequence[_Job], search: Search, reporter: _SearchMonitor
+    executor: Executor, jobs: Sequence[_Job], search: Search, monitor: _SearchMonitor
 ) -> Iterator[Attempt]:
-    """The local searches by an executor, in their order."""
+    """Yield local searches by an executor, in their order."""
     recipes = {job.task: pickle.dumps((job.task, job.basis.pieces, search)) for job in jobs}
-    found = executor.map(
-        partial(_searched_elsewhere, reporter.end), [recipes[job.task] for job in jobs], [job.guess for job in jobs]
+    attempts = executor.map(
+        partial(_searched_elsewhere, monitor.end), [recipes[job.task] for job in jobs], [job.guess for job in jobs]
     )
-    for number, (job, attempt) in enumerate(zip(jobs, found, strict=True)):
+    for number, (job, attempt) in enumerate(zip(jobs, attempts, strict=True)):
         end = attempt.report
-        report = reporter.solver_callback("search", number + 1, len(jobs))
+        report = monitor.solver_callback("search", number + 1, len(jobs))
         report(end.iterations, end.cost, end.infeasibility, end.goal_error)
         yield replace(attempt, task=job.task)
 
@@ -283,7 +282,7 @@ _KEPT = threading.local()  # the last program of a thread of an executor: it tak
 
 
 def _searched_elsewhere(end: float, recipe: bytes, guess: Guess) -> Attempt:
-    """A local search in another process or thread, until `STOP_REQUESTED` is set there or the time `end` [s, Unix]."""
+    """Search in another process or thread, until `STOP_REQUESTED` is set there or the time `end` [s since 1970]."""
     if getattr(_KEPT, "recipe", None) != recipe:
         task, pieces, search = pickle.loads(recipe)
         _KEPT.local = LocalSearch.of(task, SplineBasis(pieces), search)
@@ -297,7 +296,7 @@ class _SearchMonitor:
     Attributes
     ----------
     end : when the time limit is reached [s since 1970]: a clock that other processes share
-    stopped : reason why the search was stopped, one of `PLAN_STATUS`; empty: none
+    stopped : reason why the search was stopped, "stopped" or "out of time"; empty: none
     """
 
     def __init__(self, progress: ProgressCallback | None, time_limit: float | None) -> None:
@@ -336,9 +335,9 @@ def _default_pieces(task: Reorientation) -> int:
 
 
 def _starting_points(
-    task: Reorientation, basis: SplineBasis, search: Search, reporter: _SearchMonitor
+    task: Reorientation, basis: SplineBasis, search: Search, monitor: _SearchMonitor
 ) -> tuple[list[Guess], list[Guess]]:
-    """The guesses to start from, and those to go on with if none of them leads to a plan.
+    """Return the guesses to start from, and spare ones if none of those leads to a plan.
 
     Unless there are many joints, each is first improved on a coarse spline, and the cheapest are taken.
     """
@@ -350,9 +349,9 @@ def _starting_points(
     ranked = max(count, min(_RANKED * count, _MOST_RANKED), _LEAST_OF_FEW if few else 1)
     candidates = guesses(task, coarse, search.seed, ranked)
     program = CollocationProgram(task, coarse)
-    found: list[tuple[float, int, Guess]] = []
+    improved: list[tuple[float, int, Guess]] = []
     for number, candidate in enumerate(candidates):
-        if reporter.stopped and found:
+        if monitor.stopped and improved:
             break
         solution = program.solve(
             candidate.control,
@@ -361,13 +360,13 @@ def _starting_points(
             iterations=min(_COARSE_ITERATIONS, int(search.iterations)),
             tolerance=_COARSE_TOLERANCE,
             via_places=candidate.via_places,
-            iteration_callback=reporter.solver_callback("guesses", number + 1, len(candidates)),
+            iteration_callback=monitor.solver_callback("guesses", number + 1, len(candidates)),
         )
         near = solution.infeasibility < _COARSE_INFEASIBILITY
         guess = guess_of(task, basis, coarse.matrix(PLACES) @ (solution.control if near else candidate.control))
         if guess is not None:
-            found.append((solution.cost if near else np.inf, number, guess))
-    order = [guess for _, _, guess in sorted(found, key=lambda entry: entry[:2])]
+            improved.append((solution.cost if near else np.inf, number, guess))
+    order = [guess for _, _, guess in sorted(improved, key=lambda entry: entry[:2])]
     return order[:count], order[count : count + _SPARE]
 
 
@@ -378,7 +377,7 @@ def _plan(
     seconds: float,
     stopped: str,
 ) -> Plan | None:
-    """The plan of the best attempt; None where it has no path."""
+    """Return the plan of the best attempt; None where it has no path."""
     if best.polished is None:
         return None
     task = best.task
@@ -408,12 +407,11 @@ def _plan(
 
 
 def hamiltonian_spread(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> float | None:
-    """Largest less least mean of Pontryagin's Hamiltonian over a piece, relative to its mean; None where undefined.
+    """Range of the means of Pontryagin's Hamiltonian over pieces, relative to its mean; None where undefined.
 
-    Without momentum the cost's density L is quadratic in the rates, and what the holonomy adds to it is linear in them,
-    so that H = L; and H is constant as nothing depends on time. A limit of positions does not change that, a limit of
-    rates does, and so does a waypoint with a time; with limits of accelerations, jerks or efforts it is another
-    Hamiltonian.
+    Without momentum the cost's density L is quadratic in the rates, and the holonomy's term is linear in them, so that
+    H = L, which is constant as nothing depends on time. Limits of positions do not change that; limits of rates and
+    waypoints with a time do, and with limits of accelerations, jerks or efforts the Hamiltonian differs.
 
     Source: theory.md B6; Pontryagin's principle.
     """

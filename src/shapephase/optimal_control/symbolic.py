@@ -1,4 +1,4 @@
-"""The mechanics of a body as CasADi functions of its shape, to be differentiated and put into larger expressions."""
+"""Mechanics of a body as CasADi functions of its shape, for derivatives and larger expressions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _building = Lock()
 
 @dataclass(frozen=True, eq=False)
 class SymbolicBody:
-    """Quantities that a body's shape r (n,) determines, each a `casadi.Function` of r alone.
+    """Functions of a body's shape r (n,), each a `casadi.Function` of r alone.
 
     Called with symbols of CasADi's kind SX a function gives its expression, with MX one call in the larger graph, with
     numbers a DM. All are in base axes. Can be pickled, and each function has CasADi's own `serialize`. For numbers of
@@ -34,8 +34,8 @@ class SymbolicBody:
 
     Attributes
     ----------
-    name : of the body
-    joint_names : in the order of r
+    name : name of the body
+    joint_names : names in the order of r
     inertia : I(r), (3, 3) about the centre of mass [kg m^2]
     momentum_matrix : J(r), (3, n): the internal momentum is J rate
     connection : A(r) = I^-1 J, (3, n): with zero momentum the base turns at -A rate
@@ -73,11 +73,11 @@ class SymbolicBody:
 
     @property
     def n_shape(self) -> int:
-        """The number of independent joints."""
+        """Number of independent joints."""
         return len(self.joint_names)
 
     def derivative(self, quantity: str) -> Any:
-        """The derivative of one of the five quantities by r, as a function of r, built at the first call.
+        """Return the derivative of one of the five quantities by r, as a function of r, built at the first call.
 
         Returns
         -------
@@ -87,7 +87,7 @@ class SymbolicBody:
         Raises
         ------
         UnknownNameError
-            If there is no such quantity.
+            For an unknown quantity.
         """
         import casadi
 
@@ -101,12 +101,12 @@ class SymbolicBody:
         return self._made[key]
 
     def link_pose(self, link: str) -> Any:
-        """The pose of a link in base axes from the base origin, as a function of r: r -> (4, 4).
+        """Return the pose of a link in base axes from the base origin, as a function of r: r -> (4, 4).
 
         Raises
         ------
         UnknownNameError
-            If there is no such link.
+            For an unknown link.
         """
         import casadi
 
@@ -118,13 +118,13 @@ class SymbolicBody:
             frame, pose = self.chain.link_frames[link]
             turn, place = joint_frames(self.chain, joint_coordinates(self.chain, shape), shape)[frame]
             last = casadi.SX([[0.0, 0.0, 0.0, 1.0]])
-            seen = casadi.horzcat(turn @ constant(pose[:3, :3]), place + turn @ constant(pose[:3, 3]))
-            self._made[key] = casadi.Function(key, [shape], [casadi.densify(casadi.vertcat(seen, last))])
+            upper = casadi.horzcat(turn @ constant(pose[:3, :3]), place + turn @ constant(pose[:3, 3]))
+            self._made[key] = casadi.Function(key, [shape], [casadi.densify(casadi.vertcat(upper, last))])
         return self._made[key]
 
 
 def symbolic_body(body: Body) -> SymbolicBody:
-    """The functions of a body; built at the first call for it, kept as long as the body is.
+    """Return the functions of a body; built at its first call, kept as long as the body.
 
     Source: the composite rigid body algorithm (Featherstone, Rigid Body Dynamics Algorithms, section 6.2), reduced by
     the momentum of the base.
@@ -144,7 +144,7 @@ def symbolic_body(body: Body) -> SymbolicBody:
 
 
 def solve_linear(matrix: Any, right: Any) -> Any:
-    """matrix^-1 right in symbols, for a symmetric positive definite matrix: (m, m), (m, k) -> (m, k).
+    """Solution of matrix x = right in symbols, for a symmetric positive definite matrix: (m, m), (m, k) -> (m, k).
 
     By the factors L D L^T, entry by entry: backward stable, which the adjugate of a thin body's inertia is not.
     """
@@ -208,7 +208,7 @@ def _symbolic(body: Body) -> SymbolicBody:
 
 
 def constant(array: Array) -> Any:
-    """A constant matrix whose zeros take part in no product."""
+    """Return a constant sparse matrix."""
     import casadi
 
     return casadi.SX(casadi.sparsify(casadi.DM(array)))
@@ -217,7 +217,7 @@ def constant(array: Array) -> Any:
 def joint_frames(chain: JointChain, joints: Any, shape: Any) -> list[tuple[Any, Any]]:
     """Orientation and origin of each frame of the chain, base axes, from the coordinates of all joints.
 
-    shape : behind whose turns of ball joints the coordinates of their three hinges are counted
+    shape : the three hinges of ball joints are counted from its turns
     """
     import casadi
 
@@ -239,7 +239,7 @@ def joint_frames(chain: JointChain, joints: Any, shape: Any) -> list[tuple[Any, 
 
 
 def coordinate_slopes(chain: JointChain, shape: Any) -> Any:
-    """Derivatives of the coordinates of all joints by the shape, those of ball joints counted from the shape itself."""
+    """Derivatives of the coordinates of all joints by the shape; hinges of ball joints are counted from that shape."""
     import casadi
 
     about = casadi.SX.sym("about", shape.shape[0])
@@ -247,10 +247,9 @@ def coordinate_slopes(chain: JointChain, shape: Any) -> Any:
 
 
 def joint_coordinates(chain: JointChain, shape: Any, about: Any = None) -> Any:
-    """Of all joints, from the shape.
+    """Coordinates of all joints from the shape.
 
-    about : a shape from whose turns the three hinges of ball joints are counted; None: the same, so that they are at
-        zero
+    about : shape from whose turns the three hinges of ball joints are counted; None: `shape`, so that they are zero
     """
     import casadi
 
@@ -268,7 +267,7 @@ def joint_coordinates(chain: JointChain, shape: Any, about: Any = None) -> Any:
 
 
 def _turn(numbers: Any) -> Any:
-    """Of the four numbers of a ball joint: (3, 3)."""
+    """Rotation of the four numbers of a ball joint: (3, 3)."""
     import casadi
 
     vector, scalar = numbers[:3], numbers[3]
@@ -278,14 +277,14 @@ def _turn(numbers: Any) -> Any:
 
 
 def _followed(function: JointFunction, coordinate: Any) -> Any:
-    """A function of a coordinate: its derivatives are those of the piece that the coordinate is on."""
+    """Function of a coordinate, whose derivatives are those of the piece that the coordinate is on."""
     import casadi
 
     def chosen(numbers: Array) -> Any:
-        found = casadi.SX(float(numbers[-1]))
+        value = casadi.SX(float(numbers[-1]))
         for knot, number in zip(function.knots[::-1].tolist(), numbers[-2::-1].tolist(), strict=True):
-            found = casadi.if_else(coordinate < knot, number, found)
-        return found
+            value = casadi.if_else(coordinate < knot, number, value)
+        return value
 
     since, value = coordinate - chosen(function.centres), casadi.SX(0.0)
     for coefficients in function.coefficients[::-1]:
@@ -302,7 +301,7 @@ def _rotation(axis: Array, angle: Any) -> Any:
 
 
 def _composites(chain: JointChain, frames: list[tuple[Any, Any]]) -> tuple[Array, list[Any], list[Any]]:
-    """Of each frame with everything attached to it: mass, first moment and inertia about the base origin, base axes."""
+    """Mass, first moment and inertia of each frame with all that hangs on it, about the base origin, base axes."""
     masses = chain.masses.copy()
     moments, tensors = [], []
     for (turn, place), mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True):
@@ -319,14 +318,14 @@ def _composites(chain: JointChain, frames: list[tuple[Any, Any]]) -> tuple[Array
 
 
 def _about(tensor: Any, moment: Any, point: Any) -> Any:
-    """An inertia about the origin, moved to the centre of mass: less that of its mass at the centre."""
+    """Inertia about the centre of mass from that about the origin."""
     import casadi
 
     return tensor - (casadi.dot(moment, point) * casadi.SX.eye(3) - moment @ point.T)
 
 
 def joint_screw(chain: JointChain, number: int, frame: tuple[Any, Any]) -> tuple[Any, Any]:
-    """Motion of all that a joint carries at unit rate: angular velocity, and velocity at the base origin, base axes."""
+    """Screw of a joint at unit rate: angular velocity, and velocity at the base origin, base axes."""
     import casadi
 
     turn, place = frame
@@ -353,13 +352,13 @@ _MOST_BUFFERS = 128  # functions of one thread, of some kB each; a computation u
 
 
 class _Buffers(threading.local):
-    """The functions that a thread has called, each with the memory it works on; every thread has its own."""
+    """Functions called by a thread, with the memory of each; every thread has its own."""
 
     def __init__(self) -> None:
         self._known: dict[int, tuple[Any, Any, Any, list[int]]] = {}
 
     def for_function(self, function: Any) -> tuple[Any, Any, list[int]]:
-        """The buffer of a function, the call that evaluates it, and the lengths of its results."""
+        """Return the buffer of a function, the call that evaluates it, and the lengths of its results."""
         known = self._known.get(id(function))
         if known is None:
             if len(self._known) >= _MOST_BUFFERS:

@@ -1,4 +1,4 @@
-"""The problem that a plan solves: the turn, both end postures, the limits and the cost, checked once."""
+"""Problem that a plan solves: turn, end postures, limits and cost, checked once."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _RIGHT_ANGLE_TOLERANCE = 1e-9  # cosine of momentum and twist axis: rounding of 
 class Reorientation:
     """A reorientation task in the m coordinates that are free: shape = coupling @ coordinates + offset.
 
-    Of a ball joint that moves there are three, the tangent of half its turn from the start, times the axis.
+    A ball joint that moves has three: the axis of its turn from the start times the tangent of half the angle.
 
     Attributes
     ----------
@@ -80,35 +80,35 @@ class Reorientation:
     via: tuple[ViaPoint, ...] = ()
 
     def shapes(self, coordinates: Array) -> Array:
-        """The shape at coordinates: (..., m) -> (..., n)."""
+        """Shape at coordinates: (..., m) -> (..., n)."""
         return coordinates @ self.coupling.T + self.offset
 
     @property
     def dimension(self) -> int:
-        """m, the number of free coordinates."""
+        """Number m of free coordinates."""
         return self.coupling.shape[1]
 
     @property
     def equal_points(self) -> int:
-        """How many control points at either end are the same: two without a rate, three without acceleration either."""
+        """Number of equal control points at either end: two without a rate, three without acceleration either."""
         if self.rates_at_ends != "zero":
             return 1
         return 3 if self.cost == "acceleration" or np.isfinite(self.jerk_limit).any() else 2
 
     @property
     def limits_beyond_rates(self) -> bool:
-        """Whether accelerations, jerks or efforts have limits."""
+        """True where accelerations, jerks or efforts have limits."""
         return self.efforts_limited or bool(np.isfinite([self.acceleration_limit, self.jerk_limit]).any())
 
     @property
     def movable(self) -> Mask:
-        """(m,) which coordinates can leave their start."""
+        """Mask (m,) of coordinates that can leave their start."""
         return self.upper > self.lower
 
     def turn_to_goal(self, attitude: Array | None = None, last: Array | None = None) -> Array:
-        """The shortest rotation vector that takes an attitude at the end to the goal: (3,), inertial axes [rad].
+        """Shortest rotation vector from an attitude at the end to the goal: (3,), inertial axes [rad].
 
-        With the coordinates there (m,), which say where a link points; without both, those of the start.
+        The last coordinates (m,) determine where a link points; by default attitude and coordinates are the start's.
         """
         end = np.eye(3) if attitude is None else attitude
         if self.target is not None:
@@ -117,7 +117,7 @@ class Reorientation:
         return so3.log(so3.between(end @ self.pointed_axis(self.start if last is None else last), direction))
 
     def goal_error(self, attitude: Array, last: Array | None = None) -> float:
-        """How far an attitude at the end is from the goal, with the coordinates there (m,), as `turn_to_goal` [rad]."""
+        """Angle from an attitude at the end to the goal, with the last coordinates (m,), see `turn_to_goal` [rad]."""
         return float(np.linalg.norm(self.turn_to_goal(attitude, last)))
 
     def constrained_directions(self) -> Array:
@@ -129,13 +129,13 @@ class Reorientation:
         return np.stack([first, so3.apply(so3.hat(direction), first)])
 
     def counted_windings(self, attitudes: Array) -> Array:
-        """Somersault and twist of attitudes (N, 3, 3) that follow each other closely, unwrapped from the first: (2,).
+        """Somersault and twist of densely sampled attitudes (N, 3, 3), unwrapped from the first: (2,).
 
         R = exp(somersault) exp(tilt) exp(twist) about the three axes; not defined where the tilt is a right angle.
         """
-        seen = self.winding_axes.T @ attitudes @ self.winding_axes
-        somersault = np.unwrap(np.arctan2(-seen[:, 1, 2], seen[:, 2, 2]))
-        twist = np.unwrap(np.arctan2(-seen[:, 0, 1], seen[:, 0, 0]))
+        local = self.winding_axes.T @ attitudes @ self.winding_axes
+        somersault = np.unwrap(np.arctan2(-local[:, 1, 2], local[:, 2, 2]))
+        twist = np.unwrap(np.arctan2(-local[:, 0, 1], local[:, 0, 0]))
         return np.array([somersault[-1] - somersault[0], twist[-1] - twist[0]])
 
     def uniform_winding(self, places: Array) -> Array:
@@ -148,16 +148,16 @@ class Reorientation:
         return so3.quat_product(turns[0], turns[1])
 
     def pointing_axes(self) -> Array:
-        """The axis, of the base or a link, and the direction it has to have: (2, 3). Only with `pointing`."""
+        """Axis of the base or a link, and its required direction: (2, 3). Only with `pointing`."""
         return np.zeros((2, 3)) if self.pointing is None else self.pointing
 
     def pointed_axis(self, last: Array) -> Array:
-        """The axis that is pointed, in axes of the base, at coordinates (m,): (3,). Only with `pointing`."""
+        """Pointed axis in axes of the base, at coordinates (m,): (3,). Only with `pointing`."""
         axis, _ = self.pointing_axes()
         return axis if self.link is None else self.body.link_pose(self.shapes(last), self.link)[:3, :3] @ axis
 
     def pointed_turn(self, last: Array) -> Array:
-        """How what is pointed turns against the base by each coordinate, at coordinates (m,): (3, m), base axes."""
+        """Turn of the pointed link against the base by each coordinate, at coordinates (m,): (3, m), base axes."""
         if self.link is None:
             return np.zeros((3, self.dimension))
         shapes = np.broadcast_to(self.shapes(last), (self.dimension, self.body.n_shape))
@@ -179,7 +179,7 @@ def reorientation(
     symmetric: Mapping[str, tuple[str, float]] | None = None,
     limits: Limits | None = None,
 ) -> Reorientation:
-    """The task that `plan_reorientation`'s arguments, which are explained there, describe; of a goal with one member.
+    """Return the task of the arguments of `plan_reorientation`, for a goal with one member.
 
     Raises
     ------
@@ -195,8 +195,8 @@ def reorientation(
     check_smooth(body.chain.follows, "plans need", kinks_only=True)
     if body.ball_joints and cost != "kinetic":
         raise ShapeError(
-            f"cost={cost!r}: it is told by the coordinates of joints, and {body.ball_joints[0]} is a ball joint, of "
-            "which others would tell another cost; use 'kinetic', or three hinges in one point"
+            f"cost={cost!r} depends on the choice of coordinates, and {body.ball_joints[0]} is a ball joint, where it "
+            "is arbitrary; use 'kinetic', or three hinges in one point"
         )
     (checked_goal,) = goal_argument(goal).members
     within = Limits() if limits is None else limits
@@ -214,7 +214,7 @@ def reorientation(
     if cost == "time" and not np.isfinite(rates).all():
         unstated = ", ".join(np.array(body.joint_names)[~np.isfinite(rates)][:_MOST_NAMED])
         raise TrajectoryError(
-            "cost='time' needs rate_limits for every joint: without them there is no least time, and there is none for "
+            "cost='time' needs rate_limits for every joint: without them the least time is 0; none is given for "
             f"{unstated}; give limits=Limits(rate_limits=...)"
         )
     fixed_joints = _fixed_joints(body, joints)
@@ -275,7 +275,7 @@ def _momentum(momentum: ArrayLike) -> Array:
 
 
 def _windings(goal: Goal, momentum: Array) -> tuple[Array | None, Array]:
-    """The angles to be counted, and the axes of somersault, tilt and twist."""
+    """Return the angles to be counted, and the axes of somersault, tilt and twist."""
     if not goal.winds:
         return None, np.eye(3)
     counts = np.array([goal.somersaults or 0.0, goal.half_twists or 0.0])
@@ -291,25 +291,25 @@ def _windings(goal: Goal, momentum: Array) -> tuple[Array | None, Array]:
 
 
 def _target(goal: Goal, windings: Array | None, winding_axes: Array) -> Array | None:
-    """The attitude at the end; None where only an axis is given."""
+    """Attitude at the end; None where only an axis is given."""
     if windings is not None:
         return so3.exp(windings[0] * winding_axes[:, 0]) @ so3.exp(windings[1] * winding_axes[:, 2])
     return None if goal.rotation is None else np.asarray(goal.rotation)
 
 
 def _pointed(body: Body, goal: Goal, last: Array | None) -> tuple[Array | None, str | None]:
-    """Axis and direction (2, 3), and the link whose axis it is; from the shape at the end, if given, the base's."""
+    """Return axis and direction (2, 3), and its link; the axis is the base's where the last shape is given."""
     if goal.pointing is None:
         return None, None
     axis, direction = pair = np.asarray(goal.pointing)
     if goal.link is None:
         return pair, None
-    seen = body.link_pose(body.shape() if last is None else last, goal.link)[:3, :3] @ axis
-    return (pair, goal.link) if last is None else (np.stack([seen, direction]), None)
+    pointed = body.link_pose(body.shape() if last is None else last, goal.link)[:3, :3] @ axis
+    return (pair, goal.link) if last is None else (np.stack([pointed, direction]), None)
 
 
 def _end_postures(body: Body, bounds: Array, start: ArrayLike | None, end: Any) -> tuple[Array, Array | None]:
-    """The shapes at both ends, within the bounds (n, 2); None for a free end."""
+    """Return the shapes at both ends, within the bounds (n, 2); None for a free end."""
     first = np.clip(body.shape(), *bounds.T) if start is None else _shape(body, start, "start")
     if isinstance(end, str):
         if end != "free":
@@ -342,7 +342,7 @@ def _check_limits(body: Body, shape: Array, bounds: Array, name: str) -> None:
 
 
 def _joint_limits(body: Body, given: ArrayLike | str | None, name: str, stated: Array) -> Array:
-    """One for each joint, infinite where there are none: (n,)."""
+    """Limit of each joint, infinite where there is none: (n,)."""
     if given is None:
         return np.full(body.n_shape, np.inf)
     if isinstance(given, str):
@@ -357,18 +357,18 @@ def _joint_limits(body: Body, given: ArrayLike | str | None, name: str, stated: 
 
 
 def _effort_measure(body: Body, cost: str, limits: Limits) -> Array:
-    """What efforts are measured by, infinite where by nothing: (n,)."""
+    """Units of efforts, infinite where there are none: (n,)."""
     measured_by = "body" if cost == "effort" and limits.effort_limits is None else limits.effort_limits
     measure = _joint_limits(body, measured_by, "effort_limits", body.effort_limits)
     if measured_by is not None and not body.chain.follows.is_linear:
         raise ShapeError(
-            f"effort_limits: {body.name} has ball joints, or joints that follow others along curves, of which plans do "
-            "not know the efforts; leave them out, and see joint_torques(plan.motion)"
+            f"effort_limits: {body.name} has ball joints, or joints that follow others along curves, whose efforts "
+            "plans cannot bound; leave them out, and see joint_torques(plan.motion)"
         )
     if cost == "effort" and not np.isfinite(measure).all():
         unstated = ", ".join(np.array(body.joint_names)[~np.isfinite(measure)][:_MOST_NAMED])
         raise TrajectoryError(
-            "cost='effort' needs effort_limits for every joint, which efforts are measured by, and there is none for "
+            "cost='effort' needs effort_limits for every joint, as units of efforts; none is given for "
             f"{unstated}; give limits=Limits(effort_limits=...)"
         )
     return measure
@@ -377,7 +377,7 @@ def _effort_measure(body: Body, cost: str, limits: Limits) -> Array:
 def joint_coupling(
     body: Body, joints: Sequence[str] | None, symmetric: Mapping[str, tuple[str, float]] | None
 ) -> Array:
-    """Rates of all joints from those of the free ones: (n, m). Raises UnknownNameError, TrajectoryError."""
+    """Matrix from rates of the free joints to those of all: (n, m). Raises UnknownNameError, TrajectoryError."""
     if joints is not None:
         names_argument(joints, "joints", "names of joints")
     if symmetric is not None:
@@ -393,7 +393,7 @@ def _fixed_joints(body: Body, joints: Sequence[str] | None) -> list[int]:
 def _coupling(
     body: Body, symmetric: Mapping[str, tuple[str, float]], fixed_joints: list[int]
 ) -> tuple[Array, list[int], Array]:
-    """Each joint from the free ones (n, m), which those are, and each joint's factor (n,)."""
+    """Return the matrix from the free joints to all (n, m), the indices of the free ones, and factors (n,)."""
     followers = {
         body.joint_index(name): (body.joint_index(leader), float(factor))
         for name, (leader, factor) in symmetric.items()
@@ -436,5 +436,5 @@ def _coordinate_limits(coupling: Array, factors: Array, start: Array, bounds: Ar
 
 def _coordinate_rates(coupling: Array, factors: Array, limits: Array) -> Array:
     """Limits of rates of the coordinates, or higher derivatives (m,): the tightest of all joints that follow each."""
-    seen = np.where(coupling != 0.0, (limits / np.abs(factors))[:, None], np.inf)
-    return seen.min(axis=0, initial=np.inf)
+    scaled = np.where(coupling != 0.0, (limits / np.abs(factors))[:, None], np.inf)
+    return scaled.min(axis=0, initial=np.inf)

@@ -1,1 +1,1 @@
-"""Curves that can be optimal: their equations, how far a path is from them, and how far along they stay optimal."""
+"""Extremals: their equations, the distance of a path from them, and the time up to which they are optimal."""

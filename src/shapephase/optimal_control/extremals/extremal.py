@@ -39,7 +39,7 @@ class Extremal:
     duration : [s]
     charge : (3,) inertial axes [J s, or rad/s for "rate"]
     energy : 1/2 r' g r', kept by the motion [J, or rad^2/s^2]
-    energy_drift : the largest relative change of the computed one at the steps
+    energy_drift : largest relative change of the computed energy at the steps
     solution : SciPy's: times -> states (2 n + 4, N): shapes, their canonical momenta, quaternion xyzw
 
     Examples
@@ -62,14 +62,14 @@ class Extremal:
 
     @property
     def cost(self) -> float:
-        """The integral of 1/2 r' g r' over the duration [J s, or rad^2/s for "rate"]."""
+        """Integral of 1/2 r' g r' over the duration [J s, or rad^2/s for "rate"]."""
         return self.energy * self.duration
 
     @cached_property
     def path(self) -> ShapePath:
-        """The motion of the joints alone: on each step a series of the rates, and its integral.
+        """Motion of the joints: on each step a series of the rates, and its integral.
 
-        Between steps the solution is a polynomial of its own, whose slopes are Hamilton's rates only to some 1e-9.
+        The slopes of the solution's own polynomials are Hamilton's rates only to some 1e-9.
         """
         edges = self.solution.ts
         nodes = nodes_on(edges[:-1], edges[1:], _DEGREE)
@@ -77,25 +77,25 @@ class Extremal:
         series = values_to_coefficients(_DEGREE) @ rates
         shapes = 0.5 * np.diff(edges)[:, None, None] * chebint(series, axis=1, lbnd=-1.0)
         # Each step begins where the one before it ends, the first one at the start.
-        gone = np.cumsum(shapes.sum(axis=1), axis=0)
-        shapes[:, 0] += self.shape(0.0) + np.concatenate([np.zeros((1, self.body.n_shape)), gone[:-1]])
+        offsets = np.cumsum(shapes.sum(axis=1), axis=0)
+        shapes[:, 0] += self.shape(0.0) + np.concatenate([np.zeros((1, self.body.n_shape)), offsets[:-1]])
         curves = PiecewiseChebyshev(edges, shapes), PiecewiseChebyshev(edges, series)
         return ShapePath.function(
             lambda times: (curves[0](times), curves[1](times)), self.duration, joint_names=self.body.joint_names
         )
 
     def shape(self, t: ArrayLike) -> Array:
-        """Times (...) -> (..., n) [rad or m]. Raises TrajectoryError outside."""
+        """Shape at times (...) -> (..., n) [rad or m]. Raises TrajectoryError outside."""
         times = times_argument(t, self.duration)
         return self._states(times.ravel())[: self.body.n_shape].T.reshape(*times.shape, self.body.n_shape)
 
     def rate(self, t: ArrayLike) -> Array:
-        """Times (...) -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
+        """Rate at times (...) -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
         times = times_argument(t, self.duration)
         return self._rates(self._states(times.ravel())).reshape(*times.shape, self.body.n_shape)
 
     def attitude(self, t: ArrayLike) -> Array:
-        """Base axes to the base axes at the start: times (...) -> (..., 3, 3). Raises TrajectoryError outside."""
+        """Rotation from base axes to those at the start: times (...) -> (..., 3, 3). Raises TrajectoryError outside."""
         times = times_argument(t, self.duration)
         quaternions = so3.normalised(self._states(times.ravel())[-4:].T)
         return so3.matrix_from_quat(quaternions).reshape(*times.shape, 3, 3)
@@ -121,7 +121,7 @@ def extremal(
     metric: str = "kinetic",
     tolerance: float = 1e-11,
 ) -> Extremal:
-    """The normal extremal from a shape with a rate and a charge.
+    """Return the normal extremal from a shape with a rate and a charge.
 
     Integrates Hamilton's equations of H = 1/2 (p - A^T l) g^-1 (p - A^T l), p = g r' + A^T l.
 
@@ -172,8 +172,8 @@ def extremal(
         return call_casadi(equations.field, 1, now, moment)[0][0]
 
     momenta, _ = natural_scales(body, equations, start, speed, moment)
-    answer = integrated(field, span, state, goal, np.concatenate([np.ones(body.n_shape), momenta, np.ones(4)]))
-    energies = np.array([call_casadi(equations.energy, 1, row, moment)[0][0, 0] for row in answer.y.T])
+    result = integrated(field, span, state, goal, np.concatenate([np.ones(body.n_shape), momenta, np.ones(4)]))
+    energies = np.array([call_casadi(equations.energy, 1, row, moment)[0][0, 0] for row in result.y.T])
     energy = float(energies[0])
     drift = float(np.abs(energies - energy).max() / energy) if energy else 0.0
     return Extremal(
@@ -183,5 +183,5 @@ def extremal(
         charge=moment,
         energy=energy,
         energy_drift=drift,
-        solution=answer.sol,
+        solution=result.sol,
     )

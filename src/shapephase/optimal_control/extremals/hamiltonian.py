@@ -1,4 +1,4 @@
-"""The equations of extremals in Hamilton's form, built once for a body, and their integration."""
+"""Equations of extremals in Hamilton's form, built once for a body, and their integration."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class Hamiltonian:
     Examples
     --------
     >>> cat = sp.load_body("cat_two_halves")
-    >>> found = sp.optimal_control.hamiltonian(cat, "rate")
-    >>> print(np.array(found.metric(np.zeros(3))).diagonal())  # the identity
+    >>> equations = sp.optimal_control.hamiltonian(cat, "rate")
+    >>> print(np.array(equations.metric(np.zeros(3))).diagonal())  # the identity
     [1. 1. 1.]
     """
 
@@ -61,7 +61,7 @@ class Hamiltonian:
 
     @cached_property
     def second(self) -> Any:
-        """r, u, l -> second derivatives of L by all three, (2 n + 3, 2 n + 3); built when first needed."""
+        """Function r, u, l -> second derivatives of L by all three, (2 n + 3, 2 n + 3); built when first needed."""
         import casadi
 
         parts = [casadi.SX.sym("x", self.slopes.numel_in(place)) for place in range(3)]
@@ -70,15 +70,15 @@ class Hamiltonian:
 
 
 def hamiltonian(body: Body, metric: str) -> Hamiltonian:
-    """The equations of a body; built at the first call for it, kept as long as the body is.
+    """Return the equations of a body; built at its first call, kept as long as the body.
 
     Raises UnknownNameError, and ShapeError where a joint follows others by a function with knots.
 
     Examples
     --------
     >>> cat = sp.load_body("cat_two_halves")
-    >>> found = sp.optimal_control.hamiltonian(cat, "kinetic")
-    >>> print(np.array(found.metric(np.zeros(3))).diagonal().round(6))
+    >>> equations = sp.optimal_control.hamiltonian(cat, "kinetic")
+    >>> print(np.array(equations.metric(np.zeros(3))).diagonal().round(6))
     [0.005   0.005   0.00125]
     """
     check_object(body, "Body", "body")
@@ -88,7 +88,7 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
     check_no_balls(body.chain.follows, "the equations of extremals need")
     with _building:
         of_body = _built.setdefault(body, {})
-        if not isinstance(metric, str) or metric not in of_body:
+        if metric not in of_body:
             of_body[metric] = _hamiltonian(body, metric)
         return of_body[metric]
 
@@ -104,14 +104,14 @@ def natural_scales(body: Body, equations: Hamiltonian, shape: Array, rate: Array
     """Typical magnitudes of an extremal's momenta (n,) and charge, whatever the units of the joints."""
     metric = np.array(equations.metric(shape))
     momenta = np.sqrt(np.diag(metric)) * (np.sqrt(rate @ metric @ rate) or 1.0)
-    felt = float(np.abs(mechanical_connection(body, shape)).max())
-    return momenta, max(float(np.linalg.norm(charge)), float(momenta.max()) / felt if felt else 0.0) or 1.0
+    largest = float(np.abs(mechanical_connection(body, shape)).max())
+    return momenta, max(float(np.linalg.norm(charge)), float(momenta.max()) / largest if largest else 0.0) or 1.0
 
 
 def integrated(
     field: Callable[[Array], Array], span: float, state: Array, goal: float, scale: Array, most: int | None = None
 ) -> Any:
-    """SciPy's solution with steps of relative accuracy `goal`, `scale` what is small for each entry, and dense output.
+    """SciPy's dense solution with steps of relative accuracy `goal`; below `scale` of an entry it is absolute.
 
     Raises AccuracyNotReached, also after more evaluations than `most`.
     """
@@ -128,23 +128,23 @@ def integrated(
             )
         return field(now)
 
-    # What overflows is rejected with its step.
+    # A step that overflows is rejected.
     with np.errstate(over="ignore", invalid="ignore"):
-        answer = solve_ivp(
+        result = solve_ivp(
             counted, (0.0, span), state, method="DOP853", rtol=goal, atol=goal * scale, dense_output=True
         )
-    if answer.status != 0:
+    if result.status != 0:
         raise AccuracyNotReached(
-            f"the extremal breaks down at {answer.t[-1]:.6g} s of {span:.6g} s ({answer.message}): a shape lies ahead "
+            f"the extremal breaks down at {result.t[-1]:.6g} s of {span:.6g} s ({result.message}): a shape lies ahead "
             "in which a motion of the joints has no kinetic energy; shorten the motion, or start elsewhere"
         )
-    return answer
+    return result
 
 
 def checked_metric(body: Body, equations: Hamiltonian, shapes: Array, coupling: Array | None = None) -> Array:
-    """g of each shape, (N, n) -> (N, n, n). Raises SingularInertiaError where a motion of the joints has no energy.
+    """Metric g of each shape, (N, n) -> (N, n, n). Raises SingularInertiaError where a motion has no energy.
 
-    With a coupling (n, m) that is asked of its motions only.
+    With a coupling (n, m), only its motions are checked.
     """
     whole = np.array([np.array(equations.metric(shape)) for shape in shapes])
     metrics = whole if coupling is None else coupling.T @ whole @ coupling

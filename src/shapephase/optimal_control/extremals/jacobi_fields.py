@@ -1,4 +1,4 @@
-"""Jacobi fields of extremals, which say how their ends move with the initial conditions, and conjugate times."""
+"""Jacobi fields of extremals: the derivative of their ends by the initial conditions; and conjugate times."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _BEYOND_END = 1.05  # durations that are examined by default, so that a conjugat
 
 @dataclass(frozen=True, eq=False)
 class JacobiFields:
-    """Jacobi fields along an extremal that vanish at its start: how it moves with the initial rate and the charge.
+    """Jacobi fields of an extremal that vanish at its start: its derivative by initial rate and charge.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class ConjugateTime:
     Attributes
     ----------
     time : [s]
-    multiplicity : how many independent Jacobi fields vanish there
+    multiplicity : number of independent Jacobi fields that vanish there
 
     Examples
     --------
@@ -99,9 +99,9 @@ class ConjugateTime:
 def jacobi_fields(
     body: Body, metric: str, shape: Array, rate: Array, charge: Array, duration: float, tolerance: float
 ) -> JacobiFields:
-    """All Jacobi fields that vanish at the start, along the extremal of these (trusted) arguments.
+    """Return all Jacobi fields that vanish at the start, along the extremal of these (trusted) arguments.
 
-    Raises AccuracyNotReached as `extremal`.
+    Raises AccuracyNotReached where `extremal` does.
 
     Examples
     --------
@@ -136,28 +136,28 @@ def jacobi_fields(
     rows = np.concatenate([np.ones(n), momenta, np.ones(3)])
     scale = np.concatenate([np.ones(n), momenta, np.ones(4), np.repeat(rows, n + 3)])
     start = np.concatenate([initial_state(equations, shape, rate, charge), fields.ravel()])
-    answer = integrated(field, duration, start, tolerance, scale)
+    result = integrated(field, duration, start, tolerance, scale)
     return JacobiFields(
         duration=duration,
         n_shape=n,
         momentum_scales=momenta,
         charge_scale=charge_scale,
-        solution=answer.sol,
+        solution=result.sol,
     )
 
 
 def conjugate_times(motion: Extremal, until: float | None = None, tolerance: float = 1e-11) -> list[ConjugateTime]:
-    """When neighbours from the same start meet the extremal again: beyond the first such time it is not minimal.
+    """Times at which neighbours from the same start meet the extremal again: it is not minimal beyond the first.
 
-    A kernel that is there at all times, of charges that no motion feels (those across the plane of a planar body), is
-    left out. A symmetry of the body that keeps the start and the end turns the extremal into others with the same end,
-    so the end of an optimal loop is then a conjugate time, of the dimension of the symmetry.
+    A kernel at all times, of charges without effect (across the plane of a planar body), is left out. A symmetry of the
+    body that keeps the start and the end turns the extremal into others with the same end, so the end of an optimal
+    loop is then a conjugate time, of the dimension of the symmetry.
 
     Parameters
     ----------
     motion : the extremal
     until : [s]; None: 1.05 times its duration, so that its end is included
-    tolerance : as for `extremal`
+    tolerance : see `extremal`
 
     Returns
     -------
@@ -201,20 +201,20 @@ def conjugate_times(motion: Extremal, until: float | None = None, tolerance: flo
     values = np.linalg.svd(spread(times), compute_uv=False)
     least, largest = values[:, -1], values.max()
     dips = 1 + np.flatnonzero((least[1:-1] <= least[:-2]) & (least[1:-1] <= least[2:]))
-    found: list[ConjugateTime] = []
+    times_found: list[ConjugateTime] = []
     for dip in dips:
         time = _refined(spread, float(times[dip]), span / _SCAN)
         small = np.linalg.svd(spread(np.array([time]))[0], compute_uv=False) < _ZERO * largest
-        if small.any() and not (found and abs(time - found[-1].time) < _SAME_TIME * span):
-            found.append(ConjugateTime(time=time, multiplicity=int(small.sum())))
-    return found
+        if small.any() and not (times_found and abs(time - times_found[-1].time) < _SAME_TIME * span):
+            times_found.append(ConjugateTime(time=time, multiplicity=int(small.sum())))
+    return times_found
 
 
 def _balanced(matrices: Array) -> tuple[Array, Array]:
-    """Changes of basis, left (k, m) and right (m, k), after which all directions have the same mean effect.
+    """Return changes of basis, left (k, m) and right (m, k), after which all directions have the same mean effect.
 
-    (N, m, m); what all of them map to zero, or never reach, is left out. Without this a charge of little effect would
-    hide the zeros of the others. By rows and columns in turn, as in Sinkhorn's scaling.
+    Directions that all matrices (N, m, m) map to zero, or do not reach, are left out. A charge of little effect would
+    otherwise hide the zeros of the others. By rows and columns in turn, as in Sinkhorn's scaling.
     """
     left = right = np.eye(matrices.shape[-1])
     for _ in range(_BALANCING_ROUNDS):
@@ -224,14 +224,14 @@ def _balanced(matrices: Array) -> tuple[Array, Array]:
 
 
 def _evened(matrices: Array) -> Array:
-    """Columns after which the mean square of the matrices is the identity: (N, m, n) -> (n, k)."""
+    """Return columns after which the mean square of the matrices is the identity: (N, m, n) -> (n, k)."""
     _, values, rows = np.linalg.svd(matrices.reshape(-1, matrices.shape[-1]), full_matrices=False)
     kept = values > _NO_EFFECT * values[0]
     return rows[kept].T / values[kept] * np.sqrt(len(matrices))
 
 
 def _refined(spread: Callable[[Array], Array], time: float, step: float) -> float:
-    """The time next to a dip of the least singular value at which it vanishes, or is least."""
+    """Return the time next to a dip of the least singular value at which it vanishes, or is least."""
     centre, reach = time, step
     for _ in range(_REFINEMENTS):
         left, values, right = np.linalg.svd(spread(np.array([time]))[0], full_matrices=False)
@@ -248,6 +248,6 @@ def _refined(spread: Callable[[Array], Array], time: float, step: float) -> floa
 
 
 def inverse_scale(matrix: Array) -> float:
-    """1 over the largest entry of a matrix; 1 for a zero matrix."""
+    """Inverse of the largest entry of a matrix; 1 for a zero matrix."""
     largest = float(np.abs(matrix).max())
     return 1.0 / largest if largest else 1.0

@@ -1,4 +1,4 @@
-"""The extremal that meets a given end, by shooting from a nearly optimal path."""
+"""Extremal to a given end, by shooting from a nearly optimal path."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class _BoundaryProblem:
 
     Attributes
     ----------
-    body, metric, equations : as for `extremal`
+    body, metric, equations : see `extremal`
     start, end : (n,) shapes
     turn : (3, 3) attitude at the end
     duration : [s]
@@ -66,7 +66,7 @@ class _BoundaryProblem:
     duration: float
 
     def gap(self, rate: Array, charge: Array, accuracy: float, most: int | None = None) -> Array:
-        """How far the extremal ends from the goal, shape and rotation vector: (n + 3,)."""
+        """Distance of the extremal's end from the goal, shape and rotation vector: (n + 3,)."""
         n = self.body.n_shape
         state = initial_state(self.equations, self.start, rate, charge)
         momenta, _ = natural_scales(self.body, self.equations, self.start, rate, charge)
@@ -80,12 +80,12 @@ class _BoundaryProblem:
         return np.concatenate([last[:n] - self.end, so3.log(attitude @ self.turn.T)])
 
     def slopes(self, rate: Array, charge: Array, accuracy: float) -> Array:
-        """The derivative of the gap by g rate and charge: (n + 3, n + 3)."""
+        """Derivative of the gap by g rate and charge: (n + 3, n + 3)."""
         fields = jacobi_fields(self.body, self.metric, self.start, rate, charge, self.duration, accuracy)
         return fields.end()[2] / np.concatenate([fields.momentum_scales, np.full(3, fields.charge_scale)])
 
     def step(self, now: _Iterate, gap: Array, accuracy: float) -> _Iterate | None:
-        """A rate and charge from which the end is nearer; None if there are none."""
+        """Return a rate and charge with a nearer end; None if there are none."""
         n = self.body.n_shape
         matrix = self.slopes(now.rate, now.charge, accuracy)
         momenta, charge_scale = natural_scales(self.body, self.equations, self.start, now.rate, now.charge)
@@ -94,9 +94,9 @@ class _BoundaryProblem:
         weights = np.repeat([inverse_scale(scaled[:n]), inverse_scale(scaled[n:])], [n, 3])
         left, right = weights[:, None] * scaled, weights * gap
         across, values, along = np.linalg.svd(left)
-        # The rest are symmetries, as far as the integration can tell: along them the extremal stays where the path is.
-        telling = values > _SYMMETRY * accuracy * values[0]
-        across, values, along = across[:, telling], values[telling], along[telling]
+        # The rest are symmetries, up to the integration's accuracy: along them the extremal stays where the path is.
+        regular = values > _SYMMETRY * accuracy * values[0]
+        across, values, along = across[:, regular], values[regular], along[regular]
         metric = np.array(self.equations.metric(self.start))
         damping = now.damping
         while damping < _LAST_DAMPING:
@@ -115,7 +115,7 @@ class _BoundaryProblem:
         return None
 
     def newton(self, rate: Array, charge: Array, reach: float, accuracy: float) -> tuple[Array, Array, Array]:
-        """Rate and charge after Newton's method, which ends at a gap of `reach`, and the last gap measured."""
+        """Return rate and charge after Newton's method, which ends at a gap of `reach`, and the last gap."""
         now = _Iterate(rate=rate, charge=charge, damping=_FIRST_DAMPING)
         gap = np.full(self.body.n_shape + 3, np.inf)
         for _ in range(_STEPS):
@@ -137,7 +137,7 @@ def shoot(
     metric: str = "kinetic",
     tolerance: float = 1e-10,
 ) -> Extremal:
-    """The extremal next to a nearly optimal path, with the same start and end and a given rotation.
+    """Return the extremal next to a nearly optimal path, with the same start and end and a given rotation.
 
     Newton's method on the initial rate and the charge, with steps shortened until the end comes nearer. Where a
     symmetry of the body turns one solution into others the derivative is singular, and the damping, which falls with
@@ -145,9 +145,9 @@ def shoot(
 
     Parameters
     ----------
-    path : its start, end and duration are kept, the rate and charge of `wong_residual` are the first guess
+    path : start, end and duration are kept; the rate and charge of `wong_residual` are the first guess
     target : (3, 3) rotation over the path at zero momentum; None: that of the path
-    metric : as for `extremal`
+    metric : see `extremal`
     tolerance : of the end shape and the rotation [rad or m]
 
     Raises
@@ -155,7 +155,7 @@ def shoot(
     AccuracyNotReached
         If it does not converge: the message holds the remaining distance. Plans of bodies of up to 36 joints are near
         enough from 20 pieces on, except where light joints whirl.
-    As `extremal` and `wong_residual`.
+    Errors of `extremal` and `wong_residual`.
 
     Examples
     --------

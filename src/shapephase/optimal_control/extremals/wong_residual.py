@@ -1,4 +1,4 @@
-"""How far a joint path is from solving Wong's equations: the optimality check of a plan."""
+"""Residual of Wong's equations along a joint path: the optimality check of a plan."""
 
 from __future__ import annotations
 
@@ -30,20 +30,20 @@ _CONVERGED = 1e-9  # change of a converged residual: the accuracy of the attitud
 _CONVERGED_SHARE = 1e-3  # relative change, which suffices too: it is read as an order of magnitude
 _LEAST_FELT = 1e-9  # share of all charges' effect below which a combination is set to 0
 
-_LOOKS = 65  # times at which a path is compared with `joints` and `symmetric`, to
-_FOLLOWS = 1e-9  # [rad or m]: rounding of user input
+_SAMPLES = 65  # times at which a path is compared with `joints` and `symmetric`
+_FOLLOWS = 1e-9  # [rad or m], deviation from them: rounding of user input
 
 
 @dataclass(frozen=True, eq=False)
 class WongFit:
-    """The extremal that fits a path best, and how far the path is from solving Wong's equations.
+    """Extremal that fits a path best, and the path's residual in Wong's equations.
 
     Attributes
     ----------
     charge : (3,) that fits best, the shortest if several do, inertial axes with R(0) = 1 [J s, or rad/s for "rate"]
     rate : (n,) at the start of that extremal [rad/s or m/s]
-    residual : root mean square, in the metric of the cost, of what is missing in p = p(0) + integral of dL/dr,
-        relative to that of the rate
+    residual : root mean square, in the metric of the cost, of the defect of p = p(0) + integral of dL/dr, relative to
+        that of the rate
 
     Examples
     --------
@@ -67,31 +67,30 @@ def wong_residual(
     joints: Sequence[str] | None = None,
     symmetric: Mapping[str, tuple[str, float]] | None = None,
 ) -> WongFit:
-    """How far a path of the joints, at zero momentum, is from an extremal: the optimality check of a plan.
+    """Residual of Wong's equations along a path of the joints at zero momentum: the optimality check of a plan.
 
-    Wong's equations are taken in integrated form (du Bois-Reymond), p = g r' + A^T l = p(0) + integral of dL/dr: so a
-    spline is judged by its rate, not by its acceleration, and a jump of the rate is an error like any other.
+    The equations are integrated (du Bois-Reymond), p = g r' + A^T l = p(0) + integral of dL/dr: the rate of a spline
+    counts, not its acceleration, and a jump of the rate is an error like any other.
 
     Parameters
     ----------
     path : open or closed; between its breaks smooth
-    metric : as for `extremal`
-    joints, symmetric : as for `plan_reorientation`: the path is compared with the extremals of the motions that these
-        leave
+    metric : see `extremal`
+    joints, symmetric : see `plan_reorientation`; the path is compared with extremals of the motions that these leave
 
     Raises
     ------
     UnknownNameError, TrajectoryError
-        For another metric; if the path has other joints than the body, or moves otherwise than `joints` and `symmetric`
-        say.
+        For another metric; if the path has other joints than the body, or does not move as `joints` and
+        `symmetric` prescribe.
     SingularInertiaError
-        As `extremal`, at any shape of the path.
+        See `extremal`; at any shape of the path.
     AccuracyNotReached
         If the path is too rough between its breaks for the integral to be found.
 
     Notes
     -----
-    Source: as `extremal`.
+    Source: see `extremal`.
 
     Examples
     --------
@@ -126,12 +125,12 @@ def wong_residual(
 
 @dataclass(frozen=True, eq=False)
 class _SampledEquations:
-    """The integrated equations at Gauss points, as columns: without charge, and by each component of the charge.
+    """Integrated equations at Gauss points, as columns: without charge, and by each component of the charge.
 
     Attributes
     ----------
-    missing : (N, n, 4) what is missing in p = p(0) + integral of dL/dr, in the metric of the cost, weighted
-    initial : (N, n, n) how it changes with p(0)
+    missing : (N, n, 4) defect of p = p(0) + integral of dL/dr, in the metric of the cost, weighted
+    initial : (N, n, n) its derivative by p(0)
     speed : norm of the rate in the same metric and weights
     """
 
@@ -180,15 +179,15 @@ def _fit(
     attitude: Callable[[Array], Array],
     edges: Array,
 ) -> WongFit:
-    """Charge and initial momentum by least squares."""
+    """Fit charge and initial momentum by least squares."""
     sampled = _sampled(body, known, coupling, route, attitude, edges)
     missing = sampled.missing.reshape(-1, 4)
     # p(0) is eliminated first: the part of a charge that only shifts p(0) has no effect.
     initial, triangle = np.linalg.qr(sampled.initial.reshape(-1, coupling.shape[1]))
     left = missing - initial @ (initial.T @ missing)
-    felt, values, axes = np.linalg.svd(left[:, 1:], full_matrices=False)
+    effects, values, axes = np.linalg.svd(left[:, 1:], full_matrices=False)
     kept = values > _LEAST_FELT * np.linalg.norm(missing[:, 1:])
-    charge = -axes[kept].T @ ((felt[:, kept].T @ left[:, 0]) / values[kept])
+    charge = -axes[kept].T @ ((effects[:, kept].T @ left[:, 0]) / values[kept])
     combined = np.append(1.0, charge)
     residual = float(np.linalg.norm(left @ combined)) / sampled.speed if sampled.speed else 0.0
     momentum = np.linalg.solve(triangle, initial.T @ (missing @ combined))
@@ -200,20 +199,20 @@ def _fit(
 
 
 def _check_follows(body: Body, route: ShapePath, coupling: Array) -> None:
-    """Whether all joints of a path move as the coupling has it."""
-    shapes = route.shape(np.linspace(0.0, route.duration, _LOOKS))
+    """Raise TrajectoryError where joints of a path do not move as the coupling prescribes."""
+    shapes = route.shape(np.linspace(0.0, route.duration, _SAMPLES))
     moves = shapes - shapes[0]
-    beside = np.abs(moves - moves @ np.linalg.pinv(coupling).T @ coupling.T).max(axis=0)
-    worst = int(np.argmax(beside))
-    if beside[worst] > _FOLLOWS:
+    deviation = np.abs(moves - moves @ np.linalg.pinv(coupling).T @ coupling.T).max(axis=0)
+    worst = int(np.argmax(deviation))
+    if deviation[worst] > _FOLLOWS:
         raise TrajectoryError(
-            f"joint {body.joint_names[worst]} of the path moves by up to {beside[worst]:.3g} otherwise than joints and "
-            "symmetric say"
+            f"joint {body.joint_names[worst]} of the path deviates by up to {deviation[worst]:.3g} from what joints "
+            "and symmetric prescribe"
         )
 
 
 def _integral() -> Array:
-    """The integral from -1 to each node of the polynomial through values at the nodes: (k, k)."""
+    """Integral from -1 to each node of the polynomial through values at the nodes: (k, k)."""
     units = np.eye(len(_NODES))
     sums = np.polynomial.legendre.legval(_NODES, np.polynomial.legendre.legint(units, lbnd=-1.0))
     return sums.T @ np.linalg.inv(np.polynomial.legendre.legvander(_NODES, len(_NODES) - 1))

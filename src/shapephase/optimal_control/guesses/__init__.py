@@ -1,1 +1,1 @@
-"""Motions that the search for a plan starts from."""
+"""Motions from which the search for a plan starts."""

@@ -34,15 +34,15 @@ _SAME = 1e-6  # [rad or m] between guesses that clipping to limits has made equa
 
 @dataclass(frozen=True, eq=False)
 class Guess:
-    """A motion of the joints to start a search from.
+    """Motion of the joints from which a search starts.
 
     Attributes
     ----------
     control : (k, m) control points
-    motion : its reconstruction, roughly
+    motion : its rough reconstruction
     goal_error : angle between its attitude at the end and the goal [rad]
-    price : its cost in the metric of the start, more where it turns only part of the way; guesses are ranked by it
-    via_places : (v,) where it passes the waypoints, about
+    price : its cost in the metric of the start, divided by the squared share of the turn that it makes; ranks guesses
+    via_places : (v,) approximate places of the waypoints
     """
 
     control: Array
@@ -61,12 +61,12 @@ class Guess:
 
 
 def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> list[Guess]:
-    """Guesses, the best first: circles through the start in the planes of largest curvature, then random loops.
+    """Return guesses, the best first: circles through the start in the planes of largest curvature, then random loops.
 
     The curvature F of the mechanical connection along the axis of the turn, in the kinetic metric, is an antisymmetric
     form; its largest singular value sigma belongs to the plane of shapes in which a small loop turns the body most for
     its length: a circle of radius rho turns it by pi rho^2 sigma. Circles of several sizes, in several directions from
-    the start, once or twice round, are tried by the integrator; of each direction and number of rounds the size is
+    the start, once or twice round, are tried by the integrator; for each direction and number of rounds the size is
     taken that comes near the goal at the least cost, and the cheapest come first.
 
     Raises
@@ -87,28 +87,28 @@ def guesses(task: Reorientation, basis: SplineBasis, seed: int, count: int) -> l
             tried.append(min(of_family, key=lambda guess: guess.price))
     tried.sort(key=lambda guess: guess.price)
     # Every second start is random: circles are all alike where the optimum is not.
-    found = _different(tried)[: count - count // 2]
+    chosen = _different(tried)[: count - count // 2]
     for _ in range(_ATTEMPTS * count):
-        if len(found) == count:
+        if len(chosen) == count:
             break
         guess = guess_of(task, basis, _random(task, rng))
         if guess is not None:
-            found.append(guess)
-    if not found:
+            chosen.append(guess)
+    if not chosen:
         raise PlanNotFound(
             f"no guess of a motion of {task.body.name} could be reconstructed; change the start or the limits"
         )
-    return found
+    return chosen
 
 
 def _circles(task: Reorientation) -> list[list[Array]]:
-    """Loops (N, m) over `PLACES` through the start; in each list those that differ by their radius only."""
+    """Loops (N, m) over `PLACES` through the start; those of a list differ by their radius only."""
     families = []
     turn = task.turn_to_goal()
     angle = float(np.linalg.norm(turn))
     if angle == 0.0 or np.count_nonzero(task.movable) < 2:
         return []
-    # The plane is looked for at the start and half way to the middle of the limits: the start may be special.
+    # At the start, which may be special, and half way to the middle of the limits.
     lower, upper = np.maximum(task.lower, task.start - np.pi), np.minimum(task.upper, task.start + np.pi)
     middle = 0.5 * (lower + upper)
     for centre in (task.start, 0.5 * (task.start + middle)):
@@ -128,7 +128,7 @@ def _circles(task: Reorientation) -> list[list[Array]]:
 
 
 def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array, Array, float] | None:
-    """Two orthogonal directions of length 1 in the kinetic metric, and sigma, loops turning by +axis."""
+    """Two orthonormal directions in the kinetic metric, and sigma; loops turn by +axis."""
     shape = task.shapes(coordinates)
     moves = np.flatnonzero(task.movable)
     form = task.coupling.T @ (curvature(task.body, shape) @ axis) @ task.coupling
@@ -143,12 +143,12 @@ def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array,
     first, second = np.zeros((2, task.dimension))
     first[moves] = np.sqrt(2.0) * inverse.T @ np.real(vectors[:, -1])
     second[moves] = np.sqrt(2.0) * inverse.T @ np.imag(vectors[:, -1])
-    # A loop from `first` to `second` turns by -F(first, second): the plane's sense is chosen so that this is positive.
+    # A loop from `first` to `second` turns by -F(first, second), which is to be positive.
     return (first, second, sigma) if first @ form @ second < 0.0 else (first, -second, sigma)
 
 
 def _straight(task: Reorientation) -> list[Array]:
-    """The way that turns the body best to first order, for a free end; else straight to another end."""
+    """Straight ways: to a free end, those that turn the body best to first order; else to a different end."""
     ramp = PLACES[:, None]
     if task.end is not None:
         moves = np.any(task.end != task.start) or task.via
@@ -163,7 +163,7 @@ def _straight(task: Reorientation) -> list[Array]:
 
 
 def _random(task: Reorientation, rng: np.random.Generator) -> Array:
-    """A loop of two random harmonics through the start, as large as half the limits or one radian."""
+    """Loop of two random harmonics through the start, of the size of half the limits or one radian."""
     reach = np.minimum(0.5 * (task.upper - task.lower), 1.0)
     phase = 2.0 * np.pi * PLACES[:, None]
     curve = np.zeros((len(PLACES), task.dimension))
@@ -174,7 +174,7 @@ def _random(task: Reorientation, rng: np.random.Generator) -> Array:
 
 
 def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | None:
-    """A curve (101, m) over `PLACES`, taken within the limits and from start to end; None where it has no motion."""
+    """Return the guess of a curve (101, m) over `PLACES`, put within limits and ends; None where it has no motion."""
     if task.end is not None:
         curve = curve + PLACES[:, None] * (task.end - curve[-1])
     at = nearest_places(task, curve, PLACES)
@@ -185,7 +185,7 @@ def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | N
 def guess_of_control(
     task: Reorientation, basis: SplineBasis, control: Array, via_places: Array | None = None
 ) -> Guess | None:
-    """The spline of control points, taken within the limits and at rest at its ends; None where it has no motion."""
+    """Return the guess of control points, put within limits and at rest at the ends; None where it has no motion."""
     control, equal = control.copy(), task.equal_points
     control[:equal], control[-equal:] = control[0], control[-1]
     if task.rates_at_ends == "periodic":
@@ -213,12 +213,12 @@ def guess_of_control(
 
 
 def start_metric(task: Reorientation) -> Array:
-    """The kinetic metric of the coordinates at the start: (m, m)."""
+    """Kinetic metric of the coordinates at the start: (m, m)."""
     return task.coupling.T @ symbolic_body(task.body).shape_metric(task.shapes(task.start)).full() @ task.coupling
 
 
 def _different(tried: list[Guess]) -> list[Guess]:
-    """The guesses without those that clipping made equal."""
+    """Guesses without those that clipping made equal."""
     kept: list[Guess] = []
     for guess in tried:
         if all(np.abs(guess.control - other.control).max() > _SAME for other in kept):

@@ -1,4 +1,4 @@
-"""Guesses of many strokes: where one loop of the joints turns a body by far too little, it goes round many times."""
+"""Guesses of many strokes, for bodies that one loop of the joints turns by far too little."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ class Stroke:
 
     Attributes
     ----------
-    curve : (S + 1, m) its shapes, the last the first
+    curve : (S + 1, m) its shapes, the last equal to the first
     turn : (3,) rotation vector of the body, base axes at its start [rad]
-    length : in the metric of the task
+    length : length in the metric of the task
     """
 
     curve: Array
@@ -49,7 +49,7 @@ class Stroke:
     length: float
 
     def begun_near(self, coordinates: Array, metric: Array) -> Stroke:
-        """The same loop from its shape nearest to some coordinates."""
+        """Return the loop begun at its shape nearest to some coordinates."""
         gaps = self.curve[:-1] - coordinates
         first = int(np.argmin(np.sum((gaps @ metric) * gaps, axis=1)))
         curve = np.concatenate([self.curve[first:-1], self.curve[: first + 1]])
@@ -58,14 +58,14 @@ class Stroke:
 
 @dataclass(frozen=True, eq=False)
 class _Leg:
-    """Some rounds of a stroke, whole or not; backwards below zero."""
+    """Number of rounds of a stroke, whole or not; backwards below zero."""
 
     stroke: Stroke
     rounds: float
 
     @property
     def whole(self) -> int:
-        """Whole rounds that turn as far, one at least, each made smaller."""
+        """Number of whole rounds, one at least, that turn as far when each is made smaller."""
         return max(int(np.ceil(abs(self.rounds))), 1)
 
     def at(self, phases: Array) -> Array:
@@ -103,10 +103,10 @@ class Layout:
 
 
 def most_of_a_loop(task: Reorientation) -> float:
-    """More than a loop that goes round once can turn the body [rad]; infinite where no such bound is known.
+    """Upper bound of the turn by a loop that goes round once [rad]; infinite where no bound is known.
 
-    By Stokes' theorem the turn is at most the integral of the curvature's length over what the loop encloses, which for
-    two coordinates is at most all that their limits permit.
+    By Stokes' theorem the turn is at most the integral of the curvature's length over the area that the loop encloses:
+    for two coordinates, at most the whole range of their limits.
 
     Source: theory.md B6; Montgomery 1990.
     """
@@ -120,19 +120,17 @@ def most_of_a_loop(task: Reorientation) -> float:
     coordinates = np.tile(task.start, (_CELLS**2, 1))
     coordinates[:, moves] = np.stack(np.meshgrid(first, second), axis=-1).reshape(-1, 2)
     columns = task.coupling[:, moves]
-    found = np.einsum("kija,i,j->ka", curvature(task.body, task.shapes(coordinates)), *columns.T)
+    curvatures = np.einsum("kija,i,j->ka", curvature(task.body, task.shapes(coordinates)), *columns.T)
     area = float(np.prod(reach[:, 1] - reach[:, 0]))
-    return float(np.linalg.norm(found, axis=1).mean() * area)
+    return float(np.linalg.norm(curvatures, axis=1).mean() * area)
 
 
 def guess_of_strokes(task: Reorientation, seed: int, pieces: int | None = None) -> tuple[Layout, Array] | None:
-    """A motion of many strokes that comes near the goal, and its control points; None where there is none.
+    """Return a motion of many strokes that comes near the goal, and its control points; None where there is none.
 
-    Its spline has the pieces given at most.
-
-    Each stroke turns the body furthest for its length about some axis, within the limits. Three legs, each some rounds
-    of one of the strokes, make any rotation if their axes differ enough, as Euler's angles do; of those that reach the
-    goal the shortest are taken.
+    Its spline has at most `pieces` pieces. Each stroke turns the body furthest for its length about some axis, within
+    the limits. Three legs, each some rounds of one of the strokes, make any rotation if their axes differ enough, like
+    Euler's angles; the shortest that reach the goal are taken.
     """
     if task.momentum.any() or task.windings is not None or np.count_nonzero(task.movable) < 2:
         return None
@@ -152,7 +150,7 @@ def guess_of_strokes(task: Reorientation, seed: int, pieces: int | None = None) 
 
 
 def _joined(task: Reorientation, layout: Layout, legs: list[_Leg]) -> Array:
-    """Start, legs and end at the ends of the pieces, joined by straight ways: (pieces + 1, m)."""
+    """Coordinates at the ends of the pieces, start, legs and end joined by straight ways: (pieces + 1, m)."""
     values, place = np.tile(task.start, (layout.basis.pieces + 1, 1)), 0
     for leg, first, (pieces, rounds) in zip(legs, layout.firsts, layout.strokes, strict=True):
         last = first + pieces * rounds
@@ -165,26 +163,26 @@ def _joined(task: Reorientation, layout: Layout, legs: list[_Leg]) -> Array:
 
 
 def best_strokes(task: Reorientation, metric: Array, seed: int) -> list[Stroke]:
-    """The strokes that turn the body furthest for their length about the main axes of loops' turns, and the goal's.
+    """Return the strokes that turn the body furthest for their length about the goal's and the loops' main axes.
 
-    Length is the root of the energy over the same time, so that a stroke comes evenly paced.
+    Length is the root of the energy over the same time, so that strokes are evenly paced.
     """
     rng = np.random.default_rng(seed)
     reach = _reach(task)
     first = [_random_loop(task, reach, rng) for _ in range(_STARTS)]
     turns = so3.log(_turned(task, np.stack([_curve(loop) for loop in first])))
     axes = [*np.linalg.svd(turns)[2], so3.normalised(task.turn_to_goal())]
-    found = []
+    strokes = []
     for axis in axes:
         tried = [_improved(task, metric, reach, loop, axis) for loop in first]
         best = max(tried, key=lambda stroke: abs(stroke.turn @ axis) / stroke.length)
         if abs(best.turn @ axis) > _IDLE * best.length:
-            found.append(best)
-    return found
+            strokes.append(best)
+    return strokes
 
 
 def _metric(task: Reorientation) -> Array:
-    """By which lengths are measured: (m, m), the cost's own as far as it is one."""
+    """Metric of lengths: (m, m), the cost's own where the cost is the integral of a metric."""
     if task.cost == "time":
         return np.diag(task.rate_limit**-2.0)
     metric = start_metric(task) if task.cost == "kinetic" else task.coupling.T @ task.coupling
@@ -192,7 +190,7 @@ def _metric(task: Reorientation) -> Array:
 
 
 def _reach(task: Reorientation) -> Array:
-    """(m, 2) within which strokes stay."""
+    """Bounds of strokes: (m, 2)."""
     return np.stack(
         [np.maximum(task.lower, task.start - _FARTHEST), np.minimum(task.upper, task.start + _FARTHEST)], axis=1
     )
@@ -208,12 +206,12 @@ def _random_loop(task: Reorientation, reach: Array, rng: np.random.Generator) ->
 
 
 def _curve(control: Array) -> Array:
-    """Shapes round loops, the last the first: control points (..., K, m) -> (..., S + 1, m)."""
+    """Shapes round loops, the last equal to the first: control points (..., K, m) -> (..., S + 1, m)."""
     return _ROUND @ control
 
 
 def _round() -> Array:
-    """The periodic splines at equal steps: (S + 1, K)."""
+    """Periodic splines at equal steps: (S + 1, K)."""
     from scipy.interpolate import BSpline
 
     knots = np.arange(-3, _POINTS + 4) / _POINTS
@@ -223,7 +221,7 @@ def _round() -> Array:
 
 
 def _turned(task: Reorientation, curves: Array) -> Array:
-    """How curves turn the body, by midpoints: (L, N + 1, m) -> (L, 3, 3)."""
+    """Rotations of the body along curves, by midpoints: (L, N + 1, m) -> (L, 3, 3)."""
     steps = np.diff(curves, axis=1)
     shapes = task.shapes(0.5 * (curves[:, 1:] + curves[:, :-1]))
     connection = mechanical_connection(task.body, shapes.reshape(-1, shapes.shape[-1])).reshape(
@@ -238,7 +236,7 @@ def _turned(task: Reorientation, curves: Array) -> Array:
 
 
 def _improved(task: Reorientation, metric: Array, reach: Array, loop: Array, axis: Array) -> Stroke:
-    """The stroke next to a loop that turns the body furthest about an axis for its length."""
+    """Return the stroke next to a loop that turns the body furthest about an axis for its length."""
     from scipy.optimize import minimize
 
     first, _ = _turn_for_length(task, metric, loop, axis)
@@ -250,10 +248,10 @@ def _improved(task: Reorientation, metric: Array, reach: Array, loop: Array, axi
         return scale * rate, scale * (slope * task.movable).ravel()
 
     bounds = np.tile(reach, (_POINTS, 1))
-    found = minimize(
+    result = minimize(
         missing, loop.ravel(), jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _ITERATIONS}
     )
-    curve = _curve(found.x.reshape(loop.shape))
+    curve = _curve(result.x.reshape(loop.shape))
     return Stroke(
         curve=curve,
         turn=so3.log(_turned(task, curve[None]))[0],
@@ -262,7 +260,7 @@ def _improved(task: Reorientation, metric: Array, reach: Array, loop: Array, axi
 
 
 def _turn_for_length(task: Reorientation, metric: Array, control: Array, axis: Array) -> tuple[float, Array]:
-    """The turn about an axis for its length, of a loop of control points (K, m), and its exact slope (K, m).
+    """Ratio of turn about an axis to length, of a loop of control points (K, m), and its exact slope (K, m).
 
     The body turns by the product of exp(phi_k), phi_k = -A(r_k) d_k, r_k the middle of a step d_k.
     """
@@ -280,11 +278,11 @@ def _turn_for_length(task: Reorientation, metric: Array, control: Array, axis: A
     turn = so3.log(whole)
     # A change of the product by a rotation vector changes its logarithm by the inverse of `left_jacobian`; that of a
     # small step changes its exponential by nearly 1 + hat(phi)/2.
-    felt = np.asarray(np.linalg.solve(_left_jacobian(turn).T, axis), float)
-    seen = so3.apply(so3.transpose(before), np.broadcast_to(felt, turns.shape))
-    seen = seen - 0.5 * so3.cross(turns, seen)
-    by_middle = -np.einsum("kmna,kn,ka->km", slopes, steps, seen)
-    by_step = -np.einsum("kma,ka->km", columns, seen)
+    covector = np.asarray(np.linalg.solve(_left_jacobian(turn).T, axis), float)
+    by_turn = so3.apply(so3.transpose(before), np.broadcast_to(covector, turns.shape))
+    by_turn = by_turn - 0.5 * so3.cross(turns, by_turn)
+    by_middle = -np.einsum("kmna,kn,ka->km", slopes, steps, by_turn)
+    by_step = -np.einsum("kma,ka->km", columns, by_turn)
     length = float(_length(curve[None], metric)[0])
     by_step = by_step / length - (axis @ turn) * len(steps) * (steps @ metric) / length**3
     by_middle = by_middle / length
@@ -295,7 +293,7 @@ def _turn_for_length(task: Reorientation, metric: Array, control: Array, axis: A
 
 
 def _left_jacobian(turn: Array) -> Array:
-    """J with exp(turn + d) = exp(J d) exp(turn) to first order: (3,) -> (3, 3)."""
+    """Matrix J with exp(turn + d) = exp(J d) exp(turn) to first order: (3,) -> (3, 3)."""
     angle = float(np.linalg.norm(turn))
     spin = so3.hat(turn)
     if angle < _SMALL:
@@ -309,12 +307,12 @@ def _length(curves: Array, metric: Array) -> Array:
 
 
 def _steered(strokes: list[Stroke], goal: Array, seed: int) -> list[_Leg] | None:
-    """The shortest three legs that turn the body to the goal, each of a stroke; None where none do."""
+    """Return the shortest three legs, each of a stroke, that turn the body to the goal; None where none do."""
     if not strokes:
         return None
     sizes = np.array([np.linalg.norm(stroke.turn) for stroke in strokes])
     axes = np.array([stroke.turn for stroke in strokes]) / sizes[:, None]
-    dear = np.array([stroke.length for stroke in strokes]) / sizes
+    prices = np.array([stroke.length for stroke in strokes]) / sizes
     chosen = np.repeat(list(product(range(len(strokes)), repeat=3)), _TRIES, axis=0)
     angles = np.random.default_rng(seed).uniform(-np.pi, np.pi, size=(len(chosen), 3))
     missing = np.full_like(angles, np.inf)
@@ -328,7 +326,9 @@ def _steered(strokes: list[Stroke], goal: Array, seed: int) -> list[_Leg] | None
         damped = damped + np.finfo(float).eps * np.eye(3)
         angles = angles + so3.apply(np.linalg.inv(damped), so3.apply(so3.transpose(slopes), missing))
     angles = np.remainder(angles + np.pi, 2.0 * np.pi) - np.pi
-    costs = np.where(np.linalg.norm(missing, axis=1) < _STEERED, np.sum(np.abs(angles) * dear[chosen], axis=1), np.inf)
+    costs = np.where(
+        np.linalg.norm(missing, axis=1) < _STEERED, np.sum(np.abs(angles) * prices[chosen], axis=1), np.inf
+    )
     best = int(np.argmin(costs))
     if not np.isfinite(costs[best]):
         return None

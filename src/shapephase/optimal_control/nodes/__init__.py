@@ -1,1 +1,1 @@
-"""What one collocation node contributes to a plan's program."""
+"""Contributions of one collocation node to a plan's program."""

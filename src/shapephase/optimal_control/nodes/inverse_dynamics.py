@@ -1,16 +1,16 @@
 r"""Efforts of the joints of a free tree of links with their first and second derivatives, link by link.
 
-The base moves as the momentum M about the centre of mass, base axes, wants it, and no wrench acts on it. With s x
+The base moves such that the momentum about the centre of mass is M, base axes, without a wrench on it. With s x
 twists, s x* forces, I, P, F inertia, momentum and rate of momentum of all that a joint carries along its screw s,
 
     V' = V + s u,   A' = A + s w + V x s u   from frame to frame,   effort = s . F,
 
-V and A of the base such that all momentum is M and all force none. A joint j moves what it carries as one rigid body;
-what V and A lack of being moved along is
+V and A of the base such that all momentum is M and all force none. A joint j moves all that it carries as one rigid
+body; the defect of V and A from being moved along is
 
     p = V x s,   a = A x s + V x p      (V and A of the frame that the joint hangs on),
 
-so that with K x = I' x + x x* P (I' the rate of I) the change of F of anything that hangs on j is
+so that with K x = I' x + x x* P (I' the rate of I) the derivative of F of any link that hangs on j is
 
     by r_j   s x* F + I a + K p,      by u_j   2 I p + K s,      by w_j   I s.
 
@@ -50,7 +50,7 @@ class InverseDynamics:
 
     Attributes
     ----------
-    efforts : x -> of all joints (k,)
+    efforts : x -> efforts of all joints (k,)
     slopes : x -> their derivatives (k, 3 k + 3)
     second : x, factors (k,) -> second derivatives (3 k + 3, 3 k + 3) of their product with the efforts
     """
@@ -61,7 +61,7 @@ class InverseDynamics:
 
 
 def inverse_dynamics(chain: JointChain) -> InverseDynamics:
-    """The functions of a tree without ball joints, in symbols.
+    """Return the functions of a tree without ball joints, in symbols.
 
     Source: recursive Newton-Euler (Featherstone, Rigid Body Dynamics Algorithms, section 5.3); first and second
     derivatives after Singh, Russell and Wensing 2022 and 2023, with the base's motion eliminated.
@@ -85,7 +85,7 @@ def inverse_dynamics(chain: JointChain) -> InverseDynamics:
 
 
 def _slopes(chain: JointChain, s: Any, p: Any, a: Any, f: Any, g: Any, h: Any, e: Any, b: Any, *base: Any) -> Any:
-    """Derivatives of the efforts: those at a base that moves as it does, and by how its motion changes."""
+    """Derivatives of the efforts: at a given motion of the base, and by the change of that motion."""
     import casadi
 
     carried = carries(chain).T
@@ -134,12 +134,7 @@ def _second(chain: JointChain, rows: Any, c: Any, bs: Any, k: Any, d: Any, es: A
 
 
 class _MovingTree:
-    """A tree that moves, and what drives it, as expressions.
-
-    Attributes
-    ----------
-    efforts : of all joints
-    """
+    """Twists, accelerations, forces and momenta of a moving tree, and the efforts of all joints, as expressions."""
 
     def __init__(self, chain: JointChain, x: Any) -> None:
         import casadi
@@ -147,7 +142,7 @@ class _MovingTree:
         self._parents, joints = chain.parents, range(len(chain.parents))
         count = len(joints)
         place, rate, bend, momentum = x[:count], x[count : 2 * count], x[2 * count : 3 * count], x[3 * count :]
-        # Ball joints, which would be counted from a shape, are none of these.
+        # There are no ball joints, which would be counted from a shape.
         frames = joint_frames(chain, place, place)
         self._screws = [Twist(*joint_screw(chain, number, frames[number + 1])) for number in joints]
         self._links = [
@@ -182,25 +177,25 @@ class _MovingTree:
         self.efforts = casadi.vertcat(*(screw.power(force) for screw, force in zip(self._screws, self._forces[1:])))
 
     def _gathered(self, parts: list[Any]) -> list[Any]:
-        """Of each frame, the sum of a quantity over all that hangs on it."""
-        found = list(parts)
+        """Sum of a quantity over all frames that hang on each."""
+        sums = list(parts)
         for number in reversed(range(len(self._parents))):
-            found[self._parents[number]] = found[self._parents[number]] + found[number + 1]
-        return found
+            sums[self._parents[number]] = sums[self._parents[number]] + sums[number + 1]
+        return sums
 
     def _passed_on(self, base: Twist, steps: list[Twist]) -> list[Twist]:
-        """Of each frame, the base's and the steps of all joints on the way."""
-        found = [base]
+        """Twist of each frame: the base's and the steps of all joints on the way."""
+        twists = [base]
         for number, parent in enumerate(self._parents):
-            found.append(found[parent] + steps[number])
-        return found
+            twists.append(twists[parent] + steps[number])
+        return twists
 
     def _coriolis(self, frame: int, twist: Twist) -> Twist:
-        """K of all that hangs on a frame."""
+        """Product K x for all that hangs on a frame."""
         return self._changes[frame].momentum(twist) + twist.on_force(self._momenta[frame])
 
     def rows(self) -> list[Any]:
-        """s, p, a, f, g, h, e, K^T s, one column a joint, and of the base the inverse of I and K."""
+        """Rows s, p, a, f, g, h, e, K^T s, one column a joint, then the inverse of I and K of the base."""
         import casadi
 
         columns = []
@@ -218,7 +213,7 @@ class _MovingTree:
         return [_side_by_side(column) for column in (*zip(*columns, strict=True), inverse, coriolis)]
 
     def second_rows(self, factors: Any) -> list[Any]:
-        """c, b x s, k, d, E s, one column a joint, and E of the base."""
+        """Rows c, b x s, k, d, E s, one column a joint, then E of the base."""
         import casadi
 
         lent = [screw * factors[k] for k, screw in enumerate(self._screws)]

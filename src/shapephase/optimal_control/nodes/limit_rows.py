@@ -1,4 +1,4 @@
-"""Rows of a plan's program that bound accelerations, jerks and efforts, each a part of its limit."""
+"""Rows of a plan's program that bound accelerations, jerks and efforts, each as a share of its limit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...arrays import Array
 from .._spline_basis import SplineBasis
 from ..task import Reorientation
 from .node_efforts import node_efforts
-from .node_functions import scipy_sparse, seen_at, sparse_matrix
+from .node_functions import node_arguments, scipy_sparse, sparse_matrix
 
 
 def derivative_rows(task: Reorientation, basis: SplineBasis, unknown: Any) -> Any:
@@ -32,8 +32,7 @@ class EffortTerms:
 
     Attributes
     ----------
-    values, jacobian : expressions of the unknowns, (j,) and (j, N): of each place all shares; none where they have no
-        limits
+    values, jacobian : expressions of the unknowns, (j,) and (j, N): all shares at each place; empty without limits
     cost : [s]
     """
 
@@ -42,21 +41,21 @@ class EffortTerms:
 
         limited = task.efforts_limited
         places = np.concatenate([nodes, basis.nodes]) if limited else nodes
-        # Quadrature is by the nodes alone; the attitudes at the ends of pieces come behind those there.
+        # The nodes alone have weights; attitudes at the ends of pieces follow theirs.
         self._weights = casadi.DM(np.append(weights, np.zeros(len(places) - len(nodes)))).T
         self._costs = 1.0 if task.cost == "effort" else 0.0
-        self._seen = seen_at(task, basis, places, 2, unknown.shape[0])
+        self._arguments = node_arguments(task, basis, places, 2, unknown.shape[0])
         self._width, count = 3 * task.dimension + 5, len(places)
-        self._at = casadi.reshape(self._seen @ unknown, self._width, count)
+        self._at = casadi.reshape(self._arguments @ unknown, self._width, count)
         self._functions = node_efforts(task)
-        found = self._functions.shares.map(count)(self._at)
-        self._counted = found.shape
+        shares = self._functions.shares.map(count)(self._at)
+        self._counted = shares.shape
         self.cost = casadi.dot(self._functions.load.map(count)(self._at), self._weights)
-        self.values = casadi.vec(found) if limited else casadi.MX(0, 1)
+        self.values = casadi.vec(shares) if limited else casadi.MX(0, 1)
         self.jacobian = casadi.MX(0, unknown.shape[0])
         if limited:
             slopes = self._functions.slopes.map(count)(self._at)
-            self.jacobian = casadi.diagcat(*casadi.horzsplit(slopes, self._width)) @ self._seen
+            self.jacobian = casadi.diagcat(*casadi.horzsplit(slopes, self._width)) @ self._arguments
 
     def hessian(self, multipliers: Any, cost_factor: Any) -> Any:
         """Second derivatives of the weighted sum of the rows and of the cost: (j,), () -> (N, N)."""
@@ -66,4 +65,4 @@ class EffortTerms:
         blocks = self._functions.second.map(self._counted[1])(
             self._at, weights, self._costs * cost_factor * self._weights
         )
-        return self._seen.T @ (casadi.diagcat(*casadi.horzsplit(blocks, self._width)) @ self._seen)
+        return self._arguments.T @ (casadi.diagcat(*casadi.horzsplit(blocks, self._width)) @ self._arguments)

@@ -1,4 +1,4 @@
-"""What the motors of a body bear at one place of a plan, and its derivatives."""
+"""Efforts of a body's joints at one place of a plan, and their derivatives."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from .inverse_dynamics import InverseDynamics, inverse_dynamics
 class NodeEfforts:
     """CasADi functions of a place's y = (r, u, w, q, T): shape, its two derivatives by place, quaternion, duration.
 
-    Shares are efforts of the joints that have a measure, as a part of it: (l,). Their load is T times the sum of their
-    squares, so that its integral over places is that over time.
+    Shares are efforts relative to their measure, of the joints that have one: (l,). The load is T times the sum of
+    their squares: its integral over places is that of the squares over time.
 
     Attributes
     ----------
     shares : y -> shares (l,)
-    load : y -> of the shares
+    load : y -> load of the shares
     slopes : y -> derivatives of the shares (l, 3 m + 5)
     second : y, multipliers of the shares (l,), factor of the load -> second derivatives of the weighted sum
     """
@@ -38,7 +38,7 @@ _built: WeakKeyDictionary[Body, InverseDynamics] = WeakKeyDictionary()
 
 
 def node_efforts(task: Reorientation) -> NodeEfforts:
-    """The functions of a task; those of its body are kept as long as that is."""
+    """Return the functions of a task; those of its body are kept as long as the body."""
     import casadi
 
     m, chain = task.dimension, task.body.chain
@@ -46,10 +46,10 @@ def node_efforts(task: Reorientation) -> NodeEfforts:
         _built[task.body] = inverse_dynamics(chain)
     dynamics, measured = _built[task.body], np.flatnonzero(np.isfinite(task.effort_measure))
     y, multipliers, factor = casadi.MX.sym("y", 3 * m + 5), casadi.MX.sym("l", len(measured)), casadi.MX.sym("f")
-    seen = _seen(task)
-    x, onward = seen.values(y), seen.slopes(y)
+    arguments = _dynamics_arguments(task)
+    x, onward = arguments.values(y), arguments.slopes(y)
     duration = y[3 * m + 4]
-    # Places are counted as shares of the duration, so that these efforts are those in time, times its square.
+    # Derivatives are by place: these efforts are those in time, times T^2.
     scale = casadi.DM(chain.matrix[:, measured] / task.effort_measure[measured]).T
     bare = scale @ dynamics.efforts(x)
     by_duration = casadi.MX(1, 3 * m + 5)
@@ -58,8 +58,8 @@ def node_efforts(task: Reorientation) -> NodeEfforts:
     slopes = (scale @ dynamics.slopes(x) @ onward) / duration**2 - 2.0 * (shares @ by_duration) / duration
     weights = multipliers + 2.0 * factor * duration * shares
     gradient = scale.T @ weights / duration**2
-    curved = onward.T @ dynamics.second(x, gradient) @ onward + seen.second(y, dynamics.slopes(x).T @ gradient)
-    # Of 1 / T^2 times what depends on T itself, and of T times the squares of the shares.
+    curved = onward.T @ dynamics.second(x, gradient) @ onward + arguments.second(y, dynamics.slopes(x).T @ gradient)
+    # Derivatives by T of the factor 1 / T^2, and of T times the squares of the shares.
     with_duration = -2.0 * (slopes.T @ weights) / duration + factor * 2.0 * (slopes.T @ shares)
     alone = -2.0 * casadi.dot(weights, shares) / duration**2
     across = with_duration @ by_duration
@@ -74,8 +74,8 @@ def node_efforts(task: Reorientation) -> NodeEfforts:
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
-    """What inverse dynamics takes, (3 k + 3,), as functions of y.
+class _DynamicsArguments:
+    """Arguments of inverse dynamics, (3 k + 3,), as functions of y.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class _Seen:
     second: Any
 
 
-def _seen(task: Reorientation) -> _Seen:
+def _dynamics_arguments(task: Reorientation) -> _DynamicsArguments:
     import casadi
 
     m, chain = task.dimension, task.body.chain
@@ -103,7 +103,7 @@ def _seen(task: Reorientation) -> _Seen:
         momentum = y[3 * m + 4] * back
     x = casadi.vertcat(place, from_shape @ y[m : 2 * m], from_shape @ y[2 * m : 3 * m], momentum)
     second, _ = casadi.hessian(casadi.dot(factors, x), y)
-    return _Seen(
+    return _DynamicsArguments(
         values=casadi.Function("seen", [y], [casadi.densify(x)]),
         slopes=casadi.Function("seen_slopes", [y], [casadi.jacobian(x, y)]),
         second=casadi.Function("seen_second", [y, factors], [second]),

@@ -1,4 +1,4 @@
-"""What one collocation node contributes to the program: turning rate and cost density, and their derivatives."""
+"""Turning rate and cost density at a collocation node with their derivatives; and the layout of the unknowns."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _built: WeakKeyDictionary[Body, dict[tuple[object, ...], NodeFunctions]] = WeakK
 
 
 def node_functions(task: Reorientation) -> NodeFunctions:
-    """The functions of a task, kept as long as its body."""
+    """Return the functions of a task, kept as long as its body."""
     kept = _built.setdefault(task.body, {})
     key = (task.cost, task.coupling.shape, task.coupling.tobytes(), task.offset.tobytes(), task.momentum.tobytes())
     if key not in kept:
@@ -45,7 +45,7 @@ def node_functions(task: Reorientation) -> NodeFunctions:
 
 
 def _node_functions(task: Reorientation) -> NodeFunctions:
-    """The chain rule over three stages: coordinates and rates of joints, sixteen mechanical numbers, the turning."""
+    """Chain rule over three stages: coordinates and rates of joints, sixteen mechanical numbers, the turning."""
     import casadi
 
     m, chain = task.dimension, task.body.chain
@@ -57,19 +57,19 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     numbers, by_place, by_rate = mechanics.values(place, rate, shape)
     bare = casadi.DM(task.coupling) @ y[m : 2 * m]
     effort = 0.5 * casadi.dot(bare, bare)
-    seen = casadi.vertcat(numbers, effort, y[2 * m :])
-    turning, density = ends.values(seen)
-    # Derivatives of the sixteen by shape and rate; `onward` are those of the joints by the shape, `back` those of their
-    # rates by the shape, which is zero where joints follow others by straight lines only.
+    inputs = casadi.vertcat(numbers, effort, y[2 * m :])
+    turning, density = ends.values(inputs)
+    # `onward`: derivatives of the joints by the shape; `back`: of their rates by the shape, zero where all joints that
+    # follow others do so linearly.
     slopes = casadi.horzcat(by_place @ onward + by_rate @ back, by_rate @ onward)
     at_rate = casadi.horzcat(casadi.MX(1, m), (casadi.DM(task.coupling.T @ task.coupling) @ y[m : 2 * m]).T)
     through = casadi.diagcat(casadi.vertcat(slopes, at_rate), casadi.MX.eye(5))
-    by_seen, _ = ends.jacobian(seen)
-    jacobian = casadi.densify(by_seen @ through)
+    by_inputs, _ = ends.jacobian(inputs)
+    jacobian = casadi.densify(by_inputs @ through)
     multipliers, factor = casadi.MX.sym("multipliers", 4), casadi.MX.sym("factor")
-    gradient, bend = ends.hessian(seen, multipliers, factor)
+    gradient, bend = ends.hessian(inputs, multipliers, factor)
     places, mixed, rates = mechanics.second(place, rate, shape, gradient[:SIZE])
-    # Second derivatives by joints' coordinates and rates, seen from shape and its rate.
+    # Second derivatives by joints' coordinates and rates, chained to shape and its rate.
     lower = mixed @ onward + rates @ back
     corner = onward.T @ (places @ onward + mixed.T @ back) + back.T @ lower
     beside = onward.T @ lower
@@ -113,8 +113,8 @@ def _joints(task: Reorientation) -> _Joints:
     onward = casadi.jacobian(place, coordinates)
     rates = onward @ rate
     back = casadi.jacobian(rates, coordinates)
-    found = [casadi.substitute(one, about, shape) for one in (place, rates, onward, back)]
-    values = casadi.Function("joints", [both], [casadi.densify(found[0]), casadi.densify(found[1]), *found[2:]])
+    parts = [casadi.substitute(part, about, shape) for part in (place, rates, onward, back)]
+    values = casadi.Function("joints", [both], [casadi.densify(parts[0]), casadi.densify(parts[1]), *parts[2:]])
     if chain.follows.is_linear:
         return _Joints(values=values, bend=None)
     of_place, of_rate = (casadi.SX.sym(name, len(chain.parents)) for name in ("of_place", "of_rate"))
@@ -129,9 +129,9 @@ class _Ends:
 
     Attributes
     ----------
-    values : -> dq/ds (4,), density
-    jacobian : -> derivatives of both, (4, 22) and (1, 22)
-    hessian : and multipliers (4,), factor -> gradient (22,) and second derivatives (22, 22) of the weighted sum
+    values : dq/ds (4,), density
+    jacobian : derivatives of both, (4, 22) and (1, 22)
+    hessian : with multipliers (4,), factor -> gradient (22,) and second derivatives (22, 22) of the weighted sum
     """
 
     values: Any
@@ -142,9 +142,9 @@ class _Ends:
 def _ends(task: Reorientation) -> _Ends:
     import casadi
 
-    seen, mass = casadi.SX.sym("seen", SIZE + 6), float(task.body.chain.masses.sum())
-    moment, entries, angular, linear = seen[:3], seen[3:9], seen[9:12], seen[12:15]
-    energy, effort, q, duration = seen[15], seen[16], seen[17:21], seen[21]
+    inputs, mass = casadi.SX.sym("inputs", SIZE + 6), float(task.body.chain.masses.sum())
+    moment, entries, angular, linear = inputs[:3], inputs[3:9], inputs[9:12], inputs[12:15]
+    energy, effort, q, duration = inputs[15], inputs[16], inputs[17:21], inputs[21]
     about_origin = casadi.vertcat(
         casadi.horzcat(entries[0], entries[1], entries[2]),
         casadi.horzcat(entries[1], entries[3], entries[4]),
@@ -152,8 +152,8 @@ def _ends(task: Reorientation) -> _Ends:
     )
     inertia = about_origin - (casadi.dot(moment, moment) * casadi.SX.eye(3) - moment @ moment.T) / mass
     momentum = angular - casadi.cross(moment, linear) / mass
-    answer = solve_linear(inertia, momentum)
-    turn, vector, scalar = -answer, q[:3], q[3]
+    solution = solve_linear(inertia, momentum)
+    turn, vector, scalar = -solution, q[:3], q[3]
     if np.any(task.momentum):
         mu = casadi.DM(task.momentum)
         back = mu - 2.0 * scalar * casadi.cross(vector, mu) + 2.0 * casadi.cross(vector, casadi.cross(vector, mu))
@@ -161,29 +161,31 @@ def _ends(task: Reorientation) -> _Ends:
     turning = 0.5 * casadi.vertcat(scalar * turn + casadi.cross(vector, turn), -casadi.dot(vector, turn))
     density = casadi.SX(1, 1)
     if task.cost == "kinetic":
-        density = 0.5 * (energy - casadi.dot(linear, linear) / mass - casadi.dot(momentum, answer)) / duration
+        density = 0.5 * (energy - casadi.dot(linear, linear) / mass - casadi.dot(momentum, solution)) / duration
     elif task.cost == "rate":
         density = effort / duration
     density = casadi.densify(density)
     multipliers, factor = casadi.SX.sym("multipliers", 4), casadi.SX.sym("factor")
     weighted = casadi.dot(multipliers, turning) + factor * density
-    bend, gradient = casadi.hessian(weighted, seen)
-    slopes = [casadi.densify(casadi.jacobian(part, seen)) for part in (turning, density)]
+    bend, gradient = casadi.hessian(weighted, inputs)
+    slopes = [casadi.densify(casadi.jacobian(part, inputs)) for part in (turning, density)]
     options = {"cse": True}
     return _Ends(
-        values=casadi.Function("ends", [seen], [turning, density], options),
-        jacobian=casadi.Function("ends_jacobian", [seen], slopes, options),
+        values=casadi.Function("ends", [inputs], [turning, density], options),
+        jacobian=casadi.Function("ends_jacobian", [inputs], slopes, options),
         hessian=casadi.Function(
-            "ends_hessian", [seen, multipliers, factor], [casadi.densify(gradient), casadi.densify(bend)], options
+            "ends_hessian", [inputs, multipliers, factor], [casadi.densify(gradient), casadi.densify(bend)], options
         ),
     )
 
 
-def seen_at(task: Reorientation, basis: SplineBasis, places: Array, order: int, unknowns: int) -> Any:
-    """W: at each of the first places y = (r, dr/ds, ..., q, T) as linear functions of the unknowns.
+def node_arguments(task: Reorientation, basis: SplineBasis, places: Array, order: int, unknowns: int) -> Any:
+    """Matrix W of y = (r, dr/ds, ..., q, T) at each place from the unknowns.
+
+    The unknowns are x = (control points, T, q at nodes, q at the ends of pieces).
 
     places : (N,), whose attitudes are the first N unknown ones
-    order : of the last derivative
+    order : order of the last derivative
     """
     sparse = scipy_sparse()
     m, count = task.dimension, len(places)
@@ -203,14 +205,14 @@ def seen_at(task: Reorientation, basis: SplineBasis, places: Array, order: int, 
 
 
 def scipy_sparse() -> Any:
-    """SciPy's sparse matrices: imported late, and without the types that they lack."""
+    """SciPy's module of sparse matrices: imported late, and without types."""
     from scipy import sparse
 
     return sparse
 
 
 def sparse_matrix(matrix: Any) -> Any:
-    """A constant sparse matrix of CasADi."""
+    """Return a constant sparse matrix of CasADi."""
     import casadi
 
     return casadi.DM(scipy_sparse().csc_matrix(matrix))

@@ -1,6 +1,6 @@
 r"""Inertia, momentum and energy of a tree of links with their first and second derivatives, in time linear in joints.
 
-Of all links together, about the base origin in base axes, the program needs sixteen numbers
+For all links together, about the base origin in base axes, the program needs sixteen numbers
 
     z = (first moment h, inertia J, angular momentum n and momentum p of the joint motion, twice its energy k),
 
@@ -53,7 +53,7 @@ class NodeMechanics:
 
 
 def node_mechanics(chain: JointChain) -> NodeMechanics:
-    """The functions of a tree, in symbols.
+    """Return the functions of a tree, in symbols.
 
     Source: composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, section 6.2).
     """
@@ -80,7 +80,7 @@ def node_mechanics(chain: JointChain) -> NodeMechanics:
 
 
 def carries(chain: JointChain) -> Array:
-    """(k, k) one where the first joint carries the second, or is the same, else zero."""
+    """Matrix (k, k) of ones where the first joint carries the second, or is the same, else zeros."""
     return chain.hanging[:, 1:]
 
 
@@ -110,13 +110,13 @@ class _Tree:
         self._forces = [bodies[number + 1].momentum(self._screws[number]) for number in joints]
 
     def values(self) -> tuple[Any, Any, Any]:
-        """z and its derivatives by coordinates and rates."""
+        """Return z and its derivatives by coordinates and rates."""
         import casadi
 
         whole, momentum = self._bodies[0], self._momenta[0]
         energy = sum(screw.power(self._momenta[k + 1]) * self._rate[k] for k, screw in enumerate(self._screws))
         entries = [whole.inertia[place] for place in _INERTIA_ENTRIES]
-        found = casadi.vertcat(whole.moment, *entries, momentum.angular, momentum.linear, energy)
+        numbers = casadi.vertcat(whole.moment, *entries, momentum.angular, momentum.linear, energy)
         by_place, by_rate = [], []
         for number, screw in enumerate(self._screws):
             body, carried = self._bodies[number + 1], self._momenta[number + 1]
@@ -129,10 +129,10 @@ class _Tree:
             )
             force = self._forces[number]
             by_rate.append(casadi.vertcat(casadi.SX(9, 1), force.angular, force.linear, 2.0 * screw.power(carried)))
-        return casadi.densify(found), *(casadi.densify(casadi.horzcat(*rows)) for rows in (by_place, by_rate))
+        return casadi.densify(numbers), *(casadi.densify(casadi.horzcat(*rows)) for rows in (by_place, by_rate))
 
     def rows(self, factors: Any) -> tuple[Any, ...]:
-        """The vectors whose products are the second derivatives, one column a joint: X, Y, s, f, t, g."""
+        """Vectors whose products are the second derivatives, one column a joint: X, Y, s, f, t, g."""
         import casadi
 
         of_moment, of_energy = factors[:3], factors[15]

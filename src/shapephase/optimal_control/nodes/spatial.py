@@ -18,43 +18,43 @@ class Twist:
 
     @classmethod
     def of_stacked(cls, six: Any) -> Twist:
-        """From angular and linear part, one after the other."""
+        """Return the twist with a stacked angular and linear part."""
         return cls(six[:3], six[3:])
 
     @property
     def stacked(self) -> Any:
-        """Angular and linear part, one after the other."""
+        """Stacked angular and linear part."""
         import casadi
 
         return casadi.vertcat(self.angular, self.linear)
 
     def __add__(self, other: Twist) -> Twist:
-        """Both at once."""
+        """Sum of two twists."""
         return Twist(self.angular + other.angular, self.linear + other.linear)
 
     def __sub__(self, other: Twist) -> Twist:
-        """This one without the other."""
+        """Difference of two twists."""
         return Twist(self.angular - other.angular, self.linear - other.linear)
 
     def __mul__(self, factor: Any) -> Twist:
-        """At another size."""
+        """Multiple of the twist."""
         return Twist(self.angular * factor, self.linear * factor)
 
     def power(self, force: Twist) -> Any:
-        """Of a force on this twist."""
+        """Power of a force on this twist."""
         import casadi
 
         return casadi.dot(self.angular, force.angular) + casadi.dot(self.linear, force.linear)
 
     def cross(self, other: Twist) -> Twist:
-        """How another twist changes as it is carried along with this one."""
+        """Rate of another twist that is carried along with this one."""
         import casadi
 
         linear = casadi.cross(self.angular, other.linear) + casadi.cross(self.linear, other.angular)
         return Twist(casadi.cross(self.angular, other.angular), linear)
 
     def on_force(self, force: Twist) -> Twist:
-        """How a force, or a momentum, changes as it is carried along with this twist."""
+        """Rate of a force, or a momentum, that is carried along with this twist."""
         import casadi
 
         angular = casadi.cross(self.angular, force.angular) + casadi.cross(self.linear, force.linear)
@@ -71,27 +71,29 @@ class Inertia:
 
     @classmethod
     def of_link(cls, mass: float, frame: tuple[Any, Any], centre: Array, inertia: Array) -> Inertia:
-        """Of what has its centre of mass, and its inertia about that, in a frame (orientation, origin)."""
+        """Return the inertia of a link with centre of mass, and inertia about it, in a frame (orientation, origin)."""
         import casadi
 
         turn, place = frame
-        seen = place + turn @ constant(centre)
+        centred = place + turn @ constant(centre)
         own = turn @ constant(inertia) @ turn.T
-        return cls(mass, mass * seen, own + mass * (casadi.dot(seen, seen) * casadi.SX.eye(3) - seen @ seen.T))
+        return cls(
+            mass, mass * centred, own + mass * (casadi.dot(centred, centred) * casadi.SX.eye(3) - centred @ centred.T)
+        )
 
     def __add__(self, other: Inertia) -> Inertia:
-        """Of both in one piece."""
+        """Inertia of both as one body."""
         return Inertia(self.mass + other.mass, self.moment + other.moment, self.inertia + other.inertia)
 
     def momentum(self, twist: Twist) -> Twist:
-        """Of this body moving with a twist."""
+        """Momentum of this body moving with a twist."""
         import casadi
 
         linear = self.mass * twist.linear + casadi.cross(twist.angular, self.moment)
         return Twist(self.inertia @ twist.angular + casadi.cross(self.moment, twist.linear), linear)
 
     def moved(self, screw: Twist) -> Inertia:
-        """Its derivative along a screw, which has no mass."""
+        """Derivative along a screw, which has no mass."""
         import casadi
 
         spin, along = casadi.skew(screw.angular), self.moment @ screw.linear.T
@@ -101,7 +103,7 @@ class Inertia:
         return Inertia(0.0, moment, turned + turned.T + slid)
 
     def twist(self, force: Twist) -> Twist:
-        """With which this body has a momentum, or, as an acceleration, answers to a force."""
+        """Twist of this body from its momentum, or its acceleration from a force."""
         import casadi
 
         about_centre = (
