@@ -133,4 +133,4 @@ def test_torques_of_a_recording_have_bars_or_say_that_none_are_known(capfd, take
         if line.startswith(body.joint_names):
             # Peak, per kg, two shares of limits, rate, power and work.
             assert line.count("±") == 7
-    assert "± not known" in said(capfd, "torques", "diver", take, *MOMENTUM)
+    assert "± unknown" in said(capfd, "torques", "diver", take, *MOMENTUM)

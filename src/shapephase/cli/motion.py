@@ -42,7 +42,7 @@ _LONGEST_SHOWN = 80  # characters of a name that an error repeats
 
 
 @dataclass(frozen=True, eq=False)
-class Flight:
+class LoadedMotion:
     """A reconstructed motion, its body, path and recording.
 
     Attributes
@@ -94,7 +94,7 @@ def flight(
     gauge: str = "base",
     trail: str | None = None,
     floating: BodyOptions = BODY_DEFAULTS,
-) -> Flight:
+) -> LoadedMotion:
     """Return the motion of a command. Gauge, tolerance and trail are checked before the motion is read."""
     start = _start(motion, options)
     goal = tolerance_argument(tolerance)
@@ -108,7 +108,7 @@ def flight(
     if recorded is None:
         zero = np.zeros(3) if momentum is None else momentum
         moved = reconstruct(articulated(loaded, path), zero, start, tolerance=goal, progress=progress)
-        return Flight(motion=moved, body=loaded, path=path, recorded=None)
+        return LoadedMotion(motion=moved, body=loaded, path=path, recorded=None)
     from ..error_bars.recorded_flight import motion_from_recording
 
     flown = motion_from_recording(
@@ -120,7 +120,7 @@ def flight(
         find_axes=recording.base_axes == ESTIMATE,
         progress=progress,
     )
-    return Flight(flown.motion, loaded, path, recorded, flown.fitted, flown.momentum_by)
+    return LoadedMotion(flown.motion, loaded, path, recorded, flown.fitted, flown.momentum_by)
 
 
 def _start(motion: str, options: StartOptions) -> Array | None:

@@ -33,7 +33,7 @@ from .terminal import say_written
 
 if TYPE_CHECKING:
     from ..plots.page import Page
-    from .motion import Flight
+    from .motion import LoadedMotion
 
 
 def view_command(
@@ -186,7 +186,7 @@ def _no_momentum(kind: str) -> ShapeError:
     return ShapeError(f"the figure {kind!r} needs an angular momentum: give one by --momentum")
 
 
-def _heading(flown: Flight, motion: str) -> str:
+def _heading(flown: LoadedMotion, motion: str) -> str:
     """Return the first line about a recording: its momentum and flight; of other motions nothing."""
     from .texts.result_text import split_heading
 

@@ -115,7 +115,7 @@ def _plane_data(
         "shown": shown.tolist(),
         "box": series.box.tolist(),
         "degree": len(series.inertia) - 1,
-        # Of a symmetric tensor six entries: xx, yy, zz, yz, xz, xy.
+        # six entries of a symmetric tensor: xx, yy, zz, yz, xz, xy
         "inertia": np.ascontiguousarray(series.inertia[..., [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]),
         "momentum": np.ascontiguousarray(series.momentum),
         "inertia_error": series.inertia_error,

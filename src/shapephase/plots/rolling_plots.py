@@ -263,7 +263,7 @@ def _filled(space: ParallelAxes, corners: Array, face: str, edge: str, *, depth:
     if space.solid:
         from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-        # Of a cone the apex is the first corner, and its sides are triangles.
+        # The apex of a cone is the first corner, and its sides are triangles.
         sides = [corners[[0, k, k + 1]] for k in range(1, len(corners) - 1)] if hull else [corners]
         space.ax.add_collection3d(Poly3DCollection(sides, **look))
         return

@@ -278,7 +278,7 @@ def _limit_bands(
         columns = values[:, [k for k, _ in own]]
         low, high = float(columns.min()), float(columns.max())
         reach = _NEAR_LIMIT * (high - low)
-        # The same limit of a left and a right joint is one band.
+        # A limit that a left and a right joint share is one band.
         near = {
             (float(limit), sign, look.get("markerfacecolor", look["color"]))
             for k, look in own
