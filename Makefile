@@ -54,14 +54,14 @@ full:
 OLDEST ?= $(BIN)/python
 LOWEST ?= build/lowest
 LOWEST_TESTS ?= $(addprefix tests/, body/test_body.py cli/test_main.py deformation/test_deformation.py \
-	integrator/test_machine_code.py optimal_control/test_collocation.py phases/test_phases.py plotting/test_plots.py \
+	integrator/test_machine_code.py optimal_control/test_collocation.py phases/test_phases.py plots/test_plots.py \
 	reconstruction/test_reconstruction.py reconstruction/test_motion_record.py rigid_body/test_euler_top.py \
 	shape_space/files/test_motion_formats.py shape_space/files/test_read.py shape_space/test_connection.py \
 	test_array_arguments.py test_cards.py test_so3.py)
 lowest:
 	$(OLDEST) -m venv --clear $(LOWEST)
 	$(LOWEST)/bin/pip install --quiet --prefer-binary hypothesis mpmath pytest pytest-xdist xarray \
-		$$($(OLDEST) tests/support/lowest_versions.py data plot robots ros viz)
+		$$($(OLDEST) tests/support/lowest_versions.py bodies data plot)
 	$(LOWEST)/bin/pip install --quiet --no-deps .
 	$(LOWEST)/bin/pytest -n auto -m "not full" -W default -p no:cacheprovider $(LOWEST_TESTS)
 

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import shapephase as sp
-from shapephase.plotting import motion_page, write_report
+from shapephase.plots import report, view
 
 
 def main() -> None:
@@ -28,9 +28,9 @@ def main() -> None:
         motion = sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 8.0])
         split = sp.split(motion)
         computed = time.process_time()
-        motion_page(motion, Path(folder) / "page.html")
+        view(motion).write(Path(folder) / "page.html")
         shown = time.process_time()
-        write_report(motion, split, Path(folder) / "report.html", shape_path=path)
+        report(motion, split, shape_path=path).write(Path(folder) / "report.html")
         written = time.process_time()
         size = (Path(folder) / "report.html").stat().st_size
     print(f"{body.n_shape} joints: split {computed - began:.2f} s, page {shown - computed:.2f} s")

@@ -16,18 +16,17 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase import so3
+from shapephase import plots, so3
 from shapephase.display import Card, card_html, card_text, short_repr
 from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting, kane_scher
-from shapephase.plotting import plots
 from shapephase.reconstruction.attitude_angles import euler_angles
 from support.places import ROOT
 
 SOURCE = ROOT / "src"
 ROOMS = sorted(".".join(stub.parent.relative_to(SOURCE).parts) for stub in SOURCE.glob("shapephase/**/__init__.pyi"))
 # Classes that say of themselves what they are in a line.
-OWN = {"Body", "BodyFamily", "EulerTop", "FlightRecorder", "Gyrostat", "LiveView"}
+OWN = {"Body", "BodyFamily", "EulerTop", "FlightRecorder", "Gyrostat", "Page"}
 # Of the inside of a motion; and what is made for a browser.
 INSIDE = {"Interpolant", "SteppedRotation", "Sampler", "MovingScene"}
 WITH_CARDS = (sp.Body, sp.ShapePath, sp.Deformation, sp.Motion, sp.phases.PhaseSplit, sp.FixedPoints,

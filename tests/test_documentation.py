@@ -32,14 +32,14 @@ LONG = (
     "shapephase.examples.closed_orbit",
     "shapephase.optimal_control.Plan",
     "shapephase.plan_reorientation",
-    "shapephase.plotting.write_report",
+    "shapephase.plots.report",
 )
 # Half a second, and much the same as another example does.
 LIKE_ANOTHER = (
     "shapephase.ForcedSplit",
     "shapephase.FreeHinges",
     "shapephase.auditing.write_audit_figure",
-    "shapephase.plotting.explore_page",
+    "shapephase.plots.explore",
 )
 PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)
 

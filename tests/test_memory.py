@@ -25,12 +25,12 @@ def once(k):
     "reports": """
 import tempfile
 from pathlib import Path
-from shapephase.plotting.report import write_report
+from shapephase.plots.report_page import report
 body, path = sp.load_body("cat_two_halves"), kane_scher(0.3, 1.0)
 folder = tempfile.TemporaryDirectory()
 def once(k):
     motion = sp.reconstruct(sp.articulated(body, path), [0.01, 0.02, 1e-3 * (k + 1)])
-    write_report(motion, sp.split(motion), Path(folder.name) / "report.html", shape_path=path)
+    report(motion, sp.split(motion), shape_path=path).write(Path(folder.name) / "report.html")
 """,
 }
 MEASURED = """

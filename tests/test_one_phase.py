@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase import so3, sphere
+from shapephase import plots, so3, sphere
 from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.phases.phases import running_phases
 from shapephase.phases.split_text import CLOSED_GAP
-from shapephase.plotting import plots
 from support.independent import BODIES, body_of, random_loop, random_vector
 
 # What is computed is the same with and without machine code, which is quicker.
@@ -215,11 +214,11 @@ def test_the_split_of_a_batch_is_a_table_of_spreads():
 @pytest.mark.full
 @pytest.mark.parametrize("number", range(COUNT))
 def test_the_report_has_the_numbers_of_the_table(number, tmp_path):
-    from shapephase.plotting.report import write_report
+    from shapephase.plots.report_page import report
 
     motion, gauge = motion_of(number), gauge_of(number)
     split = sp.split(motion, gauge)
-    write_report(motion, split, tmp_path / "report.html")
+    report(motion, split).write(tmp_path / "report.html")
     page = re.sub(
         r'srcdoc="[^"]*"|src="data:[^"]*"|<(script|style).*?</\1>',
         "",

@@ -26,7 +26,7 @@ from support.public_calls import as_bytes, calls, digest, digests, digests_of_mo
 NOT_CALLED = {
     "closed_orbits", "compile_steps", "continued_orbits", "derivatives", "dynamic_phase_from_energy", "in_gauge",
     "holonomy_derivative", "load_motion", "momentum_crossings", "momentum_from_recording", "momentum_returns",
-    "export_motion", "motion_from_recording", "motion_page", "particles", "plan_reorientation", "prescribed",
+    "export_motion", "motion_from_recording", "particles", "plan_reorientation", "prescribed",
     "read_recorded_motion", "read_shape_path", "read_trajectory", "rigid",
     "sampled_uncertainty", "stokes_holonomy", "view", "write_shape_path", "base_difference",
 }  # fmt: skip

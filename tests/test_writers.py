@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from shapephase.cli.exit_codes import ExitCode
+from shapephase.cli.outcome import ExitCode
 from support.writing_process import AS_NOBODY, COMMANDS, WRITERS, WritingProcess, is_whole
 
 QUICK = ("split.npz",)

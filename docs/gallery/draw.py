@@ -15,8 +15,9 @@ from matplotlib.axes import Axes
 from PIL import Image
 
 import shapephase as sp
+from shapephase import plots
 from shapephase.examples import MOTIONS
-from shapephase.plotting import column_axes, plots
+from shapephase.plots import column_axes
 
 HERE = Path(__file__).parent
 # Dots per inch: 440 pixels wide, as a column of the page.

@@ -3,7 +3,7 @@
 The folders are the rooms of the theory, from the bottom up: `body` (a model and its inertia), `integrator` and
 `rigid_body` (rotations, in general and in closed form), `shape_space` (paths, connection, holonomy), `deformation`
 (inertia and internal momentum in time), `reconstruction` (the attitude), `dynamics` (what drives it), `phases`,
-`bounds` and `optimal_control`, `plotting` and `examples`, `study` (many cases), `auditing` (is a simulated or recorded
+`bounds` and `optimal_control`, `plots` and `examples`, `study` (many cases), `auditing` (is a simulated or recorded
 trajectory right?). `dir()` lists the rooms and the names that most scripts use; every public name of a room is an
 attribute of that room. Names are loaded when they are first used.
 """
@@ -29,6 +29,6 @@ def __dir__() -> list[str]:
     return sorted(_SHOWN)
 
 
-offer("Motion.plot", "shapephase.plotting.named_figures", "motion_figure")
+offer("Motion.plot", "shapephase.plots.named_figures", "motion_figure")
 offer("Motion.to_xarray", "shapephase.exports.tables", "motion_dataset")
-offer("Motion.view", "shapephase.plotting.viewer", "view")
+offer("Motion.view", "shapephase.plots.viewer", "view")

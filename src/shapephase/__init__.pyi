@@ -14,7 +14,7 @@ from . import (
     optimal_control,
     phases,
     planar,
-    plotting,
+    plots,
     reconstruction,
     rigid_body,
     shape_space,
@@ -67,8 +67,7 @@ from .phases.phases import (
 from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .phases.whole_turns import TurnCounts, turn_counts
-from .plotting import plots
-from .plotting.viewer import motion_page, view
+from .plots.viewer import view
 from .reconstruction.external_torque import ExternalTorque, TorqueState
 from .reconstruction.forced_motion import ForcedMotion
 from .reconstruction.motion_family import MotionFamily
@@ -197,7 +196,6 @@ __all__ = [
     "momentum_from_recording",
     "momentum_returns",
     "motion_from_recording",
-    "motion_page",
     "optimal_control",
     "parallel_transport",
     "particle_body",
@@ -208,7 +206,6 @@ __all__ = [
     "plan_reorientation",
     "planar",
     "plots",
-    "plotting",
     "prescribed",
     "principal_gauge",
     "reachable",

@@ -170,7 +170,7 @@ def test_check_says_so_and_shows_the_parts(capsys, tmp_path):
     (tmp_path / "b.urdf").write_text(f"<robot name='r'>{box('a')}{box('torso', 60_000.0)}{joint('torso')}</robot>")
     main(["check", str(tmp_path / "b.urdf"), "--json"])
     data = json.loads(capsys.readouterr().out)
-    assert data["verdict"] == "usable, with 1 warning"
+    assert data["verdict"] == "OK, 1 warning"
     assert "denser than any matter" in data["warnings"][0]
     base, torso = data["body"]["parts"]
     assert (base["links"], torso["links"], torso["mass"]) == (["a"], ["torso"], 60_000.0)

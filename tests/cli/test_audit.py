@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shapephase.cli.exit_codes import ExitCode
 from shapephase.cli.main import main
+from shapephase.cli.outcome import ExitCode
 
 FLOWN = Path(__file__).parents[1] / "data" / "flown_cat.csv"
 

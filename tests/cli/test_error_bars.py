@@ -67,9 +67,9 @@ def test_without_what_is_not_known_there_are_no_bars(capfd, take):
     assert "±" in said(capfd, "split", "diver", take, *MOMENTUM)
     assert "error bars" not in said(capfd, "split", "diver", take, *MOMENTUM)
     # The numerical estimate is called what it is.
-    assert "± above                 of the computation alone" in said(capfd, "split", "diver", take, *MOMENTUM)
-    assert "of the computation alone" not in said(capfd, "split", "diver", take, "--joint-noise", "0.1deg")
-    assert "of the computation alone" not in said(capfd, "split", "cat", "cat_righting")
+    assert "± above                 numerical error only" in said(capfd, "split", "diver", take, *MOMENTUM)
+    assert "numerical error only" not in said(capfd, "split", "diver", take, "--joint-noise", "0.1deg")
+    assert "numerical error only" not in said(capfd, "split", "cat", "cat_righting")
     assert "uncertainty" not in json.loads(said(capfd, "split", "diver", take, "--json"))
 
 
@@ -79,7 +79,7 @@ def test_an_angle_without_a_bar_is_told_as_such():
     motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3))
     found = sp.split(motion)
     lines = error_bar_lines(found, sp.uncertainty(motion, joints=0.01))
-    assert sum("no bar of its angle" in line for line in lines) == 2
+    assert sum("no bar of an angle" in line for line in lines) == 2
     assert not any("phase" in line for line in lines)
 
 
@@ -114,7 +114,7 @@ def test_a_smoothed_recording_has_the_bars_of_its_noise_and_says_what_smoothing_
     assert list(told["degrees_of_freedom"].values()) == pytest.approx(expected_freedom, rel=1e-9)
     assert 0.0 < told["bias_in_bars"] < 1.0
     text = said(capfd, "split", "diver", take, *MOMENTUM, *options, "--joint-noise", "0.1deg")
-    for part in ("degrees of freedom are left to a joint", "error bars hold both", "bias of smoothing"):
+    for part in ("degrees of freedom are left to a joint", "in the error bars", "smoothing bias"):
         assert part in text
     given = json.loads(said(capfd, "split", "diver", take, *options, "--smooth-penalty", "1e-5", "--json"))
     assert set(given["recording"]["smoothing"]["penalty_s5"].values()) == {1e-5}
@@ -133,4 +133,4 @@ def test_torques_of_a_recording_have_bars_or_say_that_none_are_known(capfd, take
         if line.startswith(body.joint_names):
             # Peak, per kg, two shares of limits, rate, power and work.
             assert line.count("±") == 7
-    assert "± not known" in said(capfd, "torques", "diver", take, *MOMENTUM)
+    assert "± unknown" in said(capfd, "torques", "diver", take, *MOMENTUM)

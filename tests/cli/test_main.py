@@ -140,7 +140,7 @@ def test_check_is_a_card_and_a_verdict(capsys, tmp_path):
     ):
         assert said in text
     assert "no: boom_extension ends 1.8 m from its start" in text
-    assert text.endswith("verdict: no fault found\n")
+    assert text.endswith("verdict: OK\n")
     (tmp_path / "swing.csv").write_text(
         "time,left_shoulder_abduction,right_shoulder_abduction,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,4,1,0,0,0,1\n2,0,0,0,0,0,1\n"
     )
@@ -151,7 +151,7 @@ def test_check_is_a_card_and_a_verdict(capsys, tmp_path):
     assert data["motion"]["base_recorded"]
     assert len(data["warnings"]) == 1
     assert "left_shoulder_abduction" in data["warnings"][0]
-    assert data["verdict"] == "usable, with 1 warning"
+    assert data["verdict"] == "OK, 1 warning"
     body = sp.load_body("diver")
     assert data["body"]["mass"] == body.mass
     assert data["body"]["sha256"] == hashlib.sha256((robots_folder() / "diver.urdf").read_bytes()).hexdigest()
@@ -169,7 +169,7 @@ def test_check_names_joints_that_are_too_fast(capsys, tmp_path):
         (tmp_path / "sway.csv").write_text("\n".join(["time,waist_yaw", *rows]))
         data = json.loads(run(capsys, "check", "cat", tmp_path / "sway.csv", "--rest-missing", "--json"))
         assert data["motion"]["too_fast"] == too_fast
-        assert data["verdict"] == ("usable, with 1 warning" if too_fast else "no fault found")
+        assert data["verdict"] == ("OK, 1 warning" if too_fast else "OK")
         assert all("waist_yaw 31 of 30 rad/s" in warning for warning in data["warnings"])
     assert "beyond their rates" not in run(capsys, "check", "cat", "cat_righting")
 

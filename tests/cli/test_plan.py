@@ -17,7 +17,7 @@ import pytest
 import shapephase as sp
 from shapephase import so3
 from shapephase.cli.main import main
-from shapephase.cli.plans import plan as cli_plan
+from shapephase.cli.plans import search as cli_search
 from shapephase.cli.progress import steps
 
 # A plan on few pieces.
@@ -31,7 +31,7 @@ def ran(*arguments):
 
 def test_a_plan_is_found_written_and_read_again(tmp_path):
     out = tmp_path / "plan.csv"
-    words = ("--rotate", 60, "--about", "x", "--duration", 0.8, "--pieces", 20)
+    words = ("--turn", "60 about x", "--duration", 0.8, "--pieces", 20)
     done = ran("cat_two_halves", *words, "--out", out, "--json")
     assert done.returncode == 0
     assert re.fullmatch(rf"wrote {re.escape(str(out))} \([0-9.]+ kB\)\n", done.stderr)
@@ -50,11 +50,10 @@ def test_a_plan_is_found_written_and_read_again(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("cat_two_halves",), 2, "--rotate"),
-        (("cat_two_halves", "--rotate", 90, "--somersaults", 1), 2, "--rotate"),
-        (("cat_two_halves", "--rotate", 90, "--about", "w"), 2, "--about"),
-        (("cat_two_halves", "--rotate", 90, "--cost", "beauty"), 2, "kinetic, rate"),
-        (("cat_two_halves", "--rotate", 90, "--turn", "90 about x"), 2, "--turn and --rotate"),
+        (("cat_two_halves",), 2, "--turn"),
+        (("cat_two_halves", "--turn", "90 about x", "--somersaults", 1), 2, "--turn and --somersaults are two goals"),
+        (("cat_two_halves", "--turn", "90 about x", "--cost", "beauty"), 2, "kinetic, rate"),
+        (("cat_two_halves", "--turn", "90 about x", "--point", "0 0 1", "0 0 1"), 2, "--turn and --point"),
         (("cat_two_halves", "--turn", "90"), 2, "90 about y"),
         (("cat_two_halves", "--turn", "90 about w"), 2, "--turn"),
         (("cat_two_halves", "--turn", "nan about x"), 2, "--turn"),
@@ -64,20 +63,20 @@ def test_a_plan_is_found_written_and_read_again(tmp_path):
         (("cat_two_halves", "--turn", "9 about x", "--symmetry", "w"), 2, "--symmetry"),
         (("cat_two_halves", "--somersaults", 1, "--symmetry", "x"), 2, "--symmetry"),
         (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw"), 2, "waist_yaw"),
-        (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw=1,2"), 2, "NAME=VALUE"),
-        (("cat_two_halves", "--turn", "9 about x", "--to", "waist_yaw=1rad"), 2, "--to"),
+        (("cat_two_halves", "--turn", "9 about x", "--from", "waist_yaw=1,2"), 2, "JOINT=VALUE"),
+        (("cat_two_halves", "--turn", "9 about x", "--to", "waist_yaw=1m"), 2, "--to"),
         (("cat_two_halves", "--turn", "9 about x", "--to", "waist_bend=1"), 2, "waist_bend"),
         (("cat_two_halves", "--turn", "9 about x", "--via", "waist_yaw=1@soon"), 2, "--via"),
         (("cat_two_halves", "--turn", "9 about x", "--via", "there.csv"), 2, "FILE@TIME"),
         (("cat_two_halves", "--turn", "9 about x", "--via", "waist_yaw"), 2, "--via"),
-        (("cat_two_halves", "--turn", "9 about x", "--joints", "a", "--hold", "b"), 2, "--hold"),
+        (("cat_two_halves", "--turn", "9 about x", "--joints", "waist_yaw,-waist_roll"), 2, "not both"),
         (("cat_two_halves", "--turn", "9 about x", "--mirror", "waist_yaw"), 2, "--mirror"),
         (("cat_two_halves", "--turn", "9 about x", "--effort", "strong"), 2, "--effort"),
         (("cat_two_halves", "--turn", "9 about x", "--jerk-limit", -1), 2, "jerk_limits"),
         (("cat_two_halves", "--turn", "9 about x", "--workers", 0), 2, "--workers"),
         (("cat_two_halves", "--turn", "9 about x", "--time-limit", 0), 2, "--time-limit"),
-        (("cat_two_halves", "--rotate", 90, "--out", "plan.txt"), 2, "--out"),
-        (("no_such_cat", "--rotate", 90), 2, "no_such_cat"),
+        (("cat_two_halves", "--turn", "90 about x", "--out", "plan.txt"), 2, "--out"),
+        (("no_such_cat", "--turn", "90 about x"), 2, "no_such_cat"),
     ],
 )
 def test_what_cannot_be_planned_is_refused_in_one_line(arguments, code, words, capsys):
@@ -102,7 +101,7 @@ def test_a_link_is_pointed(tmp_path, capsys):
     """By the attitude printed and the link's frame as the body has it at the posture asked for."""
     direction = np.array([0.3, -1.0, 2.5])
     arguments = ("cat_two_halves", "--point", "rear 0 0 1", "0.3 -1.0 2.5", "--to", "waist_pitch=0.4,waist_yaw=20deg")
-    data, shapes, body = planned(*arguments, "--hold", "waist_roll", capsys=capsys, out=tmp_path / "plan.csv")
+    data, shapes, body = planned(*arguments, "--joints", "-waist_roll", capsys=capsys, out=tmp_path / "plan.csv")
     end = np.zeros(3)
     end[[body.joint_index("waist_pitch"), body.joint_index("waist_yaw")]] = 0.4, np.radians(20.0)
     assert np.abs(shapes[-1] - end).max() < 1e-9
@@ -183,8 +182,8 @@ def test_postures_on_the_way(tmp_path, capsys):
 
 def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_take(monkeypatch):
     said = []
-    monkeypatch.setattr(cli_plan.time, "monotonic", iter([100.0, 103.0, 170.0]).__next__)
-    search = cli_plan._InterruptibleSearch(SimpleNamespace(watch=lambda *now: said.append(now)), 60.0)
+    monkeypatch.setattr(cli_search.time, "monotonic", iter([100.0, 103.0, 170.0]).__next__)
+    search = cli_search.InterruptibleSearch(SimpleNamespace(watch=lambda *now: said.append(now)), 60.0)
     for share in (0.25, 0.5):
         assert not search.report(share, "search 2 of 4: iteration 12")
     assert said == [(0.25, "search 2 of 4: iteration 12, 57 s left"), (0.5, "search 2 of 4: iteration 12, 0 s left")]
@@ -230,14 +229,14 @@ def test_a_page_says_that_nothing_was_found(tmp_path):
 @pytest.mark.usefixtures("few_guesses")
 def test_ctrl_c_keeps_the_best_so_far(tmp_path, monkeypatch, capsys):
     """The signal itself, in the third iteration; the motion written reaches the goal nearly."""
-    plain = cli_plan._InterruptibleSearch.report
+    plain = cli_search.InterruptibleSearch.report
 
     def pressed(self, share, text):
         if text.startswith("search: iteration 3,"):
             signal.raise_signal(signal.SIGINT)
         return plain(self, share, text)
 
-    monkeypatch.setattr(cli_plan._InterruptibleSearch, "report", pressed)
+    monkeypatch.setattr(cli_search.InterruptibleSearch, "report", pressed)
     handler = signal.getsignal(signal.SIGINT)
     out = tmp_path / "plan.csv"
     with pytest.raises(SystemExit) as ended:
@@ -288,14 +287,14 @@ def test_ctrl_c_before_anything_is_found_ends_at_once(monkeypatch, capsys):
 
     monkeypatch.setattr("shapephase.optimal_control.planning.reorientation", pressed)
     with pytest.raises(SystemExit) as ended:
-        main(["plan", "cat_two_halves", "--rotate", "60"])
+        main(["plan", "cat_two_halves", "--turn", "60 about x"])
     assert ended.value.code == 130
     assert capsys.readouterr().out == ""
 
 
 def test_pressed_twice_gives_it_up():
     with steps(1) as work:
-        search = cli_plan._InterruptibleSearch(work, None)
+        search = cli_search.InterruptibleSearch(work, None)
         search.report(0.3, "search: iteration 0")
         search.interrupted()
         assert search.stopped

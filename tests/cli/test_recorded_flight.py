@@ -71,7 +71,7 @@ def test_what_was_done_is_on_the_card(take, capsys):
         "momentum, fitted",
         "71 attitudes with 0.5",
         "deg rms from this one",
-        "± of the recorded base  alone; the noise of the joints is not stated",
+        "± of the recorded base  only; give --joint-noise",
         "pelvis_tilt, pelvis_list, pelvis_rotation, turning in the order z x y; the usual order, --base-order",
         "x -z y of the recorded ones; the usual ones of a pelvis, --base-axes",
         "71 of 220 samples, 0.5 to 1.2 s",
@@ -94,7 +94,7 @@ def test_options_that_do_not_go_together(take, capsys):
     for arguments, words in (
         (["--flight", "auto", "--attitude", "0", "0", "0", "1"], "attitude at the start is fitted"),
         (["--base-axes", "estimate", "--momentum", "0", "0", "1"], "leave the momentum out"),
-        (["--flight", "1", "x"], "--flight: auto, auto:2, all or two times"),
+        (["--flight", "1", "x"], "--flight: auto, auto:2, all, or a first and a later"),
         (["--flight", "soon"], "'auto', 'auto:2' (the second), 'all', 'recorded' or two times"),
         (["--flight", "0", "2.1", "--tolerance", "1e-6"], "no free flight of this body"),
     ):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from shapephase.cli.exit_codes import ExitCode
 from shapephase.cli.main import main
+from shapephase.cli.outcome import ExitCode
 from support.pages import page_data
 
 MOMENTS = (1.0, 2.0, 3.0)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase.cli.texts.result_text import body_lines
 from shapephase.errors import OpenPathError, ShapeError, TrajectoryError, TrajectoryWarning
-from shapephase.plotting.pages.motion_data import body_data
+from shapephase.plots.pages.motion_data import body_data
 from shapephase.shape_space.shape_geodesic import shape_geodesic
 from support.ball_bodies import BALLS, THREE_HINGES, Hinges
 

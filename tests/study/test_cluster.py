@@ -14,7 +14,7 @@ from distributed import Client, LocalCluster
 
 import shapephase as sp
 from shapephase import study as room
-from shapephase.cli.exit_codes import ExitCode
+from shapephase.cli.outcome import ExitCode
 from shapephase.study.dask_client import FEWEST_TASKS, PATIENCE, TASKS_PER_THREAD
 from support import counted_chunks
 from support.dask_cluster import Cluster, wait_for_lines

@@ -16,8 +16,8 @@ from distributed import Client, LocalCluster
 import shapephase as sp
 from shapephase import provenance
 from shapephase import study as room
-from shapephase.cli.exit_codes import ExitCode
 from shapephase.cli.main import main
+from shapephase.cli.outcome import ExitCode
 from shapephase.errors import StudyError, UnknownNameError
 from shapephase.study import dask_client
 from shapephase.study._workers import recipe_of

@@ -7,8 +7,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from shapephase import study as room
-from shapephase.cli.exit_codes import ExitCode
 from shapephase.cli.main import main
+from shapephase.cli.outcome import ExitCode
 from shapephase.errors import ShapeError, StudyError, UnknownNameError, WrongObjectError
 
 RIGID = room.RigidBody(np.diag([1.0, 2.0, 2.5]), 3.0)

@@ -15,8 +15,8 @@ import xarray
 
 import shapephase as sp
 from shapephase import study as room
-from shapephase.cli.exit_codes import ExitCode
 from shapephase.cli.main import main
+from shapephase.cli.outcome import ExitCode
 from shapephase.errors import InputFileNotFoundError, StudyError
 from support.study_functions import bend
 

@@ -40,8 +40,8 @@ COMMANDS = {
     "plot.pdf": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
     "plot.png": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
     "explore.html": ("explore", "cat_two_halves", "--joints", "waist_pitch", ("waist_yaw", "waist_roll"), "--html"),
-    "plan.csv": ("plan", "cat_two_halves", "--rotate", ("10", "12"), "--out"),
-    "plan.html": ("plan", "cat_two_halves", "--rotate", ("10", "12"), "--html"),
+    "plan.csv": ("plan", "cat_two_halves", "--turn", ("10 about x", "12 about x"), "--out"),
+    "plan.html": ("plan", "cat_two_halves", "--turn", ("10 about x", "12 about x"), "--html"),
     "reach.svg": ("reach", ("diver", "cat_two_halves"), "--out"),
     "reach.pdf": ("reach", ("diver", "cat_two_halves"), "--out"),
     "reach.png": ("reach", ("diver", "cat_two_halves"), "--out"),
@@ -137,7 +137,7 @@ def _write(writer: str, version: int, target: str) -> int:
         except SystemExit as stopped:
             return int(stopped.code or 0)
         return 0
-    from shapephase.cli.exit_codes import exit_code_of
+    from shapephase.cli.outcome import exit_code_of
     from shapephase.errors import ShapePhaseError
 
     try:
@@ -164,12 +164,12 @@ def _call(writer: str, version: int, target: str) -> None:
     elif writer == "motion.csv":
         motion.write_csv(target, np.linspace(0.0, 1.0, 2000))
     elif writer == "figure.svg":
-        from shapephase.plotting.named_figures import write_figure
+        from shapephase.plots.named_figures import write_figure
 
         write_figure("attitude", motion, target)
     else:
         body, path = sp.load_body("cat"), sp.examples.scenarios.cat_righting()
-        sp.motion_page(sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 0.02 + 0.01 * version]), target)
+        sp.view(sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 0.02 + 0.01 * version])).write(target)
 
 
 def _in_child(

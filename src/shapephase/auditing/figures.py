@@ -11,7 +11,7 @@ import numpy as np
 from ..arguments import check_file_name, check_object
 from ..errors import MissingExtraError, unknown_name
 from ..files import write_whole
-from ..plotting.plot_style import BLACK, COLUMN, GREY, SERIES, SKY, SMALL, axes_image
+from ..plots.plot_style import BLACK, COLUMN, GREY, SERIES, SKY, SMALL, axes_image
 from .audit_result import Audit
 
 if TYPE_CHECKING:

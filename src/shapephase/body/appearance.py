@@ -353,7 +353,7 @@ def _mesh_pieces(path: Path, node: Node, owner: str) -> list[_Piece]:
     missing = {"trimesh": "trimesh", **({"collada": "pycollada"} if path.suffix.lower() == ".dae" else {})}
     for module, package in missing.items():
         if importlib.util.find_spec(module) is None:
-            raise node.fault(owner, f"the mesh {path.name} needs {package}: pip install 'shapephase[viz]'")
+            raise node.fault(owner, f"the mesh {path.name} needs {package}: pip install 'shapephase[plot]'")
     import trimesh
 
     try:

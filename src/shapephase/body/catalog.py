@@ -62,9 +62,9 @@ def load_body(
 
     Parameters
     ----------
-    source : a path to a URDF, a xacro file (`shapephase[xacro]`), an MJCF file (`shapephase[mjcf]`), an OpenSim model
+    source : a path to a URDF, a xacro file (`shapephase[bodies]`), an MJCF file (`shapephase[mjcf]`), an OpenSim model
         (`shapephase[opensim]`), a bioMod model (`shapephase[biomod]`), a file of measurements for Yeadon's human
-        (`shapephase[yeadon]`), or a BVH or MVNX file, whose skeleton becomes a human; a name from `robot_names()` such
+        (`shapephase[bodies]`), or a BVH or MVNX file, whose skeleton becomes a human; a name from `robot_names()` such
         as "cat"; "example:human", a body of the installed example-robot-data; or a `pinocchio.Model` whose root joint
         is a free-flyer
     on_unphysical : "error" or "warn", for a link whose inertia has a negative principal moment, or that has no mass and
@@ -228,7 +228,7 @@ def example_file(name: str) -> Path:
     files = _example_files()
     if not files:
         raise MissingExtraError(
-            f"'example:{name}' needs the example-robot-data package: pip install 'shapephase[robots]'"
+            f"'example:{name}' needs the example-robot-data package: pip install 'shapephase[bodies]'"
         )
     if name not in files:
         raise unknown_name("body of example-robot-data", name, sorted(files))

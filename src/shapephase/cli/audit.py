@@ -9,8 +9,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .options import (
-    AS_TEXT,
-    AS_WRITTEN,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
     BodyArgument,
     BodyOptions,
     Calibration,
@@ -132,12 +132,12 @@ def audit_command(
     body: BodyArgument,
     /,
     *trajectories: Trajectories,
-    floating: BodyOptions = AS_WRITTEN,
+    floating: BodyOptions = BODY_DEFAULTS,
     tolerance: Annotated[float | None, Parameter(show_default=False)] = None,
     flight: Annotated[tuple[str, ...], Parameter(negative_iterable="", consume_multiple=True)] = ("auto",),
     reading: TrajectoryOptions = AS_IT_IS,
     figure: Path | None = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Audit trajectories in flight: momentum, fall, attitude and rates, and what explains it if they are wrong.
 
@@ -160,8 +160,8 @@ def audit_command(
     from ..auditing.reading import read_trajectory
     from ..auditing.trajectory_audit import audit
     from ..errors import ShapeError
-    from .exit_codes import ExitCode
     from .motion import body_argument, column_names, flight_words
+    from .outcome import ExitCode
 
     aside = check_writable(figure, "--figure", *_ENDINGS)
     if not trajectories:

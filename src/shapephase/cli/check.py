@@ -1,4 +1,4 @@
-"""`shapephase check`: what was read of a body and a motion, and whether it can be used."""
+"""`shapephase check`: what was read of a body and a motion, and what looks unlikely."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import warnings
 
 from ..errors import ImplausibleBodyWarning, TrajectoryWarning
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
@@ -23,11 +23,11 @@ def check_command(
     motion: MotionArgument | None = None,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
-    recording: RecordingOptions = AS_RECORDED,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
-    """Check a body, and a joint motion for it: what was read, what is unlikely of it, and whether it can be used."""
+    """Check a body, and a joint motion for it: what was read, what looks unlikely, and whether it can be used."""
     from ..body.plausibility import implausible, person_height
     from ..shape_space.summaries import body_summary, path_summary
     from .motion import body_argument, joint_motion

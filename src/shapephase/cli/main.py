@@ -7,13 +7,15 @@ commands import what they compute with when they are called, so that `shapephase
 from __future__ import annotations
 
 import json
+import re
 import sys
 import traceback
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, UnknownOptionError
+from cyclopts.help import format_usage
 
 from .. import __version__
 from ..errors import OutputFileError, ShapePhaseError
@@ -21,51 +23,65 @@ from ..integrator.machine_code import as_command
 from ..provenance import command_line, provenance
 from .audit import audit_command
 from .check import check_command
-from .ctrl_c import forget, was_pressed
-from .doctor import doctor_command
-from .exit_codes import ExitCode, exit_code_list, exit_code_of
-from .explore import explore_command
-from .library import compile_command, robots_command
+from .installation import compile_command, doctor_command, robots_command
+from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
-from .outcome import Outcome
-from .pictures import plot_command, view_command
+from .outcome import ExitCode, Outcome, exit_code_of
+from .pictures import explore_command, plot_command, view_command
 from .plans.plan import plan_command
 from .reach import reach_command
 from .rigid_body.conjugate import conjugate_command
 from .rigid_body.rigid import rigid_command
 from .split import split_command
+from .start import forget, was_pressed
 from .sweep import plot_study_command, sweep_app
-from .terminal import Verbosity, abandon, one_line, put, say, spoken, verbosity
-from .texts.usage import usage_message
+from .terminal import Verbosity, abandon, one_line, put, say, verbosity, verbosity_from
 from .torques import torques_command
 
+# Options that had a second name.
+_RENAMED = {
+    "--rotate": '--turn "DEGREES about AXIS"',
+    "--about": '--turn "DEGREES about AXIS"',
+    "--hold": "--joints -JOINT",
+    "--trim": "--flight FIRST LAST",
+    "--timestep": "--step",
+}
+_EXIT_CODES = "\n".join(["Exit codes:", "", *(f"- {code.value}: {code.meaning}" for code in ExitCode)])
+_WHERE_EXIT_CODES = "Exit codes: `shapephase --help`"
 app = App(
     name="shapephase",
     help="A free body changes its shape in a known way; how does it turn?",
-    help_epilogue=f"Exit codes:\n\n{exit_code_list()}",
+    help_epilogue=_EXIT_CODES,
     help_format="markdown",
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )
-app.command(split_command, name="split")
-app.command(torques_command, name="torques")
-app.command(view_command, name="view")
-plot_app = App(name="plot")
+plot_app = App(name="plot", help_epilogue=_WHERE_EXIT_CODES)
 plot_app.default(plot_command)
 plot_app.command(plot_study_command, name="sweep")
-app.command(plot_app)
-app.command(explore_command, name="explore")
-app.command(plan_command, name="plan")
-app.command(conjugate_command, name="conjugate")
-app.command(reach_command, name="reach")
-app.command(rigid_command, name="rigid")
-app.command(check_command, name="check")
-app.command(audit_command, name="audit")
-app.command(orbits_command, name="orbits")
-app.command(sweep_app)
-app.command(robots_command, name="robots")
-app.command(compile_command, name="compile")
-app.command(doctor_command, name="doctor")
+sweep_app.help_epilogue = _WHERE_EXIT_CODES
+for _name, _command in {
+    "split": split_command,
+    "torques": torques_command,
+    "view": view_command,
+    "plot": plot_app,
+    "explore": explore_command,
+    "plan": plan_command,
+    "conjugate": conjugate_command,
+    "reach": reach_command,
+    "rigid": rigid_command,
+    "check": check_command,
+    "audit": audit_command,
+    "orbits": orbits_command,
+    "sweep": sweep_app,
+    "robots": robots_command,
+    "compile": compile_command,
+    "doctor": doctor_command,
+}.items():
+    if isinstance(_command, App):
+        app.command(_command)
+    else:
+        app.command(_command, name=_name, help_epilogue=_WHERE_EXIT_CODES)
 app.register_install_completion_command(
     help="Let the shell complete commands and options with the tabulator key; for bash, zsh and fish."
 )
@@ -73,7 +89,7 @@ app.register_install_completion_command(
 
 @dataclass(frozen=True, kw_only=True)
 class _Failure:
-    """Why a command came to no result."""
+    """Failure of a command: message, exit code, kind."""
 
     message: str
     code: ExitCode
@@ -81,16 +97,18 @@ class _Failure:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; a fault ends it with one line on stderr and one of `ExitCode`.
+    """Run the command line; an error ends it with one line on stderr and one of `ExitCode`.
 
     Warnings are lines on stderr too, and a list in what `--json` prints.
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
-    with spoken(tokens), command_line(tokens), as_command():
+    SHOWS_ALL.set(HELP_ALL in tokens)
+    tokens = ["--help" if token == HELP_ALL else token for token in tokens]
+    with verbosity_from(tokens), command_line(tokens), as_command():
         try:
             code = _ran(tokens, as_json="--json" in tokens)
         except BrokenPipeError:
-            # What reads the output wants no more of it.
+            # The reader closed the pipe.
             for stream in (sys.stdout, sys.stderr):
                 abandon(stream)
             code = ExitCode.BROKEN_PIPE
@@ -103,7 +121,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _ran(tokens: list[str], *, as_json: bool) -> int:
-    """Run a command, print what it gives, and return the exit code."""
+    """Run a command, print its result, and return the exit code."""
     with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")
         outcome = _outcome(tokens)
@@ -120,7 +138,7 @@ def _ran(tokens: list[str], *, as_json: bool) -> int:
     data["provenance"] = provenance(made_from)
     if outcome.with_verdict:
         many = "1 warning" if len(messages) == 1 else f"{len(messages)} warnings"
-        verdict = f"usable, with {many}" if messages else "no fault found"
+        verdict = f"OK, {many}" if messages else "OK"
         listed = "".join(f"\nwarning: {message}" for message in messages)
         data, text = data | {"verdict": verdict}, f"{text}\n{listed}\nverdict: {verdict}"
     try:
@@ -132,11 +150,11 @@ def _ran(tokens: list[str], *, as_json: bool) -> int:
 
 
 def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
-    """What a command gives, or why it gives nothing."""
+    """Return the result of a command, or its failure."""
     try:
         return app(tokens, exit_on_error=False, print_error=False)
     except CycloptsError as error:
-        return _Failure(message=usage_message(error, app), code=ExitCode.USAGE, kind="usage")
+        return _Failure(message=_usage_message(error), code=ExitCode.USAGE, kind="usage")
     except ShapePhaseError as error:
         # Such an import may also have become a missing extra.
         if was_pressed():
@@ -153,8 +171,26 @@ def _outcome(tokens: list[str]) -> Outcome | _Failure | None:
             traceback.print_exc()
         place = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {one_line(error)} ({place.filename}:{place.lineno})"
-        hint = "this is a fault of shapephase, please report it"
+        hint = "this is a bug of shapephase, please report it"
         return _Failure(message=f"{hint}: {message}", code=ExitCode.INTERNAL, kind=type(error).__name__)
+
+
+def _usage_message(error: CycloptsError) -> str:
+    """Return one line on words that do not fit: the message of Cyclopts, an example of the option, and the usage."""
+    chain, apps, _ = app.parse_commands(error.command_chain or ())
+    usage = format_usage(app, chain, execution_path=apps).plain.strip()
+    words = [one_line(error)]
+    option = error.argument.name if error.argument is not None else ""
+    if isinstance(error, UnknownOptionError):
+        option = error.token.keyword or error.token.value
+        words = [f"Unknown option: {option}. Use {_RENAMED[option]}."] if option in _RENAMED else words
+    elif error.argument is not None:
+        page = f"{error.argument.parameter.help} {getattr(error.target, '__doc__', '')}"
+        example = re.search(rf"example\s+`({re.escape(option)} [^`]*)`", page)
+        words += [f"For example `{' '.join(example[1].split())}`."] if example else []
+    elif not chain:
+        words.append("The command comes first, as in `shapephase split cat cat_righting`.")
+    return f"{' '.join(words)} Usage: {usage}; see {' '.join(('shapephase', *chain))} --help"
 
 
 def _failure(error: ShapePhaseError) -> _Failure:

@@ -1,7 +1,8 @@
-"""The body and the motion that a command is given, loaded and reconstructed."""
+"""Body and motion of a command, loaded and reconstructed."""
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -26,31 +27,29 @@ from ..shape_space.files.flight import ANY_GRAVITY, RECORDED
 from ..shape_space.files.mapping_files import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
-from .options import AS_RECORDED, AS_WRITTEN, BodyOptions, FlightOptions, RecordingOptions
+from .joint_values import joint_values
+from .options import BODY_DEFAULTS, RECORDING_DEFAULTS, BodyOptions, RecordingOptions, StartOptions
 
 if TYPE_CHECKING:
     from ..error_bars.recorded_momentum import RecordedMomentum
 
-_STANDARD_INPUT = "-"
-"""Instead of the name of a file."""
-DEFAULT_TOLERANCE = 1e-9
-"""Of the attitude where a command has no option for it [rad]: that of `reconstruct`."""
+_STANDARD_INPUT = "-"  # instead of a file name
+DEFAULT_TOLERANCE = 1e-9  # [rad] that of `reconstruct`, for commands without the option
 
 # Endings of files that hold motions, and never bodies.
 _OF_MOTIONS = (".csv", ".tsv", ".mot", ".sto", ".npz", ".npy", ".mat", ".parquet", ".xlsx", ".c3d", ".bag", ".mcap")
-# Characters of a name that an error repeats.
-_LONGEST_SHOWN = 80
+_LONGEST_SHOWN = 80  # characters of a name that an error repeats
 
 
 @dataclass(frozen=True, eq=False)
-class Flight:
-    """A reconstructed motion and what it is made of.
+class LoadedMotion:
+    """A reconstructed motion, its body, path and recording.
 
     Attributes
     ----------
     recorded : None where the joints are not from a file
     fitted : its momentum, where it was fitted to the recorded base
-    momentum_by : "fit", "given", or "nothing" of a recording that does not say it
+    momentum_by : "fit", "given", or "nothing" for a recording without a turning base
     """
 
     motion: Motion
@@ -62,7 +61,7 @@ class Flight:
 
     @property
     def beginning(self) -> str:
-        """What the first line of output says of a recording: its flight, or that its momentum is not known."""
+        """Text about a recording for the first line: its flight, or why its momentum is zero."""
         if self.recorded is None:
             return ""
         if self.momentum_by == "nothing":
@@ -79,7 +78,7 @@ class Flight:
 
     @property
     def up(self) -> str | None:
-        """The axis that is up in the recording, where its fall says so."""
+        """Axis that points up in the recording, by its fall; None without one."""
         fall = None if self.recorded is None or self.recorded.flight is None else self.recorded.flight.fall
         return None if fall is None else fall.up.removeprefix("+")
 
@@ -87,20 +86,16 @@ class Flight:
 def flight(
     body: str,
     motion: str,
-    options: FlightOptions,
+    options: StartOptions,
     recording: RecordingOptions,
     tolerance: float = DEFAULT_TOLERANCE,
     progress: ProgressCallback | None = None,
     *,
     gauge: str = "base",
     trail: str | None = None,
-    floating: BodyOptions = AS_WRITTEN,
-) -> Flight:
-    """The motion that the arguments and options of a command describe.
-
-    What needs no motion to be checked is checked before: also the gauge, and the link of a trail, that the command is
-    to use later.
-    """
+    floating: BodyOptions = BODY_DEFAULTS,
+) -> LoadedMotion:
+    """Return the motion of a command. Gauge, tolerance and trail are checked before the motion is read."""
     start = _start(motion, options)
     goal = tolerance_argument(tolerance)
     momentum = None if options.momentum is None else finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
@@ -113,7 +108,7 @@ def flight(
     if recorded is None:
         zero = np.zeros(3) if momentum is None else momentum
         moved = reconstruct(articulated(loaded, path), zero, start, tolerance=goal, progress=progress)
-        return Flight(motion=moved, body=loaded, path=path, recorded=None)
+        return LoadedMotion(motion=moved, body=loaded, path=path, recorded=None)
     from ..error_bars.recorded_flight import motion_from_recording
 
     flown = motion_from_recording(
@@ -125,28 +120,28 @@ def flight(
         find_axes=recording.base_axes == ESTIMATE,
         progress=progress,
     )
-    return Flight(flown.motion, loaded, path, recorded, flown.fitted, flown.momentum_by)
+    return LoadedMotion(flown.motion, loaded, path, recorded, flown.fitted, flown.momentum_by)
 
 
-def _start(motion: str, options: FlightOptions) -> Array | None:
-    """The attitude at the start (3, 3): the one that is given, or that with which a motion of the library begins."""
+def _start(motion: str, options: StartOptions) -> Array | None:
+    """Return the attitude at the start (3, 3): as given, or that of a motion of the library."""
     if options.attitude is not None:
         return so3.quat_argument(options.attitude, "attitude")
     return so3.matrix_from_quat(np.array(MOTIONS[motion].attitude)) if _is_named(motion) else None
 
 
 def _is_named(motion: str) -> bool:
-    """Whether it is a motion of the library, and no file of that name."""
+    """True for a motion of the library, if no file has its name."""
     return motion in MOTIONS and not os.path.isfile(motion)
 
 
-def is_without_momentum(motion: str, options: FlightOptions) -> bool:
-    """Whether the momentum is known to be zero before the motion is read: a recorded base may still show one."""
+def is_without_momentum(motion: str, options: StartOptions) -> bool:
+    """True where the momentum is zero for sure; a recorded base may still give one."""
     return _is_named(motion) if options.momentum is None else not any(options.momentum)
 
 
 def body_argument(body: str, floating: BodyOptions) -> Body:
-    """The body that a command names. Raises what `load_body` raises, and ShapeError for what is rather a motion."""
+    """Return the body of a command. Raises as `load_body`, and ShapeError for a motion in its place."""
     is_file = os.path.isfile(body)
     if (body in MOTIONS and not is_file) or (is_file and Path(body).suffix.lower() in _OF_MOTIONS):
         raise ShapeError(
@@ -156,11 +151,11 @@ def body_argument(body: str, floating: BodyOptions) -> Body:
 
 
 def joint_motion(
-    motion: str, body: Body, recording: RecordingOptions = AS_RECORDED, *, given: bool | None = None
+    motion: str, body: Body, recording: RecordingOptions = RECORDING_DEFAULTS, *, given: bool | None = None
 ) -> tuple[ShapePath, RecordedMotion | None]:
-    """The path of a motion, and its record if it comes from a file.
+    """Return the path of a motion, and its recording if it comes from a file.
 
-    given : whether its momentum is given, and not to be found from the base; None: no momentum is needed
+    given : whether its momentum is given; False: it is fitted to the base; None: none is needed
     """
     if _is_named(motion):
         for field in fields(recording):
@@ -177,18 +172,21 @@ def joint_motion(
         raise ShapeError(f"there is no option {motion[:_LONGEST_SHOWN]!r} of this command, and no such file either")
     if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):
         raise unknown_name("motion (no such file either)", motion[:_LONGEST_SHOWN], MOTIONS)
-    said = vars(recording) | {
+    stretch = flight_words(recording.flight)
+    choices = {name: value for name, value in vars(recording).items() if name != "step"} | {
+        "timestep": recording.step,
         "names": column_names(recording.names),
-        "rest": _rest(recording.rest),
-        "flight": flight_words(recording.flight) or (RECORDED if given is False else None),
+        "rest": joint_values(body, recording.rest, "--rest"),
+        "flight": stretch or (RECORDED if given is False else None),
+        "trim": stretch if isinstance(stretch, tuple) else None,  # what lies outside may have gaps
         "gravity": ANY_GRAVITY if given and recording.gravity is None else recording.gravity,
     }
-    recorded = read_recorded_motion(motion, body, **said)
+    recorded = read_recorded_motion(motion, body, **choices)
     return recorded.path, recorded
 
 
 def column_names(words: tuple[str, ...]) -> dict[str, str | None]:
-    """The mapping of `--names`: pairs, files of pairs, or the names of all columns of a table without a header.
+    """Return the mapping of `--names`: pairs, files of pairs, or the names of all columns of a table without a header.
 
     Raises ShapeError for a column that stands twice.
     """
@@ -208,24 +206,15 @@ def column_names(words: tuple[str, ...]) -> dict[str, str | None]:
 
 
 def flight_words(words: tuple[str, ...]) -> str | tuple[float, float] | None:
-    """What `--flight` says: a word or two times. Raises ShapeError."""
+    """Return what `--flight` states: a word or two times. Raises ShapeError."""
     if len(words) < 2:
         return words[0] if words else None
     try:
         first, last = map(float, words)
     except ValueError:
-        raise ShapeError(f"--flight: auto, auto:2, all or two times are needed, got {' '.join(words)!r:.60}") from None
+        first = last = math.nan
+    if not first < last:
+        raise ShapeError(
+            f"--flight: auto, auto:2, all, or a first and a later last time are needed, got {' '.join(words)!r:.60}"
+        )
     return first, last
-
-
-def _rest(words: tuple[str, ...]) -> dict[str, str]:
-    """The joints of `--rest` with their values as written. Raises ShapeError."""
-    found: dict[str, str] = {}
-    for word in words:
-        joint, mark, value = word.partition("=")
-        if not mark or not joint.strip() or not value.strip():
-            raise ShapeError(f"--rest: JOINT=VALUE is needed, got {word!r:.60}")
-        if joint.strip() in found:
-            raise ShapeError(f"--rest: joint {joint.strip()!r:.60} stands twice")
-        found[joint.strip()] = value.strip()
-    return found

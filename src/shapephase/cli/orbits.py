@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from cyclopts import Parameter
-
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    option,
 )
 from .outcome import Outcome
 from .progress import steps
 
-_MOMENTA = 1000
-"""About as many are integrated to search all directions."""
+_MOMENTA = 1000  # about as many are integrated to search all directions
 
 
 def orbits_command(
@@ -31,25 +29,28 @@ def orbits_command(
     *,
     gauge: Annotated[
         str,
-        Parameter(
-            help="The frame in which the momentum closes: horizontal, base, principal, mean_body or link:NAME; for "
-            "example `--gauge base`."
+        option(
+            "Frame in which the momentum closes: horizontal, base, principal, mean_body or link:NAME; for example "
+            "`--gauge base`."
         ),
     ] = "horizontal",
-    tolerance: float | None = None,
-    floating: BodyOptions = AS_WRITTEN,
-    recording: RecordingOptions = AS_RECORDED,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    tolerance: Annotated[
+        float | None,
+        option(
+            "Accuracy of the attitude, from 1e-13 to 1e-4, in rad; default: 1e-11, or the tightest of 1e-10 to 1e-8 "
+            "that can be met. For example `--tolerance 1e-7`."
+        ),
+    ] = None,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
-    """Find the motions whose shape and momentum close together, and split each.
+    """Find the closed orbits: motions whose shape and momentum close together; and split each.
 
     Parameters
     ----------
     magnitude
-        Of the angular momentum, in kg m^2/s; for example `0.02`.
-    tolerance
-        Of the attitude, from 1e-13 to 1e-4, in rad; without it 1e-11, or the tightest of 1e-10 to 1e-8 that can be met
-        where errors grow too much for that. For example `--tolerance 1e-7`.
+        Angular momentum, in kg m^2/s; for example `0.02`.
     """
     import numpy as np
 
@@ -75,7 +76,7 @@ def orbits_command(
         loaded = body_argument(body, floating)
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
-        path, recorded = joint_motion(motion, loaded, recording)
+        path, recorded = joint_motion(motion, loaded, recording, given=True)
         deformation = articulated(loaded, path)
         seen = named_gauge(deformation, gauge)
         work.begin("finding what closes")

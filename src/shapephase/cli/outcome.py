@@ -1,17 +1,72 @@
-"""What a command hands back to be printed, and whether it can write what it was asked to."""
+"""Result of a command, its exit code, and the check that its files can be written."""
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..errors import UnknownNameError
+from ..errors import (
+    CompilerError,
+    ModelFileError,
+    OutputFileError,
+    PlanNotFound,
+    SchedulerLostError,
+    ShapePhaseError,
+    StudyError,
+    TrajectoryError,
+    UnknownNameError,
+)
 from ..files import output_target
-from .exit_codes import ExitCode
 
 _STANDARD_OUTPUT = 1
+
+
+class ExitCode(enum.IntEnum):
+    """Exit code of the program: number and meaning, in the help and in docs/howto/command_line.md."""
+
+    meaning: str
+
+    def __new__(cls, number: int, meaning: str) -> ExitCode:
+        """Return a member with its meaning."""
+        code = int.__new__(cls, number)
+        code._value_, code.meaning = number, meaning
+        return code
+
+    DONE = 0, "done"
+    INTERNAL = 1, "a bug of shapephase; -v shows where"
+    USAGE = 2, "usage: arguments, options, names, missing files"
+    MODEL = 3, "the body's file"
+    TRAJECTORY = 4, "the motion's file, or a motion that does not fit the body"
+    NUMERICS = 5, "numerics: singular inertia, accuracy not reached"
+    OUTPUT = 6, "output cannot be written"
+    NOT_FOUND = 7, "nothing found; the best try is written"
+    STUDY = 8, "a study's file, or a store of another study"
+    CLUSTER = 9, "no connection to the cluster; stored cases are kept"
+    WRONG = 10, "audit: the trajectory is wrong; the explanation is printed"
+    FAILED_CASES = 11, "failed cases in a study; the others are stored"
+    OUT_OF_TIME = 124, "time limit reached; the best result is written"
+    STOPPED = 130, "stopped by Ctrl-C; the best result of plan is written"
+    BROKEN_PIPE = 141, "the reader closed the pipe (SIGPIPE)"
+
+
+# The first of these that fits an error of the library gives the code.
+_CODES: tuple[tuple[type[Exception] | tuple[type[Exception], ...], ExitCode], ...] = (
+    (OutputFileError, ExitCode.OUTPUT),
+    (StudyError, ExitCode.STUDY),
+    (SchedulerLostError, ExitCode.CLUSTER),
+    (PlanNotFound, ExitCode.NOT_FOUND),
+    (TrajectoryError, ExitCode.TRAJECTORY),
+    (ModelFileError, ExitCode.MODEL),
+    ((ValueError, FileNotFoundError, ImportError, CompilerError), ExitCode.USAGE),
+)
+
+
+def exit_code_of(error: ShapePhaseError) -> ExitCode:
+    """Return the code for an error of the library."""
+    return next((code for kinds, code in _CODES if isinstance(error, kinds)), ExitCode.NUMERICS)
 
 
 @dataclass(frozen=True)
@@ -22,10 +77,10 @@ class Outcome:
     ----------
     text : for people
     data : for programs, printed with `--json`
-    with_verdict : whether a line at the end says that no fault was found, or how many warnings there are
+    with_verdict : whether a line at the end says OK, or how many warnings there are
     code : the exit code
-    made_from : the body and the recording that it is about, for its provenance
-    aside : whether standard output was taken by a file, so that the text goes to standard error
+    made_from : joints and recording, for the provenance
+    aside : whether a file takes standard output, so that the text goes to standard error
     """
 
     text: str
@@ -37,7 +92,7 @@ class Outcome:
 
 
 def check_writable(out: Path | None, option: str, *endings: str) -> bool:
-    """Look whether a file can be written, before anything is computed; returns whether it is standard output.
+    """Check that a file can be written, before anything is computed; return whether it is standard output.
 
     A pipe or a device needs no ending, where there is one kind of file only. Raises UnknownNameError,
     InputFileNotFoundError, OutputFileError.

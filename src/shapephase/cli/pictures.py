@@ -1,32 +1,39 @@
-"""`shapephase view` and `shapephase plot`: a motion in 3-D, and figures of it."""
+"""`shapephase view`, `explore` and `plot`: pages in 3-D, and figures."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from ..errors import ShapeError, unknown_name
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
-    AT_REST,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
+    START_DEFAULTS,
     BodyArgument,
     BodyOptions,
     FigureFile,
-    FlightOptions,
+    FilmFile,
     Gauge,
     MotionArgument,
+    PageFile,
     PrintOptions,
     RecordingOptions,
+    StartOptions,
+    UpAxis,
+    option,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
-from .terminal import put, say_written
+from .terminal import say_written
 
 if TYPE_CHECKING:
-    from .motion import Flight
+    from ..plots.page import Page
+    from .motion import LoadedMotion
 
 
 def view_command(
@@ -34,68 +41,103 @@ def view_command(
     motion: MotionArgument,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
-    flight: FlightOptions = AT_REST,
-    html: Path | None = None,
-    video: Path | None = None,
-    trail: str | None = None,
-    speed: float | None = None,
-    recording: RecordingOptions = AS_RECORDED,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
-) -> Outcome | None:
-    """Show a motion in 3-D: in a browser until Ctrl-C, or as one HTML file that opens offline.
-
-    Parameters
-    ----------
-    html
-        Write the animation to this HTML file, and serve nothing; without it a browser is opened. For example
-        `--html fall.html`.
-    video
-        Write a film to this GIF or MP4 file, or six pictures side by side to this PNG file, and serve nothing; without
-        it none is written. A Chromium draws it (`pip install 'shapephase[video]'`). For example `--video fall.gif`.
-    trail
-        The link that leaves a trail; without it none does. For example `--trail head`.
-    speed
-        Seconds of motion in a second of playing; without it 1, or such that playing takes from 4 to 20 s. For example
-        `--speed 0.1` for slow motion.
-    """
-    from ..plotting.pages.up_axis import up_axis
-    from ..plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
-    from ..plotting.viewer import motion_page, motion_video, view
+    start: StartOptions = START_DEFAULTS,
+    html: PageFile = None,
+    video: FilmFile = None,
+    trail: Annotated[str | None, option("Link that leaves a trail; for example `--trail head`.")] = None,
+    speed: Annotated[
+        float | None,
+        option(
+            "Seconds of motion in a second of playing; default: 1, or such that playing takes 4 to 20 s. For example "
+            "`--speed 0.1` for slow motion."
+        ),
+    ] = None,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+) -> Outcome:
+    """Show a motion in 3-D in a browser, or write it as one HTML file that opens offline, or as a film."""
+    from ..plots.pages.motion_data import up_axis
+    from ..plots.viewer import view
     from . import motion as motions
     from .texts.recording_text import recording_data
 
     up_axis(recording.up, None)
     if speed is not None and not 0.0 < speed < math.inf:
         raise ShapeError(f"--speed: seconds of motion in a second of playing, above 0, are needed, got {speed:g}")
+    aside = check_page_files(html, video)
+    with steps(2) as work:
+        work.begin("loading and reconstructing")
+        flown = motions.flight(body, motion, start, recording, progress=work.watch, trail=trail, floating=floating)
+        work.begin("making the page")
+        page = view(flown.motion, trail=trail, speed=speed, up=recording.up or flown.up)
+        lines, data = deliver(page, html, video)
+    heading = _heading(flown, motion)
+    return Outcome(
+        "\n".join([*([heading] if heading else []), *lines]),
+        data | recording_data(flown.recorded),
+        aside=aside,
+        made_from=flown.motion.deformation.made_from,
+    )
+
+
+def explore_command(
+    body: BodyArgument,
+    /,
+    *,
+    joints: Annotated[
+        tuple[str, str],
+        Parameter(
+            negative_iterable="",
+            help="Two joints; the others rest at zero. For example `--joints waist_pitch waist_yaw`.",
+        ),
+    ],
+    html: PageFile = None,
+    up: UpAxis = None,
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+) -> Outcome:
+    """Draw loops of two joints on a map of the curvature, and see what they turn the body by, in a browser or a file.
+
+    The body has no angular momentum, or one that is chosen by sliders.
+    """
+    from ..plots.explorer import explore
+    from .motion import body_argument
+
+    aside = check_page_files(html, None)
+    page = explore(body_argument(body, floating), joints, up=up)
+    lines, data = deliver(page, html, None)
+    error = page.data["plane"]["connection_error"]
+    return Outcome(
+        "\n".join(lines), data | {"joints": list(joints), "connection_error_rad_per_unit": error}, aside=aside
+    )
+
+
+def check_page_files(html: Path | None, video: Path | None) -> bool:
+    """Check that a page and its film can be written; return whether one of them takes standard output."""
+    from ..plots.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
+
     aside = check_writable(html, "--html", ".html")
     aside = check_writable(video, "--video", *VIDEO_ENDINGS) or aside
     if video is not None:
         check_video(video, FILM_SIZE)
-    with steps(2) as work:
-        work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, progress=work.watch, trail=trail, floating=floating)
-        up = recording.up or flown.up
-        if html is not None or video is not None:
-            work.begin("recording the animation")
-            if html is not None:
-                motion_page(flown.motion, html, trail=trail, speed=speed, up=up)
-                say_written(html)
-            if video is not None:
-                motion_video(flown.motion, video, trail=trail, speed=speed, up=up)
-                say_written(video)
-            files = {"html": html, "video": video}
-            data = {name: str(file) for name, file in files.items() if file is not None}
-            data |= recording_data(flown.recorded)
-            return Outcome(_heading(flown, motion), data, aside=aside, made_from=flown.motion.deformation.made_from)
-    live = view(flown.motion, trail=trail, speed=speed, up=up, notebook=False)
-    if live is not None:
-        with live:
-            if flown.recorded is not None:
-                put(_heading(flown, motion))
-            put(f"{live.url}  (Ctrl-C to stop)")
-            live.wait()
-    return None
+    return aside
+
+
+def deliver(page: Page, html: Path | None, video: Path | None) -> tuple[list[str], dict[str, str]]:
+    """Write a page and its film, or without files show it; return lines and data to print."""
+    if html is None and video is None:
+        shown = str(page.show())
+        return [f"in the browser: {shown}"], {"html": shown}
+    files = {"html": html, "video": video}
+    if html is not None:
+        page.write(html)
+    if video is not None:
+        page.film(video)
+    written = {name: file for name, file in files.items() if file is not None}
+    for file in written.values():
+        say_written(file)
+    return [], {name: str(file) for name, file in written.items()}
 
 
 def plot_command(
@@ -105,11 +147,11 @@ def plot_command(
     /,
     *,
     out: FigureFile,
-    floating: BodyOptions = AS_WRITTEN,
-    flight: FlightOptions = AT_REST,
+    start: StartOptions = START_DEFAULTS,
     gauge: Gauge = "horizontal",
-    recording: RecordingOptions = AS_RECORDED,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Draw one figure of a motion, one column wide.
 
@@ -119,18 +161,18 @@ def plot_command(
         What is drawn: momentum, phases, attitude, shape, torques, inertia, internal_momentum or energy; for example
         `phases`.
     """
-    from ..plotting.named_figures import FIGURES, write_figure
+    from ..plots.named_figures import FIGURES, write_figure
     from . import motion as motions
     from .texts.recording_text import recording_data
 
     if kind not in FIGURES:
         raise unknown_name("kind of figure", kind, FIGURES)
     check_writable(out, "--out", ".svg", ".pdf", ".png")
-    if FIGURES[kind].with_momentum and motions.is_without_momentum(motion, flight):
+    if FIGURES[kind].with_momentum and motions.is_without_momentum(motion, start):
         raise _no_momentum(kind)
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, progress=work.watch, gauge=gauge, floating=floating)
+        flown = motions.flight(body, motion, start, recording, progress=work.watch, gauge=gauge, floating=floating)
         if FIGURES[kind].with_momentum and not flown.motion.momentum.any():
             raise _no_momentum(kind)
         work.begin(f"drawing {kind.replace('_', ' ')}")
@@ -144,8 +186,8 @@ def _no_momentum(kind: str) -> ShapeError:
     return ShapeError(f"the figure {kind!r} needs an angular momentum: give one by --momentum")
 
 
-def _heading(flown: Flight, motion: str) -> str:
-    """Of a recording, its momentum and its flight; nothing of other motions."""
+def _heading(flown: LoadedMotion, motion: str) -> str:
+    """Return the first line about a recording: its momentum and flight; of other motions nothing."""
     from .texts.result_text import split_heading
 
     return "" if flown.recorded is None else split_heading(flown.body, motion, flown.motion) + flown.beginning

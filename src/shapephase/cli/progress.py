@@ -1,4 +1,4 @@
-"""A progress bar for what takes more than two seconds, on a terminal only."""
+"""Progress bar of commands that take more than two seconds, on a terminal only."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ from typing import Any
 
 from .terminal import Verbosity, say, verbosity
 
-# [s] Work that takes longer shows a progress bar; what is done sooner leaves the terminal alone.
-_PATIENCE = 2.0
+_PATIENCE = 2.0  # [s] shorter work shows no progress bar
 
 
 class Steps:
-    """The steps of a longer work, one after the other.
+    """Steps of a command, one after the other.
 
     Parameters
     ----------
-    total : how many there are
-    display : what shows them (a `rich.progress.Progress`), or None: nothing is shown
+    total : number of steps
+    display : a `rich.progress.Progress`; None: nothing is shown
     """
 
     def __init__(self, total: int, display: Any = None) -> None:
@@ -29,7 +28,7 @@ class Steps:
         self._task = None if display is None else display.add_task("", total=total)
 
     def begin(self, what: str) -> None:
-        """The next step begins, and the one before is done; `what` it does is shown."""
+        """Begin the next step, described by `what`."""
         say(f"shapephase: {what}", Verbosity.VERBOSE)
         if self._display is None:
             return
@@ -37,19 +36,19 @@ class Steps:
         self._display.update(self._task, description=what, completed=self._begun - 1)
 
     def watch(self, share: float, text: str) -> None:
-        """Progress callback of the run that is the step under way: moves the bar within the step and shows the text."""
+        """Progress callback of the run in this step: move the bar within the step and show the text."""
         if self._display is not None:
             self._display.update(self._task, description=text or None, completed=self._begun - 1 + share)
 
     def say(self, what: str) -> None:
-        """Other words for the step under way."""
+        """Change the description of this step."""
         if self._display is not None:
             self._display.update(self._task, description=what)
 
 
 @contextmanager
 def steps(total: int) -> Iterator[Steps]:
-    """Show `total` steps on standard error once two seconds have passed; in a pipe or a file nothing is written."""
+    """Yield steps that are shown on a terminal once two seconds have passed."""
     if sys.stderr is None or not sys.stderr.isatty() or verbosity() is not Verbosity.NORMAL:
         yield Steps(total)
         return

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from ..errors import ShapeError
-from .options import AS_TEXT, AS_WRITTEN, BodyArgument, BodyOptions, PrintOptions
+from .joint_values import joint_values
+from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyArgument, BodyOptions, OptionalFigureFile, PrintOptions
 from .outcome import Outcome, check_writable
 from .terminal import say_written
-
-if TYPE_CHECKING:
-    from ..shape_space.reach.holonomy_algebra import Reach
 
 _ENDINGS = (".svg", ".pdf", ".png")
 
@@ -22,11 +19,11 @@ def reach_command(
     body: BodyArgument,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
+    floating: BodyOptions = BODY_DEFAULTS,
     at: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative_iterable="", show_default=False)] = (),
     pairs: int = 10,
-    out: Path | None = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    out: OptionalFigureFile = None,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """List which rotations loops of the joints reach, the smallest loops about each axis, and the best pairs of joints.
 
@@ -35,13 +32,10 @@ def reach_command(
     Parameters
     ----------
     at
-        Where the loops begin: JOINT=VALUE, in rad or m; joints that are not named are at zero. For example
-        `--at waist_pitch=0.3`.
+        Where the loops begin: JOINT=VALUE with blanks or commas between them, in rad or m or with a unit; other joints
+        are at zero. For example `--at waist_pitch=20deg`.
     pairs
-        How many pairs of joints are listed, without unit; for example `--pairs 20`.
-    out
-        Write a figure of the best pairs to this file, .svg, .pdf or .png; without it none is drawn. For example
-        `--out reach.svg`.
+        Number of pairs of joints in the list; for example `--pairs 20`.
     """
     from ..shape_space.reach.holonomy_algebra import reachable
     from .motion import body_argument
@@ -51,26 +45,12 @@ def reach_command(
     if pairs < 0:
         raise ShapeError(f"--pairs: a whole number, 0 or more, is needed, got {pairs}")
     loaded = body_argument(body, floating)
-    found = reachable(loaded, loaded.shape(dict(_coordinate(word) for word in at)))
+    reach = reachable(loaded, loaded.shape(joint_values(loaded, at, "--at")))
     if out is not None:
-        _draw(out, found)
-    data = reach_data(found, pairs) | {"figure": None if out is None else str(out)}
-    return Outcome("\n".join(reach_lines(found, pairs)), data, aside=aside)
+        from ..plots.plot_style import column_axes, write_axes
+        from ..plots.shape_plots import plot_reach
 
-
-def _coordinate(word: str) -> tuple[str, float]:
-    name, equals, value = word.partition("=")
-    try:
-        return name, float(value if equals else "?")
-    except ValueError:
-        raise ShapeError(f"--at: JOINT=VALUE, in rad or m, is needed, got {word!r}") from None
-
-
-def _draw(out: Path, found: Reach) -> None:
-    from ..files import write_whole
-    from ..plotting.plot_style import axes_image, column_axes
-    from ..plotting.shape_plots import plot_reach
-
-    image = axes_image(plot_reach(column_axes(2.8), found), out.suffix[1:].lower())
-    write_whole(out, lambda stream: stream.write(image))
-    say_written(out)
+        write_axes(plot_reach(column_axes(2.8), reach), out)
+        say_written(out)
+    data = reach_data(reach, pairs) | {"figure": None if out is None else str(out)}
+    return Outcome("\n".join(reach_lines(reach, pairs)), data, aside=aside)

@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
-    AT_REST,
-    EXACT,
+    BODY_DEFAULTS,
+    ERROR_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
+    START_DEFAULTS,
     BodyArgument,
     BodyOptions,
     ErrorOptions,
-    FlightOptions,
     Gauge,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
     ReportFile,
+    StartOptions,
     Tolerance,
+    option,
+    rare,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import say_written
 
-_ROWS = 201
-"""Of a table of phases in time, as of attitudes."""
+_ROWS = 201  # of the table of phases, as many as of samples
 
 
 def split_command(
@@ -34,31 +36,33 @@ def split_command(
     motion: MotionArgument,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
-    flight: FlightOptions = AT_REST,
+    start: StartOptions = START_DEFAULTS,
     gauge: Gauge = "horizontal",
     tolerance: Tolerance = 1e-9,
-    recording: RecordingOptions = AS_RECORDED,
-    errors: ErrorOptions = EXACT,
-    out: Path | None = None,
-    samples: Path | None = None,
-    phases: Path | None = None,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    errors: ErrorOptions = ERROR_DEFAULTS,
     html: ReportFile = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    out: Annotated[
+        Path | None, option("Write the motion to this NPZ file, or to a pipe; for example `--out fall.npz`.")
+    ] = None,
+    samples: Annotated[
+        Path | None,
+        rare(
+            "Write base and joints at 201 even times to this file (.csv, .parquet, .nc, .mat, .h5), in SI units; for "
+            "example `--samples fall.nc`.",
+        ),
+    ] = None,
+    phases: Annotated[
+        Path | None,
+        rare(
+            "Write the phases in time, in degrees and in radians, to this CSV file, whose last row is the table's; for "
+            "example `--phases phases.csv`.",
+        ),
+    ] = None,
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
-    """Split the rotation of a free body into shape holonomy and Montgomery phase.
-
-    Parameters
-    ----------
-    out
-        Write the motion to this NPZ file, or to a pipe; without it none is written. For example `--out fall.npz`.
-    samples
-        Write base and joints at 201 even times to this file (.csv, .parquet, .nc, .mat, .h5), in SI units; without it
-        none is written. For example `--samples fall.nc`.
-    phases
-        Write the phases in time, in degrees and in radians, to this CSV file; its last row is the table's. Without it
-        none is written. For example `--phases phases.csv`.
-    """
+    """Split the rotation of a free body into shape holonomy and Montgomery phase."""
     import numpy as np
 
     from ..exports.tables import ENDINGS, export_motion
@@ -76,12 +80,12 @@ def split_command(
     aside = check_writable(phases, "--phases", ".csv") or aside
     aside = check_writable(html, "--html", ".html") or aside
     if html is not None:
-        from ..plotting.pages.up_axis import up_axis
+        from ..plots.pages.motion_data import up_axis
 
         up_axis(recording.up, None)
-    with steps(13 if html else 2) as work:
+    with steps(3 if html else 2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, gauge=gauge, floating=floating)
+        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, gauge=gauge, floating=floating)
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
         bars = error_bars(flown.motion, errors, flown.recorded, flown.fitted)
@@ -100,21 +104,21 @@ def split_command(
             running_phases(flown.motion, times, gauge).write_csv(phases)
             say_written(phases)
         if html is not None:
-            from ..plotting.report import write_report
+            work.begin("making the report")
+            from ..plots.report_page import report
 
             title = f"{flown.body.name} along {Path(motion).name}"
-            write_report(
+            report(
                 flown.motion,
                 result,
-                html,
                 shape_path=flown.path,
                 title=title,
                 up=recording.up or flown.up,
                 error_bars=error_bar_lines(result, bars, flown.recorded, errors),
                 recording=[*lines, *recording_lines(flown.body, flown.recorded)],
                 noise=joint_noise(flown.body, errors),
-                begin=work.begin,
-            )
+                progress=work.watch,
+            ).write(html)
             say_written(html)
     turns = turn_counts(flown.motion, result)
     gap = path_gap(flown.body, in_joint_order(flown.body, flown.path))

@@ -11,9 +11,8 @@ from cyclopts import App, Parameter
 
 from ..errors import ShapeError
 from ..files import write_whole
-from .exit_codes import ExitCode
-from .options import AS_TEXT, AS_WRITTEN, BodyOptions, FigureFile, PrintOptions
-from .outcome import Outcome, check_writable
+from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyOptions, FigureFile, PrintOptions
+from .outcome import ExitCode, Outcome, check_writable
 from .progress import steps
 from .terminal import Verbosity, say, say_written
 
@@ -59,8 +58,8 @@ def sweep_command(
             help="Go on with a store that is there, and compute cases that failed again; for example `--retry failed`.",
         ),
     ] = None,
-    floating: BodyOptions = AS_WRITTEN,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Compute the cases of a study in a TOML file, on all processors or on a cluster, into a Zarr store.
 
@@ -102,7 +101,7 @@ def sweep_command(
 
 
 @sweep_app.command(name="status")
-def status_command(store: str, /, *, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
+def status_command(store: str, /, *, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # noqa: ARG001
     """Say what the store of a study holds.
 
     Parameters
@@ -124,7 +123,7 @@ def export_command(
         Path,
         Parameter(help="Write a table (.parquet, .csv) or arrays (.nc) to this file; for example `--out out.nc`."),
     ],
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Write what the store of a study holds to a NetCDF, Parquet or CSV file.
 
@@ -164,7 +163,7 @@ def plot_study_command(
             "`--along momentum_z`.",
         ),
     ] = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Draw one output of a study, one column wide: how it is spread, its quantiles along a grid, or a map over two.
 
@@ -175,7 +174,7 @@ def plot_study_command(
     output
         What is drawn, an output of the study, or an entry such as `final_attitude_0_1`; for example `turn`.
     """
-    from ..plotting.plot_style import axes_image, column_axes
+    from ..plots.plot_style import axes_image, column_axes
     from ..study.figures import plot_study
     from ..study.store import open_study
 

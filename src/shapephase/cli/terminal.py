@@ -1,4 +1,4 @@
-"""What goes to standard output and standard error, and how much of it."""
+"""Standard output and standard error of the commands, and the verbosity."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ _UNPRINTABLE = frozenset({"Cc", "Cf", "Zl", "Zp", "Cs", "Cn"})
 
 
 class Verbosity(enum.IntEnum):
-    """How much is said on standard error."""
+    """Amount of text on standard error."""
 
     QUIET = 0
-    """Errors alone."""
+    """Errors."""
     NORMAL = 1
-    """Warnings and what was written, too."""
+    """Errors, warnings, files written."""
     VERBOSE = 2
-    """What is done, too, and where a fault of ours lies."""
+    """Also each step, and tracebacks of bugs."""
 
 
 _VERBOSITY: ContextVar[Verbosity] = ContextVar("_VERBOSITY", default=Verbosity.NORMAL)
 
 
 @contextlib.contextmanager
-def spoken(words: Sequence[str]) -> Iterator[None]:
-    """What is said on standard error while a command of these words runs: `-q`, `--quiet`, `-v`, `--verbose`."""
+def verbosity_from(words: Sequence[str]) -> Iterator[None]:
+    """Set the verbosity by `-q`, `--quiet`, `-v` or `--verbose` among the words while a command runs."""
     quiet, verbose = {"-q", "--quiet"} & {*words}, {"-v", "--verbose"} & {*words}
     chosen = Verbosity.QUIET if quiet else Verbosity.VERBOSE if verbose else Verbosity.NORMAL
     token = _VERBOSITY.set(chosen)
@@ -53,12 +53,12 @@ def spoken(words: Sequence[str]) -> Iterator[None]:
 
 
 def verbosity() -> Verbosity:
-    """How much is said now."""
+    """Return the verbosity of the running command."""
     return _VERBOSITY.get()
 
 
 def say(line: str, least: Verbosity = Verbosity.NORMAL) -> None:
-    """One line on standard error, from a verbosity on. Raises BrokenPipeError if nobody reads it."""
+    """Print one line on standard error, from a verbosity on. Raises BrokenPipeError if the reader closed the pipe."""
     if verbosity() < least or sys.stderr is None:
         return
     try:
@@ -66,25 +66,24 @@ def say(line: str, least: Verbosity = Verbosity.NORMAL) -> None:
     except BrokenPipeError:
         raise
     except (OSError, ValueError):
-        # There is nowhere left to say so.
-        return
+        return  # no stream is left to report it
 
 
 def say_written(path: Path) -> None:
-    """What was written, and how large it is."""
+    """Report a file that was written, and its size."""
     size = "" if output_target(path).is_stream else f" ({size_text(path)})"
     say(f"wrote {path}{size}")
 
 
 def put(text: str, *, aside: bool = False) -> None:
-    """The result of a command on standard output; `aside`, on standard error, where that is taken by a file.
+    """Print the result of a command on standard output, or `aside` on standard error where a file takes that.
 
     Raises
     ------
     OutputFileError
         If it cannot be written.
     BrokenPipeError
-        If nobody reads it any more.
+        If the reader closed the pipe.
     """
     stream = sys.stderr if aside else sys.stdout
     if stream is None:
@@ -99,7 +98,7 @@ def put(text: str, *, aside: bool = False) -> None:
 
 
 def printable(line: str) -> str:
-    """A line with what a terminal would obey, or could not show, written out."""
+    """Return a line with escapes for characters that a terminal would obey or cannot show."""
     if line.isascii() and line.isprintable():
         return line
     return "".join(
@@ -109,12 +108,12 @@ def printable(line: str) -> str:
 
 
 def one_line(error: Warning | BaseException | str) -> str:
-    """A message in one line."""
+    """Return a message as one line."""
     return " ".join(str(error).split())
 
 
 def abandon(stream: TextIO | None) -> None:
-    """Send what is still buffered nowhere, so that Python does not complain of it at its end."""
+    """Discard what is still buffered, so that Python reports no error at exit."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())  # pyright: ignore[reportOptionalMemberAccess]
@@ -122,7 +121,7 @@ def abandon(stream: TextIO | None) -> None:
 
 
 def _write(stream: TextIO, text: str) -> None:
-    """Write lines at once; letters that the stream's encoding does not have are written out."""
+    """Write a line at once, with escapes for characters that the stream's encoding does not have."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     stream.write(text.encode(encoding, "backslashreplace").decode(encoding) + "\n")
     stream.flush()

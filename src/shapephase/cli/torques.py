@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 from .options import (
-    AS_RECORDED,
-    AS_TEXT,
-    AS_WRITTEN,
-    AT_REST,
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
+    START_DEFAULTS,
     BodyArgument,
     BodyOptions,
-    FlightOptions,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    StartOptions,
     Tolerance,
+    option,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -27,22 +29,22 @@ def torques_command(
     motion: MotionArgument,
     /,
     *,
-    floating: BodyOptions = AS_WRITTEN,
-    flight: FlightOptions = AT_REST,
+    start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
-    recording: RecordingOptions = AS_RECORDED,
-    out: Path | None = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    out: Annotated[
+        Path | None,
+        option(
+            "Write torque or force, rate and power of each joint in time, in N m, N, rad/s, m/s and W, to this CSV "
+            "file; for example `--out torques.csv`."
+        ),
+    ] = None,
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Find the torques of the joints: their peaks against the limits of the body's file, power and work.
 
     The body floats or falls freely: gravity loads no joint.
-
-    Parameters
-    ----------
-    out
-        Write torque (or force), rate and power of each joint in time, in N m, N, rad/s, m/s and W, to this CSV file;
-        without it none is written. For example `--out torques.csv`.
     """
     from ..dynamics.torques import joint_torques
     from . import motion as motions
@@ -52,7 +54,7 @@ def torques_command(
     aside = check_writable(out, "--out", ".csv")
     with steps(3) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, flight, recording, tolerance, work.watch, floating=floating)
+        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
         work.begin("inverse dynamics")
         found = joint_torques(flown.motion)
         if out is not None:

@@ -150,7 +150,7 @@ def write_spice_ck(
         import spiceypy
     except ImportError:
         raise MissingExtraError(
-            "SPICE kernels need spiceypy; install it with: pip install 'shapephase[space]'"
+            "SPICE kernels need spiceypy; install it with: pip install 'shapephase[data]'"
         ) from None
     times = slerp_times(motion, goal)
     _check_epoch(motion, times, start, goal)

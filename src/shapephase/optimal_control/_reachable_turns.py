@@ -147,7 +147,7 @@ def _reachable_turns(task: Reorientation) -> _ReachableTurns | None:
 def _rigid_turns(task: Reorientation) -> _ReachableTurns | None:
     shape = task.shapes(task.start)
     links = _link_attitudes(task, shape[None])
-    remedy = "let joints move: leave out joints (--joints, --hold), or widen their limits, Limits(joint_limits=False)"
+    remedy = "let joints move: leave out joints (--joints), or widen their limits, Limits(joint_limits=False)"
     reason = "none of the joints can move, as they are held or both of their limits are the same"
     if not task.momentum.any():
         return _ReachableTurns(np.eye(3)[None], links, f"{reason}, and without momentum nothing turns it", remedy)
@@ -370,7 +370,7 @@ def _more_joints(task: Reorientation) -> str:
     """Advice about the joints."""
     if np.abs(task.coupling).any(axis=1).all() and task.movable.all() and task.dimension == task.body.n_shape:
         return "all joints move already: choose another goal"
-    return "let other joints move (joints, --joints, --hold)"
+    return "let other joints move (joints, --joints)"
 
 
 def _names(task: Reorientation, columns: Integers) -> str:

@@ -200,7 +200,7 @@ class MotionViews:
         return offered("Motion.to_xarray")(self, times, **fall)
 
     def plot(self: Any, kind: str | None = None, *, ax: Any = None, gauge: Any = "horizontal") -> Any:
-        """Draw one of the figures of `plotting.FIGURES` and return its Matplotlib axes.
+        """Draw one of the figures of `plots.FIGURES` and return its Matplotlib axes.
 
         Parameters
         ----------
@@ -219,16 +219,11 @@ class MotionViews:
         return offered("Motion.plot")(self, kind, ax=ax, gauge=gauge)
 
     def view(self: Any, **options: Any) -> Any:
-        """Show the motion in three dimensions (`shapephase.view`).
+        """Return a page of the motion in three dimensions, to write, show or film; a notebook displays it.
 
         Parameters
         ----------
         options : of `shapephase.view`
-
-        Raises
-        ------
-        MissingExtraError
-            Without viser.
         """
         return offered("Motion.view")(self, **options)
 

@@ -198,7 +198,7 @@ def check_pieces(deformation: Deformation) -> None:
             f"the motion has {pieces} intervals between breaks (a recording has one between samples), the limit is "
             f"{_MOST_PIECES}: read the recording with "
             f"resample={_rounded_down(_MOST_PIECES / deformation.duration):g} or less (--resample), or a part of it "
-            "with trim= (--trim)"
+            "with trim= (--flight)"
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import check_choice, check_object, names_argument
 from ..arrays import Array
 from ..errors import StudyError, unknown_name
-from ..plotting.plot_style import BLACK, BLUE, GREY, SERIES, SKY, SMALL, check_flat_axes, finish
+from ..plots.plot_style import BLACK, BLUE, GREY, SERIES, SKY, SMALL, check_flat_axes, finish
 from ..warning_filters import quiet
 from .store import StudyStore
 
@@ -62,7 +62,7 @@ def plot_study(
     --------
     >>> over = {"momentum_z": [0.0, 0.1, 0.2], "masses": sp.study.LogNormal(0.05)}
     >>> study = sp.study.Study("cat", "cat_righting", over, outputs=("turn",), draws=4)
-    >>> ax = sp.study.plot_study(sp.plotting.column_axes(), study.run("drawn.zarr", workers=0), "turn")
+    >>> ax = sp.study.plot_study(sp.plots.column_axes(), study.run("drawn.zarr", workers=0), "turn")
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('momentum z [kg m²/s]', 'turn [deg]')
     """

@@ -124,7 +124,7 @@ def test_what_cannot_be_closed_is_named():
             TrajectoryError,
             rf"joint {right} ends -1\.719 deg from its start, and .* 0\.025 rad",
         ),
-        ({"close": "1deg"}, TrajectoryError, rf"joint {right} ends .*--trim.*--close"),
+        ({"close": "1deg"}, TrajectoryError, rf"joint {right} ends .*--flight.*--close"),
         ({"close": "5mm"}, TrajectoryError, "gaps up to 0 rad"),
         ({"close": True}, TrajectoryError, "how large a gap"),
         ({"close": "much"}, TrajectoryError, "close: a number is needed"),

@@ -128,7 +128,7 @@ def test_a_turn_that_may_have_gone_either_way_is_refused():
     frame = table()
     frame[QUATERNION] = Rotation.from_rotvec(30.0 * TIMES[:, None] * AXIS).as_quat()
     frame.loc[range(10, 14), QUATERNION] = np.nan
-    with pytest.raises(TrajectoryError, match=r"which way round.*--trim"):
+    with pytest.raises(TrajectoryError, match=r"which way round.*--flight"):
         sp.read_recorded_motion(frame, DIVER, fill=0.2)
 
 

@@ -41,8 +41,8 @@ FORMATS = {
     MJCF: Format("an MJCF model", "mujoco", "mjcf", ".mujoco_reading", ".mujoco_drawing", ("root", "root_body")),
     "biomod": Format("a bioMod model", "biorbd", "biomod", ".biorbd_reading", options=("root_body",)),
     "opensim": Format("an OpenSim model", "opensim", "opensim", ".opensim_reading", options=("root_body",)),
-    XACRO: Format("a xacro file", "xacrodoc", "xacro", ".xacro_reading", options=("packages", "root", "xacro_args")),
-    "yeadon": Format("measurements for Yeadon's model", "yeadon", "yeadon", ".yeadon_reading"),
+    XACRO: Format("a xacro file", "xacrodoc", "bodies", ".xacro_reading", options=("packages", "root", "xacro_args")),
+    "yeadon": Format("measurements for Yeadon's model", "yeadon", "bodies", ".yeadon_reading"),
 }
 """By our name."""
 _COMMENT = re.compile(rb"//[^\n]*|/\*.*?\*/|\s+", re.DOTALL)

@@ -1,12 +1,15 @@
-"""What `shapephase plan` has to reach, from the words of the command line."""
+"""Options of `shapephase plan` for the goal: a turn, a direction of an axis, or somersaults and twists."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
 
 from ...errors import ShapeError
+from ..options import option, rare
 
 if TYPE_CHECKING:
     from ...arrays import Array
@@ -15,75 +18,91 @@ if TYPE_CHECKING:
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
+@Parameter(name="*")
 @dataclass(frozen=True)
-class GoalWords:
-    """The options that say what a plan reaches, as they were given; None: not."""
+class GoalOptions:
+    """What the motion reaches."""
 
-    turn: tuple[str, ...]
-    rotate: float | None
-    about: str | None
-    point: tuple[str, str] | None
-    symmetry: str | None
-    somersaults: float | None
-    half_twists: float | None
-
-    def check(self) -> None:
-        """Raise ShapeError for options that exclude or need one another, or are no numbers."""
-        winding = {"--somersaults": self.somersaults, "--half-twists": self.half_twists}
-        windings = [option for option, value in winding.items() if value is not None]
-        ways = {"--turn": self.turn or None, "--rotate": self.rotate, "--point": self.point}
-        given = [option for option, value in ways.items() if value is not None] + windings[:1]
-        if len(given) > 1:
-            raise ShapeError(f"{given[0]} and {given[1]} each say how the body turns; give one of them")
-        if self.rotate is None and self.about is not None:
-            raise ShapeError("--about: the axis of --rotate DEGREES, which is not given")
-        if self.symmetry is not None and not (self.turn or self.rotate is not None or self.point):
-            raise ShapeError("--symmetry: goes with --turn, --rotate or --point, none of which is given")
-        if not given:
-            raise ShapeError(
-                'give --turn "90 about y", --point AXIS DIRECTION, --rotate DEGREES --about AXIS, or --somersaults and '
-                "--half-twists"
-            )
-        for option, value in {"--rotate": self.rotate, **winding}.items():
-            if value is not None and not math.isfinite(value):
-                raise ShapeError(f"{option}: a finite number is needed, got {value:g}")
+    turn: Annotated[
+        tuple[str, ...],
+        option(
+            "Turn at the end: degrees, and an axis of the base at the start (x, y, z, or three numbers with commas "
+            'between them); of several the cheapest. For example `--turn "90 about y"`.',
+            negative_iterable="",
+            allow_leading_hyphen=True,
+        ),
+    ] = ()
+    point: Annotated[
+        tuple[str, str] | None,
+        option(
+            "Axis of the base, or behind a link's name of this link, and its direction at the end, inertial axes; the "
+            'turn about it is free. For example `--point "dish 0 0 1" "0 1 0"`.',
+            negative_iterable="",
+            allow_leading_hyphen=True,
+        ),
+    ] = None
+    somersaults: Annotated[
+        float | None,
+        option("Turns about the momentum; for example `--somersaults 1.5 --momentum 0 40 0`."),
+    ] = None
+    half_twists: Annotated[
+        float | None,
+        option("Half turns about the base's z axis, with --somersaults; for example `--half-twists 2`."),
+    ] = None
+    symmetry: Annotated[
+        str | None,
+        rare(
+            "Symmetry of the body, or of the link of --point: how often it repeats about an axis of the base, or an "
+            'axis alone for all turns about it. For example `--symmetry "4 about x"`.',
+            allow_leading_hyphen=True,
+        ),
+    ] = None
 
     def goal(self) -> Goal:
-        """The goal that they say."""
+        """Return the goal. Raises ShapeError for options that exclude or need one another, or not finite numbers."""
         from ...optimal_control.plan_options import Goal
 
+        winding = {"--somersaults": self.somersaults, "--half-twists": self.half_twists}
+        windings = [name for name, value in winding.items() if value is not None]
+        goals = {"--turn": self.turn, "--point": self.point}
+        given = [name for name, value in goals.items() if value] + windings[:1]
+        if not given:
+            raise ShapeError('give --turn "90 about y", --point AXIS DIRECTION, or --somersaults and --half-twists')
+        if len(given) > 1:
+            raise ShapeError(f"{given[0]} and {given[1]} are two goals; give one of them")
+        if windings:
+            if self.symmetry is not None:
+                raise ShapeError("--symmetry: goes with --turn or --point, none of which is given")
+            for name in windings:
+                if not math.isfinite(winding[name] or 0.0):
+                    raise ShapeError(f"{name}: a finite number is needed, got {winding[name]:g}")
+            return Goal(somersaults=self.somersaults, half_twists=self.half_twists)
         symmetry = None if self.symmetry is None else _symmetry(self.symmetry)
-        if self.turn:
-            turns = [_turn(turn, "--turn") for turn in self.turn]
-            return Goal(rotation=turns if len(turns) > 1 else turns[0], symmetry=symmetry)
-        if self.rotate is not None:
-            return Goal(rotation=_rotation(self.rotate, _axis(self.about or "x", "--about")), symmetry=symmetry)
         if self.point is not None:
             (axis, link), direction = _axis_of_link(self.point[0]), _numbers(self.point[1], "--point")
             return Goal(pointing=(axis, direction), link=link, symmetry=symmetry)
-        return Goal(somersaults=self.somersaults, half_twists=self.half_twists)
+        turns = [_turn(turn) for turn in self.turn]
+        return Goal(rotation=turns if len(turns) > 1 else turns[0], symmetry=symmetry)
 
 
-def _turn(text: str, option: str) -> Array:
-    angle, found, axis = text.partition(" about ")
+def _turn(text: str) -> Array:
+    angle, about, axis = text.partition(" about ")
     try:
         degrees = float(angle)
     except ValueError:
         degrees = math.nan
-    if not found or not math.isfinite(degrees):
-        raise ShapeError(f'{option}: degrees and an axis, such as "90 about y", are needed, got {text!r}')
-    return _rotation(degrees, _axis(axis.strip(), option))
+    if not about or not math.isfinite(degrees):
+        raise ShapeError(f'--turn: degrees and an axis, such as "90 about y", are needed, got {text!r}')
+    return _rotation(degrees, _axis(axis.strip(), "--turn"))
 
 
 def _symmetry(text: str) -> Array:
-    """An axis, or the rotation of a whole part of a turn about it, from "4 about x"."""
-    count, found, axis = text.partition(" about ")
-    if not found:
+    """Return an axis, or from "4 about x" the rotation by a fourth of a turn about it."""
+    count, about, axis = text.partition(" about ")
+    if not about:
         return _axis(text.strip(), "--symmetry")
     if not (count.strip().isdecimal() and int(count) > 0):
-        raise ShapeError(
-            f'--symmetry: an axis, or how often the body looks the same about it, as "4 about x", got {text!r}'
-        )
+        raise ShapeError(f'--symmetry: an axis, or a count and an axis as "4 about x", is needed, got {text!r}')
     return _rotation(360.0 / int(count), _axis(axis.strip(), "--symmetry"))
 
 
@@ -96,7 +115,7 @@ def _rotation(degrees: float, axis: Array) -> Array:
 
 
 def _axis(text: str, option: str) -> Array:
-    """A unit vector: x, y, z, or three numbers."""
+    """Return a unit vector from x, y, z, or three numbers."""
     import numpy as np
 
     from ... import so3
@@ -105,11 +124,11 @@ def _axis(text: str, option: str) -> Array:
 
 
 def _numbers(text: str, option: str) -> Array:
-    """Three numbers with blanks or commas between them, not all zero."""
+    """Return three numbers with blanks or commas between them, not all zero."""
     import numpy as np
 
     try:
-        axis = np.array([float(part) for part in text.replace(",", " ").split()])
+        axis = np.array([float(number) for number in text.replace(",", " ").split()])
     except ValueError:
         axis = np.zeros(0)
     if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
@@ -119,7 +138,6 @@ def _numbers(text: str, option: str) -> Array:
 
 
 def _axis_of_link(text: str) -> tuple[Array, str | None]:
-    """An axis, and whose: of a link, or None: of the base."""
-    # A link's name may have blanks; the numbers come last.
-    words = text.replace(",", " ").split()
+    """Return an axis and its link; None is the base."""
+    words = text.replace(",", " ").split()  # a link's name may have blanks; the numbers come last
     return _numbers(" ".join(words[-3:]), "--point"), " ".join(words[:-3]) or None

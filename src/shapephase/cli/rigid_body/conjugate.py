@@ -2,54 +2,41 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
 from ...errors import ShapeError
-from ..options import AS_TEXT, PrintOptions
+from ..options import PRINT_DEFAULTS, Moments, OptionalFigureFile, PrintOptions
 from ..outcome import Outcome, check_writable
 from ..terminal import say_written
 
-if TYPE_CHECKING:
-    from ...arrays import Array
-
 _ENDINGS = (".svg", ".pdf", ".png")
-_PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)
-"""The p listed without --momenta, in parts of the way from the separatrix' p to the largest."""
+_PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)  # of the way from the separatrix' p to the largest: the p without --momenta
 
 
 def conjugate_command(
-    i1: float,
-    i2: float,
-    i3: float,
+    moments: Moments,
     /,
     *,
     momenta: Annotated[
         tuple[float, ...], Parameter(consume_multiple=True, negative_iterable="", show_default=False)
     ] = (),
     order: int = 1,
-    out: Path | None = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    out: OptionalFigureFile = None,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """List conjugate points of the free rigid body's Serret-Andoyer metric, and draw their locus.
 
+    The three principal moments must differ.
+
     Parameters
     ----------
-    i1
-        Principal moment about axis 1, in kg m^2; the three must differ and may come in any order. For example `1`.
-    i2
-        Principal moment about axis 2, in kg m^2; for example `2`.
-    i3
-        Principal moment about axis 3, in kg m^2; for example `3`.
     momenta
         Momenta of the geodesics, p = |Pi|/sqrt(2 E), above the square root of the middle moment and at most that of the
-        largest, in sqrt(kg) m; without it six of them. For example `--momenta 1.5 1.6`.
+        largest, in sqrt(kg) m; default: six of them. For example `--momenta 1.5 1.6`.
     order
         Which conjugate point of each geodesic, 1 the first; for example `--order 2`.
-    out
-        Write the figure to this file, .svg, .pdf or .png; without it none is drawn. For example `--out locus.svg`.
     """
     import numpy as np
 
@@ -57,7 +44,7 @@ def conjugate_command(
     from ...rigid_body.geodesics import serret_andoyer_metric
 
     aside = check_writable(out, "--out", *_ENDINGS)
-    metric = serret_andoyer_metric((i1, i2, i3))
+    metric = serret_andoyer_metric(moments)
     low, high = metric.separatrix_momentum, metric.largest_momentum
     p = finite_array(momenta if momenta else [low + part * (high - low) for part in _PARTS], "--momenta", (None,))
     p = p if momenta else np.minimum(p, high)
@@ -69,10 +56,15 @@ def conjugate_command(
     family = metric.geodesics(p)
     found = family.conjugate_points(order)
     if out is not None:
-        _draw(out, (i1, i2, i3), order, p)
+        from ...plots.geodesic_plots import plot_conjugate_locus
+        from ...plots.plot_style import column_axes, write_axes
+
+        write_axes(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=p), out)
+        say_written(out)
     rows = zip(p, family.period, family.first_return, found.time, found.phi, found.theta, strict=True)
+    listed = " ".join(f"{moment:g}" for moment in moments)
     lines = [
-        f"Serret-Andoyer metric of moments {i1:g} {i2:g} {i3:g} kg m^2, conjugate points of order {order}",
+        f"Serret-Andoyer metric of moments {listed} kg m^2, conjugate points of order {order}",
         f"asymptote at phi = {metric.crest:.9f} sqrt(kg) m either side, as p falls to {low:.9f}",
         "",
         "".join(f"{name:>16}" for name in ("p", "T", "R [rad]", "time", "phi", "theta [rad]")),
@@ -81,7 +73,7 @@ def conjugate_command(
         "p, T, time and phi in sqrt(kg) m; of geodesics that start upward, the others are mirror images",
     ]
     data = {
-        "moments_kg_m2": [i1, i2, i3],
+        "moments_kg_m2": list(moments),
         "order": order,
         "crest": metric.crest,
         "p": p.tolist(),
@@ -93,13 +85,3 @@ def conjugate_command(
         "figure": None if out is None else str(out),
     }
     return Outcome("\n".join(lines), data, aside=aside)
-
-
-def _draw(out: Path, moments: tuple[float, float, float], order: int, momenta: Array) -> None:
-    from ...files import write_whole
-    from ...plotting.geodesic_plots import plot_conjugate_locus
-    from ...plotting.plot_style import axes_image, column_axes
-
-    image = axes_image(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=momenta), out.suffix[1:].lower())
-    write_whole(out, lambda stream: stream.write(image))
-    say_written(out)

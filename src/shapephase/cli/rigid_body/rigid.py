@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from ...errors import ShapeError
-from ..options import AS_TEXT, PrintOptions
+from ..options import PRINT_DEFAULTS, FilmFile, Moments, OptionalFigureFile, PageFile, PrintOptions
 from ..outcome import Outcome, check_writable
+from ..pictures import check_page_files, deliver
 from ..terminal import say_written
 
 if TYPE_CHECKING:
@@ -18,14 +18,11 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 
-# Largest momentum [kg m^2/s] and angular velocity [rad/s], and one over its least: pages hold it in 32 bits.
-_LARGEST = 1e30
+_LARGEST = 1e30  # [kg m^2/s, rad/s] and one over the least: pages hold numbers in 32 bits
 
 
 def rigid_command(
-    i1: float,
-    i2: float,
-    i3: float,
+    moments: Moments,
     /,
     *,
     momentum: Annotated[
@@ -38,63 +35,42 @@ def rigid_command(
     ],
     figure: str = "polhodes",
     time: float = 0.0,
-    out: Path | None = None,
-    html: Path | None = None,
-    video: Path | None = None,
-    printing: PrintOptions = AS_TEXT,  # noqa: ARG001
+    out: OptionalFigureFile = None,
+    html: PageFile = None,
+    video: FilmFile = None,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
-    """Say how a free rigid body turns, and draw its polhodes, its rolling ellipsoid or its cones.
+    """Analyse a free rigid body: period, phase, polhodes, rolling ellipsoid, cones.
 
     Parameters
     ----------
-    i1
-        Principal moment about axis 1, in kg m^2; for example `1`.
-    i2
-        Principal moment about axis 2, in kg m^2; for example `2`.
-    i3
-        Principal moment about axis 3, in kg m^2; for example `3`.
     figure
         What `--out` draws: polhodes, herpolhode, rolling (the ellipsoid on its plane) or, with two equal moments,
         cones (of the body and of space); for example `--figure rolling`.
     time
         When the ellipsoid and the cones are shown, in s; for example `--time 1.5`.
-    out
-        Write the figure to this file, .svg, .pdf or .png; without it none is drawn. For example `--out polhodes.svg`.
-    html
-        Write the ellipsoid that rolls on its plane to this HTML file, to play offline; without it none is written. For
-        example `--html rolling.html`.
-    video
-        Write the same as a film to this GIF or MP4 file, or six pictures side by side to this PNG file; without it none
-        is written. A Chromium draws it (`pip install 'shapephase[video]'`). For example `--video rolling.gif`.
     """
     from ...errors import unknown_name
-    from ...plotting.named_figures import RIGID_FIGURES, write_rigid_figure
-    from ...plotting.pages.poinsot_page import poinsot_page, poinsot_video, rolling_facts
-    from ...plotting.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
+    from ...plots.named_figures import RIGID_FIGURES, write_rigid_figure
+    from ...plots.pages.poinsot_page import rolling_ellipsoid, rolling_facts
 
     if figure not in RIGID_FIGURES:
         raise unknown_name("kind of figure", figure, RIGID_FIGURES)
     if not math.isfinite(time):
         raise ShapeError(f"--time: a number is needed, got {time}")
     aside = check_writable(out, "--out", ".svg", ".pdf", ".png")
-    aside = check_writable(html, "--html", ".html") or aside
-    aside = check_writable(video, "--video", *VIDEO_ENDINGS) or aside
-    if video is not None:
-        check_video(video, FILM_SIZE)
-    top = _top((i1, i2, i3), momentum)
+    aside = check_page_files(html, video) or aside
+    top = _top(moments, momentum)
     facts = rolling_facts(top)
-    files = {"figure": out, "html": html, "video": video}
+    written: dict[str, str] = {}
     if out is not None:
         write_rigid_figure(figure, top, out, time)
-    if html is not None:
-        poinsot_page(top, html)
-    if video is not None:
-        poinsot_video(top, video)
-    written = {name: str(file) for name, file in files.items() if file is not None}
-    for file in written.values():
-        say_written(Path(file))
+        say_written(out)
+        written = {"figure": str(out)}
+    if html is not None or video is not None:
+        written |= deliver(rolling_ellipsoid(top), html, video)[1]
     data = {
-        "moments_kg_m2": [i1, i2, i3],
+        "moments_kg_m2": list(moments),
         "momentum_kg_m2_s": list(momentum),
         "energy_J": top.energy,
         "regime": top.regime,
@@ -107,7 +83,7 @@ def rigid_command(
 
 
 def _top(moments: Vector, momentum: Vector) -> EulerTop:
-    """The body, if it turns at a rate that can be drawn. Raises ShapeError."""
+    """Return the body. Raises ShapeError for rates that cannot be drawn."""
     from ...rigid_body.euler_top import EulerTop
 
     largest = max(map(abs, momentum))

@@ -1,1 +1,1 @@
-"""What commands say: results as text for people and as plain data for programs, and answers to wrong words."""
+"""Results of commands as text for people and as plain data for programs."""

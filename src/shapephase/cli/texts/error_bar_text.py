@@ -15,23 +15,20 @@ from ...plain_data import plain
 from ...reconstruction.reconstruction import Motion
 from ...shape_space.files.labels import amounts
 from ...shape_space.files.read import RecordedMotion
-from ..options import EXACT, ErrorOptions
+from ..options import ERROR_DEFAULTS, ErrorOptions
 
 if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
     from ...error_bars.recorded_momentum import RecordedMomentum
 
-# Digits of a bar that are shown; the number before it ends where the bar does.
-_DIGITS = 2
-# Of the angle, or of a degree: a bar below is rounding.
-_NO_BAR = 1e-12
+_DIGITS = 2  # of a bar; the number before it ends where the bar does
+_NO_BAR = 1e-12  # [of the angle, or of a degree] a smaller bar is rounding
 
 
 def error_bars(
     motion: Motion, options: ErrorOptions, recorded: RecordedMotion | None, fitted: RecordedMomentum | None = None
 ) -> Uncertainty | None:
-    """The error bars that were asked for, if any were: also by the noise that a recording was smoothed for, and by
-    that of the base that a momentum was fitted to."""
+    """Return the requested error bars, or None; smoothing noise and a fitted momentum request them, too."""
     relative = (options.mass_error, options.centre_error, options.inertia_error)
     smoothing = None if recorded is None else recorded.smoothing
     joints = options.joint_noise if options.joint_noise is not None or smoothing is None else smoothing.noise
@@ -53,7 +50,7 @@ def error_bars(
 
 
 def joint_noise(body: Body, options: ErrorOptions) -> Array | None:
-    """What --joint-noise says of each joint: (n,) [rad or m]; None where it says nothing."""
+    """Return --joint-noise for each joint (n,) [rad or m], or None."""
     if options.joint_noise is None:
         return None
     levels = amounts(options.joint_noise, "--joint-noise")
@@ -64,21 +61,20 @@ def error_bar_lines(
     result: PhaseSplit,
     found: Uncertainty | None,
     recorded: RecordedMotion | None = None,
-    options: ErrorOptions = EXACT,
+    options: ErrorOptions = ERROR_DEFAULTS,
 ) -> list[str]:
-    """For people: angles with their bars, in degrees; where an angle has none, how far the rotation may be off.
+    """Return lines with angles and their bars in degrees, or where an angle has none the largest error of the rotation.
 
-    Of a recording whose noise is not stated, that the errors in the table are those of the computation alone; of a
-    flight, that its bars are those of the recorded base alone.
+    For a recording without a stated noise, the line says which errors the bars or the table contain.
     """
     if found is None:
         if recorded is None:
             return []
         return [
             "",
-            f"{'± above':24}of the computation alone; the recording's noise is not stated (--joint-noise 0.3deg)",
+            f"{'± above':24}numerical error only; give --joint-noise (0.3deg) for measurement error",
         ]
-    lines = ["", "error bars: one standard deviation of what the inputs leave open, to first order"]
+    lines = ["", "error bars: one standard deviation due to the inputs, to first order"]
     lines.append(_rotation_line("total rotation", result.total_rotation, found.total_angle, found.total_rotation))
     name = "  shape holonomy" if result.is_loop else "  shape lift (open)"
     lines.append(_rotation_line(name, result.holonomy, found.holonomy_angle, found.holonomy))
@@ -90,19 +86,17 @@ def error_bar_lines(
         ):
             lines.append(f"{name:24}{_with_bar(float(phase), bar)} deg")
     elif result.has_phase:
-        lines.append("phases: their bars are computed in the horizontal gauge (--gauge horizontal)")
-    of_base_alone = recorded is not None and recorded.flight is not None and recorded.smoothing is None
-    if of_base_alone and options.joint_noise is None:
-        lines.append(
-            f"{'± of the recorded base':24}alone; the noise of the joints is not stated (--joint-noise 0.3deg)"
-        )
+        lines.append("phases: error bars need the horizontal gauge (--gauge horizontal)")
+    flown = recorded if recorded is not None and recorded.flight is not None else None
+    if flown is not None and flown.base_attitude is not None and not (flown.smoothing or options.joint_noise):
+        lines.append(f"{'± of the recorded base':24}only; give --joint-noise (0.3deg) for the noise of the joints")
     if found.smoothing_bias:
-        lines.append(f"{'bias of smoothing':24}{found.smoothing_bias:.2g} of a bar at most; the bars hold it")
+        lines.append(f"{'smoothing bias':24}at most {found.smoothing_bias:.2g} sigma, in the bars")
     return lines
 
 
 def error_bar_data(found: Uncertainty | None) -> dict[str, Any]:
-    """For programs, under `uncertainty`: covariances [rad^2] and standard deviations [rad]."""
+    """Return covariances [rad^2] and standard deviations [rad], under `uncertainty`."""
     return {} if found is None else {"uncertainty": plain(found)}
 
 
@@ -110,11 +104,11 @@ def _rotation_line(name: str, rotation: Array, bar: float, covariance: Array) ->
     if math.isfinite(bar):
         return f"{name:24}{_with_bar(float(so3.angle(rotation)), bar)} deg"
     widest = math.degrees(math.sqrt(max(float(np.linalg.eigvalsh(covariance)[-1]), 0.0)))
-    return f"{name:24}no bar of its angle, so near 0 or 180 degrees; off by {widest:.2g} deg about the worst axis"
+    return f"{name:24}no bar of an angle this near 0 or 180 degrees; error {widest:.2g} deg about the worst axis"
 
 
 def _with_bar(angle: float, bar: float) -> str:
-    """Both in degrees, ending at the same digit."""
+    """Return an angle and its bar in degrees, ending at the same digit."""
     angle, bar = math.degrees(angle), math.degrees(bar)
     if bar < _NO_BAR * max(angle, 1.0):
         return f"{angle:16.6f} ± 0"

@@ -1,4 +1,4 @@
-"""What `shapephase reach` says: as lines, and as JSON holds it."""
+"""Result of `shapephase reach` as text and as plain data."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ _WORDS = {
     1: "rotations about one axis",
     3: "every rotation",
 }
-# [strokes] the loops of the table, for what they turn the body by.
-_STROKE = 0.1
+_STROKE = 0.1  # [strokes] size of the loops in the table
 
 
 def reach_lines(found: Reach, most_pairs: int) -> list[str]:
-    """The table."""
+    """Return the table."""
     moved = {name: value for name, value in zip(found.joint_names, found.shape, strict=True) if value}
     place = " ".join(f"{name}={value:g}" for name, value in moved.items()) or "neutral"
     lines = [f"{found.name}: {len(found.joint_names)} joints, from the shape {place}"]
     lines.append(f"reached by loops without angular momentum: {_WORDS[found.rank]} (rank {found.rank} of 3)")
     values = " ".join(f"{value:.3g}" for value in found.singular_values)
-    lines.append(f"singular values {values}; the least that counts is {found.gap:.2g} times the next, or the noise")
+    lines.append(f"singular values {values}; the smallest of the rank is {found.gap:.2g} times the next, or the noise")
     if found.orders:
         lines += ["", "order  rank  axes reached (base axes)"]
         lines += [
@@ -50,7 +49,7 @@ def reach_lines(found: Reach, most_pairs: int) -> list[str]:
 
 
 def reach_data(found: Reach, most_pairs: int) -> dict[str, Any]:
-    """The same for JSON."""
+    """Return the result for programs."""
     return {
         "body": found.name,
         "joints": list(found.joint_names),

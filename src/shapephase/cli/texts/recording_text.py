@@ -1,4 +1,4 @@
-"""What was read of a recording, and what was done to it, as text for people and as plain data for programs."""
+"""A recording and its processing as text for people and as plain data for programs."""
 
 from __future__ import annotations
 
@@ -24,20 +24,15 @@ if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
     from ...error_bars.recorded_momentum import RecordedMomentum
 
-_MOST_NAMES = 8
-"""Names that one line lists."""
-_MOST_PARTS = 10
-"""Stretches of a flight of which the table has a column."""
-_BAR_DIGITS = 2
-"""Digits of a bar that are shown."""
-_WIDER = 1.1
-"""By which bars have to be longer than those of white noise for that to be printed."""
-_ROUNDING = 1e-12
-"""[rad or m] from samples to the path that goes through them."""
+_MOST_NAMES = 8  # in one line
+_MOST_PARTS = 10  # columns of the table of residuals in time
+_BAR_DIGITS = 2  # of a bar
+_WIDER = 1.1  # over the bars of white noise: a smaller ratio is not printed
+_ROUNDING = 1e-12  # [rad or m] from samples to the path through them
 
 
 def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
-    """What was done to a recording on the way to the path, for people; nothing where that is nothing."""
+    """Return lines about the processing of a recording, if there was any."""
     if recorded is None:
         return []
     record = recorded.record
@@ -52,7 +47,7 @@ def recording_lines(body: Body, recorded: RecordedMotion | None) -> list[str]:
 
 
 def recording_data(recorded: RecordedMotion | None) -> dict[str, Any]:
-    """The same for programs, under `recording`."""
+    """Return the processing of a recording for programs, under `recording`."""
     if recorded is None:
         return {}
     record = dict(recorded.record)
@@ -63,7 +58,7 @@ def recording_data(recorded: RecordedMotion | None) -> dict[str, Any]:
 
 
 def fit_lines(fitted: RecordedMomentum, errors: Uncertainty) -> list[str]:
-    """A momentum that was fitted to a recorded base, and how the two then differ in time, for people."""
+    """Return lines about a momentum fitted to a recorded base, and the residuals in time."""
     bars = np.sqrt(np.diag(errors.start)[3:])
     digits = max(_BAR_DIGITS - 1 - math.floor(math.log10(float(bars.min()))), 0) if bars.all() else _BAR_DIGITS
     momentum = ", ".join(f"{v:.{digits}f} ± {bar:.{digits}f}" for v, bar in zip(fitted.momentum, bars, strict=True))
@@ -98,7 +93,7 @@ def fit_lines(fitted: RecordedMomentum, errors: Uncertainty) -> list[str]:
 
 
 def fit_data(fitted: RecordedMomentum) -> dict[str, Any]:
-    """The same for programs, under `momentum_fit`."""
+    """Return the fit for programs, under `momentum_fit`."""
     worst = int(np.argmax(fitted.angles))
     found = {
         "momentum_covariance": fitted.momentum_covariance.tolist(),
@@ -122,7 +117,7 @@ def fit_data(fitted: RecordedMomentum) -> dict[str, Any]:
 
 
 def _correlated(fitted: RecordedMomentum) -> str:
-    """What a correlation of the noise does to the bars, where that shows."""
+    """Return the effect of correlated noise on the bars, where it is not small."""
     if fitted.widening < _WIDER:
         return ""
     return f", correlated in time: bars up to {fitted.widening:.2g} times those of white noise"
@@ -133,7 +128,7 @@ def _rms(angles: Array) -> float:
 
 
 def _unit_lines(record: Any) -> list[str]:
-    """Units other than those of the library."""
+    """Return a line about units other than those of the library."""
     found = [] if record["time_unit"] == "s" else [f"times in {record['time_unit']}"]
     for unit in ("deg", "mrad", "mm", "cm"):
         count = sum(said == unit for said in record["units"].values())
@@ -143,7 +138,7 @@ def _unit_lines(record: Any) -> list[str]:
 
 
 def _column_lines(body: Body, record: Any) -> list[str]:
-    """Columns under other names, joints without a column, columns without a joint."""
+    """Return lines about columns of other names, joints without a column, and ignored columns."""
     lines = []
     if (order := record.get("joint_order")) is not None:
         lines.append(f"{'joints without names':24}{order['means']} ({order['order']}): {', '.join(order['joints'])}")
@@ -161,17 +156,17 @@ def _column_lines(body: Body, record: Any) -> list[str]:
 
 
 def _columns_of(base: Mapping[str, Any], what: str) -> list[str]:
-    """The columns that say an attitude or a place; none where an array does."""
+    """Return the columns of an attitude or a position; none where an array has it."""
     found = base.get(what, [])
     return [] if isinstance(found, str) else found
 
 
 def _base_lines(record: Any) -> list[str]:
-    """What the motion of the base was read from, where its columns leave a choice, and the flight that was kept."""
+    """Return lines about the columns and axes of the base, and the flight that was kept."""
     lines = []
     base = record["base"] or {}
     if "order" in base:
-        said = "as told" if base["order_said"] else "the usual order, --base-order says another"
+        said = "as given" if base["order_said"] else "the usual order, --base-order changes it"
         lines.append(
             f"{'base':24}{', '.join(base['attitude'])}, turning in the order {' '.join(base['order'])}; {said}"
         )
@@ -180,14 +175,14 @@ def _base_lines(record: Any) -> list[str]:
     if any(not text.startswith("base_") for text in _columns_of(base, "position")):
         lines.append(f"{'place of the base':24}{', '.join(_columns_of(base, 'position'))}")
     if "axes" in base and (base["axes_said"] or base["axes"] != "x y z"):
-        said = "as told" if base["axes_said"] else "the usual ones of a pelvis, --base-axes says others"
+        said = "as given" if base["axes_said"] else "the usual ones of a pelvis, --base-axes changes them"
         lines.append(f"{'axes of the base':24}{base['axes']} of the recorded ones; {said}")
     flight = record["flight"]
     if flight is not None:
         found = ""
         if "up" in flight:
             off = 1e3 * flight["off_parabola_rms_m"]
-            found = f", found by the centre of mass: it falls to {off:.2g} mm as gravity says, {flight['up']} is up"
+            found = f", found by the centre of mass: {off:.2g} mm rms from a free fall, {flight['up']} is up"
         ends = f"{flight['first_time']:.9g} to {flight['last_time']:.9g} {record['time_unit']}"
         if len(flight.get("all", ())) > 1:
             lines.append(f"{'flights':24}{_flight_words(flight['all'], record['time_unit'])}")
@@ -196,7 +191,7 @@ def _base_lines(record: Any) -> list[str]:
 
 
 def _segment_lines(segments: Any) -> list[str]:
-    """How poses of segments became joints, and the momentum of both."""
+    """Return lines about poses of segments, and the momentum by them and by the joints."""
     if segments is None:
         return []
     renamed = [f"{link} from {name!r}" for name, link in segments["links"].items() if link != name]
@@ -235,7 +230,7 @@ def _flight_words(flights: Sequence[Sequence[float]], unit: str) -> str:
 
 
 def flights_in(body: Body, recorded: RecordedMotion, options: RecordingOptions) -> list[list[float]]:
-    """First and last times of all flights of a recording of which no flight was asked for, as the file tells them."""
+    """Return first and last times of all flights of a recording, in the file's clock."""
     record, times = recorded.record, recorded.times
     base = record["base"] or {}
     if recorded.base_attitude is None or recorded.base_position is None or base.get("axes") == ESTIMATE:
@@ -251,12 +246,12 @@ def flights_in(body: Body, recorded: RecordedMotion, options: RecordingOptions) 
 
 
 def flight_lines(flights: list[list[float]], recorded: RecordedMotion) -> list[str]:
-    """These flights for people."""
+    """Return a line about flights."""
     return [f"{'flights':24}{_flight_words(flights, recorded.record['time_unit'])}"] if flights else []
 
 
 def _levels(body: Body, smoothed: Mapping[str, float]) -> str:
-    """The noise of joints that turn, and of those that slide."""
+    """Return the noise of turning and of sliding joints."""
     found = []
     for unit in ("rad", "1", "m"):
         own = {name: level for name, level in smoothed.items() if body.joint_units[body.joint_index(name)] == unit}
@@ -268,9 +263,9 @@ def _levels(body: Body, smoothed: Mapping[str, float]) -> str:
 
 
 def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str]:
-    """What makes the path another than the samples."""
+    """Return lines about differences of the path from the samples."""
     lines = _gap_lines(record)
-    if record["trim"] is not None:
+    if record["trim"] is not None and record["flight"] is None:
         lines.append(
             f"{'kept':24}{record['samples']} of {record['samples_in_file']} samples, from {record['first_time']:.9g} "
             f"to {record['last_time']:.9g} {record['time_unit']}"
@@ -289,12 +284,12 @@ def _change_lines(body: Body, record: Any, recorded: RecordedMotion) -> list[str
         joint = int(np.argmax(recorded.residual))
         names = recorded.path.joint_names or ()
         off = _value(body, names[joint], recorded.residual[joint])
-        lines.append(f"{'off the samples':24}{off} rms at most, {names[joint]}")
+        lines.append(f"{'largest rms residual':24}{off}, {names[joint]}")
     return lines
 
 
 def _gap_lines(record: Any) -> list[str]:
-    """Which gaps were filled, and what was cut off at the ends for those there."""
+    """Return lines about gaps that were filled, and samples cut off at the ends."""
     gaps, unit = record["gaps"] or {"filled": (), "cut": ()}, record["time_unit"]
     filled = [
         f"{_listed(gap['columns'])} from {gap['after']:.9g} to {gap['until']:.9g} {unit} ({gap['seconds']:.4g} s, by a "
@@ -311,7 +306,7 @@ def _gap_lines(record: Any) -> list[str]:
 
 
 def _low_pass_lines(body: Body, record: Any) -> list[str]:
-    """The filter, its noise, where it lacks samples, and what of the motion it may have taken."""
+    """Return lines about the filter: its noise, its ends, and what it may remove of the motion."""
     noise, beyond, by_noise = record["noise"], record["rms_up_to_twice_the_cut_off"], record["of_that_by_noise"]
     twice = f"{record['twice_the_cut_off_hz']:.4g} Hz"
     worst = max(beyond, key=lambda name: beyond[name] - by_noise[name])
@@ -319,23 +314,23 @@ def _low_pass_lines(body: Body, record: Any) -> list[str]:
     return [
         f"{'low-pass':24}{record['cut_off_hz']:.6g} Hz, Butterworth of second order forwards and backwards",
         f"{'  noise':24}{_levels(body, noise) or 'none'}, rms, by what is above {twice}, "
-        "taken as white; error bars hold what passes of it",
+        "assumed white; error bars contain what passes the filter",
         f"{'  may be lost':24}{_value(body, worst, beyond[worst])} rms of {worst} up to "
         f"{twice}, {_value(body, worst, by_noise[worst])} of it by noise; "
-        "the bars do not hold this",
+        "not in the bars",
         f"{'  ends':24}the first {start:.3g} s and the last {end:.3g} s have samples on one side only",
     ]
 
 
 def _smoothing_lines(smoothing: Smoothing) -> list[str]:
-    """How much was smoothed, and what that did to the motion itself."""
+    """Return lines about the smoothing and its bias."""
     own = smoothing.penalty > 0.0
     if not own.any():
         return []
     penalties, free = smoothing.penalty[own], smoothing.degrees_of_freedom[own]
     return [
         f"{'  penalty':24}{_span(penalties)} s^5; {_span(free)} degrees of freedom are left to a joint",
-        f"{'  bias':24}rms {smoothing.bias_in_bars:.2g} of the noise that is left, at most; error bars hold both",
+        f"{'  bias':24}at most {smoothing.bias_in_bars:.2g} of the remaining noise, rms; in the error bars",
     ]
 
 
@@ -345,7 +340,7 @@ def _span(values: Array) -> str:
 
 
 def _closing_lines(closing: Closing) -> list[str]:
-    """The gap that was closed, and what that did."""
+    """Return lines about a gap that was closed, and its effect."""
     joint = int(np.argmax(np.abs(closing.gap)))
     names = closing.body.joint_names
     change = float(np.degrees(np.linalg.norm(closing.holonomy_change)))
@@ -353,12 +348,12 @@ def _closing_lines(closing: Closing) -> list[str]:
     added = f", which takes {closing.seconds_added:.4g} s" if closing.seconds_added else ""
     return [
         f"{'closed':24}{way}{added}; {names[joint]} ended {_value(closing.body, names[joint], closing.gap[joint])} off",
-        f"{'by that, the holonomy':24}changes by {change:.4g} deg",
+        f"{'change of the holonomy':24}{change:.4g} deg",
     ]
 
 
 def _value(body: Body, name: str, value: float) -> str:
-    """A coordinate of a joint in degrees or metres."""
+    """Return a joint coordinate in degrees or metres."""
     turns = body.joint_units[body.joint_index(name)] == "rad"
     if turns:
         return f"{np.degrees(value) + 0.0:.4g} deg"

@@ -1,4 +1,4 @@
-"""The results of commands as text for people and as plain data for programs."""
+"""Bodies, motions, splits and closed orbits as text for people and as plain data for programs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ...shape_space.summaries import BodySummary, PathSummary
 
 
 def split_heading(body: Body, motion_name: str, motion: Motion) -> str:
-    """The first line of the table of a split."""
+    """Return the first line of the table of a split."""
     momentum = " ".join(f"{v:g}" for v in motion.momentum)
     start = so3.quat_from_matrix(motion.initial_attitude)
     turned = "" if start[3] == 1.0 else f", attitude at the start ({' '.join(f'{v:.6g}' for v in start + 0.0)})"
@@ -31,7 +31,7 @@ def split_heading(body: Body, motion_name: str, motion: Motion) -> str:
 
 
 def split_data(body: Body, motion_name: str, motion: Motion, result: PhaseSplit) -> dict[str, Any]:
-    """A split for programs."""
+    """Return a split for programs."""
     return {
         "body": body.name,
         "motion": motion_name,
@@ -49,7 +49,7 @@ def split_data(body: Body, motion_name: str, motion: Motion, result: PhaseSplit)
 def orbit_lines(
     body: Body, motion_name: str, gauge: str, found: FixedPoints, starts: Array, splits: list[PhaseSplit]
 ) -> list[str]:
-    """Closed orbits and their phases for people."""
+    """Return the table of closed orbits and their phases."""
     certain = "these are all: their indices sum to 2"
     if not found.complete:
         certain = f"these are perhaps not all: their indices sum to {found.index_sum}, those of all to 2"
@@ -71,7 +71,7 @@ def orbit_lines(
 def orbit_data(
     body: Body, motion_name: str, gauge: str, found: FixedPoints, starts: Array, splits: list[PhaseSplit]
 ) -> dict[str, Any]:
-    """Closed orbits and their phases for programs."""
+    """Return closed orbits and their phases for programs."""
     rows = zip(starts.tolist(), found.index.tolist(), found.trace.tolist(), found.stability, splits, strict=True)
     names = ("momentum_direction_at_start", "index", "trace", "stability")
     orbits = [dict(zip(names, row[:4], strict=True)) | row[4].to_dict() | {"gauge": gauge} for row in rows]
@@ -88,7 +88,7 @@ def orbit_data(
 
 
 def body_lines(summary: BodySummary) -> list[str]:
-    """The summary of a body for people."""
+    """Return the table of a body."""
     width = max(map(len, ("joint", *(joint.name for joint in summary.joints))))
     balls = sum(joint.kind == "ball" for joint in summary.joints) // 4
     count = len(summary.joints) - 3 * balls
@@ -118,7 +118,7 @@ def body_lines(summary: BodySummary) -> list[str]:
 
 
 def _part_lines(summary: BodySummary) -> list[str]:
-    """What moves as one, by its first link and how many are fixed to it."""
+    """Return a table of rigid parts, by the first link and the number of links fixed to it."""
     names = [
         part.links[0] if len(part.links) == 1 else f"{part.links[0]} +{len(part.links) - 1}" for part in summary.parts
     ]
@@ -132,7 +132,7 @@ def _part_lines(summary: BodySummary) -> list[str]:
 
 
 def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMotion | None) -> list[str]:
-    """The summary of a joint motion for people."""
+    """Return the table of a joint motion."""
     closes = "yes" if summary.is_loop else f"no: {gap_text(body, summary.gap)} from its start"
     lines = [
         f"{name}: {summary.duration:g} s, {_pieces(summary.breaks - 1)}",
@@ -156,7 +156,7 @@ def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMo
 
 
 def too_fast(body: Body, summary: PathSummary) -> str:
-    """Which joints move faster than the body's file allows, and what to do about it."""
+    """Return a warning about joints that move faster than the body's file allows."""
     rows = [body.joint_index(name) for name in summary.joints_beyond_rates]
     rows.sort(key=lambda k: -summary.fastest[k] / body.rate_limits[k])
     rates = [
@@ -165,8 +165,8 @@ def too_fast(body: Body, summary: PathSummary) -> str:
     ]
     more = [f"{len(rows) - _MOST_NAMED} more"] if len(rows) > _MOST_NAMED else []
     return (
-        f"joints move faster than the limits of the body's file: {', '.join(rates + more)}; see to the times and "
-        "units, slow the motion down, or state other limits (velocity)"
+        f"joints move faster than the limits of the body's file: {', '.join(rates + more)}; check times and "
+        "units, slow the motion down, or change the limits (velocity)"
     )
 
 
@@ -175,7 +175,7 @@ def _pieces(count: int) -> str:
 
 
 def gap_text(body: Body, gap: Array) -> str:
-    """The joint that ends farthest from its start, and how far: (n,) [rad or m]."""
+    """Return the joint that ends farthest from its start, and its gap of (n,) [rad or m]."""
     worst = int(np.argmax(np.abs(gap)))
     unit, off = body.joint_units[worst], float(gap[worst])
     turned = f" ({math.degrees(off):.4g} deg)" if unit == "rad" else ""
@@ -183,7 +183,7 @@ def gap_text(body: Body, gap: Array) -> str:
 
 
 def record_data(body: Body, recorded: RecordedMotion | None) -> dict[str, Any]:
-    """What is known of a recording, for programs."""
+    """Return a recording for programs."""
     if recorded is None:
         return {}
     return {
@@ -195,7 +195,7 @@ def record_data(body: Body, recorded: RecordedMotion | None) -> dict[str, Any]:
 
 
 def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple[list[str], dict[str, Any]]:
-    """How far a base that was recorded is from the reconstructed one, for people and for programs."""
+    """Return the difference of the recorded base from the reconstructed one, as lines and as data."""
     if recorded is None or recorded.base_attitude is None:
         return [], {}
     found = base_difference(motion, recorded.times, recorded.base_attitude)
@@ -205,23 +205,20 @@ def recorded_base_text(motion: Motion, recorded: RecordedMotion | None) -> tuple
     return [text], {"recorded_base_difference_rad": angle, "recorded_base_difference_time_s": when}
 
 
-# Joints that a warning names.
-_MOST_NAMED = 4
-# After the point of a direction.
-_DIRECTION_DIGITS = 7
-_FIRST_OF_FOUR = ".x"
-"""The end of the name of a ball joint's first number, in whose row it is shown."""
+_MOST_NAMED = 4  # joints in a warning
+_DIRECTION_DIGITS = 7  # after the point
+_FIRST_OF_FOUR = ".x"  # end of the name of a ball joint's first number, in whose row it is shown
 _PATH_KEYS = {"joints_beyond_limits": "beyond", "joints_beyond_rates": "too_fast", "still_joints": "resting"}
 """JSON keys that are shorter than the names of the fields."""
 
 
 def path_data(summary: PathSummary) -> dict[str, Any]:
-    """A summary of a joint motion as JSON can hold it."""
+    """Return the summary of a joint motion for programs."""
     return {_PATH_KEYS.get(key, key): value for key, value in plain(summary).items()}
 
 
 def _of_ball(name: str) -> str:
-    """The ball joint that a name of one of its four numbers is of."""
+    """Return the ball joint of a name such as `neck.x`."""
     return name.rpartition(".")[0]
 
 

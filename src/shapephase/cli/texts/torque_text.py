@@ -1,4 +1,4 @@
-"""The torques of joints as a table for people and as plain data for programs."""
+"""Torques of joints as a table for people and as plain data for programs."""
 
 from __future__ import annotations
 
@@ -17,15 +17,14 @@ from ...reconstruction.reconstruction import Motion
 from ...shape_space.files.read import RecordedMotion
 from .result_text import split_heading
 
-# Of a limit, that is still printed.
-_LEAST_SHARE = 1e-3
+_LEAST_SHARE = 1e-3  # of a limit that is printed
 _EFFORTS = {"rad": "N m", "m": "N"}
 
 
 def torque_lines(
     loads: JointLoads, flown: Motion, body: Body, motion_name: str, bars: LoadErrors | None = None
 ) -> list[str]:
-    """Peaks, limits, power and work of each joint for people, of a recording with their bars."""
+    """Return the table of peaks, limits, power and work of each joint, with bars for a recording."""
     head = ("joint", "peak", "", "at [s]", "per kg", "of limit", "peak rate", "", "of limit", "peak [W]", "work [J]")
     rows: list[tuple[str, ...]] = [head]
     for k, (name, unit) in enumerate(zip(loads.joint_names, loads.joint_units, strict=True)):
@@ -61,32 +60,34 @@ def torque_lines(
         "",
         *_aligned(rows),
         "",
-        f"work of all joints {whole} J, change of the kinetic energy {change} J",
+        f"net work of all joints {whole} J, change of the kinetic energy {change} J",
         f"beyond a limit of the body's file: {', '.join(beyond) if beyond else 'none'}",
     ]
 
 
 def load_bars(motion: Motion, loads: JointLoads, recorded: RecordedMotion | None) -> tuple[LoadErrors | None, str]:
-    """Bars of what a recording's joints do, and what is to be said of them; of other motions there are none."""
+    """Return the bars of a recording's loads, and a line about them; other motions have none."""
     if recorded is None:
         return None, ""
     if recorded.smoothing is None:
         return (
             None,
-            "± not known: the noise of the recording is not stated (--smooth 0.3deg, --lowpass 6); most of this may be "
-            "noise",
+            "± unknown: give the noise of the recording (--smooth 0.3deg, --lowpass 6); most of this may be noise",
         )
     try:
         found = load_errors(motion, loads)
     except WrongObjectError as error:
-        return None, f"± not known: {error}"
+        return None, f"± unknown: {error}"
     if recorded.smoothing.low_pass is not None:
-        return found, "± one standard deviation, by what passes of the noise; what the filter takes off is not in it"
-    return found, "± one standard deviation, by the noise that was stated and by what smoothing takes off"
+        return (
+            found,
+            "± one standard deviation, by the noise that passes the filter; what the filter removes is not included",
+        )
+    return found, "± one standard deviation, by the given noise and the smoothing bias"
 
 
 def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
-    """Columns side by side: names and units from the left, numbers from the right."""
+    """Return aligned columns: names and units to the left, numbers to the right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = []
     for row in rows:
@@ -100,7 +101,7 @@ def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
 
 
 def _with_bar(value: float, bar: float | None, digits: int = 4) -> str:
-    """A number, and where its bar is known both, ending at the same digit."""
+    """Return a number with its bar, if it has one, ending at the same digit."""
     if bar is None:
         return f"{value:.{digits}g}"
     return number_with_bar(float(value), float(bar))
@@ -109,7 +110,7 @@ def _with_bar(value: float, bar: float | None, digits: int = 4) -> str:
 def torque_data(
     found: JointTorques, flown: Motion, body: Body, motion_name: str, bars: LoadErrors | None = None
 ) -> dict[str, Any]:
-    """The same for programs."""
+    """Return the torques for programs."""
     own = {} if bars is None else {"standard_deviations": plain(bars)}
     return {
         "body": body.name,
@@ -124,7 +125,7 @@ def torque_data(
 
 
 def _share(limit: float, share: float, bar: float | None) -> str:
-    """How much of a limit is used; the bar is that of the load itself."""
+    """Return the used share of a limit; the bar is that of the load."""
     if not np.isfinite(limit):
         return "none"
     if bar is not None:

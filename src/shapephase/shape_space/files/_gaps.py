@@ -200,7 +200,7 @@ class Gaps:
         """The option that keeps the longer side of a gap."""
         clock = self._recording.clock
         first, last = (0, before) if before >= len(clock) - 1 - after else (after, len(clock) - 1)
-        return f"--trim {clock[first]:.9g} {clock[last]:.9g}"
+        return f"--flight {clock[first]:.9g} {clock[last]:.9g}"
 
 
 def _held(values: Array, missing: Mask) -> Array:

@@ -62,7 +62,7 @@ def without_first_pose(recording: Recording, motion: Matched, body: Body) -> tup
             return part_of(recording, samples), motion.kept(samples)
         warn(
             f"{recording.place(0)}: {moved}: is the first {recording.table.row} a pose that is no part of the motion? "
-            "Leave it out with trim (--trim)"
+            "Leave it out with trim (--flight)"
         )
         break
     return recording, motion

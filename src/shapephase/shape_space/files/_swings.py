@@ -28,5 +28,5 @@ def check_swings(path: ShapePath, body: Body) -> None:
             f"joint {body.joint_names[joint]}: a smooth path through the samples would swing by some "
             f"{swings[piece, joint]:.2g} {body.joint_units[joint]} between {curve.knots[piece]:.9g} s and "
             f"{curve.knots[piece + 1]:.9g} s; is there a gap, or are two samples nearly at one time? Keep what is "
-            "before or after it (trim, --trim), or drop a sample"
+            "before or after it (trim, --flight), or drop a sample"
         )

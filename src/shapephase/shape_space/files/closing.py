@@ -134,7 +134,7 @@ def _check_gap(gap: Array, within: dict[str, float], body: Body) -> None:
         shown = f"{np.degrees(gap[joint]):.4g} deg" if unit == "rad" else f"{gap[joint]:.4g} {unit.replace('1', '')}"
         raise TrajectoryError(
             f"joint {name} ends {shown} from its start, and gaps up to {allowed[joint]:.6g} {unit} are to be closed; "
-            "cut the recording at a full cycle (trim, --trim), or allow more (close, --close)"
+            "cut the recording at a full cycle (trim, --flight), or allow more (close, --close)"
         )
 
 

@@ -131,13 +131,13 @@ def in_flight(
     Raises
     ------
     TrajectoryError
-        If the attitude of the base was not recorded, or, where the flight is to be found, its position; if none is
-        found, or less than three samples are in it; if it falls otherwise than by gravity, as units make it.
+        If, without two times, the attitude of the base was not recorded, or, where the flight is to be found, its
+        position; if none is found, or less than three samples are in it; if it falls otherwise than by gravity.
     """
     said, where, base = choices.said, recording.table.where, motion.base
     if said is None or (said == RECORDED and not turns(base.attitude)):
         return recording, motion, None
-    if base.attitude is None:
+    if base.attitude is None and not isinstance(said, tuple):
         raise TrajectoryError(
             f"{where}: a flight is fitted to the recorded attitude of the base, and there is none; columns such as "
             "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed. Or give the "

@@ -238,7 +238,7 @@ def read_recorded_motion(
         flight that falls by another acceleration than gravity, by more than a tenth of it and three error bars of its
         own (with 1 cm of wander of the centre of mass), with the slips of units of length or frame rates that fit.
     MissingExtraError
-        For ROS without the extra `ros`; for `.xlsx`, `.parquet`, `.c3d`, MATLAB, HDF5 without the extra `data`.
+        For ROS, `.xlsx`, `.parquet`, `.c3d`, MATLAB, HDF5 without the extra `data`.
 
     Warns
     -----

@@ -127,7 +127,7 @@ def _timed(table: Table, column: str | None, unit: str | None, timestep: float |
             raise TrajectoryError(
                 f"{table.where}: the header has no column `time`; it reads {_some(list(table.columns))}. Name the one "
                 "that has the times: --names COLUMN=time (names={column: 'time'}); or give the time between samples: "
-                "--timestep 0.01 (timestep=0.01)"
+                "--step 0.01 (timestep=0.01)"
             )
         step = positive_argument(timestep, "timestep")
         return replace(table, times=step * np.arange(len(table.rows))), "s", False
@@ -184,7 +184,7 @@ def _trimmed(table: Table, clock: Array, trim: tuple[float, float]) -> Table:
         raise TrajectoryError(
             f"{table.where}: {len(samples)} samples from {trim[0]:.9g} to {trim[1]:.9g}, two or more are needed; the "
             f"file's own times go from {clock.min():.9g} to {clock.max():.9g}: trim=({clock.min():.9g}, "
-            f"{clock.max():.9g}) (--trim {clock.min():.9g} {clock.max():.9g}) keeps all of it"
+            f"{clock.max():.9g}) (--flight {clock.min():.9g} {clock.max():.9g}) keeps all of it"
             if len(clock)
             else f"{table.where}: two samples or more are needed, got 0"
         )

@@ -213,7 +213,7 @@ def _times(arrays: Mapping[str, Any], kind: str, where: str, count: int, timeste
     if len(given) != 1:
         raise TrajectoryError(
             f"{where}: the times of {kind} come from one of the array 'time', the arrays 'timestep' and 'fps' of one "
-            f"number and the argument timestep (--timestep); {'none' if not given else 'more than one'} is there"
+            f"number and the argument timestep (--step); {'none' if not given else 'more than one'} is there"
         )
     if given == ["time"]:
         times = np.asarray(arrays["time"])

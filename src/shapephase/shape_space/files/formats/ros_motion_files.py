@@ -91,7 +91,7 @@ def read_bag(where: Path, topic: str | None) -> Table:
     try:
         import rosbags.highlevel  # noqa: F401
     except ImportError:
-        raise MissingExtraError("ROS bags need rosbags; install it with: pip install 'shapephase[ros]'") from None
+        raise MissingExtraError("ROS bags need rosbags; install it with: pip install 'shapephase[data]'") from None
     if where.is_dir() and not (where / "metadata.yaml").is_file():
         raise TrajectoryError(f"{where}: a folder without metadata.yaml, so no rosbag2; name a file in it")
     try:

@@ -29,7 +29,7 @@ def yaml_documents(text: str, where: str) -> list[Any]:
     try:
         import yaml
     except ImportError:
-        raise MissingExtraError("YAML files need PyYAML; install it with: pip install 'shapephase[ros]'") from None
+        raise MissingExtraError("YAML files need PyYAML; install it with: pip install 'shapephase[data]'") from None
 
     # Without resolvers, plain values are texts.
     safe = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

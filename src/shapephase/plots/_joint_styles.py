@@ -1,0 +1,79 @@
+"""Names of users and styles of joints in figures; a left joint and its right one have the same colour and marker."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from ..letters import printable
+from .plot_style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SERIES, VERMILION
+
+_COLOURS = (BLUE, ORANGE, BLACK, GREEN, VERMILION, PURPLE)  # neighbours differ in grey, too
+_MARKERS = ("o", "s", "^", "D", "v", "P")
+# Sides in names of joints: whole words, or letters set off by the end of the name or an underline.
+_SIDES = {"left": "right", "right": "left", "l": "r", "r": "l"}
+_SIDE = re.compile(
+    r"(?<![A-Za-z])(left|right|l|r)(?![A-Za-z])|(?<![a-z])(left|right)(?=[A-Z])|(?<=[a-z])(left|right)\b", re.IGNORECASE
+)
+_PALE = 0.5  # share of white in the broad line of the left side
+_MARKS = 6  # along a curve
+_MAX_LETTERS = 32  # of a name in a figure: more would leave no room for the curves
+
+
+def plain_text(name: str) -> str:
+    """Return a name as Matplotlib draws it letter by letter: no formulas; long ones are shortened in the middle."""
+    letters = printable(name)
+    if len(letters) > _MAX_LETTERS:
+        half = _MAX_LETTERS // 2
+        letters = f"{letters[:half]}…{letters[-half:]}"
+    # An underscore at the start would leave it out of legends; a hair space before it is not seen.
+    return ("\u200a" if letters.startswith("_") else "") + letters.replace("$", r"\$")
+
+
+def other_side(name: str) -> str | None:
+    """The name of the same joint on the other side; None for a name without a side."""
+    found = _SIDE.search(name)
+    if found is None:
+        return None
+    word = found[0]
+    other = _SIDES[word.lower()]
+    other = other.upper() if word.isupper() else other.capitalize() if word[0].isupper() else other
+    return name[: found.start()] + other + name[found.end() :]
+
+
+def both_sides(names: Sequence[str]) -> bool:
+    """True where a left joint and its right one are among the names."""
+    return any(other_side(name) in names for name in names)
+
+
+def joint_styles(names: Sequence[str]) -> list[dict[str, Any]]:
+    """Line styles of at most six joints: `SERIES`, or for both sides of a joint one colour and marker."""
+    if not both_sides(names):
+        return list(SERIES[: len(names)])
+    groups: dict[str, int] = {}
+    looks = []
+    for name in names:
+        other = other_side(name)
+        group = groups.setdefault(min(name, other) if other else name, len(groups))
+        colour = _COLOURS[group]
+        marks = {"marker": _MARKERS[group], "markersize": 3.2, "markevery": ((0.5 + group) / _MARKS**2, 1.0 / _MARKS)}
+        if other is None:
+            look = {"color": colour, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.5, "zorder": 2.1}
+        elif _is_left(name):
+            look = {"color": _paler(colour), "linestyle": "-", "linewidth": 3.0, "zorder": 1.9}
+        else:
+            look = {"color": colour, "linestyle": (0, (4, 2)), "linewidth": 1.3, "zorder": 2.2}
+        looks.append({**look, **marks, "markerfacecolor": colour, "markeredgecolor": colour})
+    return looks
+
+
+def _is_left(name: str) -> bool:
+    found = _SIDE.search(name)
+    return found is not None and found[0].lower().startswith("l")
+
+
+def _paler(colour: str) -> tuple[float, ...]:
+    from matplotlib.colors import to_rgb
+
+    return tuple(_PALE + (1.0 - _PALE) * channel for channel in to_rgb(colour))

@@ -1,0 +1,186 @@
+"""Figures of a motion or a rigid body by name, one column wide, as images in files or in memory."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..arguments import check_file_name, check_object
+from ..display import short_repr
+from ..errors import ShapeError, unknown_name
+from ..files import write_whole
+from ..phases.momentum_curve import Gauge
+from ..reconstruction.reconstruction import Motion
+from ..rigid_body.euler_top import EulerTop
+from ..shape_space.shape_path import ShapePath
+from .momentum_plots import plot_momentum_curve
+from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
+from .plot_style import axes_image, column_axes, write_axes
+from .polhode_plots import plot_herpolhode, plot_polhodes
+from .rolling_plots import plot_cones, plot_rolling_ellipsoid
+from .shape_plots import plot_shape_path
+from .torque_plots import plot_torques
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A kind of figure.
+
+    Attributes
+    ----------
+    caption : one line
+    height : [in]
+    draw : function of axes, motion, path of the joints and gauge
+    with_momentum, with_path : whether it needs a momentum, a path of the joints
+    of_change : whether it shows nothing but zero of a rigid body
+
+    Examples
+    --------
+    >>> sp.plots.FIGURES["phases"].height > 0.0
+    True
+    """
+
+    caption: str
+    height: float
+    draw: Callable[[Axes, Motion, ShapePath | None, Gauge], object]
+    with_momentum: bool = False
+    with_path: bool = False
+    of_change: bool = False
+
+    __repr__ = short_repr
+
+
+def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
+    if path is None:
+        raise ShapeError("the figure 'shape' needs the path of the joints, and there is none")
+    plot_shape_path(ax, path, getattr(motion.deformation.description, "body", None))
+
+
+FIGURES: Mapping[str, Figure] = {
+    "momentum": Figure(
+        "The momentum in the frame of the gauge, and the area it encloses",
+        3.9,
+        lambda ax, motion, _, gauge: plot_momentum_curve(ax, motion, gauge),
+        with_momentum=True,
+    ),
+    "phases": Figure(
+        "The phases in time", 2.8, lambda ax, motion, _, gauge: plot_phases(ax, motion, gauge), with_momentum=True
+    ),
+    "attitude": Figure("The attitude as a rotation vector", 2.8, lambda ax, motion, *_: plot_attitude(ax, motion)),
+    "shape": Figure(
+        "The joints", 2.8, lambda ax, motion, path, _: _draw_shape(ax, motion, path), with_path=True, of_change=True
+    ),
+    "torques": Figure(
+        "The torques of the joints", 2.8, lambda ax, motion, *_: plot_torques(ax, motion), with_path=True
+    ),
+    "inertia": Figure(
+        "Principal moments of the locked inertia", 2.8, lambda ax, motion, *_: plot_inertia(ax, motion.deformation)
+    ),
+    "internal_momentum": Figure(
+        "Internal momentum", 2.8, lambda ax, motion, *_: plot_internal_momentum(ax, motion.deformation), of_change=True
+    ),
+    "energy": Figure(
+        "The energy, and the axis that the momentum circles",
+        2.8,
+        lambda ax, motion, *_: plot_energy(ax, motion),
+        with_momentum=True,
+    ),
+}
+RIGID_FIGURES: Mapping[str, tuple[float, Callable[[Axes, EulerTop, float], object]]] = {
+    "polhodes": (3.8, lambda ax, top, _: plot_polhodes(ax, top)),
+    "herpolhode": (3.8, lambda ax, top, _: plot_herpolhode(ax, top)),
+    "rolling": (3.6, lambda ax, top, time: plot_rolling_ellipsoid(ax, top, time)),
+    "cones": (3.6, lambda ax, top, time: plot_cones(ax, top, time)),
+}
+"""Figures of a free rigid body by name: the height of each [in], and the function that draws it at a time [s]."""
+
+
+def motion_figure(
+    motion: Motion, kind: str | None = None, *, ax: Axes | None = None, gauge: Gauge = "horizontal"
+) -> Axes:
+    """Return one of `FIGURES` as axes; see `Motion.plot`."""
+    check_object(motion, "Motion", "motion")
+    named = kind or ("phases" if motion.momentum.any() else "attitude")
+    axes = column_axes(_figure_of(named, motion).height) if ax is None else ax
+    FIGURES[named].draw(axes, motion, getattr(motion.deformation.description, "path", None), gauge)
+    return axes
+
+
+def _figure_of(kind: str, motion: Motion) -> Figure:
+    """Return a kind of figure that this motion has. Raises UnknownNameError, ShapeError."""
+    if not isinstance(kind, str) or kind not in FIGURES:
+        raise unknown_name("kind of figure", kind, FIGURES)
+    if FIGURES[kind].with_momentum and not motion.momentum.any():
+        raise ShapeError(f"the figure {kind!r} needs an angular momentum; it is zero here, give one")
+    return FIGURES[kind]
+
+
+def figure_image(
+    kind: str, motion: Motion, path: ShapePath | None = None, gauge: Gauge = "horizontal", *, ending: str = "svg"
+) -> bytes:
+    """Return one of `FIGURES` as an image: "svg", "pdf" or "png"."""
+    figure = _figure_of(kind, motion)
+    if not isinstance(ending, str) or ending not in ("svg", "pdf", "png"):
+        raise unknown_name("kind of image", ending, ("svg", "pdf", "png"))
+    ax = column_axes(figure.height)
+    figure.draw(ax, motion, path, gauge)
+    return axes_image(ax, ending)
+
+
+def write_figure(
+    kind: str,
+    motion: Motion,
+    out: str | os.PathLike[str],
+    path: ShapePath | None = None,
+    gauge: Gauge = "horizontal",
+) -> None:
+    """Write one of `FIGURES` to an .svg, .pdf or .png file, whole or not at all.
+
+    Parameters
+    ----------
+    path : of the joints, for "shape"
+
+    Raises
+    ------
+    UnknownNameError
+        For another kind, or another ending.
+    ShapeError
+        For a kind that needs a momentum or a path, if there is none; or if the motion is a batch.
+    MissingExtraError
+        Without Matplotlib.
+
+    Examples
+    --------
+    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
+    >>> sp.plots.write_figure("energy", motion, "energy.svg")
+    >>> from pathlib import Path
+    >>> Path("energy.svg").read_text()[:5]
+    '<?xml'
+    """
+    check_object(motion, "Motion", "motion")
+    check_file_name(out, "out")
+    if path is not None:
+        check_object(path, "ShapePath", "path")
+    image = figure_image(kind, motion, path, gauge, ending=Path(out).suffix.removeprefix(".").lower())
+    write_whole(out, lambda stream: stream.write(image))
+
+
+def write_rigid_figure(kind: str, top: EulerTop, out: str | os.PathLike[str], time: float = 0.0) -> None:
+    """Write one of `RIGID_FIGURES` to an .svg, .pdf or .png file, whole or not at all.
+
+    Parameters
+    ----------
+    time : at which the ellipsoid or the cones are shown [s]
+    """
+    if kind not in RIGID_FIGURES:
+        raise unknown_name("kind of figure", kind, RIGID_FIGURES)
+    height, draw = RIGID_FIGURES[kind]
+    ax = column_axes(height)
+    draw(ax, top, time)
+    write_axes(ax, out)

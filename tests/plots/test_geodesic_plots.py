@@ -1,0 +1,283 @@
+"""What is drawn of conjugate points, and listed by the command, agrees with closed forms and other algorithms."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from cyclopts import App
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d import art3d
+from scipy.interpolate import CubicSpline
+
+from shapephase import so3
+from shapephase.cli.rigid_body.conjugate import conjugate_command
+from shapephase.errors import InputFileNotFoundError, ShapeError, UnknownNameError
+from shapephase.plots.geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
+from shapephase.plots.plot_style import column_axes
+from shapephase.rigid_body.geodesics._conjugate_locus import conjugate_locus
+from shapephase.rigid_body.geodesics._ellipsoid import astroid, ellipsoid, meridian_length
+from shapephase.rigid_body.geodesics.axisymmetric_cut import axisymmetric_metric
+from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
+from shapephase.rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
+
+MOMENTS = (3.0, 2.0, 1.0)
+# p, T, R, phi and theta of the first conjugate point of MOMENTS: theory.md, section 6.
+TABLE = np.array(
+    [
+        [1.70, 11.3634614556, 3.2816745281, -0.094594, 3.565678],
+        [1.60, 13.3636563838, 3.8894133371, -0.644765, 5.025759],
+        [1.50, 17.0851557433, 5.0954738015, -1.152362, 7.022735],
+        [1.43, 25.3967481375, 7.9511732331, -1.676710, 11.331023],
+        [1.42, 30.3253866338, 9.6815243490, -1.829686, 13.924233],
+    ]
+)
+CREST = 2.0646141015
+
+
+def curves(ax, label):
+    return [np.array(line.get_data()) for line in ax.lines if line.get_label() == label]
+
+
+def labels(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def between(curve, x):
+    """A drawn curve of ascending abscissa at x, by a spline."""
+    return CubicSpline(curve[0], curve[1])(x)
+
+
+def test_the_branches_pass_through_the_reference_points_and_are_mirror_images():
+    ax = plot_conjugate_locus(column_axes(), MOMENTS)
+    upward, downward = curves(ax, "locus, upward start")[0], curves(ax, "locus, downward start")[0]
+    assert np.abs(between(upward[:, 2:], TABLE[:, 4]) - TABLE[:, 3]).max() < 3e-6
+    assert np.array_equal(upward * [[1.0], [-1.0]], downward)
+    assert np.abs(upward[:, 0] - [np.pi, 0.0]).max() < 1e-7
+    assert np.all(np.diff(upward[1]) < 0.0)
+    assert 0.0 < CREST + upward[1, -1] < 0.1
+    asymptotes = sorted(
+        line.get_ydata()[0] for line in ax.lines if len(set(line.get_ydata())) == 1 and len(line.get_ydata()) == 2
+    )
+    assert np.abs(np.array(asymptotes) - [-CREST, CREST]).max() < 1e-9
+
+
+def test_the_faint_geodesics_solve_the_equations_and_touch_the_locus():
+    ax = plot_conjugate_locus(column_axes(), MOMENTS, geodesics=6)
+    locus = curves(ax, "locus, upward start")[0]
+    faint = [np.array(line.get_data()) for line in ax.lines if line.get_linewidth() == 0.6]
+    assert len(faint) == 12
+    metric = serret_andoyer_metric(MOMENTS)
+    for theta, phi in faint[:6]:
+        assert np.abs(locus - np.array([[theta[-1]], [phi[-1]]])).max(axis=0).min() < 1e-13
+        # d theta/d phi = p/sqrt(m (m - p^2)): Clairaut's p is the same wherever it is read off the curve.
+        steps = np.linspace(0.0, 1.0, len(theta))
+        turn, rise = np.gradient(theta, steps, edge_order=2), np.gradient(phi, steps, edge_order=2)
+        m = metric.m(phi)
+        p = m * turn / np.sqrt(rise**2 + m * turn**2)
+        assert np.ptp(p[3:-3]) < 2e-3
+    for up, down in zip(faint[:6], faint[6:], strict=True):
+        assert np.array_equal(up * [[1.0], [-1.0]], down)
+
+
+def test_given_momenta_are_marked_and_the_second_order_starts_on_the_other_side():
+    ax = plot_conjugate_locus(column_axes(), MOMENTS, momenta=TABLE[:, 0])
+    assert np.abs(curves(ax, r"of the $p_\theta$ given")[0] - TABLE[:, [4, 3]].T).max() < 1e-6
+    ax = plot_conjugate_locus(column_axes(), MOMENTS, 2)
+    second = curves(ax, "locus, upward start")[0]
+    assert np.abs(second[:, 0] - [2.0 * np.pi, 0.0]).max() < 1e-7
+    assert np.all(second[1, 1:] > 0.0)
+    assert r"of the $p_\theta$ given" not in labels(ax)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_nearly_round_ellipsoid_shows_the_astroid(order):
+    flattening = 1e-4
+    ax = plot_ellipsoid_locus(column_axes(), 1.0 - flattening, (order,))
+    x, y = curves(ax, f"order {order}: 4 cusps")[0]
+    # An astroid: |x|^(2/3) + |y|^(2/3) is constant; the size grows with the order.
+    radius = order * np.abs(astroid(1.0 - flattening, 0.0)[1] - np.pi)
+    assert np.abs(np.abs(x / radius) ** (2 / 3) + np.abs(y / radius) ** (2 / 3) - 1.0).max() < 10.0 * flattening
+    assert (x[0], y[0]) == (x[-1], y[-1])
+    for values in (x, y):
+        assert values.min() < -0.9 * radius
+        assert values.max() > 0.9 * radius
+
+
+def test_the_ellipsoid_is_drawn_with_both_orders_and_geodesics_that_touch_the_first():
+    ax = plot_ellipsoid_locus(column_axes(), 0.5, geodesics=12)
+    assert labels(ax) == ["geodesics", "order 1: 4 cusps", "order 2: 4 cusps"]
+    assert ax.get_aspect() == 1.0
+    x, y = curves(ax, "order 1: 4 cusps")[0]
+    # The cusps on the equator: the equator's conjugate time is pi epsilon, so theta = pi/2 or, westward, 3 pi/2.
+    assert abs(np.abs(x).max() - 0.5 * np.pi) < 1e-3
+    faint = [np.array(line.get_data()) for line in ax.lines if line.get_linewidth() == 0.6]
+    assert len(faint) == 12
+    for east, north in faint:
+        assert np.hypot(x[:, None] - east, y[:, None] - north).min() < 0.02
+    assert max(np.abs(east[0]) for east, _ in faint) == pytest.approx(np.pi, abs=1e-14)
+    for index, (_, north) in enumerate(faint):
+        # Clairaut: the parallel where a geodesic turns has the latitude of its direction at the start.
+        steepest = np.arcsin(np.sin(2.0 * np.pi * (index + 0.5) / 12))
+        assert abs(north.max() - abs(steepest)) < 1e-3
+        assert north[1] * steepest > 0.0
+    assert plot_ellipsoid_locus(column_axes(), 1.5, (1,), latitude=0.3, geodesics=0).lines
+
+
+@pytest.mark.parametrize(("aspect", "latitude"), [(0.5, 0.0), (1.5, 0.4)])
+def test_the_ordinate_is_the_parametric_latitude(aspect, latitude):
+    """The meridian's length up to it, by the elliptic integral, is the phi of the conjugate points."""
+    x, y = curves(plot_ellipsoid_locus(column_axes(), aspect, (1,), latitude=latitude), "order 1: 4 cusps")[0]
+    points = conjugate_locus(ellipsoid(aspect), 400, 1, latitude).points
+    phi = meridian_length(aspect, 0.5 * np.pi) - meridian_length(aspect, 0.5 * np.pi - y[:-1])
+    assert np.abs(phi - points.latitude).max() < 1e-12
+    assert np.abs(np.sin(x[:-1] - np.pi - points.longitude)).max() < 1e-12
+
+
+@pytest.fixture
+def corners(monkeypatch):
+    """The corners of the meshes that a caustic is drawn with, (Q, 4, 3), and the axes."""
+
+    def drawn(moments, circles):
+        made = []
+
+        class Recorded(art3d.Poly3DCollection):
+            def __init__(self, verts, **look):
+                made.append(np.array(verts))
+                super().__init__(verts, **look)
+
+        monkeypatch.setattr(art3d, "Poly3DCollection", Recorded)
+        ax = plot_caustic(column_axes(3.6, projection="3d"), moments, circles=circles)
+        assert len(ax.collections) == len(made) == 1
+        return made[0], ax
+
+    return drawn
+
+
+def test_the_caustic_of_an_axisymmetric_body_is_that_of_the_closed_form(corners):
+    metric, closed = left_invariant_metric((2.0, 2.0, 1.0)), axisymmetric_metric(2.0, 1.0)
+    drawn = corners((2.0, 2.0, 1.0), 16)[0].reshape(-1, 3)
+    assert np.linalg.norm(drawn, axis=-1).max() <= np.pi
+    polar = (np.arange(16) + 0.5) * np.pi / 16
+    around = np.linspace(0.0, 2.0 * np.pi, 33)
+    velocity = [(np.cos(a), np.sin(a) * np.cos(b), np.sin(a) * np.sin(b)) for a in polar for b in around]
+    momentum = np.array(velocity) * np.sqrt([2.0, 2.0, 1.0])
+    expected = so3.log(metric.attitude(momentum, closed.conjugate_time(momentum)))
+    # Next to the ball's surface the sign is rounding, and meshes that pass it are left out.
+    for point in drawn[::7]:
+        gaps = np.minimum(np.abs(expected - point).max(axis=1), np.abs(expected + point).max(axis=1))
+        assert gaps.min() < 1e-9
+    inner = expected[np.linalg.norm(expected, axis=1) < 1.2]
+    for point in inner:
+        assert np.abs(drawn - point).max(axis=1).min() < 1e-9
+
+
+def test_meshes_of_the_caustic_do_not_pass_the_boundary_of_the_ball(corners):
+    quads, _ = corners(MOMENTS, 10)
+    assert 100 < len(quads) < 9 * 20
+    assert np.linalg.norm(quads - np.roll(quads, 1, axis=1), axis=-1).max() < np.pi
+    quads, ax = corners((1.2, 1.1, 1.0), 10)
+    assert len(quads) == 9 * 20
+    assert ax.get_xlim()[1] < 1.2
+    # In a convex mesh whose corners go round, the diagonals together are longer than two opposite sides.
+    side = np.linalg.norm(quads - np.roll(quads, 1, axis=1), axis=-1)
+    diagonals = np.linalg.norm(quads[:, 0] - quads[:, 2], axis=-1) + np.linalg.norm(quads[:, 1] - quads[:, 3], axis=-1)
+    assert np.mean(diagonals > np.maximum(side[:, 0] + side[:, 2], side[:, 1] + side[:, 3])) > 0.8
+
+
+def test_renaming_the_axes_turns_the_caustic(corners):
+    first, turned = corners((1.3, 1.1, 1.0), 8)[0], corners((1.0, 1.3, 1.1), 8)[0]
+    assert np.abs(turned[..., [1, 2, 0]] - first).max() < 1e-9
+
+
+def test_the_sub_riemannian_caustic_lies_on_the_forbidden_axis(corners):
+    """Where I_3 >= I_1 the geodesics of one axial momentum meet on the axis (theory.md section 7)."""
+    drawn = corners((1.0, 1.0, np.inf), 12)[0].reshape(-1, 3)
+    assert np.abs(drawn[:, :2]).max() < 1e-7
+    assert np.ptp(drawn[:, 2]) > 3.0
+
+
+def test_figures_refuse_what_they_cannot_draw():
+    flat, deep = column_axes(), column_axes(projection="3d")
+    for draw in (
+        lambda: plot_conjugate_locus(deep, MOMENTS),
+        lambda: plot_ellipsoid_locus(deep, 0.5),
+        lambda: plot_caustic(flat, MOMENTS),
+        lambda: plot_conjugate_locus(Figure(), MOMENTS),
+        lambda: plot_conjugate_locus(flat, (3.0, 3.0, 1.0)),
+        lambda: plot_conjugate_locus(flat, MOMENTS, 0),
+        lambda: plot_conjugate_locus(flat, MOMENTS, momenta=[-1.5]),
+        lambda: plot_conjugate_locus(flat, MOMENTS, momenta=[1.2]),
+        lambda: plot_conjugate_locus(flat, MOMENTS, geodesics=-1),
+        lambda: plot_ellipsoid_locus(flat, 1.0),
+        lambda: plot_ellipsoid_locus(flat, 0.5, ()),
+        lambda: plot_ellipsoid_locus(flat, 0.5, geodesics=0.5),
+        lambda: plot_caustic(deep, MOMENTS, circles=1),
+        lambda: plot_caustic(deep, (1.0, np.inf, np.inf)),
+    ):
+        with pytest.raises(ShapeError):
+            draw()
+    assert not flat.lines
+    assert not deep.lines
+
+
+def test_the_command_prints_the_reference_table():
+    said = conjugate_command(*MOMENTS, momenta=tuple(TABLE[:, 0]))
+    rows = [[float(word) for word in line.split()] for line in said.text.splitlines()[4:9]]
+    printed = np.array(rows)
+    assert np.abs(printed[:, [0, 1, 2]] - TABLE[:, :3]).max() < 1e-9
+    assert np.abs(printed[:, [4, 5]] - TABLE[:, 3:]).max() < 6e-7
+    data = json.loads(json.dumps(said.data))
+    for name, column in (("p", 0), ("period", 1), ("first_return_rad", 2), ("conjugate_time", 3), ("phi", 4)):
+        assert np.abs(np.array(data[name]) - printed[:, column]).max() < 1e-9
+    assert data["figure"] is None
+    # At the conjugate time the Jacobi field of the geodesic is 0.
+    metric = serret_andoyer_metric(MOMENTS)
+    assert np.abs(metric.geodesics(data["p"]).jacobi_field(data["conjugate_time"])).max() < 1e-10
+
+
+def test_the_command_chooses_momenta_and_writes_the_figure(tmp_path, capsys):
+    out = tmp_path / "locus.svg"
+    said = conjugate_command(*MOMENTS, order=2, out=out)
+    assert out.read_bytes().startswith(b"<?xml")
+    assert b"<dc:date>" not in out.read_bytes()
+    assert capsys.readouterr().err.startswith(f"wrote {out} (")
+    assert "phi = 2.064614101" in said.text or "phi = 2.064614102" in said.text
+    assert said.data["p"][0] == np.sqrt(3.0)
+    assert abs(said.data["theta_rad"][0] - 2.0 * np.pi) < 1e-7
+    assert np.all(np.diff(said.data["theta_rad"]) > 0.0)
+    for ending in ("png", "pdf"):
+        conjugate_command(*MOMENTS, order=2, out=tmp_path / f"locus.{ending}")
+        assert (tmp_path / f"locus.{ending}").stat().st_size > 1000
+    ax = plot_conjugate_locus(column_axes(2.8), MOMENTS, 2, momenta=said.data["p"])
+    ax.figure.savefig(tmp_path / "direct.png", dpi=300)
+    assert (tmp_path / "direct.png").read_bytes() == (tmp_path / "locus.png").read_bytes()
+
+
+def test_the_command_takes_moments_in_any_order():
+    said, other = conjugate_command(*MOMENTS), conjugate_command(*MOMENTS[::-1])
+    assert other.data["moments_kg_m2"] == list(MOMENTS[::-1])
+    assert said.text.splitlines()[1:] == other.text.splitlines()[1:]
+
+
+def test_the_command_is_read_from_words():
+    app = App(result_action="return_value")
+    app.command(conjugate_command, name="conjugate")
+    said = app(["conjugate", "3", "2", "1", "--momenta", "1.5", "1.6", "--order", "1", "--json"], exit_on_error=False)
+    assert said.data["p"] == [1.5, 1.6]
+
+
+def test_the_command_refuses_with_a_reason(tmp_path):
+    with pytest.raises(ShapeError, match=r"1\.41421 < p <= 1\.73205"):
+        conjugate_command(*MOMENTS, momenta=(1.5, 1.2))
+    with pytest.raises(ShapeError, match="--momenta"):
+        conjugate_command(*MOMENTS, momenta=(1.5, 1.8))
+    with pytest.raises(ShapeError, match="three different moments"):
+        conjugate_command(2.0, 2.0, 3.0)
+    with pytest.raises(UnknownNameError, match="--out"):
+        conjugate_command(*MOMENTS, out=tmp_path / "locus.txt")
+    with pytest.raises(InputFileNotFoundError):
+        conjugate_command(*MOMENTS, out=tmp_path / "nowhere" / "locus.svg")
+    with pytest.raises(ShapeError, match="order"):
+        conjugate_command(*MOMENTS, order=0)
