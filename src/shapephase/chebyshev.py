@@ -12,8 +12,7 @@ from .display import short_repr
 
 # Numbers in the largest intermediate array of an evaluation: 16 megabytes.
 _CHUNK = 2_000_000
-MARGIN_OF_WIDTH = 1e-3
-"""Of an interval's width: times are not moved farther inside than this."""
+MARGIN_OF_WIDTH = 1e-3  # of an interval's width: times are not moved farther inside than this
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,8 +21,7 @@ from .errors import SingularInertiaError
 _WELL_CONDITIONED = 1e-3
 """Determinant, relative to the cube of the trace, above which the condition number is at most some hundred, and so is
 the factor by which the adjugate magnifies rounding."""
-_SINGULAR = 1e-12
-"""Least ratio of the smallest to the largest moment: below it the inverse has no correct digits left."""
+_SINGULAR = 1e-12  # least ratio of the smallest to the largest moment: below it the inverse has no correct digits left
 
 
 def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
@@ -88,8 +87,6 @@ def second_moment(inertia: Array) -> Array:
     Any real distribution of mass has J positive semidefinite, which is the triangle inequality of the
     principal moments. Source: theory.md A4.
 
-    Notes
-    -----
     Equation :eq:`triangle` of the documentation.
 
     Examples
@@ -116,14 +113,12 @@ def triangle_defect(inertia: Array) -> Array:
 def principal_axes(inertia: Array) -> tuple[Array, Array]:
     """Principal moments, ascending, and a proper frame of principal axes.
 
+    Source: theory.md A11 (Marsden and Ratiu, section 15.3).
+
     Returns
     -------
     moments : (..., 3) [kg m^2]
     axes : (..., 3, 3), columns are the axes, determinant +1: inertia = axes diag(moments) axes^T
-
-    Notes
-    -----
-    Source: theory.md A11 (Marsden and Ratiu, section 15.3).
 
     Examples
     --------
@@ -142,15 +137,13 @@ def ascending_moments(moments: Array) -> tuple[Array, NDArray[np.intp], Array]:
     Vectors v on the given axes are v[order] on the ordered ones. Those are right-handed only for an even permutation:
     formulas that need a proper rotation multiply one of the axes by the parity.
 
+    Source: theory.md section 1 (table of conventions).
+
     Returns
     -------
     ascending : (..., 3) [kg m^2]
     order : (..., 3) indices with ascending = moments[order]; equal moments keep their order
     parity : (...) 1 for an even permutation, -1 for an odd one
-
-    Notes
-    -----
-    Source: theory.md section 1 (table of conventions).
 
     Examples
     --------

@@ -9,8 +9,7 @@ import numpy as np
 from .arrays import Array
 from .errors import AccuracyNotReached
 
-ROUNDING = 2e-16
-"""The floor for an angle in [-pi/2, pi/2]."""
+ROUNDING = 2e-16  # the floor for an angle in [-pi/2, pi/2]
 _STEPS = 120
 _CLOSE = 6e-16
 

@@ -23,8 +23,7 @@ Curve = Callable[[Array], tuple[Array, Array]]
 
 _GAUSS = np.polynomial.legendre.leggauss(8)
 """Nodes in [-1, 1] and weights of `gauss_nodes`; exact for polynomials of degree 15."""
-_MAGNUS_NODES = np.polynomial.legendre.leggauss(3)[0]
-"""Nodes in [-1, 1] of the sixth-order Magnus step in `transport`."""
+_MAGNUS_NODES = np.polynomial.legendre.leggauss(3)[0]  # nodes in [-1, 1] of the sixth-order Magnus step in `transport`
 _HALVINGS = 12
 """Most times that all steps are halved: a curve that needs steps 4096 times shorter has a kink between its edges."""
 
@@ -145,6 +144,8 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     It takes the curve's start to its end, as the sphere rolls along without twisting; round a closed curve it is a turn
     about the start by the enclosed area.
 
+    Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
+
     Parameters
     ----------
     curve : as for `curve_area`
@@ -155,10 +156,6 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     ------
     AccuracyNotReached
         If the rotation has not converged after the steps were halved twelve times.
-
-    Notes
-    -----
-    Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
 
     Examples
     --------
@@ -250,5 +247,4 @@ def fibonacci_directions(count: int) -> Array:
     return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height], axis=-1)
 
 
-REFERENCES = fibonacci_directions(642)
-"""Those that `far_reference` chooses from: (642, 3)."""
+REFERENCES = fibonacci_directions(642)  # those that `far_reference` chooses from: (642, 3)

@@ -140,6 +140,9 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
 
         phi' = l cos(theta) (1/I_i - 1/I_k + (1/I_j - 1/I_i) sin(phi)^2).
 
+    Equation :eq:`azimuth` of the documentation.
+    Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
+
     Parameters
     ----------
     moments : (..., 3) about the three axes [kg m^2]
@@ -150,11 +153,6 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
     ------
     ShapeError
         Along the axis, where there is no azimuth, and for a moment that is not above zero.
-
-    Notes
-    -----
-    Equation :eq:`azimuth` of the documentation.
-    Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
 
     Examples
     --------
@@ -181,14 +179,12 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
     With n the part of I^-1 that couples the axis with the plane across, A' the part of I^-1 in that plane, p the
     direction of Pi in it, and w = I^-1 L_o, phi' = Pi_k (p.A'p - 1/I_k) up to (l |n| + |w|)/sin(theta).
 
+    Source: Cabrera 2006, equation (14) with theory.md C-E4; E10, E12.
+
     Raises
     ------
     ShapeError
         If no axis is certain.
-
-    Notes
-    -----
-    Source: Cabrera 2006, equation (14) with theory.md C-E4; E10, E12.
 
     Examples
     --------
@@ -222,8 +218,6 @@ def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
 
     Source: Cabrera 2006, remark 4.1, as corrected in theory.md C-E10; E12.
 
-    Notes
-    -----
     Equation :eq:`return-time` of the documentation.
 
     Examples

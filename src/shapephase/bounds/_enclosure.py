@@ -177,6 +177,8 @@ def enclosure(
 ) -> Enclosure:
     """Bounds of the channels of a deformation and of their rates over an interval.
 
+    Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
+
     Parameters
     ----------
     interval : (start, end) [s]; None: [0, duration]
@@ -189,10 +191,6 @@ def enclosure(
     ------
     AccuracyNotReached
         If the deformation is too rough between its breaks to be sampled.
-
-    Notes
-    -----
-    Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
     """
     start, end = interval_argument(interval, deformation.duration)
     sampled = deformation.sampler().samples(magnitude or 1.0, tolerance).interpolant

@@ -97,6 +97,8 @@ def energy_bounds(
 ) -> EnergyBounds:
     """Bounds of the energy E_t = Pi.I^-1 Pi/2 over an interval, before any motion is computed.
 
+    Source: Cabrera 2006, section 4.1 (the rate of E_t); theory.md E3, E9.
+
     Parameters
     ----------
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
@@ -110,10 +112,6 @@ def energy_bounds(
         For arguments of the wrong shape, an attitude that is not a rotation, or times outside the deformation.
     AccuracyNotReached
         If the deformation is too rough between its breaks to be sampled.
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 4.1 (the rate of E_t); theory.md E3, E9.
 
     Examples
     --------

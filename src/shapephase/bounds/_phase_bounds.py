@@ -105,14 +105,12 @@ def solid_angle_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     2 pi (1 - cos(theta)) for the least and the greatest angle possible between Pi and the axis, negative about the
     axis of the smallest moment.
 
+    Source: theory.md E8, E13.
+
     Raises
     ------
     ShapeError
         If no axis is certain, or the sense in which Pi circles it is not.
-
-    Notes
-    -----
-    Source: theory.md E8, E13.
 
     Examples
     --------

@@ -75,6 +75,8 @@ def bounds(
 
     Bounds that need a certain axis, or a full turn about it, are listed only where there is one.
 
+    Source: theory.md E3, E6 to E14.
+
     Parameters
     ----------
     motion : of one momentum, no batch
@@ -85,10 +87,6 @@ def bounds(
     ------
     ShapeError
         If the motion is a batch, or has no momentum, so that there is nothing to bound.
-
-    Notes
-    -----
-    Source: theory.md E3, E6 to E14.
 
     Examples
     --------

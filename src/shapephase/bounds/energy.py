@@ -118,8 +118,6 @@ def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
 
     Source: Cabrera 2006, section 4.1, with L_o where L(d_0) is printed (theory.md C-E9); E3.
 
-    Notes
-    -----
     Equation :eq:`energy-rate` of the documentation.
 
     Examples
@@ -147,8 +145,6 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
     Raises GaugeError if the deformation is known by its inertia only.
     Source: Cabrera 2006, equation (4), with the missing half (theory.md C-E1); A6.
 
-    Notes
-    -----
     Equation :eq:`energies` of the documentation.
 
     Examples
@@ -170,14 +166,12 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
 def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) -> Array:
     """l^2/(2 I_2(t)), the energy on the separatrix of the body frozen at each time: times (...) -> (...) [J].
 
+    Equation :eq:`homoclinic` of the documentation.
+    Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
+
     Parameters
     ----------
     magnitude : l, the momentum's norm [kg m^2/s]
-
-    Notes
-    -----
-    Equation :eq:`homoclinic` of the documentation.
-    Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
 
     Examples
     --------
@@ -194,14 +188,12 @@ def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) 
 def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, count: int = 200) -> FrozenPolhode:
     """The level set of E_t through Pi: its polhode if the body stayed rigid with the inertia of time t.
 
+    Source: Cabrera 2006, section 4.1; theory.md E4.
+
     Parameters
     ----------
     momentum : (3,) Pi(t), base axes [kg m^2/s]
     count : number of points, 2 or more
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 4.1; theory.md E4.
 
     Examples
     --------

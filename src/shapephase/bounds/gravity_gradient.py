@@ -247,6 +247,8 @@ class GravityTorque:
 def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
     """Kepler's equation E - e sin(E) = M, or e sinh(H) - H = M for e > 1, solved for E or H to rounding.
 
+    Newton's method from above the root, where the function is convex, so that it always converges.
+
     Parameters
     ----------
     mean_anomaly : (...) [rad]; E is in the same revolution
@@ -256,10 +258,6 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
     ------
     ShapeError
         For a negative eccentricity, or 1.
-
-    Notes
-    -----
-    Newton's method from above the root, where the function is convex, so that it always converges.
 
     Examples
     --------
@@ -345,6 +343,8 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
     becomes exp(eps) R with eps' = R I^-1 R^T (dmu + mu x eps): to first order, with the growth of eps along the
     motion. The change of the torque with the attitude is left out: trust it while `attitude_error` is well below 1.
 
+    Source: Cabrera 2006, remark 4.7; theory.md A16; the equation of eps by linearising theory.md section 2.
+
     Parameters
     ----------
     motion : of one body, not a batch; with the inertial axes and the t = 0 of the orbit
@@ -357,10 +357,6 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
         For a batch of motions.
     AccuracyNotReached
         If the estimate would take too many steps.
-
-    Notes
-    -----
-    Source: Cabrera 2006, remark 4.7; theory.md A16; the equation of eps by linearising theory.md section 2.
 
     Examples
     --------

@@ -196,18 +196,16 @@ def regime_certificate(
 
     No motion is computed: E_t, and the energy at which Pi could cross to the other side, are bounded over the interval.
 
+    Raises as `energy_bounds`.
+
+    Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.
+
     Parameters
     ----------
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
     attitude : (3, 3) at the start of the interval; None: the identity
     interval : (start, end) [s]; None: [0, duration]
     resolution : as for `enclosure`; smaller is sharper and slower
-
-    Notes
-    -----
-    Raises as `energy_bounds`.
-
-    Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.
 
     Examples
     --------

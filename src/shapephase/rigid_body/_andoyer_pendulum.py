@@ -52,15 +52,13 @@ class AndoyerPendulum:
     def coordinates(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
         """G, y in (-pi, pi] and p_y of body momenta: (..., 3) -> (...), (...) [rad], (...) [kg m^2/s].
 
+        Source: Bonnard et al., before (5).
+
         Raises
         ------
         ShapeError
             If a momentum is along the axis of the smallest moment, where y is undefined, or is not three finite
             numbers.
-
-        Notes
-        -----
-        Source: Bonnard et al., before (5).
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         smallest, middle, largest = np.moveaxis(pi[..., self._order], -1, 0)

@@ -13,10 +13,8 @@ from ..arguments import check_function
 from ..arrays import Array, finite_array
 from ..errors import AccuracyNotReached, ShapeError
 
-_TOLERANCE = 3e-14
-"""Relative tolerance of a step; SciPy warns below 2.2e-14 (100 eps) and raises the value."""
-_STEPS = 20_000
-"""Most steps from one time to the next; a motion that needs more is too stiff for an explicit method."""
+_TOLERANCE = 3e-14  # relative tolerance of a step; SciPy warns below 2.2e-14 (100 eps) and raises the value
+_STEPS = 20_000  # most steps from one time to the next; a motion that needs more is too stiff for an explicit method
 
 
 def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Array | float | None = None) -> Array:

@@ -27,17 +27,12 @@ from ..arrays import Array, lock_arrays
 from ..errors import AccuracyNotReached
 
 _EPS = float(np.finfo(float).eps)
-_REAL = 1e-9
-"""Relative imaginary part below which a root of the quartic is tried as a real one."""
+_REAL = 1e-9  # relative imaginary part below which a root of the quartic is tried as a real one
 _METRIC = np.diag([1.0, 1.0, 1.0, -1.0])
-_DOUBLE = 1e-13
-"""Relative discriminant below which two roots are one: some hundred roundings."""
-_BISECTIONS = 60
-"""Halvings of an arc of the circle, which leave rounding."""
-_GOOD = 1e-9
-"""How near the curve must pass by its start to be ours."""
-_AXES = 48
-"""Directions among which the one is chosen that the attitude is counted by."""
+_DOUBLE = 1e-13  # relative discriminant below which two roots are one: some hundred roundings
+_BISECTIONS = 60  # halvings of an arc of the circle, which leave rounding
+_GOOD = 1e-9  # how near the curve must pass by its start to be ours
+_AXES = 48  # directions among which the one is chosen that the attitude is counted by
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -22,8 +22,7 @@ from ..inertia_tensor import ascending_moments
 from ..roots import safe_newton
 from ._momentum_orbit import momentum_orbit
 
-_FARTHEST = 300.0
-"""Logarithm of the largest tan(psi), and cot(psi), that matter: squares of both are numbers."""
+_FARTHEST = 300.0  # logarithm of the largest tan(psi), and cot(psi), that matter: squares of both are numbers
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,9 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     Between two flips Pi circles the axis of the largest or of the smallest moment by half a turn, 2K of the elliptic
     functions. The distance from the separatrix is computed without rounding; parts of Pi below 1e-140 count as zero.
 
+    Source: Marsden and Ratiu, section 15.8 and section 15.9 remark 1, whose I1 >= I2 >= I3 are our I3, I2, I1;
+    theory.md L4.
+
     Parameters
     ----------
     moments : (..., 3) principal moments in any order, any positive numbers [kg m^2]
@@ -74,11 +76,6 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
         If shapes or entries are wrong.
     SingularInertiaError
         If a moment is not positive.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, section 15.8 and section 15.9 remark 1, whose I1 >= I2 >= I3 are our I3, I2, I1;
-    theory.md L4.
 
     Examples
     --------
@@ -138,6 +135,8 @@ def twist_defect(moments: ArrayLike) -> Array:
 
         pi = artanh(u sqrt(a)/sqrt(a + b - b u^2))/sqrt(a b) - arcsin(u sqrt(b/(a + b))).
 
+    Source: Van Damme, Mardesic and Sugny 2017; Ashbaugh, Chicone and Cushman 1991; theory.md section 7.
+
     Parameters
     ----------
     moments : (..., 3) three different principal moments in any order [kg m^2]
@@ -150,10 +149,6 @@ def twist_defect(moments: ArrayLike) -> Array:
     ------
     ShapeError
         If two moments are equal: there is no intermediate axis.
-
-    Notes
-    -----
-    Source: Van Damme, Mardesic and Sugny 2017; Ashbaugh, Chicone and Cushman 1991; theory.md section 7.
 
     Examples
     --------
@@ -194,6 +189,8 @@ def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
 
     an integral in Carlson's forms. For c > 0 the racket twists on and on; for c < 0 it swings to and fro.
 
+    Source: Van Damme, Mardesic and Sugny 2017; theory.md section 7.
+
     Parameters
     ----------
     moments : (..., 3) three different principal moments in any order [kg m^2]
@@ -207,10 +204,6 @@ def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
     ------
     ShapeError
         If two moments are equal, or there is no momentum.
-
-    Notes
-    -----
-    Source: Van Damme, Mardesic and Sugny 2017; theory.md section 7.
 
     Examples
     --------

@@ -172,6 +172,8 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
 def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     """The area between the two separatrices, on the side of one principal axis [sr].
 
+    Source: theory.md section 7.
+
     Parameters
     ----------
     moments : (3,) in any order, above 0, not all equal [kg m^2]
@@ -181,10 +183,6 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     ------
     ShapeError
         If the moments are not such numbers, or the axis is the intermediate one.
-
-    Notes
-    -----
-    Source: theory.md section 7.
 
     Examples
     --------
@@ -253,6 +251,8 @@ def weierstrass_form(moments: ArrayLike, momentum: ArrayLike) -> WeierstrassForm
     With Pi_i' = a_i Pi_j Pi_k all three Pi_i^2 change in step: Pi_i^2 = (y - e_i)/(a_j a_k) with one y, and the product
     of Euler's equations says y'^2 = 4 (y - e_1)(y - e_2)(y - e_3).
 
+    Source: Bonnard, Cots and Shcherbakova 2013, section 3.5; Lawden 1989; theory.md H14.
+
     Parameters
     ----------
     moments : (3,) three different principal moments by body axis [kg m^2]
@@ -262,10 +262,6 @@ def weierstrass_form(moments: ArrayLike, momentum: ArrayLike) -> WeierstrassForm
     ------
     ShapeError
         If two moments are equal, or the momentum stands still or is on the separatrix, where P has no period.
-
-    Notes
-    -----
-    Source: Bonnard, Cots and Shcherbakova 2013, section 3.5; Lawden 1989; theory.md H14.
 
     Examples
     --------

@@ -23,8 +23,7 @@ from ..elliptic import complete_k, complete_pi, incomplete_f, incomplete_pi, jac
 from ..errors import ShapeError
 from .lagrange_top import LagrangeTop
 
-_UNIT = 1e-6
-"""Farthest from 1 that the length of a vertical may be: six digits, as people write them, are enough."""
+_UNIT = 1e-6  # farthest from 1 that the length of a vertical may be: six digits, as people write them, are enough
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ from ..display import short_repr
 from ..errors import ChartPoleError, ShapeError
 from ..inertia_tensor import inverse_inertia
 
-_NEAREST = 1e-8
-"""Sine of theta up to which angles are not coordinates: dividing by it costs half of the sixteen digits."""
+_NEAREST = 1e-8  # sine of theta up to which angles are not coordinates: dividing by it costs half of the sixteen digits
 _AT_POLE = 1e-15
 """Sine of half the angle to a pole, up to which an attitude is at it: the rounding of an attitude is as large."""
 
@@ -53,14 +52,12 @@ class EulerChart:
     def attitude(self, angles: ArrayLike) -> Array:
         """The rotation from body to inertial axes: (..., 3) [rad] -> (..., 3, 3). Any real angles, poles included.
 
+        Source: Marsden and Ratiu (15.6.1-5), R = P^T; Bonnard et al., section 3.3.
+
         Raises
         ------
         ShapeError
             If the last axis is not three finite numbers; so do all methods.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu (15.6.1-5), R = P^T; Bonnard et al., section 3.3.
         """
         phi, theta, psi = np.moveaxis(finite_array(angles, "angles", (3,), unit="rad"), -1, 0)
         half_sum, half_difference, half = 0.5 * (phi + psi), 0.5 * (phi - psi), 0.5 * theta
@@ -187,14 +184,12 @@ class EulerChart:
         p_phi is the component of the momentum along the inertial third axis, p_psi that along the body's, p_theta that
         along the line of nodes.
 
+        Source: Marsden and Ratiu (15.7.3).
+
         Raises
         ------
         ChartPoleError
             Within 1e-8 of a pole.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu (15.7.3).
         """
         angles, momentum = _pair(angles, body_momentum, "body_momentum", "kg m^2/s")
         self._refuse_poles(angles)
@@ -203,14 +198,12 @@ class EulerChart:
     def body_momentum(self, angles: ArrayLike, momenta: ArrayLike) -> Array:
         """Pi of (p_phi, p_theta, p_psi), the inverse of `conjugate_momenta`: (..., 3), (..., 3) -> (..., 3) [kg m^2/s].
 
+        Source: Marsden and Ratiu (15.7.4); for ZYZ the brackets in Bonnard et al., proposition 6.
+
         Raises
         ------
         ChartPoleError
             Within 1e-8 of a pole.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu (15.7.4); for ZYZ the brackets in Bonnard et al., proposition 6.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
         self._refuse_poles(angles)
@@ -224,14 +217,12 @@ class EulerChart:
         With D = [[0, 1], [-1, 0]] and this matrix M, M D M^T = hat(Pi): Pi as a function of angles and momenta takes
         the canonical bracket to the minus Lie-Poisson bracket.
 
+        Source: Marsden and Ratiu, exercise 15.7-1.
+
         Raises
         ------
         ChartPoleError
             Within 1e-8 of a pole.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu, exercise 15.7-1.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
         self._refuse_poles(angles)
@@ -252,14 +243,12 @@ class EulerChart:
     def kinetic_energy(self, inertia: ArrayLike, angles: ArrayLike, rates: ArrayLike) -> Array:
         """Omega.I Omega / 2 of angles and their rates: (..., 3, 3), (..., 3), (..., 3) -> (...) [J]. Poles included.
 
+        Source: Marsden and Ratiu (15.3.3) with (15.7.2).
+
         Raises
         ------
         UnphysicalInertiaError, SingularInertiaError
             If an inertia is not symmetric, or not positive definite.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu (15.3.3) with (15.7.2).
         """
         angles, rates = _pair(angles, rates, "rates", "rad/s")
         tensor = _inertia(inertia, angles)
@@ -269,16 +258,14 @@ class EulerChart:
     def hamiltonian(self, inertia: ArrayLike, angles: ArrayLike, momenta: ArrayLike) -> Array:
         """The kinetic energy of angles and conjugate momenta: (..., 3, 3), (..., 3), (..., 3) -> (...) [J].
 
+        Source: Marsden and Ratiu (15.7.5), (15.7.6); Bonnard et al., proposition 6.
+
         Raises
         ------
         ChartPoleError
             Within 1e-8 of a pole.
         UnphysicalInertiaError, SingularInertiaError
             If an inertia is not symmetric, or not positive definite.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu (15.7.5), (15.7.6); Bonnard et al., proposition 6.
         """
         momentum = self.body_momentum(angles, momenta)
         inverse = inverse_inertia(_inertia(inertia, momentum))
@@ -289,16 +276,14 @@ class EulerChart:
 
         [rad/s], [kg m^2/s^2]; the inertia [kg m^2] in body axes.
 
+        Source: Marsden and Ratiu, section 15.7, Hamilton's canonical equations.
+
         Raises
         ------
         ChartPoleError
             Within 1e-8 of a pole.
         UnphysicalInertiaError, SingularInertiaError
             If an inertia is not symmetric, or not positive definite.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu, section 15.7, Hamilton's canonical equations.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
         momentum = self.body_momentum(angles, momenta)
@@ -311,14 +296,12 @@ class EulerChart:
 
         The two angles that Pi alone determines; phi advances by `precession_rate`. At a pole psi is 0.
 
+        Source: Bonnard et al., before (4), with H_3 = +|H| cos phi_2; theory.md B-E3.
+
         Raises
         ------
         ShapeError
             If a momentum is zero.
-
-        Notes
-        -----
-        Source: Bonnard et al., before (4), with H_3 = +|H| cos phi_2; theory.md B-E3.
         """
         momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
         if np.any(np.all(momentum == 0.0, axis=-1)):
@@ -359,11 +342,9 @@ class EulerChart:
             )
 
 
-ZXZ = EulerChart("zxz", (1.0, 0.0))
-"""R = R_z(phi) R_x(theta) R_z(psi): Marsden and Ratiu, section 15.6."""
+ZXZ = EulerChart("zxz", (1.0, 0.0))  # R = R_z(phi) R_x(theta) R_z(psi): Marsden and Ratiu, section 15.6
 
-ZYZ = EulerChart("zyz", (0.0, 1.0))
-"""R = R_z(phi) R_y(theta) R_z(psi): Bonnard et al., section 3.3."""
+ZYZ = EulerChart("zyz", (0.0, 1.0))  # R = R_z(phi) R_y(theta) R_z(psi): Bonnard et al., section 3.3
 
 
 def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Array:
@@ -371,14 +352,12 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
 
     The same in both charts, for the inertial third axis along the momentum.
 
+    Source: Bonnard et al. (4), its last form, which needs no distinction of cases.
+
     Raises
     ------
     ChartPoleError
         If the body's third axis is within 1e-8 of the momentum's line.
-
-    Notes
-    -----
-    Source: Bonnard et al. (4), its last form, which needs no distinction of cases.
 
     Examples
     --------
@@ -402,14 +381,12 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
 def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
     """{F, G} = F_q.G_p - F_p.G_q from gradients by n coordinates and their n momenta: (..., 2n), (..., 2n) -> (...).
 
+    Source: Marsden and Ratiu (15.7.7).
+
     Raises
     ------
     ShapeError
         If the gradients have different or odd lengths.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.7.7).
 
     Examples
     --------

@@ -33,14 +33,15 @@ _TURNS = 1e12
 _EQUAL = 4.0 * float(np.finfo(float).eps)
 """Moments of a tensor that is not diagonal closer than this, relative to the largest, count as equal: `eigh` errs by
 as much."""
-_BLOCK = 16_384
-"""Times evaluated together: the arrays of so many (half a megabyte each) stay in a processor's cache."""
+_BLOCK = 16_384  # times evaluated together: the arrays of so many (half a megabyte each) stay in a processor's cache
 
 
 class EulerTop:
     """A free rigid body with a given inertia, angular momentum and initial attitude.
 
     Every inertia and momentum is allowed, also zero momentum; times may be negative.
+
+    Equations :eq:`jacobi` and :eq:`rigid-phase` of the documentation.
 
     Parameters
     ----------
@@ -62,10 +63,6 @@ class EulerTop:
         For arrays of the wrong shape or entries that are not finite numbers.
     UnphysicalInertiaError, SingularInertiaError
         If the inertia is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Equations :eq:`jacobi` and :eq:`rigid-phase` of the documentation.
 
     Examples
     --------

@@ -22,8 +22,7 @@ from ..errors import ShapeError
 from ._gyrostat_orbit import GyrostatOrbit, Swing, best_axis, gyrostat_orbit, swing_about
 from .euler_top import _array, _attitude, _principal
 
-_TURNS = 1e12
-"""Turns of the body [1] after which times are refused, as of `EulerTop`."""
+_TURNS = 1e12  # turns of the body [1] after which times are refused, as of `EulerTop`
 _STILL = 16.0 * float(np.finfo(float).eps)
 """Of the momentum's speed, relative to its terms: below it the momentum stands still to rounding."""
 _SYMMETRIC = 4.0 * float(np.finfo(float).eps)
@@ -36,6 +35,8 @@ class Gyrostat:
     Two wheels are described by this. One whose speed relative to the body is kept: `inertia` has the wheel in it, and
     `rotor` is its moment times that speed along its axle. One that turns freely, whose momentum about the axle p is
     constant: `inertia` is without the wheel's moment J about its axle, I - J a a^T, and `rotor` is p a.
+
+    Source: Volterra 1899; Wittenburg 1977.
 
     Parameters
     ----------
@@ -63,10 +64,6 @@ class Gyrostat:
         Within some 3e-5 rad of a steady rotation, where the oval is so small that its digits are lost (from 1e-2 rad
         on the error of the start grows as the inverse square of that angle), or of a body so nearly symmetric that it
         is nearly a circle; `reconstruct` with `prescribed` has no such limit.
-
-    Notes
-    -----
-    Source: Volterra 1899; Wittenburg 1977.
 
     Examples
     --------

@@ -24,32 +24,27 @@ from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..letters import what_came
 
-_FLOOR = 3e-14
-"""Relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14."""
+_FLOOR = 3e-14  # relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14
 _RATIO = 32.0
 """Ratio of the local tolerances of the two runs of a motion, far enough apart that their difference shows the error."""
 _SHARE = 0.1
 """Share of the runs' difference given as the error of the finer one: measured it is about 1/32, so this is cautious."""
-_FIRST = 0.01
-"""Local tolerance of the first try, relative to that of the whole motion: errors of steps add up."""
-_AIM = 0.3
-"""Error aimed at when a try is repeated, relative to the tolerance, so that one repetition mostly suffices."""
-_DROP = 1e-3
-"""Most that the local tolerance is lowered from one try to the next, as estimates of coarse runs are rough."""
-_STEPS = 200_000
-"""Most steps of one run, some minutes of computing."""
-_UNIT = 1e-6
-"""Farthest from 1 that the length of a unit vector may be: six digits, as people write them, are enough."""
-_UP = np.array([0.0, 0.0, 1.0])
-"""The upward vertical e_z, inertial axes."""
+_FIRST = 0.01  # local tolerance of the first try, relative to that of the whole motion: errors of steps add up
+_AIM = 0.3  # error aimed at when a try is repeated, relative to the tolerance, so that one repetition mostly suffices
+_DROP = 1e-3  # most that the local tolerance is lowered from one try to the next, as estimates of coarse runs are rough
+_STEPS = 200_000  # most steps of one run, some minutes of computing
+_UNIT = 1e-6  # farthest from 1 that the length of a unit vector may be: six digits, as people write them, are enough
+_UP = np.array([0.0, 0.0, 1.0])  # the upward vertical e_z, inertial axes
 
-Pair = tuple[Array, Array]
-"""A point of se(3)*, or a gradient there: its Pi part and its Gamma part, each (..., 3)."""
+Pair = tuple[Array, Array]  # A point of se(3)*, or a gradient there: its Pi part and its Gamma part, each (..., 3)
 
 
 @dataclass(frozen=True, eq=False)
 class HeavyTop:
     """A heavy top, or a batch of them.
+
+    Equation :eq:`heavy-top` of the documentation.
+    Source: Marsden and Ratiu (15.10.1-3).
 
     Parameters
     ----------
@@ -63,11 +58,6 @@ class HeavyTop:
         If shapes or entries are wrong, or chi is no unit vector (to 1e-6).
     UnphysicalInertiaError, SingularInertiaError
         If a tensor is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Equation :eq:`heavy-top` of the documentation.
-    Source: Marsden and Ratiu (15.10.1-3).
 
     Examples
     --------
@@ -335,14 +325,12 @@ def semidirect_bracket(
 
     {F, G} = -Pi.(F_Pi x G_Pi) - Gamma.(F_Pi x G_Gamma + F_Gamma x G_Pi); F' = {F, H} along a heavy top's motion.
 
+    Source: Marsden and Ratiu, introduction (heavy top) and section 15.10; theory.md M2.
+
     Parameters
     ----------
     df, dg : gradients (F_Pi, F_Gamma), (G_Pi, G_Gamma), each of two (..., 3)
     momentum, gamma : (..., 3) the point
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, introduction (heavy top) and section 15.10; theory.md M2.
 
     Examples
     --------

@@ -25,8 +25,7 @@ _GROWTH = 50.0
 nutation of stable spins next to the threshold."""
 _LARGEST_TILT = 0.01
 """Largest first tilt of a simulation [rad]: its growth by the factor above is still less than a right angle."""
-_LOCAL_TOLERANCE = 1e-9
-"""Local tolerance of a simulation [rad], far below the least sensible tilt."""
+_LOCAL_TOLERANCE = 1e-9  # local tolerance of a simulation [rad], far below the least sensible tilt
 _THRESHOLD = 8.0 * float(np.finfo(float).eps)
 """Of p^2 - 4 Mgl I1, relative to p^2: closer to the threshold, the momentum is `critical_momentum` but for rounding."""
 
@@ -152,14 +151,12 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     and Pi.Gamma (see `upright_potential`), and an isolated level of conserved quantities is stable.
     The free number e = -Phi_dot/p is taken where the e-quadratic is largest, at 1/(2 I1).
 
+    Source: Marsden and Ratiu, theorem 15.10.1; D. Aeyels, Syst. Control Lett. 19 (1992) 461, for equality.
+
     Raises
     ------
     ShapeError
         If the momentum is not a finite number.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, theorem 15.10.1; D. Aeyels, Syst. Control Lett. 19 (1992) 461, for equality.
 
     Examples
     --------
@@ -279,6 +276,8 @@ def e_quadratic(top: LagrangeTop, momentum: float) -> Array:
 def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> Array:
     """The linearised equations of (Pi_1, Pi_2, Gamma_1, Gamma_2) at an upright spin: (..., 4, 4).
 
+    Source: Marsden and Ratiu (15.10.15) with theory.md M-E10, extended to I2 other than I1.
+
     Parameters
     ----------
     moments : (..., 3) principal moments by body axis, in any order; I1 and I2 need not be equal, and the centre of
@@ -290,10 +289,6 @@ def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> 
     ------
     ShapeError, SingularInertiaError
         If an argument is of a wrong shape or value, or a moment is not positive.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.10.15) with theory.md M-E10, extended to I2 other than I1.
 
     Examples
     --------
@@ -374,6 +369,8 @@ def stability_chart(
     tilt stays within 50 times the first one. Next to the threshold the tilt grows slowly, at the rate
     sqrt(1 - Pi_3^2/4), and long durations are needed.
 
+    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M8.
+
     Parameters
     ----------
     axial_ratios : (R,) I3/I1 > 0
@@ -387,10 +384,6 @@ def stability_chart(
         If an argument is wrong.
     AccuracyNotReached
         If the simulation needs more than 200 000 steps.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M8.
 
     Examples
     --------

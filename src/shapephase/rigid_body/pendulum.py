@@ -92,14 +92,12 @@ class RigidBodyPendulum:
     def coordinates(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
         """r, theta in (-pi, pi] and p of body momenta: (..., 3) -> (...), (...) [rad], (...) [kg m^2/s].
 
+        Source: Marsden and Ratiu (15.11.12).
+
         Raises
         ------
         ShapeError
             If a momentum is along the third axis, where the angle is undefined, or is not three finite numbers.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu (15.11.12).
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         first, second, third = np.moveaxis(pi[..., list(self.axes)], -1, 0)
@@ -186,14 +184,12 @@ class RigidBodyPendulum:
         The distance from the separatrix is computed in exact arithmetic from the numbers given, so a motion next to it
         or on it is as accurate as any other.
 
+        Source: Marsden and Ratiu (15.11.18); the pendulum's solution in Jacobi's functions is standard.
+
         Raises
         ------
         ShapeError
             For a momentum along the third axis, or with a part below 1e-140 of its largest that is not zero.
-
-        Notes
-        -----
-        Source: Marsden and Ratiu (15.11.18); the pendulum's solution in Jacobi's functions is standard.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         if pi.shape != (3,):
@@ -295,6 +291,9 @@ class PendulumMotion:
 def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -> RigidBodyPendulum:
     """The pendulum of a rigid body with given principal moments.
 
+    Equation :eq:`pendulum` of the documentation.
+    Source: Marsden and Ratiu (15.11.7) to (15.11.13).
+
     Parameters
     ----------
     moments : (3,) [kg m^2], any order; momenta have their components in the same order
@@ -306,11 +305,6 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
     ShapeError
         If the moments are not positive, or all equal (then every momentum is at rest), or `axes` is not a permutation,
         or the third axis is the intermediate one or shares its moment with another: K is then not an elliptic cylinder.
-
-    Notes
-    -----
-    Equation :eq:`pendulum` of the documentation.
-    Source: Marsden and Ratiu (15.11.7) to (15.11.13).
 
     Examples
     --------

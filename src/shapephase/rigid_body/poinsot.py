@@ -26,8 +26,7 @@ from .portrait import inverse_difference
 
 _TAIL = 60.0
 """Argument u beyond which the separatrix is not integrated: the arc that is left is shorter than 1e-25 of it."""
-_QUADRATURE = 1e-14
-"""Error of a panel, relative to the arc length, below which it is not halved again; near rounding."""
+_QUADRATURE = 1e-14  # error of a panel, relative to the arc length, below which it is not halved again; near rounding
 _EQUAL = 1e-12
 """Moments closer than this, relative to the larger, count as equal: inertias are seldom known to more digits."""
 
@@ -372,15 +371,13 @@ def cones(top: EulerTop) -> Cones:
     Two moments that agree to 1e-12 count as equal. For a body that spins about its axis of symmetry both cones have no
     width; for one that spins about an axis across, the body cone is a plane.
 
+    Source: Marsden and Ratiu, 15.8 case 2, whose I1 = I2 are the equal moments and I3 the one about the axis of
+    symmetry, with the signs of theory.md M-E6: Omega = Pi/I1 - lambda e.
+
     Raises
     ------
     ShapeError
         If no two moments are equal, or all three, or the momentum is zero.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, 15.8 case 2, whose I1 = I2 are the equal moments and I3 the one about the axis of
-    symmetry, with the signs of theory.md M-E6: Omega = Pi/I1 - lambda e.
 
     Examples
     --------

@@ -72,14 +72,12 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     For moments in any order, on the axes as they were given. In axes of ascending moments each lies in a
     plane, |Pi_1/Pi_3| = sqrt((1/I2 - 1/I3)/(1/I1 - 1/I2)).
 
+    Source: Marsden and Ratiu (15.8.10), whose I1, I2, I3 are our I3, I2, I1, with the signs of theory.md M-E4.
+
     Raises
     ------
     ShapeError
         If two moments are equal: the middle axis is then on a circle of equilibria and there is no separatrix.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.8.10), whose I1, I2, I3 are our I3, I2, I1, with the signs of theory.md M-E4.
 
     Examples
     --------

@@ -28,15 +28,15 @@ from ..letters import what_came
 
 _GROWTH = 30.0 * float(np.sqrt(np.finfo(float).eps))
 """Of the fastest mode: real parts of eigenvalues below it come from double eigenvalues and rounding."""
-_FLAT = 1e3 * float(np.finfo(float).eps)
-"""Of the largest second derivative: smaller ones are zero but for rounding."""
-_RESIDUAL = 1e-10
-"""Of the forces that balance in a steady spin, relative to their size."""
+_FLAT = 1e3 * float(np.finfo(float).eps)  # of the largest second derivative: smaller ones are zero but for rounding
+_RESIDUAL = 1e-10  # of the forces that balance in a steady spin, relative to their size
 
 
 @dataclass(frozen=True, eq=False)
 class PseudoRigidBody:
     """A homogeneously deforming body of neo-Hookean material.
+
+    Of a rigid body with principal moments I_i, E_i = (I_j + I_k - I_i)/2 (`inertia_tensor.second_moment`).
 
     Parameters
     ----------
@@ -48,10 +48,6 @@ class PseudoRigidBody:
     ------
     ShapeError, UnphysicalInertiaError
         If they are not such numbers.
-
-    Notes
-    -----
-    Of a rigid body with principal moments I_i, E_i = (I_j + I_k - I_i)/2 (`inertia_tensor.second_moment`).
 
     Examples
     --------
@@ -156,6 +152,8 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
 
     The stretches are a critical point of V + momentum^2/(2 I(q)), reached from the body at rest.
 
+    Source: Lewis and Simo 1990; Marsden and Ratiu, section 15.9, remark 5 (theory.md L8).
+
     Parameters
     ----------
     axis : 0, 1 or 2, of the reference's principal axes
@@ -167,10 +165,6 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
         If the axis is none of these, or the momentum not a finite number.
     AccuracyNotReached
         If no equilibrium is found.
-
-    Notes
-    -----
-    Source: Lewis and Simo 1990; Marsden and Ratiu, section 15.9, remark 5 (theory.md L8).
 
     Examples
     --------

@@ -27,15 +27,15 @@ _ROUNDING = 16.0 * np.finfo(float).eps
 _ALIGNED = 1e-12
 """Distance of I n from the line of n, relative to the trace of I, up to which n is a principal axis: what rounding
 leaves of axes that were computed."""
-_LEAST = 1e-100
-"""Smallest momentum taken [kg m^2/s]: its square and the curvature, its inverse square, must be finite."""
-_MOST = 1e100
-"""Largest momentum taken [kg m^2/s], for the same reason."""
+_LEAST = 1e-100  # smallest momentum taken [kg m^2/s]: its square and the curvature, its inverse square, must be finite
+_MOST = 1e100  # largest momentum taken [kg m^2/s], for the same reason
 
 
 @dataclass(frozen=True)
 class SteadyRotation:
     """A steady rotation of a free rigid body and what three methods say of its stability.
+
+    A spherical body is "stable" everywhere: every momentum stands still.
 
     Attributes
     ----------
@@ -52,10 +52,6 @@ class SteadyRotation:
     index : number of negative directions of `sphere_hessian`
     verdict : "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (where this moment equals
         exactly one of the others: a neighbouring motion drifts along the circle of equilibria and stays near it)
-
-    Notes
-    -----
-    A spherical body is "stable" everywhere: every momentum stands still.
 
     Examples
     --------
@@ -97,6 +93,9 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     +-|Pi| sqrt((I_e - I_i)(I_j - I_e)/(I_i I_j)) / I_e. The energy-Casimir method proves stability where that matrix
     is definite (the largest and the smallest moment); the spectrum proves instability where it is indefinite.
 
+    Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2 (I_e is their I1 in turn for each axis; where they
+    order the moments, their I1 > I2 > I3 are our I3, I2, I1); theory.md L1-L3, L5, M-E13.
+
     Parameters
     ----------
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
@@ -108,11 +107,6 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
         If a shape is wrong, or the momentum is zero or not along a principal axis (to 1e-12).
     UnphysicalInertiaError, SingularInertiaError
         If the tensor is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2 (I_e is their I1 in turn for each axis; where they
-    order the moments, their I1 > I2 > I3 are our I3, I2, I1); theory.md L1-L3, L5, M-E13.
 
     Examples
     --------
@@ -154,6 +148,9 @@ def steady_rotations(
     15.9.1 is the axis of the largest moment (its I1, our I3), which is the shortest axis of the inertia ellipsoid and
     of a homogeneous box: here axes go by their moments (theory.md M-E12).
 
+    Equation :eq:`unstable-rate` of the documentation.
+    Source: Marsden and Ratiu, theorem 15.9.1.
+
     Parameters
     ----------
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
@@ -163,11 +160,6 @@ def steady_rotations(
     ------
     ShapeError, UnphysicalInertiaError, SingularInertiaError
         As `steady_rotation`.
-
-    Notes
-    -----
-    Equation :eq:`unstable-rate` of the documentation.
-    Source: Marsden and Ratiu, theorem 15.9.1.
 
     Examples
     --------
@@ -223,6 +215,8 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
     With two equal moments a rotation across their axis is unstable in space: the momentum wanders along the circle of
     equilibria, and the axis away from the momentum.
 
+    Source: Marsden and Ratiu, section 15.9, remark 3 (theory.md L7); M-E1 and M-E7 for the farthest point.
+
     Parameters
     ----------
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
@@ -233,10 +227,6 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
     ------
     ShapeError, UnphysicalInertiaError, SingularInertiaError
         As `steady_rotation`; also if `disturbed` is zero.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, section 15.9, remark 3 (theory.md L7); M-E1 and M-E7 for the farthest point.
 
     Examples
     --------

@@ -18,10 +18,8 @@ from ..errors import ShapeError
 from .euler_top import _array, _principal
 
 _EPS = float(np.finfo(float).eps)
-_ABSENT = 4.0 * _EPS
-"""Part of the rotor along an axis, relative to all of it, that is rounding."""
-_SAME = 4.0 * _EPS
-"""Relative difference of inverse moments that is rounding."""
+_ABSENT = 4.0 * _EPS  # part of the rotor along an axis, relative to all of it, that is rounding
+_SAME = 4.0 * _EPS  # relative difference of inverse moments that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +57,8 @@ def gyrostat_equilibria(inertia: ArrayLike, rotor: ArrayLike, magnitude: float) 
     There omega = r Pi/|Pi|, and with c = r/|Pi| and b = h/|Pi| the direction is x_i = a_i b_i/(a_i - c), a = 1/I, where
     the sum of x_i^2 is 1. Where a symmetric body has whole circles of them, two of each circle are given.
 
+    Source: Wittenburg 1977, section 4.6.2; Hughes 1986, chapter 6.
+
     Parameters
     ----------
     inertia : (3, 3) [kg m^2]
@@ -69,10 +69,6 @@ def gyrostat_equilibria(inertia: ArrayLike, rotor: ArrayLike, magnitude: float) 
     ------
     ShapeError, TrajectoryError
         For arrays of the wrong shape, or a magnitude that is not above 0.
-
-    Notes
-    -----
-    Source: Wittenburg 1977, section 4.6.2; Hughes 1986, chapter 6.
 
     Examples
     --------
@@ -92,14 +88,12 @@ def gyrostat_equilibria(inertia: ArrayLike, rotor: ArrayLike, magnitude: float) 
 def bifurcation_rotors(inertia: ArrayLike, rotor_axis: ArrayLike) -> Array:
     """Momenta of a rotor about an axis, over |Pi|, at which the number of steady rotations changes: (k,) ascending.
 
+    Source: the equation of `gyrostat_equilibria`, whose left side is convex between two of its poles.
+
     Parameters
     ----------
     inertia : (3, 3) [kg m^2]
     rotor_axis : (3,) not zero, body axes
-
-    Notes
-    -----
-    Source: the equation of `gyrostat_equilibria`, whose left side is convex between two of its poles.
 
     Examples
     --------
@@ -151,6 +145,8 @@ def dual_spin_turn(inertia: ArrayLike, rotor_axis: ArrayLike, magnitude: float, 
     The body stays in its steady rotation of least energy, which friction favours, and ends at rest with the rotor's
     axis along the momentum.
 
+    Source: Kaplan 1976, section 5.4; Hughes 1986, chapter 6.
+
     Parameters
     ----------
     inertia : (3, 3) [kg m^2]
@@ -162,10 +158,6 @@ def dual_spin_turn(inertia: ArrayLike, rotor_axis: ArrayLike, magnitude: float, 
     ------
     ShapeError
         If the rotor's axis is zero, or at right angles to that of the largest moment.
-
-    Notes
-    -----
-    Source: Kaplan 1976, section 5.4; Hughes 1986, chapter 6.
 
     Examples
     --------

@@ -37,24 +37,15 @@ from ..sphere import gauss_nodes
 from .euler_top import EulerTop
 from .gyrostat import Gyrostat
 
-_CELLS = 16
-"""In a period or less, whose quadrature counts whole turns: its error is far below half of one."""
-_SLOWEST = 0.3
-"""Least momentum that a dive is looked for with, of that which does all somersaults without a twist."""
-_FASTEST = 4.0
-"""Largest momentum that a dive is looked for with, likewise."""
-_TRIALS = 24
-"""Momenta among which a dive of given duration is looked for."""
-_EDGE = 1e-9
-"""[rad] From the long axis and from the separatrix, between which the tilt of a twist is looked for."""
-_ROUNDED = 1.0 + 1e-12
-"""Of the duration: times up to which are the end, but for rounding."""
-_FORWARD = np.array([1.0, 0.0, 0.0])
-"""x, about which the rotor turns."""
-_ACROSS = np.array([0.0, 1.0, 0.0])
-"""y, about which the body somersaults."""
-_TWIST = 2
-"""The stage in which the body twists."""
+_CELLS = 16  # in a period or less, whose quadrature counts whole turns: its error is far below half of one
+_SLOWEST = 0.3  # least momentum that a dive is looked for with, of that which does all somersaults without a twist
+_FASTEST = 4.0  # largest momentum that a dive is looked for with, likewise
+_TRIALS = 24  # momenta among which a dive of given duration is looked for
+_EDGE = 1e-9  # [rad] From the long axis and from the separatrix, between which the tilt of a twist is looked for
+_ROUNDED = 1.0 + 1e-12  # of the duration: times up to which are the end, but for rounding
+_FORWARD = np.array([1.0, 0.0, 0.0])  # x, about which the rotor turns
+_ACROSS = np.array([0.0, 1.0, 0.0])  # y, about which the body somersaults
+_TWIST = 2  # the stage in which the body twists
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -194,6 +185,8 @@ def rotor_dive(
     What is left for somersaults without twist, half of it at the start and half at the end, follows, and with it the
     duration. `rotor_dive_lasting` finds the momentum for a duration.
 
+    Source: Bharadwaj et al. 2016; Cabrera 2006 (13); theory.md F10.
+
     Parameters
     ----------
     moments : (3,) about the rotor's axis x, the somersault's y and the long axis z, that about z the smallest [kg m^2]
@@ -210,10 +203,6 @@ def rotor_dive(
     TrajectoryError
         If there is no such dive: after the first shape change the momentum does not circle the long axis, or has
         circled it too far already, or shape changes and twist alone are more somersaults.
-
-    Notes
-    -----
-    Source: Bharadwaj et al. 2016; Cabrera 2006 (13); theory.md F10.
 
     Examples
     --------
@@ -249,14 +238,12 @@ def rotor_dive_lasting(
 ) -> RotorDive:
     """The dive with m somersaults and n twists in a given time: the momentum is solved for.
 
+    Other parameters and errors as `rotor_dive`; TrajectoryError also where no momentum between 0.3 and 4 times that of
+    the somersaults alone gives the duration.
+
     Parameters
     ----------
     duration : of the whole dive, 1.5 s from a platform of ten metres [s]
-
-    Notes
-    -----
-    Other parameters and errors as `rotor_dive`; TrajectoryError also where no momentum between 0.3 and 4 times that of
-    the somersaults alone gives the duration.
 
     Examples
     --------
@@ -294,6 +281,8 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
     In the kick model shape changes take no time. The momentum, tilted from y towards z by this angle, then circles z n
     times while the long axis goes round the momentum m times.
 
+    Source: Dullin and Tong 2016, the kick model; theory.md F10.
+
     Parameters
     ----------
     moments : (3,) as for `rotor_dive` [kg m^2]
@@ -305,10 +294,6 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
         If the arguments are of a wrong shape or value.
     TrajectoryError
         If a twist takes more somersaults at any tilt.
-
-    Notes
-    -----
-    Source: Dullin and Tong 2016, the kick model; theory.md F10.
 
     Examples
     --------

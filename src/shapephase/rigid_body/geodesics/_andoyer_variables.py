@@ -34,16 +34,11 @@ from ...inertia_tensor import inverse_inertia
 from ...letters import what_came
 from ..euler_angles import ZXZ, ZYZ, EulerChart
 
-_NEAREST = 1e-8
-"""sqrt(G^2 - L^2)/G; nearer, L rounds to G, and the part of the momentum across the axis is lost."""
-_LARGEST_TURN = 1.0
-"""[rad] From one sample to the next: far from half a turn, where a turn's sense is lost."""
-_NO_TURN = 1e-9
-"""[rad] Turns of a body at rest, which do not become less with the step."""
-_MOST_SAMPLES = 200_000
-"""14 MB of attitudes; or eight times the number of times given, if that is more."""
-_REFINEMENT_RATIO = 0.7
-"""Half the step turns by half; more than this share is a turn that was missed by whole turns."""
+_NEAREST = 1e-8  # sqrt(G^2 - L^2)/G; nearer, L rounds to G, and the part of the momentum across the axis is lost
+_LARGEST_TURN = 1.0  # [rad] From one sample to the next: far from half a turn, where a turn's sense is lost
+_NO_TURN = 1e-9  # [rad] Turns of a body at rest, which do not become less with the step
+_MOST_SAMPLES = 200_000  # 14 MB of attitudes; or eight times the number of times given, if that is more
+_REFINEMENT_RATIO = 0.7  # half the step turns by half; more than this share is a turn that was missed by whole turns
 
 
 class TurningBody(Protocol):
@@ -145,15 +140,13 @@ class AndoyerVariables:
 
         p_phi = K and p_psi = L in both charts, `ZYZ` of Bonnard et al. and `ZXZ` of Marsden and Ratiu.
 
+        Source: Bonnard et al., section 3.4, the complete relations, of which the last is for phi_3 (theory.md B-E4).
+
         Raises
         ------
         ChartPoleError
             Within 1e-8 of a pole of the chart, where the two third axes are parallel. Its converse is
             `andoyer_from_euler`.
-
-        Notes
-        -----
-        Source: Bonnard et al., section 3.4, the complete relations, of which the last is for phi_3 (theory.md B-E4).
         """
         angles = chart.angles(self.attitude)
         return angles, chart.conjugate_momenta(angles, self.body_momentum)
@@ -161,14 +154,12 @@ class AndoyerVariables:
     def hamiltonian(self, inertia: ArrayLike) -> Array:
         """The energy Pi.I^-1 Pi/2 of a body of this inertia: (..., 3, 3) [kg m^2, body axes] -> (...) [J].
 
+        Source: Bonnard et al. (5), there in principal axes.
+
         Raises
         ------
         ShapeError, UnphysicalInertiaError, SingularInertiaError
             If the inertia does not go with the variables, is not symmetric, or not positive definite.
-
-        Notes
-        -----
-        Source: Bonnard et al. (5), there in principal axes.
         """
         momentum = self.body_momentum
         return 0.5 * np.sum(momentum * so3.apply(self._inverse(inertia), momentum), axis=-1)
@@ -176,16 +167,14 @@ class AndoyerVariables:
     def rates(self, inertia: ArrayLike) -> tuple[Array, Array, Array]:
         """g', l' [rad/s] and L' [kg m^2/s^2] of free motion; k, G and K are constant: (..., 3, 3) -> three (...).
 
+        Source: Bonnard et al. (8), there in principal axes.
+
         Raises
         ------
         ChartPoleError
             At L = +-G, to 1e-8 of the momentum, if the body's third axis is not principal: l has no rate there.
         ShapeError, UnphysicalInertiaError, SingularInertiaError
             As `hamiltonian`.
-
-        Notes
-        -----
-        Source: Bonnard et al. (8), there in principal axes.
         """
         inverse = self._inverse(inertia)
         sine, cosine, across, along = np.sin(self.l), np.cos(self.l), self._across, self.axial
@@ -283,16 +272,14 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
 def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart = ZYZ) -> AndoyerVariables:
     """Andoyer's variables of Euler angles (phi, theta, psi) and their momenta: (..., 3), (..., 3) -> (...) each.
 
+    Source: as `AndoyerVariables.euler_angles`.
+
     Raises
     ------
     ChartPoleError
         Within 1e-8 of a pole of the chart.
     ShapeError
         If an argument is not a finite vector, or a momentum is zero.
-
-    Notes
-    -----
-    Source: as `AndoyerVariables.euler_angles`.
 
     Examples
     --------
@@ -313,6 +300,9 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     is followed reliably, and g and l may gain half turns there that leave the attitude unchanged. Between the times
     given the motion is sampled more densely, until it turns by less than a radian from one sample to the next.
 
+    Equation :eq:`andoyer-energy` of the documentation.
+    Source: Cabrera 2006 (13) for the phase; theory.md R1.
+
     Parameters
     ----------
     motion : with `attitude(t)` and `body_momentum(t)`: an `EulerTop`, or a `Motion`, also of a deforming body
@@ -324,11 +314,6 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
         If the times are not a list in order, or the momentum is zero.
     AccuracyNotReached
         If the attitude jumps, or turns so often between the times that it cannot be followed.
-
-    Notes
-    -----
-    Equation :eq:`andoyer-energy` of the documentation.
-    Source: Cabrera 2006 (13) for the phase; theory.md R1.
 
     Examples
     --------

@@ -17,21 +17,17 @@ import numpy as np
 from ...arrays import Array, Mask
 
 Triple = tuple[Array, Array, Array]
-Stretch = Callable[[Array, Array], Triple]
-"""Y and depth - Y, (N,) each -> D(Y), D'(Y), D''(Y), (N,) each."""
+Stretch = Callable[[Array, Array], Triple]  # Y and depth - Y, (N,) each -> D(Y), D'(Y), D''(Y), (N,) each
 
 _RULE = np.polynomial.legendre.leggauss(16)
-_NODES = _RULE[0]
-"""(16,) in [-1, 1]: right to rounding on panels that are as long as their distance to a singularity."""
+_NODES = _RULE[0]  # (16,) in [-1, 1]: right to rounding on panels that are as long as their distance to a singularity
 _WEIGHTS = _RULE[1]
 _NEAR_POLE = 1e-4
 """1 - Y; nearer, the difference D(Y) - D(1) loses four digits, and the series by D' and D'' is right to rounding."""
 _BEND_WIDTH = 0.02
 """Weight of |D''/D'| at the pole: where D bends sharply the series holds less far, to 1 - Y = 0.005 |D'/D''|."""
-_NOT_ZERO = 1e-30
-"""Least q and depth - q of the grading: beyond that many halvings nothing changes."""
-_MOST_SPLITS = 7
-"""Parts of each panel; a metric that needs more is too rough."""
+_NOT_ZERO = 1e-30  # least q and depth - q of the grading: beyond that many halvings nothing changes
+_MOST_SPLITS = 7  # parts of each panel; a metric that needs more is too rough
 _SETTLED = np.array([2e-13, 2e-13, 2e-12, 1e-8])
 """Relative changes that are rounding: of integrals of D, and of its derivatives, which may come from a table of D."""
 

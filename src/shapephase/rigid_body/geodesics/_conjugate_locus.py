@@ -21,12 +21,9 @@ from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
 from .surface_of_revolution import SurfaceOfRevolution
 
-_HIGHEST_ORDER = 1000
-"""Up to here the phase, order times pi, keeps twelve digits of the way between two turning points."""
-_CONSTANT_TIME = 1e-11
-"""Rates of the conjugate time by the direction [1/rad], in parts of the time, that are rounding."""
-_LEAST_DIRECTIONS = 8
-"""Two in each quadrant, the least that show the four cusps of a generic locus."""
+_HIGHEST_ORDER = 1000  # up to here the phase, order times pi, keeps twelve digits of the way between two turning points
+_CONSTANT_TIME = 1e-11  # rates of the conjugate time by the direction [1/rad], in parts of the time, that are rounding
+_LEAST_DIRECTIONS = 8  # two in each quadrant, the least that show the four cusps of a generic locus
 _BAND_MARGIN = 1e-6
 """In parts of the widest angle of oscillating extremals, at which conjugate points are infinitely far."""
 
@@ -94,14 +91,12 @@ def conjugate_points(
 ) -> ConjugatePoints:
     """The conjugate points of an order along extremals from a latitude, longitude 0: directions (...) [rad] -> (...).
 
+    Source: Bonnard et al., lemma 2.7 and remark 2, in the form of the module `surface_of_revolution`.
+
     Raises
     ------
     ShapeError
         If the order is not in 1..1000 or a direction leads out of the band of oscillating extremals.
-
-    Notes
-    -----
-    Source: Bonnard et al., lemma 2.7 and remark 2, in the form of the module `surface_of_revolution`.
 
     Examples
     --------
@@ -195,14 +190,12 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
     The second derivative by p of the longitude on the latitude of the conjugate point of order n, of extremals from the
     equator with 0 < p < sqrt(m(0)): (...) -> (...). Where it is not 0 the branch has no cusp, also where R'' < 0.
 
+    Source: Bonnard et al., before proposition 3, which assumes R'' > 0; theory.md B-E9, O13.
+
     Raises
     ------
     ShapeError
         If p is that of the equator, where it is infinite, or of no oscillating extremal.
-
-    Notes
-    -----
-    Source: Bonnard et al., before proposition 3, which assumes R'' > 0; theory.md B-E9, O13.
 
     Examples
     --------

@@ -20,14 +20,12 @@ from ...arrays import Array, Integers
 from ...errors import AccuracyNotReached
 from ._momentum_flow import attitude_flow, exponential_fields, momentum_flow
 
-_TURN = 2.0 * np.pi
-"""[rad]"""
+_TURN = 2.0 * np.pi  # [rad]
 _STEP_SAFETY = 0.9
 """A step is so much of the shortest time in which the angles' sum could grow by a whole turn, and a turn be missed."""
 _STEPS_EACH = 10_000
 """Steps for each order: moments (3, 2, 1) need about ten, only moments five thousandfold apart need more."""
-_SLACK = 1e-6
-"""[rad] By so much rounding may set the angles' sum back; far below the growth in a step."""
+_SLACK = 1e-6  # [rad] By so much rounding may set the angles' sum back; far below the growth in a step
 _EPS = float(np.finfo(float).eps)
 
 

@@ -27,10 +27,8 @@ from ._conjugate_locus import conjugate_points
 from ._extremal import start_of
 from .surface_of_revolution import SurfaceOfRevolution
 
-_MERIDIAN = 1e-9
-"""In parts of the largest p: below, the longitude jumps at the pole within the rounding of the phase."""
-_POLE_MARGIN = 1e-12
-"""Of |y|, which is 1 at the pole, where the direction of an extremal is not defined."""
+_MERIDIAN = 1e-9  # in parts of the largest p: below, the longitude jumps at the pole within the rounding of the phase
+_POLE_MARGIN = 1e-12  # of |y|, which is 1 at the pole, where the direction of an extremal is not defined
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,7 @@ from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 _LEAST_ASPECT = 1e-3
 """Far beyond any body of use, and its square, of which the closed forms are made, keeps ten digits beside 1."""
 _LARGEST_ASPECT = 1e3
-_BEYOND_A_POLE = 1e-12
-"""Relative: latitudes so little further are taken for the pole's."""
+_BEYOND_A_POLE = 1e-12  # relative: latitudes so little further are taken for the pole's
 
 
 @dataclass(frozen=True)
@@ -73,14 +72,12 @@ class EllipsoidStretch:
 def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolution:
     """The ellipsoid of revolution with polar over equatorial axis `aspect`: below 1 oblate, above 1 prolate.
 
+    Source: Bonnard et al., section 2 (F_1, F_2); theory.md P1.
+
     Raises
     ------
     ShapeError
         If the aspect is not between 0.001 and 1000, or the radius not positive.
-
-    Notes
-    -----
-    Source: Bonnard et al., section 2 (F_1, F_2); theory.md P1.
 
     Examples
     --------

@@ -18,8 +18,7 @@ from .surface_of_revolution import SurfaceOfRevolution
 
 _RELATIVE_TOLERANCE = 3e-14
 """Just above the least that SciPy accepts: the integration is there to check the closed form."""
-_ABSOLUTE_TOLERANCE = 1e-15
-"""[rad, or length of a field that starts with slope 1]"""
+_ABSOLUTE_TOLERANCE = 1e-15  # [rad, or length of a field that starts with slope 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,14 +224,12 @@ def variational_jacobi_field(
 
     The phase is integrated with it, by d chi/dt = 1/D, so that turning points are regular. Times ascend, from 0 on.
 
+    Source: Bonnard et al., definition 2.2.
+
     Raises
     ------
     AccuracyNotReached
         If the integration fails.
-
-    Notes
-    -----
-    Source: Bonnard et al., definition 2.2.
 
     Examples
     --------

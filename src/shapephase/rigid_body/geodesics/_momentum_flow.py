@@ -29,8 +29,7 @@ from ...errors import ShapeError
 
 _LONGEST_STEP = 1.0
 """In units of 1/sqrt(max(P, Q)), of which a quarter period is at least pi/2: no step nears a zero of c or d."""
-_MOST_STEPS = 20_000
-"""Limit of the time of one call; rounding grows with the steps, too."""
+_MOST_STEPS = 20_000  # limit of the time of one call; rounding grows with the steps, too
 _SMALL_TURN = 0.02
 """[rad] Below, R dPi(t)/dPi − 1 would lose two digits, and Gauss's rule of six nodes is right to rounding."""
 

@@ -36,8 +36,7 @@ from ...letters import what_came
 from ._andoyer_variables import AndoyerVariables, andoyer_variables
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
 
-_HALVINGS = 60
-"""Of a right angle, which leave rounding."""
+_HALVINGS = 60  # of a right angle, which leave rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,14 +134,12 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
     The rate at which the momentum goes round in the body, and the mean rate about the momentum; on the separatrix their
     limits, of which the first is 0. The moments, in any order, are those about the momenta's axes.
 
+    Source: theory.md R15.
+
     Raises
     ------
     ShapeError
         If two moments are equal, or a momentum is zero.
-
-    Notes
-    -----
-    Source: theory.md R15.
 
     Examples
     --------
@@ -164,6 +161,11 @@ def andoyer_from_sadov(
 ) -> AndoyerVariables:
     """The states with these angle and action variables, in Andoyer's: (3,), (..., 3), (..., 3), (...) -> (...).
 
+    The energy is found from J by bisection, as J grows with the angle of the momentum from the axis of the largest
+    moment. Next to the separatrix angles lose digits as in `sadov_variables`.
+
+    Source: Sadov 1970; theory.md R15.
+
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
@@ -176,13 +178,6 @@ def andoyer_from_sadov(
     ------
     ShapeError
         If two moments are equal, an action is out of range, a side is another number, or J is that of the separatrix.
-
-    Notes
-    -----
-    The energy is found from J by bisection, as J grows with the angle of the momentum from the axis of the largest
-    moment. Next to the separatrix angles lose digits as in `sadov_variables`.
-
-    Source: Sadov 1970; theory.md R15.
 
     Examples
     --------

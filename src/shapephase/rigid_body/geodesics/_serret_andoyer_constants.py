@@ -46,8 +46,7 @@ class GeodesicClass(IntEnum):
 _LEAST_MOMENTUM = 1e-9
 """In parts of sqrt(I_1): theta is proportional to p to the last digit below, as what is left out is p^2/I_1 of it."""
 _EPS = float(np.finfo(float).eps)
-_DEKKER_FACTOR = 2.0**27 + 1.0
-"""Splits a float64 of 53 bits into two halves whose products are exact (Dekker 1971)."""
+_DEKKER_FACTOR = 2.0**27 + 1.0  # splits a float64 of 53 bits into two halves whose products are exact (Dekker 1971)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,8 +28,7 @@ from ...errors import ShapeError
 from ...letters import what_came
 from ...roots import safe_newton
 
-_SAMPLES = 129
-"""Axial parts of momenta, among which the longest geodesic up to its cut is looked for."""
+_SAMPLES = 129  # axial parts of momenta, among which the longest geodesic up to its cut is looked for
 
 
 @dataclass(frozen=True)
@@ -289,6 +288,8 @@ class AxisymmetricMetric:
 def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
     """The metric of moments (I_1, I_1, I_3), I_3 about the axis of symmetry, which is the third.
 
+    Equation :eq:`conjugate-time` of the documentation.
+
     Parameters
     ----------
     equatorial : I_1 > 0 [kg m^2]
@@ -298,10 +299,6 @@ def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
     ------
     ShapeError
         If a moment is not a number above 0, or I_1 is not finite.
-
-    Notes
-    -----
-    Equation :eq:`conjugate-time` of the documentation.
 
     Examples
     --------

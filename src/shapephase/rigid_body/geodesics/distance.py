@@ -35,30 +35,21 @@ from .left_invariant import LeftInvariantMetric
 
 _FRACTIONS = (0.35, 0.7, 1.05, 1.4)
 """Sizes of the starts, in parts of the largest momenta along the axes; a loop that closes is at about sqrt(2)."""
-_FEW = 48
-"""Directions of a search."""
-_MANY = 384
-"""Directions of the last, where the others find nothing as short as the upper bound."""
-_MOST_SEARCHES = 4
-"""Searches with starts scaled to the last one's length; the second rarely finds anything shorter."""
-_STEPS = 60
-"""Levenberg-Marquardt steps; Newton's last few square the error, the others only have to reach their basin."""
-_CLOSE = 1e-9
-"""In parts of how far such a way can turn: arrived, what the next step would leave is rounding."""
-_ROUNDING = 1e-15
-"""[rad] An attitude is no better known."""
-_MARGIN = 1e-7
-"""By so much, in parts, a length may be above its upper bound, or an end past the cut, for rounding."""
-_IMPROVED = 1e-9
-"""In parts: a length that is shorter by more is another way."""
+_FEW = 48  # directions of a search
+_MANY = 384  # directions of the last, where the others find nothing as short as the upper bound
+_MOST_SEARCHES = 4  # searches with starts scaled to the last one's length; the second rarely finds anything shorter
+_STEPS = 60  # levenberg-Marquardt steps; Newton's last few square the error, the others only have to reach their basin
+_CLOSE = 1e-9  # in parts of how far such a way can turn: arrived, what the next step would leave is rounding
+_ROUNDING = 1e-15  # [rad] An attitude is no better known
+_MARGIN = 1e-7  # by so much, in parts, a length may be above its upper bound, or an end past the cut, for rounding
+_IMPROVED = 1e-9  # in parts: a length that is shorter by more is another way
 _FIRST_DAMPING = 1e-2
 """Of the mean square of the differential: near Newton's step, but bounded where the differential is singular."""
 _LEAST_DAMPING = 1e-16
 _LARGEST_DAMPING = 1e6
 _HOPELESS_DAMPING = 1e5
 """Above it a start is given up: ten steps in a row, each a tenth of the last, did not come closer."""
-_FIRST_AXIS_LAST = [1, 2, 0]
-"""A cyclic order of the axes, so right-handed, with that of the smallest moment as third."""
+_FIRST_AXIS_LAST = [1, 2, 0]  # A cyclic order of the axes, so right-handed, with that of the smallest moment as third
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +91,14 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
     more than once about the axis of the smallest moment, longer than 2 pi sqrt(I_1), many geodesics have nearly equal
     length: there a shorter one may have been.
 
+    Source: theory.md Q6.
+
     Raises
     ------
     ShapeError
         If the attitude is no rotation (3, 3).
     AccuracyNotReached
         If no geodesic arrives that is as short as the upper bound says.
-
-    Notes
-    -----
-    Source: theory.md Q6.
 
     Examples
     --------

@@ -148,16 +148,14 @@ class LeftInvariantMetric:
 
         Points where two Jacobi fields vanish count twice. Right to about 1e-13 of the time.
 
+        Source: theory.md Q6; `conjugate_times`.
+
         Raises
         ------
         ShapeError
             Where H is 0, or if `order` is not a whole number of 1 or more.
         AccuracyNotReached
             If none is found in ten thousand steps of the search, because the moments are too unequal.
-
-        Notes
-        -----
-        Source: theory.md Q6; `conjugate_times`.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         self._moving(pi)
@@ -194,6 +192,8 @@ class LeftInvariantMetric:
 def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
     """The metric u.I u of an inertia, or of principal moments one of which may be infinite.
 
+    Source: Bonnard et al., sections 3.1 and 3.2.
+
     Parameters
     ----------
     inertia : (3,) principal moments about the three body axes, in any order, one of them `inf` for the sub-Riemannian
@@ -205,10 +205,6 @@ def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
         For another shape, moments not positive, or more than one infinite.
     UnphysicalInertiaError, SingularInertiaError
         If a tensor is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Source: Bonnard et al., sections 3.1 and 3.2.
 
     Examples
     --------

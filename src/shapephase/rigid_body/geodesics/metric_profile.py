@@ -25,37 +25,25 @@ from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
 Profile = Callable[[Array], tuple[Array, Array]]
 """x (N,) -> F_2 and dF_2/dx, (N,) each; the derivative with all its digits next to the equator, where it vanishes."""
-Meridian = Callable[[Array], Array]
-"""x (N,) -> F_1 > 0 (N,)."""
+Meridian = Callable[[Array], Array]  # x (N,) -> F_1 > 0 (N,)
 
 _DEGREE = 24
 """Of the polynomial on a panel: high enough for few panels, low enough for derivatives that keep their digits."""
-_HALVINGS = 14
-"""Of the panels: a metric that needs more is too rough, or given with noise."""
-_SETTLED = 1.5e-15
-"""Last coefficients, in parts of the largest value, that are rounding; about seven eps."""
+_HALVINGS = 14  # of the panels: a metric that needs more is too rough, or given with noise
+_SETTLED = 1.5e-15  # last coefficients, in parts of the largest value, that are rounding; about seven eps
 _MOST_FORGIVEN = 20.0 * _SETTLED
 """The same on the finest panels, where the noise of the functions given is all that is left."""
-_TRIMMED = 4e-16
-"""Coefficients, in parts of the largest value, that are dropped at the end of a series: two eps."""
+_TRIMMED = 4e-16  # coefficients, in parts of the largest value, that are dropped at the end of a series: two eps
 _RULE = np.polynomial.legendre.leggauss(32)
-_NODES = _RULE[0]
-"""(32,) in [-1, 1]: with few panels right to rounding for F_2' that a polynomial of `_DEGREE` holds."""
+_NODES = _RULE[0]  # (32,) in [-1, 1]: with few panels right to rounding for F_2' that a polynomial of `_DEGREE` holds
 _WEIGHTS = _RULE[1]
-_MOST_PANELS = 64
-"""Of the integral of F_2': enough for metrics that `_DEGREE` and `_HALVINGS` can resolve."""
-_DROP_SETTLED = 1e-14
-"""Change of Y, in [0, 1], with the number of panels that is rounding."""
-_DROP_ERROR = 1e-11
-"""Difference of Y by F_2 and by the integral of F_2' above which the derivative is wrong."""
-_SAMPLES = 257
-"""Of each function, by which the assumptions are judged."""
-_ROUNDING = 1e-12
-"""In parts of the largest value: differences of F_1, F_2 and slopes that are rounding."""
-_SLOPE_ROUNDING = 1e-10
-"""The same for F_2' on both sides of the equator, which a caller may have by differences."""
-_FLAT = 1e-9
-"""In parts of the largest |F_2'|: smaller slopes at the reach are those of a parallel."""
+_MOST_PANELS = 64  # of the integral of F_2': enough for metrics that `_DEGREE` and `_HALVINGS` can resolve
+_DROP_SETTLED = 1e-14  # change of Y, in [0, 1], with the number of panels that is rounding
+_DROP_ERROR = 1e-11  # difference of Y by F_2 and by the integral of F_2' above which the derivative is wrong
+_SAMPLES = 257  # of each function, by which the assumptions are judged
+_ROUNDING = 1e-12  # in parts of the largest value: differences of F_1, F_2 and slopes that are rounding
+_SLOPE_ROUNDING = 1e-10  # the same for F_2' on both sides of the equator, which a caller may have by differences
+_FLAT = 1e-9  # in parts of the largest |F_2'|: smaller slopes at the reach are those of a parallel
 _NEAREST = 1e-60
 """Least depth - Y: at a parallel D is infinite, while so near to it the curvature has reached its limit."""
 
@@ -134,14 +122,12 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
 
     (A3), on the curvature, is `SurfaceOfRevolution.is_greatest_curvature_on_equator`.
 
+    Source: Bonnard et al., section 2.1.
+
     Raises
     ------
     ShapeError
         If the reach is not positive, or the functions give no finite numbers of the right shape, or F_2 <= 0 inside.
-
-    Notes
-    -----
-    Source: Bonnard et al., section 2.1.
 
     Examples
     --------
@@ -185,6 +171,8 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
 def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None = None) -> SurfaceOfRevolution:
     """The surface with the metric F_1 dx^2 + F_2 d theta^2, |x| <= reach.
 
+    Source: Bonnard et al., sections 2.1 and 2.2; theory.md O1, O4, P1.
+
     Parameters
     ----------
     profile : F_2 with its derivative (m with m' where F_1 = 1), see `Profile`
@@ -198,10 +186,6 @@ def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None 
         reach; or if the derivative is not that of F_2.
     AccuracyNotReached
         If the metric is too rough to be tabulated to rounding.
-
-    Notes
-    -----
-    Source: Bonnard et al., sections 2.1 and 2.2; theory.md O1, O4, P1.
 
     Examples
     --------

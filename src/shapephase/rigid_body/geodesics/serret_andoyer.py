@@ -111,14 +111,12 @@ class SerretAndoyerMetric:
     def w(self, y: ArrayLike) -> Array:
         """a_3 sin^2 y + a_2 cos^2 y, z/2 of the paper: (...) [rad] -> (...) [1/(kg m^2)].
 
+        Source: Bonnard et al., before (7).
+
         Raises
         ------
         ShapeError
             If an argument is not finite; so do all methods.
-
-        Notes
-        -----
-        Source: Bonnard et al., before (7).
         """
         angle = finite_array(y, "y", unit="rad")
         _, a2, a3 = self._inverse
@@ -218,14 +216,12 @@ class SerretAndoyerMetric:
     def geodesics(self, p_theta: ArrayLike) -> GeodesicFamily:
         """The geodesics of unit speed from the equator with these p_theta, |p_theta| <= sqrt(I_3): (...).
 
+        Source: Bonnard et al., sections 4.2 and 4.3.
+
         Raises
         ------
         ShapeError
             If a p_theta is beyond `largest_momentum`.
-
-        Notes
-        -----
-        Source: Bonnard et al., sections 4.2 and 4.3.
         """
         return GeodesicFamily(constants=constants_of(self.moments, p_theta))
 
@@ -280,6 +276,8 @@ class SerretAndoyerMetric:
 def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
     """The Serret-Andoyer metric of three different principal moments.
 
+    Equation :eq:`andoyer-metric` of the documentation.
+
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
@@ -288,10 +286,6 @@ def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
     ------
     ShapeError
         If the moments are not positive, or two of them are equal.
-
-    Notes
-    -----
-    Equation :eq:`andoyer-metric` of the documentation.
 
     Examples
     --------

@@ -235,15 +235,13 @@ class GeodesicFamily:
         in the equator, of the geodesics that start downward; it starts with a cusp on the equator at p = sqrt(I_3) and
         tends to phi = -K/alpha, theta infinite, as p falls to sqrt(I_2).
 
+        Source: Bonnard et al., section 4.4; theory.md R12.
+
         Raises
         ------
         ShapeError
             If the order is no such number, or a geodesic does not oscillate: the others have no conjugate point
             (theory.md R13).
-
-        Notes
-        -----
-        Source: Bonnard et al., section 4.4; theory.md R12.
         """
         if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
             raise ShapeError(f"order: expected a whole number from 1 on, got {what_came(order)}")

@@ -50,16 +50,12 @@ _SEPARATRIX_MARGIN = 1e-9
 """In parts of p: nearer to that of a parallel, which extremals approach without end, results lose half their digits."""
 _NEAREST = 1e-60
 """Least depth - Y: at a parallel the stretch is infinite, while so near to it the curvature has reached its limit."""
-_REACH_ROUNDING = 1e-12
-"""In parts of the reach: so much further latitudes are taken for the reach."""
+_REACH_ROUNDING = 1e-12  # in parts of the reach: so much further latitudes are taken for the reach
 _TIP_SLOPE_ERROR = 1e-9
 """Poles whose slope of sqrt(m) is 1 but for so much are smooth; tabulated metrics are not known better."""
-_SAMPLES = 65
-"""Values of p, or of y, by which the trends of the first return and of the curvature are judged."""
-_CONSTANT_RETURN = 1e-11
-"""Rates of the first return, in parts of reach/m(0), that are rounding."""
-_CONSTANT_CURVATURE = 1e-10
-"""Range of the curvature, in parts of its largest value, that is rounding."""
+_SAMPLES = 65  # values of p, or of y, by which the trends of the first return and of the curvature are judged
+_CONSTANT_RETURN = 1e-11  # rates of the first return, in parts of reach/m(0), that are rounding
+_CONSTANT_CURVATURE = 1e-10  # range of the curvature, in parts of its largest value, that is rounding
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,7 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import principal_axes
 
-_ZERO = 1e-14
-"""Eigenvalue of a quadratic form, relative to the largest, that counts as zero: rounding leaves as much."""
+_ZERO = 1e-14  # eigenvalue of a quadratic form, relative to the largest, that counts as zero: rounding leaves as much
 _CANCELLED = 16.0 * np.finfo(float).eps
 """Sum, relative to its two terms, that counts as zero: the rounding of moments and of the matrix (a, b; c, d)."""
 _UNIT = 1e-9
@@ -107,6 +106,8 @@ class NambuPair:
 def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
     """K = a H + b L and N = c H + d L of a rigid body.
 
+    Source: Marsden and Ratiu (15.11.5), (15.11.6); theory.md M-E11.
+
     Parameters
     ----------
     inertia : (3, 3) [kg m^2, body axes]
@@ -122,10 +123,6 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
         If the determinant differs from 1 and -1 by more than 1e-9.
     UnphysicalInertiaError, SingularInertiaError
         If the inertia is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.11.5), (15.11.6); theory.md M-E11.
 
     Examples
     --------
@@ -165,14 +162,12 @@ def cylinder_matrix(moments: ArrayLike) -> Array:
     The moments may be in any order; the cylinders are elliptic where the second one is the intermediate, as for the
     ascending moments of the book. The determinant is 1, as there, so Pi' = grad N x grad K.
 
+    Source: Marsden and Ratiu (15.11.7).
+
     Raises
     ------
     ShapeError
         If the moments are not positive, or the first equals the third.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.11.7).
 
     Examples
     --------
@@ -190,6 +185,8 @@ def cylinder_matrix(moments: ArrayLike) -> Array:
 def structure_constants(form: ArrayLike) -> Array:
     """c[i, j, k] with [e_i, e_j] = sum of c[i, j, k] e_k for the bracket [a, b] = Q (a x b): (3, 3) -> (3, 3, 3).
 
+    Source: Marsden and Ratiu, theorem 15.11.3 and exercise 14.9-1.
+
     Parameters
     ----------
     form : (3, 3) symmetric, Q; Pi.Q Pi / 2 is then a Casimir of the Lie-Poisson bracket
@@ -198,10 +195,6 @@ def structure_constants(form: ArrayLike) -> Array:
     ------
     ShapeError
         If the matrix is not symmetric.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, theorem 15.11.3 and exercise 14.9-1.
 
     Examples
     --------
@@ -219,14 +212,12 @@ def lie_group(form: ArrayLike) -> str:
     common sign. An eigenvalue below 1e-14 of the largest counts as zero. For a non-degenerate form the group is that
     of the rotations of the form.
 
+    Source: Marsden and Ratiu, theorem 15.11.3, which leaves out (+-0) and (000).
+
     Raises
     ------
     ShapeError
         If the matrix is not symmetric.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, theorem 15.11.3, which leaves out (+-0) and (000).
 
     Examples
     --------

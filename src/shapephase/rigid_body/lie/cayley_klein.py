@@ -23,14 +23,12 @@ from .._flow import ascending_times, flow
 from .lie_algebra import complex_or_real, su2
 from .lie_poisson import angular_velocity, kinetic_energy
 
-Spinor = NDArray[np.complex128]
-"""Vectors of C^2: (..., 2)."""
+Spinor = NDArray[np.complex128]  # vectors of C^2: (..., 2)
 
 _EQUAL_LENGTHS = 1e-6
 """Largest relative difference of |z| and |start|, which a motion keeps equal: six digits, as people write them."""
 
-PAULI = 2j * su2().matrix_basis
-"""Pauli's matrices sigma_k: (3, 2, 2)."""
+PAULI = 2j * su2().matrix_basis  # pauli's matrices sigma_k: (3, 2, 2)
 PAULI.setflags(write=False)
 
 
@@ -75,13 +73,11 @@ def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
 def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
     """{F, G} on C^2 = T*R^2, from gradients with respect to q (real parts) and p (imaginary parts): (...).
 
+    Raises ShapeError.
+
     Parameters
     ----------
     first, second : (..., 2) complex, dF/dq + i dF/dp
-
-    Notes
-    -----
-    Raises ShapeError.
 
     Examples
     --------

@@ -21,15 +21,13 @@ from .lie_poisson import Gradient, angular_velocity, gradient_at
 def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, alpha: ArrayLike) -> Array:
     """{F, G}_sym = -alpha (Pi x grad F) . (Pi x grad G), from gradients at momenta (..., 3): (...).
 
+    Raises ShapeError.
+
     Parameters
     ----------
     first, second : gradients of F and G, values (..., 3) or callables of the momentum
     momentum : (..., 3) body momentum [kg m^2/s]
     alpha : (...) dissipation [s/(kg m^2)], positive where energy is lost
-
-    Notes
-    -----
-    Raises ShapeError.
 
     Examples
     --------
@@ -78,15 +76,13 @@ def dissipated_power(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) 
 def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float, times: ArrayLike) -> Array:
     """The body momentum under double-bracket dissipation, given at the first time: (..., 3), (N,) -> (..., N, 3).
 
+    Raises as `double_bracket_equations`.
+
     Parameters
     ----------
     inertia : (3, 3) or (..., 3, 3) [kg m^2]
     alpha : (...) dissipation [s/(kg m^2)]; a negative one drives the body
     times : (N,) strictly ascending [s]
-
-    Notes
-    -----
-    Raises as `double_bracket_equations`.
 
     Examples
     --------

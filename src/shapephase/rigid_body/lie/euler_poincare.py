@@ -69,6 +69,8 @@ class EulerPoincareMotion:
 def euler_poincare_rate(algebra: LieAlgebra, inertia: ArrayLike, momentum: ArrayLike) -> Array:
     """mu' = ad*_xi mu with xi = I^-1 mu: (..., d) -> (..., d).
 
+    Source: Marsden and Ratiu, section 15.3 and chapter 13; theory.md G7.
+
     Parameters
     ----------
     inertia : (d, d) symmetric isomorphism of the algebra with its dual
@@ -78,10 +80,6 @@ def euler_poincare_rate(algebra: LieAlgebra, inertia: ArrayLike, momentum: Array
     ------
     ShapeError, LieAlgebraError
         If the shapes do not fit, an entry is not finite, or the operator is not symmetric or singular.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, section 15.3 and chapter 13; theory.md G7.
 
     Examples
     --------
@@ -100,6 +98,8 @@ def euler_poincare_motion(
 ) -> EulerPoincareMotion:
     """The motion with a given body momentum at the first time, with its reconstruction g' = g xi.
 
+    Source: Marsden and Ratiu, equation (15.2.10) for the reconstruction.
+
     Parameters
     ----------
     inertia : (d, d) symmetric isomorphism of the algebra with its dual
@@ -112,10 +112,6 @@ def euler_poincare_motion(
         As `euler_poincare_rate`, or if the times do not ascend.
     AccuracyNotReached
         If the motion goes to infinity before the last time, as it can on some algebras.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, equation (15.2.10) for the reconstruction.
 
     Examples
     --------

@@ -113,15 +113,13 @@ def invariable_hyperplane(algebra: LieAlgebra, inertia: ArrayLike, momentum: Arr
 def contact_conormal(inertia: ArrayLike, adjoint: ArrayLike, point: ArrayLike) -> Array:
     """The differential of l o Ad_{g^-1} at a point, the conormal of the moved energy quadric: (..., d) -> (..., d).
 
+    Raises ShapeError.
+
     Parameters
     ----------
     inertia : (d, d) symmetric operator
     adjoint : (..., d, d) Ad_g
     point : (..., d) in space
-
-    Notes
-    -----
-    Raises ShapeError.
 
     Examples
     --------
@@ -139,15 +137,13 @@ def contact_conormal(inertia: ArrayLike, adjoint: ArrayLike, point: ArrayLike) -
 def contact_velocity(algebra: LieAlgebra, adjoint: ArrayLike, velocity: ArrayLike, body_point: ArrayLike) -> Array:
     """The velocity in space of a point fixed in the body's algebra, d/dt Ad_g eta = Ad_g [xi, eta]: -> (..., d).
 
+    Raises ShapeError.
+
     Parameters
     ----------
     adjoint : (..., d, d) Ad_g
     velocity : (..., d) body velocity xi
     body_point : (..., d) eta; at the contact it is xi, and the velocity is zero
-
-    Notes
-    -----
-    Raises ShapeError.
 
     Examples
     --------

@@ -79,14 +79,12 @@ def coadjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
 def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Array:
     """V^B = g^-1 V of a tangent vector at g: (..., n, n), (..., n, n) -> (..., d).
 
+    Source: Marsden and Ratiu, equation (15.4.4).
+
     Raises
     ------
     LieAlgebraError
         If g^-1 V is not an element of the algebra: V is not tangent to the group.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, equation (15.4.4).
 
     Examples
     --------

@@ -59,6 +59,12 @@ def hamiltonian_motion(
 ) -> HamiltonianMotion:
     """The motion, momentum and attitude, of a Hamiltonian of the body momentum alone, quadratic or not.
 
+    |Pi| and R Pi are exact to rounding; how well H is kept shows the error, which is a few 1e-12 in ten periods.
+    Where the inertial third axis is along mu, the azimuth of the body's third axis about it grows by `precession_rate`
+    of the momentum and the gradient: the quadrature of the paper's (4).
+
+    Source: Bonnard et al., remark 3, proposition 5 and (4); theory.md Q9.
+
     Parameters
     ----------
     hamiltonian : gradient of H, momenta (..., 3) [kg m^2/s] -> (..., 3) [rad/s]
@@ -72,14 +78,6 @@ def hamiltonian_motion(
         If the gradient, the momentum, the times or the attitude are not right.
     AccuracyNotReached
         If the motion is too rough to be followed.
-
-    Notes
-    -----
-    |Pi| and R Pi are exact to rounding; how well H is kept shows the error, which is a few 1e-12 in ten periods.
-    Where the inertial third axis is along mu, the azimuth of the body's third axis about it grows by `precession_rate`
-    of the momentum and the gradient: the quadrature of the paper's (4).
-
-    Source: Bonnard et al., remark 3, proposition 5 and (4); theory.md Q9.
 
     Examples
     --------

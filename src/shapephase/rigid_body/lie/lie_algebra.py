@@ -20,18 +20,14 @@ from ...display import short_repr
 from ...errors import LieAlgebraError, ShapeError
 from ...letters import what_came
 
-Matrices = NDArray[Any]
-"""Real or complex square matrices (..., n, n)."""
+Matrices = NDArray[Any]  # real or complex square matrices (..., n, n)
 
-_ROUNDING = 1e-12
-"""Largest defect of antisymmetry, of Jacobi's identity and of a closed basis, relative to the entries."""
+_ROUNDING = 1e-12  # largest defect of antisymmetry, of Jacobi's identity and of a closed basis, relative to the entries
 _OUTSIDE = 1e-9
 """Distance of a matrix from the span of the basis, relative to its largest entry, up to which it is an element of the
 algebra; also the largest asymmetry of an operator. Nine digits, as people write them, are enough."""
-_SINGULAR = 1e-14
-"""Least ratio of an operator's eigenvalues, by magnitude: below it the smallest is rounding."""
-_INTEGER = 1e-14
-"""Fitted structure constants closer than this to an integer, relative to the largest, are that integer."""
+_SINGULAR = 1e-14  # least ratio of an operator's eigenvalues, by magnitude: below it the smallest is rounding
+_INTEGER = 1e-14  # fitted structure constants closer than this to an integer, relative to the largest, are that integer
 
 
 @dataclass(frozen=True, eq=False)

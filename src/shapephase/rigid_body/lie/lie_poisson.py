@@ -23,14 +23,11 @@ from .lie_algebra import LieAlgebra, so3
 Gradient = ArrayLike | Callable[[Array], ArrayLike]
 """The gradient of a function on the dual: values (..., d), or a callable of momenta (..., d)."""
 
-_SO3 = so3()
-"""The algebra of a function that is not given one."""
+_SO3 = so3()  # the algebra of a function that is not given one
 _TANGENT = 1e-9
 """Part of a vector off the orbit's tangent plane, relative to its length, that is allowed: nine digits, as written."""
-_RANK = 1e-12
-"""Singular values of the Poisson tensor below this share of the largest are zero, and the leaf is smaller."""
-_NULL = 1e-10
-"""Singular values of a linear system below this share of the largest (or of 1) belong to its null space."""
+_RANK = 1e-12  # singular values of the Poisson tensor below this share of the largest are zero, and the leaf is smaller
+_NULL = 1e-10  # singular values of a linear system below this share of the largest (or of 1) belong to its null space
 
 
 def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
@@ -53,15 +50,13 @@ def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
 def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
     """{F, G}(mu) = -<mu, [dF, dG]>: (...), from the gradients of F and G at momenta (..., d).
 
+    Equation :eq:`bracket` of the documentation.
+    Source: Marsden and Ratiu, equation (15.3.8); theory.md K1.
+
     Raises
     ------
     ShapeError
         If a shape is wrong or an entry not finite.
-
-    Notes
-    -----
-    Equation :eq:`bracket` of the documentation.
-    Source: Marsden and Ratiu, equation (15.3.8); theory.md K1.
 
     Examples
     --------
@@ -84,14 +79,12 @@ def bracket_gradient(
 ) -> Array:
     """The gradient of {F, G}, with which brackets can be nested: (..., d).
 
+    Raises ShapeError.
+
     Parameters
     ----------
     first, second : gradient (..., d) and Hessian (..., d, d) of F and of G at the momenta
     momentum : (..., d)
-
-    Notes
-    -----
-    Raises ShapeError.
 
     Examples
     --------
@@ -277,8 +270,6 @@ def sphere_symplectic_form(momentum: ArrayLike, first: ArrayLike, second: ArrayL
 
     omega(X_H, v) = dH . v for tangent v. Raises ShapeError for a zero momentum. Source: theory.md K2, D3.
 
-    Notes
-    -----
     Equation :eq:`symplectic` of the documentation.
 
     Examples
@@ -294,15 +285,13 @@ def sphere_symplectic_form(momentum: ArrayLike, first: ArrayLike, second: ArrayL
 def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     """Pi' = Pi x I^-1 Pi: (..., 3, 3), (..., 3) -> (..., 3) [kg m^2/s^2].
 
+    Equations :eq:`euler-rigid` and :eq:`hamiltonian` of the documentation.
+    Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
+
     Raises
     ------
     ShapeError, SingularInertiaError
         If the inertia is not symmetric positive definite, or the shapes are not right.
-
-    Notes
-    -----
-    Equations :eq:`euler-rigid` and :eq:`hamiltonian` of the documentation.
-    Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
 
     Examples
     --------

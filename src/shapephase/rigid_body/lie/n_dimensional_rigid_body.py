@@ -21,8 +21,7 @@ _ASYMMETRY = 1e-9
 """Largest difference of entries that mirror each other, relative to the largest entry: nine digits, as written."""
 _NO_INERTIA = 1e-14
 """Least inertia of a plane, relative to the largest eigenvalue of J: below it the sum of two is rounding."""
-_LARGEST_PFAFFIAN = 10
-"""Largest dimension of a Pfaffian: its expansion has (n - 1)!! terms, 945 for ten."""
+_LARGEST_PFAFFIAN = 10  # largest dimension of a Pfaffian: its expansion has (n - 1)!! terms, 945 for ten
 
 
 def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
@@ -140,6 +139,8 @@ def pfaffian(momentum: ArrayLike) -> Array:
 def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int) -> Array:
     """The coefficients of 1, lambda, ... in tr (M + lambda J^2)^k, all constant: (..., n, n) -> (..., k + 1).
 
+    Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
+
     Parameters
     ----------
     second_moment : (n, n) symmetric J
@@ -150,10 +151,6 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
     ------
     ShapeError, SingularInertiaError
         As `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
-
-    Notes
-    -----
-    Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
 
     Examples
     --------
