@@ -27,7 +27,9 @@ _CANCELLATION = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class ArcLengthBounds:
-    """Upper bounds of the length of Pi's curve over an interval [kg m^2/s], each sharper than the one before.
+    """Upper bounds of the length of Pi's curve over an interval [kg m^2/s], ascending in sharpness.
+
+    Made by `arc_length_bounds`.
 
     Attributes
     ----------
@@ -35,13 +37,6 @@ class ArcLengthBounds:
     by_drift : l times the integral of l/I_1 + |I^-1 L_o|
     by_energy : l times the integral of l sqrt((1/I_1 - e)(e - 1/I_3)) + |I^-1 L_o|, e = 2 E/l^2 anywhere in its bounds;
         zero for a body with three equal moments, whose momentum does not move
-
-    Examples
-    --------
-    >>> energy = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
-    >>> found = sp.bounds.arc_length_bounds(energy)
-    >>> found.by_energy <= found.general
-    True
     """
 
     general: float
@@ -53,20 +48,13 @@ class ArcLengthBounds:
 
 @dataclass(frozen=True, eq=False)
 class AzimuthBounds:
-    """Bounds of the rate at which Pi circles the certified axis, on each of K cells.
+    """Bounds of the rate at which Pi circles the certified axis, on each of K cells. Made by `azimuth_bounds`.
 
     Attributes
     ----------
     sense : +1 counterclockwise seen from the tip of the axis ("about axis 3"), -1 clockwise ("about axis 1")
     slow, fast : (K,) of sense times the azimuth's rate [rad/s]; infinite where Pi may be on the axis
     monotone : whether the azimuth is certain to change in one sense throughout
-
-    Examples
-    --------
-    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
-    >>> bounds = sp.bounds.azimuth_bounds(certificate)
-    >>> bounds.monotone, bounds.sense
-    (True, 1.0)
     """
 
     sense: float
@@ -81,6 +69,8 @@ class AzimuthBounds:
 class ReturnTimeBounds:
     """Lower bounds of the time after which Pi is first back at its start [s]; 0 where nothing is certain.
 
+    Made by `return_time_bounds`.
+
     Attributes
     ----------
     by_latitude : 2 pi |Pi x axis|/(l^2 max 1/I_1)
@@ -88,12 +78,6 @@ class ReturnTimeBounds:
     by_azimuth : when the fastest possible azimuth has gone once round, at least `by_inertia`
     within : whether Pi can be back in the interval at all; if not, all three are at most the interval's length
     latest : an upper bound of the time after which Pi has gone once round the axis; infinite where nothing is certain
-
-    Examples
-    --------
-    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 30.0), [0.1, 0.2, 2.0])
-    >>> print(f"{sp.bounds.return_time_bounds(certificate).by_inertia:.4f} s")
-    4.1629 s
     """
 
     by_latitude: float

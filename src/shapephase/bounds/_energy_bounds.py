@@ -39,6 +39,8 @@ _PASSES = 3
 class EnergyBounds:
     """Bounds of E_t along every solution from one initial momentum, on each of K cells of time.
 
+    Made by `energy_bounds`.
+
     Attributes
     ----------
     enclosure : bounds of the deformation
@@ -46,12 +48,6 @@ class EnergyBounds:
     initial : (2,) bounds of E at the start of the interval, apart by rounding and the error of sampling [J]
     lower, upper : (K,) of E on each cell [J]
     rate_lower, rate_upper : (K,) of dE/dt [W]
-
-    Examples
-    --------
-    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
-    >>> print(f"{found.magnitude:.6f} kg m^2/s, {found.lower.min():.6f} J")
-    2.000000 kg m^2/s, 0.500000 J
     """
 
     enclosure: Enclosure

@@ -30,7 +30,7 @@ _PARTS_OF_STEP = 4
 
 @dataclass(frozen=True)
 class Bound:
-    """A bound of a quantity of a motion, and the quantity itself.
+    """Bound of a quantity of a motion, and the quantity itself. Made by `bounds`.
 
     Attributes
     ----------
@@ -38,13 +38,6 @@ class Bound:
     is_upper : whether the value is at most the bound; else it is at least the bound
     limit : the bound
     value : of the motion
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
-    >>> bound = sp.bounds.bounds(motion)[0]
-    >>> bound.slack >= 0.0
-    True
     """
 
     name: str

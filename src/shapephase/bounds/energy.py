@@ -29,19 +29,12 @@ from ..rigid_body.euler_top import EulerTop
 
 @dataclass(frozen=True, eq=False)
 class EnergyRate:
-    """The two parts of dE_t/dt; fields are batch + t.shape [W].
+    """The two parts of dE_t/dt; fields are batch + t.shape [W]. Made by `energy_rate`.
 
     Attributes
     ----------
     by_inertia : Pi.(I^-1)' Pi/2, the whole rate if there is no internal momentum
     by_internal_momentum : (Pi x I^-1 Pi).I^-1 L_o
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.3, 0.4, 2.0])
-    >>> rate = sp.bounds.energy_rate(motion, 1.0)
-    >>> float(rate.by_inertia), float(rate.by_internal_momentum)
-    (0.0, 0.0)
     """
 
     by_inertia: Array
@@ -57,7 +50,7 @@ class EnergyRate:
 
 @dataclass(frozen=True, eq=False)
 class FrozenPolhode:
-    """The polhode of Pi if the body stayed rigid from one time on.
+    """Polhode of Pi if the body stayed rigid from one time on. Made by `frozen_polhode`.
 
     Attributes
     ----------
@@ -67,12 +60,6 @@ class FrozenPolhode:
     homoclinic_energy : E_t of the separatrix [J]
     period : of the rigid body's Pi [s]; infinite on the separatrix and at an equilibrium
     regime : as `EulerTop.regime`
-
-    Examples
-    --------
-    >>> curve = sp.bounds.frozen_polhode(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), 0.0, [0.1, 0.2, 2.0])
-    >>> curve.regime, curve.energy < curve.homoclinic_energy
-    ('circling', True)
     """
 
     points: Array

@@ -213,7 +213,7 @@ class KeplerOrbit:
 
 @dataclass(frozen=True)
 class GravityTorque:
-    """The effect of the gravity-gradient torque, neglected for a free body, on a motion, to first order.
+    """Effect of the neglected gravity-gradient torque on a motion, to first order. Made by `gravity_torque_estimate`.
 
     Attributes
     ----------
@@ -221,14 +221,6 @@ class GravityTorque:
     impulse : the largest change of the angular momentum [kg m^2/s]
     attitude_error : the largest rotation away from the free motion [rad]
     tolerance : the rotation that is allowed [rad]
-
-    Examples
-    --------
-    >>> orbit = sp.bounds.KeplerOrbit.from_state([7.0e6, 0.0, 0.0], [0.0, 7546.05, 0.0], gm=3.986e14)
-    >>> motion = sp.reconstruct(sp.rigid(np.eye(3), 10.0), [0.0, 0.5, 5.0])
-    >>> found = sp.bounds.gravity_torque_estimate(motion, orbit)
-    >>> print(f"{found.largest_torque:.9f} N m")  # a sphere feels none
-    0.000000000 N m
     """
 
     largest_torque: float

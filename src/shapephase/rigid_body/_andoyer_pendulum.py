@@ -36,13 +36,7 @@ _REGIME_NAMES = {"libration": "oscillating", "rotation": "rotating"}
 
 @dataclass(frozen=True, eq=False)
 class AndoyerPendulum:
-    """The reduced Euler-Poinsot motion in the (y, p_y) plane, see `andoyer_pendulum`.
-
-    Examples
-    --------
-    >>> sp.rigid_body.andoyer_pendulum([3.0, 2.0, 1.0]).moments.tolist()
-    [3.0, 2.0, 1.0]
-    """
+    """Reduced free rigid body in the (y, p_y) plane. Made by `andoyer_pendulum`."""
 
     moments: Array
     """(3,) principal moments about the caller's axes 1, 2, 3 [kg m^2]."""

@@ -27,7 +27,7 @@ _FARTHEST = 300.0  # logarithm of the largest tan(psi), and cot(psi), that matte
 
 @dataclass(frozen=True)
 class HalfTwist:
-    """When a free rigid body turns over about its intermediate axis.
+    """Times at which a free rigid body turns over about its intermediate axis. Made by `half_twist`.
 
     Attributes
     ----------
@@ -39,12 +39,6 @@ class HalfTwist:
     rate : (...) argument of the elliptic functions per second; 0 where Pi stands still [rad/s]
     growth_rate : (...) the positive eigenvalue at the intermediate axis,
         |Pi| sqrt((I2 - I1)(I3 - I2)/(I1 I3))/I2 [1/s]
-
-    Examples
-    --------
-    >>> flip = sp.rigid_body.half_twist([1.0, 2.0, 3.0], [0.001, 2.0, 0.0])
-    >>> print(f"{flip.time:.6f} s, by the logarithm alone {flip.asymptote:.6f} s")
-    28.731424 s, by the logarithm alone 28.731429 s
     """
 
     time: Array
@@ -69,13 +63,6 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     ----------
     moments : (..., 3) principal moments in any order, any positive numbers [kg m^2]
     momentum : (..., 3) Pi along these axes at any one time [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError
-        If shapes or entries are wrong.
-    SingularInertiaError
-        If a moment is not positive.
 
     Examples
     --------
@@ -103,11 +90,6 @@ def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLi
     magnitude : (...) |Pi| [kg m^2/s]
     tilt : (...) angle between Pi and the intermediate axis at the start [rad]
     azimuth : (...) direction of the tilt, from the axis of the smallest to that of the largest moment [rad]
-
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        As `half_twist`.
 
     Examples
     --------

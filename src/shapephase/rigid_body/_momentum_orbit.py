@@ -34,7 +34,7 @@ _NEGLIGIBLE = 1e-140
 
 @dataclass(frozen=True, eq=False)
 class MomentumOrbit:
-    """How Pi moves in the principal axes of a free rigid body.
+    """Motion of Pi in the principal axes of a free rigid body. Made by `momentum_orbit`.
 
     Attributes
     ----------
@@ -54,12 +54,6 @@ class MomentumOrbit:
     precession : (L/I_a − L/I_k)/rate
     sense : +1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still
     condition : how much a small change of inertia or momentum is magnified, see `EulerTop.condition`
-
-    Examples
-    --------
-    >>> orbit = sp.rigid_body.momentum_orbit(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.2, 1.5]))
-    >>> orbit.circled, round(orbit.magnitude, 6)
-    (2, 1.516575)
     """
 
     moments: Array
@@ -206,7 +200,7 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class WeierstrassForm:
-    """The squares of a free rigid body's momentum by Weierstrass's function; see `weierstrass_form`.
+    """Squares of a free rigid body's momentum by Weierstrass's function. Made by `weierstrass_form`.
 
     Attributes
     ----------
@@ -215,12 +209,6 @@ class WeierstrassForm:
     invariants : g_2 [1/s^4] and g_3 [1/s^6] of y'^2 = 4 y^3 - g_2 y - g_3
     half_periods : omega, and the size of the imaginary one, omega' = i times it [s]; Pi_i^2 has the period 2 omega
     shift : t_0, real part of the constant in y = P(t + t_0 + omega') [s]
-
-    Examples
-    --------
-    >>> form = sp.rigid_body.weierstrass_form([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
-    >>> print(np.sqrt(form.squares(0.0)).round(9))
-    [0.6 0.9 0.5]
     """
 
     moments: Array

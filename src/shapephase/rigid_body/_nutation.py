@@ -28,7 +28,7 @@ _UNIT = 1e-6  # farthest from 1 that the length of a vertical may be: six digits
 
 @dataclass(frozen=True)
 class Nutation:
-    """The rise and fall of a Lagrange top's axis.
+    """Rise and fall of a Lagrange top's axis. Made by `nutation`.
 
     Attributes
     ----------
@@ -37,13 +37,6 @@ class Nutation:
     rate : argument of the elliptic functions per second [rad/s]
     complement : m1 = 1 - k^2
     period : 2K/rate; infinite where the axis only approaches the vertical [s]
-
-    Examples
-    --------
-    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
-    >>> found = sp.rigid_body.nutation(top, [0.0, 0.3, 3.0], [0.0, 0.6, 0.8])
-    >>> print(f"{found.highest:.6f}")
-    0.800000
     """
 
     lowest: float

@@ -53,11 +53,6 @@ class EulerChart:
         """The rotation from body to inertial axes: (..., 3) [rad] -> (..., 3, 3). Any real angles, poles included.
 
         Source: Marsden and Ratiu (15.6.1-5), R = P^T; Bonnard et al., section 3.3.
-
-        Raises
-        ------
-        ShapeError
-            If the last axis is not three finite numbers; so do all methods.
         """
         phi, theta, psi = np.moveaxis(finite_array(angles, "angles", (3,), unit="rad"), -1, 0)
         half_sum, half_difference, half = 0.5 * (phi + psi), 0.5 * (phi - psi), 0.5 * theta
@@ -70,11 +65,6 @@ class EulerChart:
 
         At a pole, to rounding, theta is exactly 0 or pi (as rounded), psi is 0 and phi takes the whole turn: there the
         attitude determines phi + psi, or at pi phi - psi, alone.
-
-        Raises
-        ------
-        ShapeError
-            If a matrix is further than 1e-6 from a proper rotation.
         """
         half_sum, half_difference, theta, pole = self._half_angles(attitude)
         half_sum = np.where(pole & (theta > 0.0), half_difference, half_sum)
@@ -244,11 +234,6 @@ class EulerChart:
         """Omega.I Omega / 2 of angles and their rates: (..., 3, 3), (..., 3), (..., 3) -> (...) [J]. Poles included.
 
         Source: Marsden and Ratiu (15.3.3) with (15.7.2).
-
-        Raises
-        ------
-        UnphysicalInertiaError, SingularInertiaError
-            If an inertia is not symmetric, or not positive definite.
         """
         angles, rates = _pair(angles, rates, "rates", "rad/s")
         tensor = _inertia(inertia, angles)
@@ -264,8 +249,6 @@ class EulerChart:
         ------
         ChartPoleError
             Within 1e-8 of a pole.
-        UnphysicalInertiaError, SingularInertiaError
-            If an inertia is not symmetric, or not positive definite.
         """
         momentum = self.body_momentum(angles, momenta)
         inverse = inverse_inertia(_inertia(inertia, momentum))
@@ -282,8 +265,6 @@ class EulerChart:
         ------
         ChartPoleError
             Within 1e-8 of a pole.
-        UnphysicalInertiaError, SingularInertiaError
-            If an inertia is not symmetric, or not positive definite.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
         momentum = self.body_momentum(angles, momenta)

@@ -56,10 +56,6 @@ class Gyrostat:
 
     Raises
     ------
-    ShapeError
-        For arrays of the wrong shape or entries that are not finite numbers.
-    UnphysicalInertiaError, SingularInertiaError
-        If the inertia is not symmetric, or not positive definite.
     AccuracyNotReached
         Within some 3e-5 rad of a steady rotation, where the oval is so small that its digits are lost (from 1e-2 rad
         on the error of the start grows as the inverse square of that angle), or of a body so nearly symmetric that it

@@ -56,8 +56,6 @@ class HeavyTop:
     ------
     ShapeError
         If shapes or entries are wrong, or chi is no unit vector (to 1e-6).
-    UnphysicalInertiaError, SingularInertiaError
-        If a tensor is not symmetric, or not positive definite.
 
     Examples
     --------
@@ -243,7 +241,9 @@ class HeavyTop:
 
 @dataclass(frozen=True, eq=False)
 class HeavyTopMotion:
-    """A motion of a heavy top on [0, duration]. Times (...) give results of shape batch + time + item.
+    """Motion of a heavy top on [0, duration].
+
+    Times (...) give results of shape batch + time + item. Made by `HeavyTop.motion`.
 
     Attributes
     ----------
@@ -253,13 +253,6 @@ class HeavyTopMotion:
     error_estimate : (...) of the attitude over the whole motion, a tenth of the largest difference from a run with 32
         times the local tolerance [rad]
     energy_drift : (...) largest |H(t) - H(0)| at the ends of the steps [J]
-
-    Examples
-    --------
-    >>> top = sp.rigid_body.HeavyTop(np.diag([1.0, 1.0, 0.5]), 2.0)
-    >>> motion = top.motion([0.0, 0.0, 3.0], duration=1.0)
-    >>> print(f"{float(motion.energy_drift) < 1e-9} {float(motion.vertical_momentum):.6f}")
-    True 3.000000
     """
 
     top: HeavyTop

@@ -34,13 +34,6 @@ _THRESHOLD = 8.0 * float(np.finfo(float).eps)
 class LagrangeTop:
     """A heavy top with I1 = I2 = `transverse`, I3 = `axial` [kg m^2], chi = e3 and this Mgl [J].
 
-    Raises
-    ------
-    ShapeError
-        If an entry is not a finite number.
-    SingularInertiaError
-        If a moment is not positive.
-
     Examples
     --------
     >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
@@ -74,7 +67,7 @@ class LagrangeTop:
 
 @dataclass(frozen=True)
 class SleepingTop:
-    """The upright spin of a Lagrange top and what two methods say about its stability.
+    """Upright spin of a Lagrange top and its stability by two methods. Made by `sleeping_top`.
 
     The conserved quantity is H + Phi(Pi.Gamma, |Gamma|^2) + phi(Pi_3); dots are derivatives by Pi.Gamma.
 
@@ -92,12 +85,6 @@ class SleepingTop:
     verdict : "stable" or "unstable". Where p^2 = 4 Mgl I1 > 0 neither method decides, but `upright_potential` does: it
         has a strict minimum there, and the spin is stable. "marginal" where p and Mgl both vanish: a top at rest
         without weight, which any momentum carries away
-
-    Examples
-    --------
-    >>> top = sp.rigid_body.sleeping_top(sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0), 3.0)
-    >>> top.momentum, top.energy_casimir, top.verdict
-    (3.0, True, 'stable')
     """
 
     momentum: float
@@ -120,18 +107,14 @@ class SleepingTop:
 class StabilityChart:
     """Stability of the upright spin over the ratio of moments and the spin, by three methods.
 
+    Made by `stability_chart`.
+
     Attributes
     ----------
     axial_ratios : (R,) I3/I1
     momenta : (P,) Pi_3 in units of sqrt(Mgl I1); the threshold is 2
     energy_casimir, spectrum, simulation : (R, P) True where the method finds the spin stable
     largest_tilt : (R, P) of the simulated motions [rad]
-
-    Examples
-    --------
-    >>> chart = sp.rigid_body.stability_chart([0.5], [1.0, 3.0], duration=8.0)
-    >>> chart.energy_casimir.tolist()
-    [[False, True]]
     """
 
     axial_ratios: Array
@@ -152,11 +135,6 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     The free number e = -Phi_dot/p is taken where the e-quadratic is largest, at 1/(2 I1).
 
     Source: Marsden and Ratiu, theorem 15.10.1; D. Aeyels, Syst. Control Lett. 19 (1992) 461, for equality.
-
-    Raises
-    ------
-    ShapeError
-        If the momentum is not a finite number.
 
     Examples
     --------
@@ -285,11 +263,6 @@ def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> 
     mgl : (...) [J]
     momentum : (...) p = Pi_3 [kg m^2/s]
 
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If an argument is of a wrong shape or value, or a moment is not positive.
-
     Examples
     --------
     >>> sp.rigid_body.sleeping_matrix([1.0, 1.0, 0.5], 2.0, 3.0).tolist()
@@ -380,8 +353,6 @@ def stability_chart(
 
     Raises
     ------
-    ShapeError, SingularInertiaError
-        If an argument is wrong.
     AccuracyNotReached
         If the simulation needs more than 200 000 steps.
 

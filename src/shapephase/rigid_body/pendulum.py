@@ -41,14 +41,7 @@ _FAINT = 1e-140
 
 @dataclass(frozen=True)
 class PendulumEquilibrium:
-    """A steady rotation as an equilibrium of the pendulum, p = 0.
-
-    Examples
-    --------
-    >>> pendulum = sp.rigid_body.rigid_body_pendulum([1.0, 2.0, 3.0])
-    >>> [(round(point.angle, 6), point.stability) for point in pendulum.equilibria]
-    [(0.0, 'stable'), (1.570796, 'unstable'), (3.141593, 'stable'), (4.712389, 'unstable')]
-    """
+    """Steady rotation as an equilibrium of the pendulum, p = 0. Made by `RigidBodyPendulum.equilibria`."""
 
     angle: float
     """theta [rad]: 0, pi/2, pi or 3 pi/2."""
@@ -64,15 +57,7 @@ class PendulumEquilibrium:
 
 @dataclass(frozen=True, eq=False)
 class RigidBodyPendulum:
-    """The coordinates (r, theta, p) of body momenta on elliptic cylinders, see `rigid_body_pendulum`.
-
-    Examples
-    --------
-    >>> pendulum = sp.rigid_body.rigid_body_pendulum([1.0, 2.0, 3.0])
-    >>> radius, angle, p = pendulum.coordinates([0.6, 0.9, 0.5])
-    >>> print(f"{radius:.6f} {angle:.6f} {p:.6f}")
-    0.612372 0.643501 0.500000
-    """
+    """Coordinates (r, theta, p) of body momenta on elliptic cylinders. Made by `rigid_body_pendulum`."""
 
     moments: Array
     """(3,) principal moments as given [kg m^2]."""
@@ -203,15 +188,7 @@ class RigidBodyPendulum:
 
 @dataclass(frozen=True, eq=False)
 class PendulumMotion:
-    """A motion of the pendulum, and of the rigid body, in closed form; made by `RigidBodyPendulum.motion`.
-
-    Examples
-    --------
-    >>> motion = sp.rigid_body.rigid_body_pendulum([1.0, 2.0, 3.0]).motion([0.6, 0.9, 0.5])
-    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
-    >>> print(np.abs(motion.body_momentum(1.0) - top.body_momentum(1.0)).max().round(9))
-    0.0
-    """
+    """Motion of the pendulum, and of the rigid body, in closed form. Made by `RigidBodyPendulum.motion`."""
 
     pendulum: RigidBodyPendulum
     radius: float

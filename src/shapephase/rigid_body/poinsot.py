@@ -33,20 +33,15 @@ _EQUAL = 1e-12
 
 @dataclass(frozen=True)
 class Closure:
-    """How a herpolhode closes; a circle has no lobes and closes in one turn, a point has neither.
+    """Turns and lobes after which a herpolhode closes.
+
+    A circle has no lobes and closes in one turn, a point has neither. Made by `Poinsot.closure`.
 
     Attributes
     ----------
     turns : about mu
     lobes : waves between the two circles that the herpolhode touches
     gap : angle between its start and its end [rad]
-
-    Examples
-    --------
-    >>> top = sp.EulerTop.principal([1.0, 1.0, 2.0], [0.6, 0.0, 0.8])
-    >>> closure = sp.rigid_body.Poinsot(top).closure()
-    >>> closure.turns, closure.lobes
-    (5, 4)
     """
 
     turns: int
@@ -58,7 +53,9 @@ class Closure:
 
 @dataclass(frozen=True)
 class Cones:
-    """The cones of an axisymmetric body: the body cone rolls on the space cone, both with their apex in the centre.
+    """Body cone and space cone of an axisymmetric body; the first rolls on the second, both apices in the centre.
+
+    Made by `cones`.
 
     Attributes
     ----------
@@ -67,12 +64,6 @@ class Cones:
     space_inside_body : the space cone lies inside the body cone (oblate), or the two touch from outside (prolate)
     precession_rate : of the axis of symmetry about the momentum, |mu| / I1 [rad/s]
     spin_rate : lambda, of the momentum about the axis of symmetry seen in the body [rad/s]; > 0 oblate, < 0 prolate
-
-    Examples
-    --------
-    >>> cones = sp.rigid_body.cones(sp.EulerTop.principal([1.0, 1.0, 2.0], [3.0, 0.0, 4.0]))
-    >>> print(f"{np.degrees(cones.body_half_angle):.3f} degrees, {cones.precession_rate:.3f} rad/s")
-    56.310 degrees, 5.000 rad/s
     """
 
     body_half_angle: float

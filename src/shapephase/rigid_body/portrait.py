@@ -23,19 +23,13 @@ _ROUNDED = 1e-12
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A steady rotation as a point on the momentum sphere, on a principal axis.
+    """Steady rotation as a point on the momentum sphere, on a principal axis. Made by `equilibria`.
 
     Attributes
     ----------
     direction : (3,) unit vector
     kind : "centre" (extreme moment), "saddle" (middle moment), "degenerate" (one of a circle or sphere of equilibria)
     rate : angular frequency about a centre, rate of growth at a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]
-
-    Examples
-    --------
-    >>> points = sp.rigid_body.equilibria([1.0, 2.0, 3.0])
-    >>> len(points), [point.kind for point in points]
-    (6, ['centre', 'centre', 'saddle', 'saddle', 'centre', 'centre'])
     """
 
     direction: Array

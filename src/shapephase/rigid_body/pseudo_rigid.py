@@ -44,11 +44,6 @@ class PseudoRigidBody:
     shear : mu > 0, shear modulus times volume [J]
     bulk : lambda >= 0, Lame's first constant times volume [J]
 
-    Raises
-    ------
-    ShapeError, UnphysicalInertiaError
-        If they are not such numbers.
-
     Examples
     --------
     >>> body = sp.rigid_body.PseudoRigidBody([3.0, 2.0, 1.0], shear=10.0, bulk=20.0)
@@ -107,7 +102,7 @@ class PseudoRigidBody:
 
 @dataclass(frozen=True, eq=False)
 class PseudoRigidSpin:
-    """A steady spin of a pseudo-rigid body; see `pseudo_rigid_spin`.
+    """Steady spin of a pseudo-rigid body. Made by `pseudo_rigid_spin`.
 
     Attributes
     ----------
@@ -122,12 +117,6 @@ class PseudoRigidSpin:
     verdict : "stable" where all curvatures are positive (energy-momentum method: in the sense of Liapunov, up to the
         turn about the momentum); "unstable" where an eigenvalue has a positive real part; else "spectrally stable", as
         about the axis of the smallest moment, where friction would decide otherwise
-
-    Examples
-    --------
-    >>> body = sp.rigid_body.PseudoRigidBody([3.0, 2.0, 1.0], shear=10.0, bulk=20.0)
-    >>> [sp.rigid_body.pseudo_rigid_spin(body, axis, 2.0).verdict for axis in range(3)]
-    ['spectrally stable', 'unstable', 'stable']
     """
 
     body: PseudoRigidBody
@@ -161,8 +150,6 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
 
     Raises
     ------
-    ShapeError
-        If the axis is none of these, or the momentum not a finite number.
     AccuracyNotReached
         If no equilibrium is found.
 

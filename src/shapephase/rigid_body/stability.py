@@ -33,7 +33,7 @@ _MOST = 1e100  # largest momentum taken [kg m^2/s], for the same reason
 
 @dataclass(frozen=True)
 class SteadyRotation:
-    """A steady rotation of a free rigid body and what three methods say of its stability.
+    """Steady rotation of a free rigid body, and its stability by three methods. Made by `steady_rotation`.
 
     A spherical body is "stable" everywhere: every momentum stands still.
 
@@ -52,12 +52,6 @@ class SteadyRotation:
     index : number of negative directions of `sphere_hessian`
     verdict : "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (where this moment equals
         exactly one of the others: a neighbouring motion drifts along the circle of equilibria and stays near it)
-
-    Examples
-    --------
-    >>> spin = sp.rigid_body.steady_rotation(np.diag([1.0, 2.0, 3.0]), [0.0, 0.0, 1.0])
-    >>> spin.moment, spin.verdict
-    (3.0, 'stable')
     """
 
     momentum: Array
@@ -105,8 +99,6 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     ------
     ShapeError
         If a shape is wrong, or the momentum is zero or not along a principal axis (to 1e-12).
-    UnphysicalInertiaError, SingularInertiaError
-        If the tensor is not symmetric, or not positive definite.
 
     Examples
     --------
@@ -156,11 +148,6 @@ def steady_rotations(
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
     magnitude : |Pi| > 0 [kg m^2/s]
 
-    Raises
-    ------
-    ShapeError, UnphysicalInertiaError, SingularInertiaError
-        As `steady_rotation`.
-
     Examples
     --------
     >>> [spin.verdict for spin in sp.rigid_body.steady_rotations(np.diag([1.0, 2.0, 3.0]))]
@@ -177,7 +164,7 @@ def steady_rotations(
 
 @dataclass(frozen=True)
 class SpinInSpace:
-    """How a body moves in space that was disturbed in a steady rotation, for all time; see `spin_in_space`.
+    """Motion in space of a body disturbed in a steady rotation, for all time. Made by `spin_in_space`.
 
     Attributes
     ----------
@@ -189,12 +176,6 @@ class SpinInSpace:
         Pi does not circle the axis
     verdict : "stable up to the turn about the momentum": the tilt is as small as one likes for small disturbances,
         while the angle about the momentum drifts; or "unstable"
-
-    Examples
-    --------
-    >>> spin = sp.rigid_body.spin_in_space(np.diag([1.0, 2.0, 3.0]), [0.0, 0.0, 1.0], [0.0, 0.01, 1.0])
-    >>> spin.verdict
-    'stable up to the turn about the momentum'
     """
 
     steady: SteadyRotation

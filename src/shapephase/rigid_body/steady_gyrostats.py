@@ -24,7 +24,7 @@ _SAME = 4.0 * _EPS  # relative difference of inverse moments that is rounding
 
 @dataclass(frozen=True, eq=False)
 class GyrostatEquilibrium:
-    """A steady rotation of a gyrostat about its momentum.
+    """Steady rotation of a gyrostat about its momentum. Made by `gyrostat_equilibria`.
 
     Attributes
     ----------
@@ -33,12 +33,6 @@ class GyrostatEquilibrium:
     energy : omega.I omega/2 [J]
     stability : "least energy", "most energy" or "saddle"; only the first withstands friction
     frequency : of small oscillations about a stable one, or the rate of growth from a saddle [rad/s]
-
-    Examples
-    --------
-    >>> found = sp.rigid_body.gyrostat_equilibria(np.diag([1.0, 2.0, 3.0]), [0.1, 0.1, 0.1], 1.0)
-    >>> [each.stability for each in found]
-    ['least energy', 'least energy', 'saddle', 'saddle', 'most energy', 'most energy']
     """
 
     direction: Array
@@ -64,11 +58,6 @@ def gyrostat_equilibria(inertia: ArrayLike, rotor: ArrayLike, magnitude: float) 
     inertia : (3, 3) [kg m^2]
     rotor : (3,) momentum of the rotor, body axes [kg m^2/s]
     magnitude : of the momentum, above 0 [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError, TrajectoryError
-        For arrays of the wrong shape, or a magnitude that is not above 0.
 
     Examples
     --------
@@ -116,19 +105,13 @@ def bifurcation_rotors(inertia: ArrayLike, rotor_axis: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class DualSpinTurn:
-    """The turn of a body whose rotor slowly takes up all momentum. Made by `dual_spin_turn`.
+    """Turn of a body whose rotor slowly takes up all momentum. Made by `dual_spin_turn`.
 
     Attributes
     ----------
     rotor : (N,) momentum of the rotor, from 0 to all of it [kg m^2/s]
     direction : (N, 3) of the momentum in the body, from the axis of the largest moment to that of the rotor
     rate : (N,) of the body about it [rad/s]
-
-    Examples
-    --------
-    >>> turn = sp.rigid_body.dual_spin_turn(np.diag([1.0, 2.0, 3.0]), [1.0, 0.0, 1.0], 1.0)
-    >>> print(f"{np.degrees(np.arccos(turn.direction[0] @ turn.direction[-1])):.6f} degrees")
-    45.000000 degrees
     """
 
     rotor: Array

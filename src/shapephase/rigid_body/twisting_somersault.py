@@ -50,7 +50,7 @@ _TWIST = 2  # the stage in which the body twists
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RotorDive:
-    """A dive of five stages; see `rotor_dive`.
+    """Dive of five stages. Made by `rotor_dive`.
 
     Attributes
     ----------
@@ -61,12 +61,6 @@ class RotorDive:
     times : (6,) at which the stages begin and the dive ends [s]
     turns : (5,) what the long axis turns through about the momentum in each stage [rad], of sum 2 pi m
     tilt : the angle of the momentum from the plane of x and y halfway [rad]
-
-    Examples
-    --------
-    >>> dive = sp.rigid_body.rotor_dive([12.0, 11.0, 1.0], 70.0, 50.0, 0.12, somersaults=1.5, twists=2)
-    >>> print(f"{dive.duration:.4f} s, of which it twists {np.diff(dive.times)[2]:.4f} s")
-    1.5857 s, of which it twists 0.4005 s
     """
 
     moments: Array
@@ -198,8 +192,6 @@ def rotor_dive(
 
     Raises
     ------
-    ShapeError
-        If an argument is of a wrong shape or value.
     TrajectoryError
         If there is no such dive: after the first shape change the momentum does not circle the long axis, or has
         circled it too far already, or shape changes and twist alone are more somersaults.
@@ -290,8 +282,6 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
 
     Raises
     ------
-    ShapeError
-        If the arguments are of a wrong shape or value.
     TrajectoryError
         If a twist takes more somersaults at any tilt.
 

@@ -155,11 +155,6 @@ class AndoyerVariables:
         """The energy Pi.I^-1 Pi/2 of a body of this inertia: (..., 3, 3) [kg m^2, body axes] -> (...) [J].
 
         Source: Bonnard et al. (5), there in principal axes.
-
-        Raises
-        ------
-        ShapeError, UnphysicalInertiaError, SingularInertiaError
-            If the inertia does not go with the variables, is not symmetric, or not positive definite.
         """
         momentum = self.body_momentum
         return 0.5 * np.sum(momentum * so3.apply(self._inverse(inertia), momentum), axis=-1)

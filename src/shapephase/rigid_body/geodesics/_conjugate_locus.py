@@ -30,15 +30,7 @@ _BAND_MARGIN = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ConjugatePoints:
-    """Conjugate points along extremals in directions (...), see `conjugate_points`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> points = geodesics.conjugate_points(geodesics.ellipsoid(0.8), 0.5)
-    >>> print(f"{points.time:.6f} {points.latitude:.6f} {points.longitude:.6f}")
-    2.745913 -0.073137 2.732659
-    """
+    """Conjugate points along extremals in directions (...). Made by `conjugate_points`."""
 
     direction: Array
     """Angle at the start from east to north [rad]."""
@@ -60,15 +52,7 @@ class ConjugatePoints:
 
 @dataclass(frozen=True, eq=False)
 class ConjugateLocus:
-    """The conjugate locus of one order, sampled, see `conjugate_locus`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> locus = geodesics.conjugate_locus(geodesics.ellipsoid(0.8), 60)
-    >>> locus.order, len(locus.cusp_directions)
-    (1, 4)
-    """
+    """Conjugate locus of one order, sampled. Made by `conjugate_locus`."""
 
     order: int
     points: ConjugatePoints

@@ -33,15 +33,7 @@ _POLE_MARGIN = 1e-12  # of |y|, which is 1 at the pole, where the direction of a
 
 @dataclass(frozen=True)
 class CutLocus:
-    """The cut locus of the point at a latitude and longitude 0: an arc between two ends, see `cut_locus`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> cut = geodesics.cut_locus(geodesics.ellipsoid(1.5))
-    >>> print(cut.kind, np.round(cut.longitudes, 6))
-    meridian [3.141593 3.141593]
-    """
+    """Cut locus of the point at a latitude and longitude 0: an arc between two ends. Made by `cut_locus`."""
 
     kind: str
     """ "parallel", "meridian" or "point"."""
@@ -85,11 +77,6 @@ def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     """The length up to which extremals from a latitude in directions (...) [rad] are shortest: (...) -> (...).
 
     Until they meet their mirror image: at the opposite parallel, after half a period, or at the opposite meridian.
-
-    Raises
-    ------
-    ShapeError
-        See `cut_locus`.
 
     Examples
     --------

@@ -186,11 +186,6 @@ def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: 
     aspect, equatorial_radius : as for `ellipsoid`
     geodetic : (...) from -pi/2 to pi/2 [rad]
 
-    Raises
-    ------
-    ShapeError
-        If a latitude is beyond a pole, or another argument is not such a number.
-
     Examples
     --------
     >>> from shapephase.rigid_body import geodesics
@@ -209,11 +204,6 @@ def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: 
 
 def geodetic_latitude(aspect: float, latitude: ArrayLike, equatorial_radius: float = 1.0) -> Array:
     """The geodetic latitude of phi, the inverse of `latitude_of_geodetic`: (...) -> (...) [rad].
-
-    Raises
-    ------
-    ShapeError
-        If a latitude is beyond a pole, or another argument is not such a number.
 
     Examples
     --------

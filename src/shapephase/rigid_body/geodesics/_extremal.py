@@ -50,16 +50,9 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Extremal:
-    """Extremals of unit speed from one latitude, longitude 0, in directions (...); made by `extremal`.
+    """Extremals of unit speed from one latitude, longitude 0, in directions (...). Made by `extremal`.
 
     Arguments t (...) [length] are any numbers; results have the directions' axes first, then those of t.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> geodesic = geodesics.extremal(geodesics.ellipsoid(1.0), 0.5)
-    >>> print(f"{geodesic.jacobi_field(np.pi / 2.0):.9f}")  # sin t on a sphere
-    1.000000000
     """
 
     surface: SurfaceOfRevolution

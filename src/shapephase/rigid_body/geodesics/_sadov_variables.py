@@ -41,15 +41,7 @@ _HALVINGS = 60  # of a right angle, which leave rounding
 
 @dataclass(frozen=True, eq=False)
 class SadovVariables:
-    """Actions, angles and frequencies, (...) each; see `sadov_variables`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
-    >>> print(f"{geodesics.sadov_variables([3.0, 2.0, 1.0], state).precession_rate:.6f} rad/s")
-    0.567543 rad/s
-    """
+    """Actions, angles and frequencies, (...) each. Made by `sadov_variables`."""
 
     own: Array
     """Conjugate to `action` [rad]."""

@@ -33,16 +33,9 @@ _SAMPLES = 129  # axial parts of momenta, among which the longest geodesic up to
 
 @dataclass(frozen=True)
 class AxisymmetricMetric:
-    """The metric of moments (I_1, I_1, I_3) in these axes, see `axisymmetric_metric`.
+    """Metric of moments (I_1, I_1, I_3) in these axes. Made by `axisymmetric_metric`.
 
     Momenta are in body axes, axis 3 the axis of symmetry; they need not have unit speed, and times are theirs.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.axisymmetric_metric(1.0, 1.0)
-    >>> print(f"{metric.cut_time([0.6, 0.0, 0.8]):.9f} = pi")  # of a round body
-    3.141592654 = pi
     """
 
     equatorial: float
@@ -159,13 +152,7 @@ class AxisymmetricMetric:
         return np.sqrt(self.axial) * alpha
 
     def distance(self, attitude: ArrayLike) -> Array:
-        """The distance from the identity: (..., 3, 3) -> (...), the length of `shortest_momentum`'s geodesic.
-
-        Raises
-        ------
-        ShapeError
-            If a matrix is further than 1e-6 from a proper rotation.
-        """
+        """The distance from the identity: (..., 3, 3) -> (...), the length of `shortest_momentum`'s geodesic."""
         return self._length(self.shortest_momentum(attitude))
 
     def shortest_momentum(self, attitude: ArrayLike) -> Array:
@@ -173,32 +160,15 @@ class AxisymmetricMetric:
 
         The attitude leaves one unknown, the angle nu of cos tau + i p_3 sin tau, and before the cut the angle nu + beta
         of q_0 + i q_3 takes each value once. On the cut one of several shortest ways is chosen.
-
-        Raises
-        ------
-        ShapeError
-            If a matrix is further than 1e-6 from a proper rotation.
         """
         return self._shortest_of_each(so3.quat_from_matrix(so3.rotation_argument(attitude, "attitude")))
 
     def distance_on_su2(self, quat_xyzw: ArrayLike) -> Array:
-        """The distance of unit quaternions from 1, where −1 is another point: (..., 4) -> (...).
-
-        Raises
-        ------
-        ShapeError
-            If a quaternion's length is further than 1e-3 from 1.
-        """
+        """The distance of unit quaternions from 1, where −1 is another point: (..., 4) -> (...)."""
         return self._length(self.shortest_momentum_on_su2(quat_xyzw))
 
     def shortest_momentum_on_su2(self, quat_xyzw: ArrayLike) -> Array:
-        """As `shortest_momentum`, to a unit quaternion and not to its negative: (..., 4) -> (..., 3).
-
-        Raises
-        ------
-        ShapeError
-            If a quaternion's length is further than 1e-3 from 1.
-        """
+        """As `shortest_momentum`, to a unit quaternion and not to its negative: (..., 4) -> (..., 3)."""
         so3.quat_argument(quat_xyzw, "quat_xyzw")
         return self._shortest_of_each(so3.normalised(np.asarray(quat_xyzw, dtype=float)))
 

@@ -54,7 +54,7 @@ _FIRST_AXIS_LAST = [1, 2, 0]  # A cyclic order of the axes, so right-handed, wit
 
 @dataclass(frozen=True, eq=False)
 class ShortestGeodesic:
-    """The shortest geodesic found from the identity to an attitude, see `shortest_geodesic`.
+    """Shortest geodesic found from the identity to an attitude. Made by `shortest_geodesic`.
 
     Attributes
     ----------
@@ -63,14 +63,6 @@ class ShortestGeodesic:
     certified : whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut
     lower_bound, upper_bound : distances of axisymmetric metrics below and above this one [sqrt(kg) m]
     residual : angle by which the end misses the attitude [rad]
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 1.0, 1.0])
-    >>> found = geodesics.shortest_geodesic(metric, sp.so3.exp(np.array([0.3, 0.0, 0.4])))
-    >>> print(found.momentum.round(6))
-    [0.3 0.  0.4]
     """
 
     momentum: Array

@@ -37,19 +37,11 @@ _LEAST_SPEED = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class LeftInvariantMetric:
-    """A left-invariant metric on SO(3), see `left_invariant_metric`.
+    """Left-invariant metric on SO(3). Made by `left_invariant_metric`.
 
     Momenta are those at the start, in body axes, and the geodesics start at the identity: by left invariance the one
     that starts at R_0 is R_0 times it. Leading axes of momenta and times broadcast. Everything raises `ShapeError` for
     momenta or times of the wrong shape or not finite.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 2.0, 4.0])
-    >>> turn = metric.attitude(np.array([0.0, 0.0, 2.0]), 1.0)
-    >>> print(f"{sp.so3.angle(turn):.9f}")  # momentum over moment
-    0.500000000
     """
 
     moments: Array
@@ -203,8 +195,6 @@ def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
     ------
     ShapeError
         For another shape, moments not positive, or more than one infinite.
-    UnphysicalInertiaError, SingularInertiaError
-        If a tensor is not symmetric, or not positive definite.
 
     Examples
     --------

@@ -50,16 +50,7 @@ _NEAREST = 1e-60
 
 @dataclass(frozen=True)
 class Assumptions:
-    """Which assumptions a metric meets, see `assumptions`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> def catenoid(x):
-    ...     return np.cosh(x) ** 2, np.sinh(2.0 * x)
-    >>> geodesics.assumptions(catenoid, 1.0).falls_to_reach
-    False
-    """
+    """Assumptions that a metric meets. Made by `assumptions`."""
 
     equator_is_parallel: bool
     """(A1) F_2'(0) = 0."""

@@ -42,15 +42,7 @@ from .serret_andoyer_geodesics import GeodesicFamily
 
 @dataclass(frozen=True, eq=False)
 class SerretAndoyerMetric:
-    """The metric of three principal moments, see `serret_andoyer_metric`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0])
-    >>> print(np.round(metric.curvature_range, 9))  # 1/3 on the equator
-    [-0.16666667  0.33333333]
-    """
+    """Metric of three principal moments. Made by `serret_andoyer_metric`."""
 
     moments: Array
     """(3,) three different principal moments about the caller's axes 1, 2, 3 [kg m^2]."""
@@ -112,11 +104,6 @@ class SerretAndoyerMetric:
         """a_3 sin^2 y + a_2 cos^2 y, z/2 of the paper: (...) [rad] -> (...) [1/(kg m^2)].
 
         Source: Bonnard et al., before (7).
-
-        Raises
-        ------
-        ShapeError
-            If an argument is not finite; so do all methods.
         """
         angle = finite_array(y, "y", unit="rad")
         _, a2, a3 = self._inverse

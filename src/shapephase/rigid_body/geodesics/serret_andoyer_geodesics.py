@@ -332,16 +332,7 @@ class GeodesicFamily:
 
 @dataclass(frozen=True, eq=False)
 class EquatorialConjugatePoints:
-    """Points conjugate to a start on the equator, see `GeodesicFamily.conjugate_points`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> family = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0]).geodesics(1.7)
-    >>> points = family.conjugate_points()
-    >>> print(f"{points.phi:.6f} {points.theta:.6f}")
-    -0.094594 3.565678
-    """
+    """Points conjugate to a start on the equator. Made by `GeodesicFamily.conjugate_points`."""
 
     time: Array
     """(...) arc length from the start [sqrt(kg) m]."""

@@ -194,11 +194,6 @@ class SurfaceOfRevolution:
         """Time, longitude and bend from the equator to a phase: (...), (...) [rad] -> `Arcs`.
 
         Any real phase. At p = 0 the longitude is the limit from p > 0, half a turn for every pole that is passed.
-
-        Raises
-        ------
-        ShapeError
-            See `parameters`.
         """
         p, q, room = self.parameters(momentum)
         chi = finite_array(phase, "phase", unit="rad")

@@ -68,13 +68,7 @@ class NambuPair:
     __repr__ = short_repr
 
     def values(self, momentum: ArrayLike) -> tuple[Array, Array]:
-        """K and N, both constant along a motion: (..., 3) -> (...), (...).
-
-        Raises
-        ------
-        ShapeError
-            If the last axis is not three finite numbers; so do all methods.
-        """
+        """K and N, both constant along a motion: (..., 3) -> (...), (...)."""
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         return 0.5 * _dot(pi, pi @ self.casimir), 0.5 * _dot(pi, pi @ self.hamiltonian)
 
@@ -121,8 +115,6 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
     ------
     ShapeError
         If the determinant differs from 1 and -1 by more than 1e-9.
-    UnphysicalInertiaError, SingularInertiaError
-        If the inertia is not symmetric, or not positive definite.
 
     Examples
     --------
@@ -191,11 +183,6 @@ def structure_constants(form: ArrayLike) -> Array:
     ----------
     form : (3, 3) symmetric, Q; Pi.Q Pi / 2 is then a Casimir of the Lie-Poisson bracket
 
-    Raises
-    ------
-    ShapeError
-        If the matrix is not symmetric.
-
     Examples
     --------
     >>> from shapephase.rigid_body import lie
@@ -213,11 +200,6 @@ def lie_group(form: ArrayLike) -> str:
     of the rotations of the form.
 
     Source: Marsden and Ratiu, theorem 15.11.3, which leaves out (+-0) and (000).
-
-    Raises
-    ------
-    ShapeError
-        If the matrix is not symmetric.
 
     Examples
     --------

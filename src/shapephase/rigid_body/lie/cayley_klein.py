@@ -106,11 +106,6 @@ def cayley_klein_gradient(omega: ArrayLike, z: ArrayLike) -> Spinor:
 def cayley_klein_hamiltonian(inertia: ArrayLike, z: ArrayLike) -> Array:
     """The kinetic energy as a function on C^2, K(Pi(z)): (..., 3, 3), (..., 2) -> (...) [J].
 
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If the inertia is not symmetric positive definite, or the shapes are not right.
-
     Examples
     --------
     >>> from shapephase.rigid_body import lie

@@ -44,11 +44,6 @@ def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, al
 def double_bracket_equations(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) -> Array:
     """Pi' = Pi x Omega + alpha Pi x (Pi x Omega): (..., 3, 3), (..., 3), (...) -> (..., 3) [kg m^2/s^2].
 
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If the inertia is not symmetric positive definite, or the shapes are not right.
-
     Examples
     --------
     >>> from shapephase.rigid_body import lie

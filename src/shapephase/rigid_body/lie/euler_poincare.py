@@ -20,7 +20,7 @@ from .lie_algebra import LieAlgebra, Matrices, inertia_operator, linear_solution
 
 @dataclass(frozen=True, eq=False)
 class EulerPoincareMotion:
-    """A motion of the Euler-Poincare equations that starts at the identity of the group.
+    """Motion of the Euler-Poincare equations from the identity of the group. Made by `euler_poincare_motion`.
 
     Attributes
     ----------
@@ -31,13 +31,6 @@ class EulerPoincareMotion:
     velocity : (..., N, d) body velocity xi = I^-1 mu
     adjoint : (..., N, d, d) Ad_g, from body to space components; needs no matrices of the group
     attitude : (..., N, n, n) the group element g, g' = g xi; None where the algebra has no basis of matrices
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> motion = lie.euler_poincare_motion(lie.so3(), np.diag([1.0, 2.0, 4.0]), [0.3, 0.4, 1.2], [0.0, 1.0])
-    >>> print((motion.attitude[-1] @ motion.momentum[-1]).round(9))  # the spatial momentum is constant
-    [0.3 0.4 1.2]
     """
 
     algebra: LieAlgebra

@@ -24,19 +24,12 @@ from .lie_algebra import LieAlgebra, inertia_operator, linear_solution
 
 @dataclass(frozen=True, eq=False)
 class InvariableHyperplane:
-    """The affine hyperplane {x : <normal, x> = level} of the algebra.
+    """Affine hyperplane {x : <normal, x> = level} of the algebra. Made by `invariable_hyperplane`.
 
     Attributes
     ----------
     normal : (..., d) covector, the space momentum mu_s
     level : (...) twice the energy
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> plane = lie.invariable_hyperplane(lie.so3(), np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 0.0])
-    >>> plane.level.item()  # twice the energy
-    1.0
     """
 
     normal: Array
@@ -52,7 +45,9 @@ class InvariableHyperplane:
 
 @dataclass(frozen=True, eq=False)
 class RollingContact:
-    """Where the energy quadric touches the invariable hyperplane along a motion, and how it rolls there.
+    """Contact of the energy quadric with the invariable hyperplane along a motion, and its rolling there.
+
+    Made by `rolling_contact`.
 
     Attributes
     ----------
@@ -64,13 +59,6 @@ class RollingContact:
     contact_velocity : (..., N, d) velocity of the point of the moved quadric that touches; zero, part (c)
     body_rate : (..., N, d) xi', the rate of the contact along the quadric, body components
     space_rate : (..., N, d) Ad_g xi', its rate along the hyperplane; equal rates are equal lengths of the two curves
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> motion = lie.euler_poincare_motion(lie.so3(), np.diag([1.0, 2.0, 4.0]), [0.3, 0.4, 1.2], [0.0, 1.0])
-    >>> lie.rolling_contact(motion).point[0].round(9).tolist()  # the angular velocity at the start
-    [0.3, 0.2, 0.3]
     """
 
     hyperplane: InvariableHyperplane

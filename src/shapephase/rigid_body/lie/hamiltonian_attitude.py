@@ -24,7 +24,7 @@ from .lie_poisson import gradient_at
 
 @dataclass(frozen=True, eq=False)
 class HamiltonianMotion:
-    """A motion of R' = R hat(grad H(Pi)); see `hamiltonian_motion`.
+    """Motion of R' = R hat(grad H(Pi)). Made by `hamiltonian_motion`.
 
     Attributes
     ----------
@@ -33,13 +33,6 @@ class HamiltonianMotion:
     momentum : (..., 3) mu, inertial axes, constant [kg m^2/s]
     body_momentum : (..., N, 3) Pi = R^T mu [kg m^2/s]
     angular_velocity : (..., N, 3) grad H, body axes [rad/s]
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> motion = lie.hamiltonian_motion(lambda pi: pi / np.array([1.0, 2.0, 4.0]), [0.3, 0.4, 1.2], [0.0, 5.0])
-    >>> motion.attitude.shape, motion.momentum.round(9).tolist()
-    ((2, 3, 3), [0.3, 0.4, 1.2])
     """
 
     times: Array
@@ -74,8 +67,6 @@ def hamiltonian_motion(
 
     Raises
     ------
-    ShapeError
-        If the gradient, the momentum, the times or the attitude are not right.
     AccuracyNotReached
         If the motion is too rough to be followed.
 

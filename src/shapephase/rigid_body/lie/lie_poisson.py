@@ -53,11 +53,6 @@ def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, 
     Equation :eq:`bracket` of the documentation.
     Source: Marsden and Ratiu, equation (15.3.8); theory.md K1.
 
-    Raises
-    ------
-    ShapeError
-        If a shape is wrong or an entry not finite.
-
     Examples
     --------
     >>> from shapephase.rigid_body import lie
@@ -132,8 +127,6 @@ def lie_poisson_motion(
 
     Raises
     ------
-    ShapeError
-        If the gradient, the momentum or the times are not right.
     AccuracyNotReached
         If the motion goes to infinity before the last time.
 
@@ -287,11 +280,6 @@ def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
     Equations :eq:`euler-rigid` and :eq:`hamiltonian` of the documentation.
     Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
-
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If the inertia is not symmetric positive definite, or the shapes are not right.
 
     Examples
     --------

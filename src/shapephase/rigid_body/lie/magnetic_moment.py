@@ -19,7 +19,7 @@ from ...letters import what_came
 
 @dataclass(frozen=True, eq=False)
 class MagneticEquilibrium:
-    """An equilibrium of M' = M x B on the sphere |M| = magnitude; a centre.
+    """Equilibrium of M' = M x B on the sphere |M| = magnitude; a centre. Made by `magnetic_equilibria`.
 
     It is Lyapunov stable since |M - moment| is constant along every motion, and not asymptotically: all motions nearby
     circle it with the same frequency.
@@ -30,13 +30,6 @@ class MagneticEquilibrium:
     energy : (...) M . B
     spectrum : (..., 3) eigenvalues of the linearisation delta M' = delta M x B: 0 along the line of equilibria, and
         +-i |B| on the sphere's tangent plane
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> along, opposite = lie.magnetic_equilibria(3.0, [0.0, 0.0, 2.0])
-    >>> float(along.energy), float(opposite.energy)
-    (6.0, -6.0)
     """
 
     moment: Array
