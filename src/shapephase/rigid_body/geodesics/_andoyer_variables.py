@@ -46,7 +46,6 @@ class TurningBody(Protocol):
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
     >>> top.attitude(0.0).shape, top.body_momentum(0.0).round(9).tolist()  # what is needed of it
     ((3, 3), [1.5, 0.3, 0.4])
@@ -72,8 +71,7 @@ class AndoyerVariables:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
+    >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
     >>> print(f"{state.hamiltonian(np.diag([1.0, 2.0, 4.0])):.9f}, {0.3**2 / 2 + 0.4**2 / 4 + 1.2**2 / 8:.9f}")
     0.265000000, 0.265000000
     """
@@ -229,8 +227,7 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
+    >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
     >>> print(f"{state.total:.9f} {state.axial:.9f}")
     1.300000000 1.200000000
     """
@@ -278,8 +275,7 @@ def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart 
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_from_euler([0.1, 1.0, 0.2], [1.2, 0.1, 0.3])
+    >>> state = sp.rigid_body.geodesics.andoyer_from_euler([0.1, 1.0, 0.2], [1.2, 0.1, 0.3])
     >>> print(f"{state.vertical:.9f} {state.axial:.9f}")
     1.200000000 0.300000000
     """
@@ -312,9 +308,8 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
-    >>> state = geodesics.andoyer_motion(top, [0.0, top.period])
+    >>> state = sp.rigid_body.geodesics.andoyer_motion(top, [0.0, top.period])
     >>> print(state.total.round(9), f"{state.g[1] - state.g[0]:.6f}")
     [1.58113883 1.58113883] 7.508599
     """

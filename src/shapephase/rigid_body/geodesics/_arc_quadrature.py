@@ -37,8 +37,7 @@ class Arcs(NamedTuple):
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> arcs = geodesics.Arcs(np.array(1.0), np.array(0.5), np.array(0.0))
+    >>> arcs = sp.rigid_body.geodesics.Arcs(np.array(1.0), np.array(0.5), np.array(0.0))
     >>> float(arcs.time), float(arcs.longitude)
     (1.0, 0.5)
     """

@@ -84,8 +84,7 @@ def conjugate_points(
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> points = geodesics.conjugate_points(geodesics.ellipsoid(1.0), [0.3, 0.9])
+    >>> points = sp.rigid_body.geodesics.conjugate_points(sp.rigid_body.geodesics.ellipsoid(1.0), [0.3, 0.9])
     >>> print(points.time.round(9))  # pi on a sphere
     [3.14159265 3.14159265]
     """
@@ -136,8 +135,7 @@ def conjugate_locus(
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> geodesics.conjugate_locus(geodesics.ellipsoid(0.8), 60).cusps
+    >>> sp.rigid_body.geodesics.conjugate_locus(sp.rigid_body.geodesics.ellipsoid(0.8), 60).cusps
     4
     """
     latitude = number_argument(latitude, "latitude", "rad")

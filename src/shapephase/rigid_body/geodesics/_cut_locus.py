@@ -56,8 +56,7 @@ def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> cut = geodesics.cut_locus(geodesics.ellipsoid(0.8))
+    >>> cut = sp.rigid_body.geodesics.cut_locus(sp.rigid_body.geodesics.ellipsoid(0.8))
     >>> print(cut.kind, np.round(np.array(cut.longitudes) / np.pi, 9))
     parallel [0.8 1.2]
     """
@@ -80,8 +79,7 @@ def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.cut_time(geodesics.ellipsoid(1.0), 0.5):.9f} = pi")
+    >>> print(f"{sp.rigid_body.geodesics.cut_time(sp.rigid_body.geodesics.ellipsoid(1.0), 0.5):.9f} = pi")
     3.141592654 = pi
     """
     check_object(surface, "SurfaceOfRevolution", "surface")

@@ -37,8 +37,7 @@ class EllipsoidStretch:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> geodesics.ellipsoid(0.5).stretch
+    >>> sp.rigid_body.geodesics.ellipsoid(0.5).stretch
     EllipsoidStretch(aspect=0.5, radius=1)
     """
 
@@ -81,8 +80,7 @@ def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolut
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> oblate = geodesics.ellipsoid(0.5)
+    >>> oblate = sp.rigid_body.geodesics.ellipsoid(0.5)
     >>> oblate.equator, oblate.end
     (1.0, 'pole')
     """
@@ -102,8 +100,7 @@ def metric_coefficients(aspect: float, colatitude: ArrayLike) -> tuple[Array, Ar
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> tuple(float(value) for value in geodesics.metric_coefficients(0.5, np.pi / 2.0))
+    >>> tuple(float(value) for value in sp.rigid_body.geodesics.metric_coefficients(0.5, np.pi / 2.0))
     (0.25, 1.0)
     """
     phi = finite_array(colatitude, "colatitude", unit="rad")
@@ -119,8 +116,7 @@ def meridian_length(aspect: float, colatitude: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.meridian_length(1.0, np.pi / 2.0):.9f} = pi/2")  # of a sphere
+    >>> print(f"{sp.rigid_body.geodesics.meridian_length(1.0, np.pi / 2.0):.9f} = pi/2")  # of a sphere
     1.570796327 = pi/2
     """
     epsilon = _number(aspect, "aspect")
@@ -141,8 +137,7 @@ def ellipsoid_period(aspect: float, momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.ellipsoid_period(1.0, 0.5):.9f} = 2 pi")  # of a sphere
+    >>> print(f"{sp.rigid_body.geodesics.ellipsoid_period(1.0, 0.5):.9f} = 2 pi")  # of a sphere
     6.283185307 = 2 pi
     """
     epsilon = _number(aspect, "aspect")
@@ -165,8 +160,7 @@ def astroid(aspect: float, direction: ArrayLike) -> tuple[Array, Array]:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> latitude, longitude = geodesics.astroid(0.999, 0.0)
+    >>> latitude, longitude = sp.rigid_body.geodesics.astroid(0.999, 0.0)
     >>> print(f"{abs(latitude):.6f} {np.pi - longitude:.6f}")
     0.000000 0.003142
     """
@@ -188,8 +182,7 @@ def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: 
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> north = geodesics.latitude_of_geodetic(1.0 - 1.0 / 298.257223563, np.radians(45.0), 6378137.0)
+    >>> north = sp.rigid_body.geodesics.latitude_of_geodetic(1.0 - 1.0 / 298.257223563, np.radians(45.0), 6378137.0)
     >>> print(f"{north:.3f} m from the equator of the Earth")
     4984944.378 m from the equator of the Earth
     """

@@ -155,8 +155,7 @@ def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> meridian = geodesics.extremal(geodesics.ellipsoid(1.0), np.pi / 2.0)
+    >>> meridian = sp.rigid_body.geodesics.extremal(sp.rigid_body.geodesics.ellipsoid(1.0), np.pi / 2.0)
     >>> latitude, longitude, direction = meridian.state(0.3)
     >>> print(f"{latitude:.9f}")  # on a sphere as far north as it went
     0.300000000
@@ -170,8 +169,7 @@ def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> start = geodesics.start_of(geodesics.ellipsoid(1.0), 0.5)
+    >>> start = sp.rigid_body.geodesics.start_of(sp.rigid_body.geodesics.ellipsoid(1.0), 0.5)
     >>> print(f"{start.momentum:.9f} = cos 0.5")
     0.877582562 = cos 0.5
     """
@@ -196,10 +194,9 @@ def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> surface = geodesics.ellipsoid(1.0)
-    >>> start = geodesics.start_of(surface, 0.5)
-    >>> float(geodesics.stretch_at(surface, start.q, start.room, start.phase)[0])
+    >>> surface = sp.rigid_body.geodesics.ellipsoid(1.0)
+    >>> start = sp.rigid_body.geodesics.start_of(surface, 0.5)
+    >>> float(sp.rigid_body.geodesics.stretch_at(surface, start.q, start.room, start.phase)[0])
     1.0
     """
     check_object(surface, "SurfaceOfRevolution", "surface")

@@ -81,9 +81,8 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
-    >>> found = geodesics.sadov_variables([3.0, 2.0, 1.0], state)
+    >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
+    >>> found = sp.rigid_body.geodesics.sadov_variables([3.0, 2.0, 1.0], state)
     >>> print(f"{found.total:.9f} {found.own_rate:.6f}")
     1.581138830 0.474919
     """
@@ -135,9 +134,8 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
-    >>> own, precession = geodesics.sadov_frequencies([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
+    >>> own, precession = sp.rigid_body.geodesics.sadov_frequencies([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
     >>> print(f"{own * top.period:.9f} = 2 pi")
     6.283185307 = 2 pi
     """
@@ -173,12 +171,11 @@ def andoyer_from_sadov(
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
-    >>> sadov = geodesics.sadov_variables([3.0, 2.0, 1.0], state)
+    >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
+    >>> sadov = sp.rigid_body.geodesics.sadov_variables([3.0, 2.0, 1.0], state)
     >>> angles = [sadov.own, sadov.precession, sadov.node]
     >>> actions = [sadov.action, sadov.total, sadov.vertical]
-    >>> again = geodesics.andoyer_from_sadov([3.0, 2.0, 1.0], angles, actions)
+    >>> again = sp.rigid_body.geodesics.andoyer_from_sadov([3.0, 2.0, 1.0], angles, actions)
     >>> print(again.body_momentum.round(9))
     [1.5 0.3 0.4]
     """

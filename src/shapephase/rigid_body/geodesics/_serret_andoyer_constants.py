@@ -26,8 +26,7 @@ class GeodesicClass(IntEnum):
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> [kind.name for kind in geodesics.GeodesicClass]
+    >>> [kind.name for kind in sp.rigid_body.geodesics.GeodesicClass]
     ['EXTENDED', 'ROTATING', 'SEPARATRIX', 'OSCILLATING', 'EQUATOR']
     """
 
@@ -55,8 +54,7 @@ class GeodesicConstants:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> constants = geodesics.constants_of(np.array([3.0, 2.0, 1.0]), [1.7, 1.5])
+    >>> constants = sp.rigid_body.geodesics.constants_of(np.array([3.0, 2.0, 1.0]), [1.7, 1.5])
     >>> constants.p_theta.tolist()
     [1.7, 1.5]
     """
@@ -101,8 +99,7 @@ def constants_of(moments: Array, p_theta: ArrayLike) -> GeodesicConstants:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> constants = geodesics.constants_of(np.array([3.0, 2.0, 1.0]), 1.7)
+    >>> constants = sp.rigid_body.geodesics.constants_of(np.array([3.0, 2.0, 1.0]), 1.7)
     >>> float(constants.p_theta)
     1.7
     """
@@ -124,8 +121,7 @@ def constants_of_momentum(moments: Array, body_momentum: Array) -> GeodesicConst
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> constants = geodesics.constants_of_momentum(np.array([3.0, 2.0, 1.0]), np.array([3.0, 0.0, 0.0]))
+    >>> constants = sp.rigid_body.geodesics.constants_of_momentum(np.array([3.0, 2.0, 1.0]), np.array([3.0, 0.0, 0.0]))
     >>> print(f"{constants.p_theta**2:.9f}")  # l^2/(2 E) is the moment of a steady rotation
     3.000000000
     """
@@ -146,8 +142,7 @@ def separatrix_constants(moments: Array) -> GeodesicConstants:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.separatrix_constants(np.array([3.0, 2.0, 1.0])).p_theta**2:.9f}")  # I_2
+    >>> print(f"{sp.rigid_body.geodesics.separatrix_constants(np.array([3.0, 2.0, 1.0])).p_theta**2:.9f}")  # I_2
     2.000000000
     """
     ascending, _, _ = ascending_moments(moments)

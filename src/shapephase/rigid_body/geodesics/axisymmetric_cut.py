@@ -272,8 +272,7 @@ def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.axisymmetric_metric(2.0, 1.0).diameter:.9f} = pi sqrt(2)")
+    >>> print(f"{sp.rigid_body.geodesics.axisymmetric_metric(2.0, 1.0).diameter:.9f} = pi sqrt(2)")
     4.442882938 = pi sqrt(2)
     """
     try:

@@ -94,9 +94,8 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 1.0, 1.0])
-    >>> found = geodesics.shortest_geodesic(metric, sp.so3.exp(np.array([0.3, 0.0, 0.4])))
+    >>> metric = sp.rigid_body.geodesics.left_invariant_metric([1.0, 1.0, 1.0])
+    >>> found = sp.rigid_body.geodesics.shortest_geodesic(metric, sp.so3.exp(np.array([0.3, 0.0, 0.4])))
     >>> print(f"{found.length:.9f}")
     0.500000000
     """
@@ -144,10 +143,9 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 2.0, 3.0])
+    >>> metric = sp.rigid_body.geodesics.left_invariant_metric([1.0, 2.0, 3.0])
     >>> same = sp.so3.exp(np.array([[0.0, 0.0, 2.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0 - np.pi]]))
-    >>> number, found = geodesics.nearest_attitude(metric, same)
+    >>> number, found = sp.rigid_body.geodesics.nearest_attitude(metric, same)
     >>> print(number, f"{found.length:.6f}")
     1 1.414214
     """

@@ -198,8 +198,7 @@ def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 1.0, 1.0])
+    >>> metric = sp.rigid_body.geodesics.left_invariant_metric([1.0, 1.0, 1.0])
     >>> print(f"{metric.conjugate_time(np.array([0.6, 0.0, 0.8])):.9f} = 2 pi")  # of a round body
     6.283185307 = 2 pi
     """

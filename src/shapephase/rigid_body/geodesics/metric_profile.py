@@ -70,10 +70,9 @@ class TabulatedStretch:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> def sphere(x):
     ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
-    >>> stretch = geodesics.surface_of_metric(sphere, np.pi / 2.0).stretch
+    >>> stretch = sp.rigid_body.geodesics.surface_of_metric(sphere, np.pi / 2.0).stretch
     >>> type(stretch).__name__, len(stretch.edges) >= 2
     ('TabulatedStretch', True)
     """
@@ -122,10 +121,9 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> def sphere(x):
     ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
-    >>> found = geodesics.assumptions(sphere, np.pi / 2.0)
+    >>> found = sp.rigid_body.geodesics.assumptions(sphere, np.pi / 2.0)
     >>> found.is_symmetric, found.falls_to_reach, found.end
     (True, True, 'pole')
     """
@@ -180,11 +178,10 @@ def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None 
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> def sphere(x):
     ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
-    >>> surface = geodesics.surface_of_metric(sphere, np.pi / 2.0)
-    >>> print(f"{geodesics.cut_time(surface, 0.5):.6f} = pi")
+    >>> surface = sp.rigid_body.geodesics.surface_of_metric(sphere, np.pi / 2.0)
+    >>> print(f"{sp.rigid_body.geodesics.cut_time(surface, 0.5):.6f} = pi")
     3.141593 = pi
     """
     reach = number_argument(reach, "reach")

@@ -276,8 +276,7 @@ def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0])
+    >>> metric = sp.rigid_body.geodesics.serret_andoyer_metric([3.0, 2.0, 1.0])
     >>> print(f"{metric.geodesics(1.7).first_return:.9f}")
     3.281674528
     """

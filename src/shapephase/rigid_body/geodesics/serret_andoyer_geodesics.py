@@ -57,8 +57,7 @@ class GeodesicFamily:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> family = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0]).geodesics([1.7, 1.5])
+    >>> family = sp.rigid_body.geodesics.serret_andoyer_metric([3.0, 2.0, 1.0]).geodesics([1.7, 1.5])
     >>> print(family.period.round(6), family.first_return.round(6))
     [11.363461 17.085156] [3.281675 5.095474]
     """

@@ -69,8 +69,7 @@ class SurfaceOfRevolution:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> sphere = geodesics.ellipsoid(1.0)
+    >>> sphere = sp.rigid_body.geodesics.ellipsoid(1.0)
     >>> sphere.equator, sphere.depth, sphere.end
     (1.0, 1.0, 'pole')
     """

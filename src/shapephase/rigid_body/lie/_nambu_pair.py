@@ -52,8 +52,7 @@ class NambuPair:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> pair = lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
+    >>> pair = sp.rigid_body.lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
     >>> pair.orientation
     -1.0
     """
@@ -118,8 +117,7 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> pair = lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
+    >>> pair = sp.rigid_body.lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
     >>> pair.casimir.diagonal().tolist(), pair.hamiltonian.diagonal().tolist()
     ([1.0, 0.5, 0.25], [1.0, 1.0, 1.0])
     """
@@ -163,9 +161,8 @@ def cylinder_matrix(moments: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> matrix = lie.cylinder_matrix([1.0, 2.0, 4.0])
-    >>> lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), matrix).casimir.diagonal().round(9).tolist()
+    >>> matrix = sp.rigid_body.lie.cylinder_matrix([1.0, 2.0, 4.0])
+    >>> sp.rigid_body.lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), matrix).casimir.diagonal().round(9).tolist()
     [0.75, 0.25, 0.0]
     """
     first, _, third = moments_argument(moments)
@@ -185,8 +182,7 @@ def structure_constants(form: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.structure_constants(np.eye(3))[0, 1].tolist()  # those of so(3)
+    >>> sp.rigid_body.lie.structure_constants(np.eye(3))[0, 1].tolist()  # those of so(3)
     [0.0, 0.0, 1.0]
     """
     return np.einsum("ijl,lk->ijk", so3.hat(np.eye(3)).transpose(1, 2, 0) * -1.0, _form(form))
@@ -203,8 +199,7 @@ def lie_group(form: ArrayLike) -> str:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> [lie.lie_group(np.diag([1.0, 1.0, last])) for last in (1.0, -1.0, 0.0)]
+    >>> [sp.rigid_body.lie.lie_group(np.diag([1.0, 1.0, last])) for last in (1.0, -1.0, 0.0)]
     ['SO(3)', 'SO(2,1)', 'SE(2)']
     """
     values = np.linalg.eigvalsh(_form(form))
@@ -222,8 +217,7 @@ def maxwell_bloch_invariants(state: ArrayLike) -> tuple[Array, Array]:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> tuple(float(value) for value in lie.maxwell_bloch_invariants([1.0, 2.0, 3.0]))
+    >>> tuple(float(value) for value in sp.rigid_body.lie.maxwell_bloch_invariants([1.0, 2.0, 3.0]))
     (6.5, 3.5)
     """
     x, y, z = np.moveaxis(finite_array(state, "state", (3,)), -1, 0)
@@ -235,8 +229,7 @@ def maxwell_bloch_rate(state: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.maxwell_bloch_rate([1.0, 2.0, 3.0]).tolist()
+    >>> sp.rigid_body.lie.maxwell_bloch_rate([1.0, 2.0, 3.0]).tolist()
     [2.0, 3.0, -2.0]
     """
     x, y, z = np.moveaxis(finite_array(state, "state", (3,)), -1, 0)

@@ -39,8 +39,7 @@ def cayley_klein_momentum(z: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> print(lie.cayley_klein_momentum([2.0, 0.0]) + 0.0)
+    >>> print(sp.rigid_body.lie.cayley_klein_momentum([2.0, 0.0]) + 0.0)
     [ 0.  0. -1.]
     """
     spinor = _spinor(z, "z")
@@ -54,9 +53,8 @@ def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> z = lie.cayley_klein_spinor([0.3, 0.4, 1.2])
-    >>> print(lie.cayley_klein_momentum(z).round(9))
+    >>> z = sp.rigid_body.lie.cayley_klein_spinor([0.3, 0.4, 1.2])
+    >>> print(sp.rigid_body.lie.cayley_klein_momentum(z).round(9))
     [0.3 0.4 1.2]
     """
     pi, angle = finite_array(momentum, "momentum", (3,)), finite_array(phase, "phase")
@@ -81,8 +79,7 @@ def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> float(np.real(lie.cayley_klein_bracket([1.0, 0.0], [1.0j, 0.0])))  # {q_1, p_1}
+    >>> float(np.real(sp.rigid_body.lie.cayley_klein_bracket([1.0, 0.0], [1.0j, 0.0])))  # {q_1, p_1}
     1.0
     """
     f, g = _spinor(first, "first"), _spinor(second, "second")
@@ -96,8 +93,7 @@ def cayley_klein_gradient(omega: ArrayLike, z: ArrayLike) -> Spinor:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.cayley_klein_gradient([0.0, 0.0, 2.0], [2.0, 0.0]).shape
+    >>> sp.rigid_body.lie.cayley_klein_gradient([0.0, 0.0, 2.0], [2.0, 0.0]).shape
     (2,)
     """
     return -0.5 * _turned(finite_array(omega, "omega", (3,)), _spinor(z, "z"))
@@ -108,9 +104,8 @@ def cayley_klein_hamiltonian(inertia: ArrayLike, z: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> z = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
-    >>> print(f"{lie.cayley_klein_hamiltonian(np.diag([1.0, 2.0, 4.0]), z):.9f} J")
+    >>> z = sp.rigid_body.lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> print(f"{sp.rigid_body.lie.cayley_klein_hamiltonian(np.diag([1.0, 2.0, 4.0]), z):.9f} J")
     0.500000000 J
     """
     return kinetic_energy(inertia, cayley_klein_momentum(z))
@@ -123,9 +118,8 @@ def cayley_klein_equations(inertia: ArrayLike, z: ArrayLike) -> Spinor:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> z = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
-    >>> rate = lie.cayley_klein_equations(np.diag([1.0, 2.0, 4.0]), z)
+    >>> z = sp.rigid_body.lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> rate = sp.rigid_body.lie.cayley_klein_equations(np.diag([1.0, 2.0, 4.0]), z)
     >>> print(f"{np.linalg.norm(rate) / np.linalg.norm(z):.9f}")  # half of Omega_3 = 1/2
     0.250000000
     """
@@ -140,10 +134,9 @@ def cayley_klein_motion(inertia: ArrayLike, z: ArrayLike, times: ArrayLike) -> S
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> start = lie.cayley_klein_spinor([0.3, 0.4, 1.2])
-    >>> z = lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])
-    >>> print(np.linalg.norm(lie.cayley_klein_momentum(z), axis=-1).round(9))
+    >>> start = sp.rigid_body.lie.cayley_klein_spinor([0.3, 0.4, 1.2])
+    >>> z = sp.rigid_body.lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])
+    >>> print(np.linalg.norm(sp.rigid_body.lie.cayley_klein_momentum(z), axis=-1).round(9))
     [1.3 1.3]
     """
     inverse = inverse_inertia_argument(inertia)
@@ -162,10 +155,9 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> start = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
-    >>> z = lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])[-1]
-    >>> print(f"{sp.so3.angle(lie.cayley_klein_attitude(start, z)):.9f}")  # 1/2 rad/s for 1 s
+    >>> start = sp.rigid_body.lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> z = sp.rigid_body.lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])[-1]
+    >>> print(f"{sp.so3.angle(sp.rigid_body.lie.cayley_klein_attitude(start, z)):.9f}")  # 1/2 rad/s for 1 s
     0.500000000
     """
     first, last = _spinor(start, "start"), _spinor(z, "z")

@@ -31,9 +31,8 @@ def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, al
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> x, y, z = np.eye(3)
-    >>> lie.symmetric_bracket(x, x, [0.0, 0.0, 2.0], 0.5).item()  # -alpha |Pi x e_x|^2
+    >>> sp.rigid_body.lie.symmetric_bracket(x, x, [0.0, 0.0, 2.0], 0.5).item()  # -alpha |Pi x e_x|^2
     -2.0
     """
     pi, strength = _momentum(momentum), finite_array(alpha, "alpha")
@@ -46,8 +45,7 @@ def double_bracket_equations(inertia: ArrayLike, momentum: ArrayLike, alpha: Arr
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.double_bracket_equations(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0], 0.1).tolist()
+    >>> sp.rigid_body.lie.double_bracket_equations(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0], 0.1).tolist()
     [0.0, 0.0, 0.0]
     """
     pi = _momentum(momentum)
@@ -81,8 +79,7 @@ def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float,
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> pi = lie.double_bracket_motion(np.diag([1.0, 2.0, 4.0]), [0.6, 0.1, 0.5], 1.0, [0.0, 60.0])
+    >>> pi = sp.rigid_body.lie.double_bracket_motion(np.diag([1.0, 2.0, 4.0]), [0.6, 0.1, 0.5], 1.0, [0.0, 60.0])
     >>> print(pi[-1].round(4) + 0.0, np.linalg.norm(pi, axis=-1).round(6))
     [0.     0.     0.7874] [0.787401 0.787401]
     """

@@ -111,8 +111,7 @@ def contact_conormal(inertia: ArrayLike, adjoint: ArrayLike, point: ArrayLike) -
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.contact_conormal(np.diag([1.0, 2.0, 4.0]), np.eye(3), [1.0, 1.0, 1.0]).tolist()
+    >>> sp.rigid_body.lie.contact_conormal(np.diag([1.0, 2.0, 4.0]), np.eye(3), [1.0, 1.0, 1.0]).tolist()
     [1.0, 2.0, 4.0]
     """
     points = finite_array(point, "point", (None,))
@@ -135,9 +134,8 @@ def contact_velocity(algebra: LieAlgebra, adjoint: ArrayLike, velocity: ArrayLik
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> x, y, z = np.eye(3)
-    >>> lie.contact_velocity(lie.so3(), np.eye(3), z, x).tolist()  # z x x
+    >>> sp.rigid_body.lie.contact_velocity(sp.rigid_body.lie.so3(), np.eye(3), z, x).tolist()  # z x x
     [0.0, 1.0, 0.0]
     """
     check_object(algebra, "LieAlgebra", "algebra")

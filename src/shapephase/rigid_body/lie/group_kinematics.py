@@ -22,8 +22,7 @@ def group_exponential(algebra: LieAlgebra, a: ArrayLike) -> Matrices:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> quarter = lie.group_exponential(lie.so3(), [0.0, 0.0, np.pi / 2.0])
+    >>> quarter = sp.rigid_body.lie.group_exponential(sp.rigid_body.lie.so3(), [0.0, 0.0, np.pi / 2.0])
     >>> print(quarter.real.round(9) + 0.0)
     [[ 0. -1.  0.]
      [ 1.  0.  0.]
@@ -45,9 +44,8 @@ def adjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> half = np.diag([1.0, -1.0, -1.0])
-    >>> print(lie.adjoint_action(lie.so3(), half).round(9) + 0.0)
+    >>> print(sp.rigid_body.lie.adjoint_action(sp.rigid_body.lie.so3(), half).round(9) + 0.0)
     [[ 1.  0.  0.]
      [ 0. -1.  0.]
      [ 0.  0. -1.]]
@@ -66,9 +64,8 @@ def coadjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> half = np.diag([1.0, -1.0, -1.0])
-    >>> print(lie.coadjoint_action(lie.so3(), half).diagonal().round(9))
+    >>> print(sp.rigid_body.lie.coadjoint_action(sp.rigid_body.lie.so3(), half).diagonal().round(9))
     [ 1. -1. -1.]
     """
     check_object(algebra, "LieAlgebra", "algebra")

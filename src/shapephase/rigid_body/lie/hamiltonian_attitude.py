@@ -74,10 +74,9 @@ def hamiltonian_motion(
     --------
     A rotor whose energy grows faster than the square of the momentum:
 
-    >>> from shapephase.rigid_body import lie
     >>> def gradient(pi):
     ...     return pi / np.array([1.0, 2.0, 4.0]) + 0.1 * pi**3
-    >>> motion = lie.hamiltonian_motion(gradient, [0.3, 0.4, 1.2], np.linspace(0.0, 20.0, 5))
+    >>> motion = sp.rigid_body.lie.hamiltonian_motion(gradient, [0.3, 0.4, 1.2], np.linspace(0.0, 20.0, 5))
     >>> pi = motion.body_momentum
     >>> energy = np.sum(pi**2 / np.array([2.0, 4.0, 8.0]) + 0.025 * pi**4, axis=-1)
     >>> print(energy.round(9))

@@ -35,8 +35,7 @@ class ReducedBody:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.reduce_translations([1.0, 3.0], [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]]).mass
+    >>> sp.rigid_body.lie.reduce_translations([1.0, 3.0], [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]]).mass
     4.0
     """
 
@@ -61,8 +60,7 @@ def material_velocity(attitude_rate: ArrayLike, positions: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.material_velocity(sp.so3.hat(np.array([0.0, 0.0, 2.0])), [[1.0, 0.0, 0.0]]).tolist()
+    >>> sp.rigid_body.lie.material_velocity(sp.so3.hat(np.array([0.0, 0.0, 2.0])), [[1.0, 0.0, 0.0]]).tolist()
     [[0.0, 2.0, 0.0]]
     """
     rate, points = finite_array(attitude_rate, "attitude_rate", (3, 3)), finite_array(positions, "positions", (None, 3))
@@ -76,8 +74,7 @@ def spatial_velocity(attitude: ArrayLike, attitude_rate: ArrayLike, points: Arra
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.spatial_velocity(np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 2.0])), [[1.0, 0.0, 0.0]]).tolist()
+    >>> sp.rigid_body.lie.spatial_velocity(np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 2.0])), [[1.0, 0.0, 0.0]]).tolist()
     [[0.0, 2.0, 0.0]]
     """
     omega = spatial_angular_velocity(attitude, attitude_rate)
@@ -111,8 +108,7 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.body_angular_velocity(np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).tolist()
+    >>> sp.rigid_body.lie.body_angular_velocity(np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).tolist()
     [1.0, 2.0, 3.0]
     """
     rotation, rate = so3.rotation_argument(attitude, "attitude"), finite_array(attitude_rate, "attitude_rate", (3, 3))
@@ -133,8 +129,7 @@ def spatial_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> A
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.spatial_angular_velocity(np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).tolist()
+    >>> sp.rigid_body.lie.spatial_angular_velocity(np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).tolist()
     [1.0, 2.0, 3.0]
     """
     return so3.apply(so3.rotation_argument(attitude, "attitude"), body_angular_velocity(attitude, attitude_rate))
@@ -148,8 +143,7 @@ def material_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude_rate: 
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.material_lagrangian([3.0], [[1.0, 0.0, 0.0]], sp.so3.hat(np.array([0.0, 0.0, 2.0]))).item()
+    >>> sp.rigid_body.lie.material_lagrangian([3.0], [[1.0, 0.0, 0.0]], sp.so3.hat(np.array([0.0, 0.0, 2.0]))).item()
     6.0
     """
     m, _ = _particles(masses, positions)
@@ -161,9 +155,8 @@ def spatial_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude: ArrayL
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> rate = sp.so3.hat(np.array([0.0, 0.0, 2.0]))
-    >>> lie.spatial_lagrangian([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).item()  # 3 * 2^2/2
+    >>> sp.rigid_body.lie.spatial_lagrangian([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).item()  # 3 * 2^2/2
     6.0
     """
     m, points = _particles(masses, positions)
@@ -178,9 +171,8 @@ def convective_lagrangian(
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> rate = sp.so3.hat(np.array([0.0, 0.0, 2.0]))
-    >>> lie.convective_lagrangian([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).item()  # 3 * 2^2/2
+    >>> sp.rigid_body.lie.convective_lagrangian([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).item()  # 3 * 2^2/2
     6.0
     """
     m, points = _particles(masses, positions)
@@ -194,9 +186,8 @@ def mass_inner_product(masses: ArrayLike, positions: ArrayLike, a: ArrayLike, b:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> x = [1.0, 0.0, 0.0]
-    >>> lie.mass_inner_product([2.0], [[0.0, 3.0, 0.0]], x, x).item()  # m r^2
+    >>> sp.rigid_body.lie.mass_inner_product([2.0], [[0.0, 3.0, 0.0]], x, x).item()  # m r^2
     18.0
     """
     m, points = _particles(masses, positions)
@@ -211,8 +202,7 @@ def mass_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.mass_inertia([1.0, 1.0], [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]).tolist()
+    >>> sp.rigid_body.lie.mass_inertia([1.0, 1.0], [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]).tolist()
     [[4.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 5.0]]
     """
     m, points = _particles(masses, positions)
@@ -226,8 +216,7 @@ def legendre_transform(masses: ArrayLike, positions: ArrayLike, angular_velocity
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.legendre_transform([2.0], [[0.0, 3.0, 0.0]], [1.0, 0.0, 0.0]).tolist()
+    >>> sp.rigid_body.lie.legendre_transform([2.0], [[0.0, 3.0, 0.0]], [1.0, 0.0, 0.0]).tolist()
     [18.0, 0.0, 0.0]
     """
     m, points = _particles(masses, positions)
@@ -242,9 +231,8 @@ def spatial_momentum(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLik
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> rate = sp.so3.hat(np.array([0.0, 0.0, 2.0]))
-    >>> lie.spatial_momentum([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).tolist()
+    >>> sp.rigid_body.lie.spatial_momentum([3.0], [[1.0, 0.0, 0.0]], np.eye(3), rate).tolist()
     [0.0, 0.0, 6.0]
     """
     m, points = _particles(masses, positions)
@@ -259,8 +247,7 @@ def se3_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.se3_inertia([2.0], [[0.0, 3.0, 0.0]]).diagonal().tolist()
+    >>> sp.rigid_body.lie.se3_inertia([2.0], [[0.0, 3.0, 0.0]]).diagonal().tolist()
     [18.0, 0.0, 18.0, 2.0, 2.0, 2.0]
     """
     m, points = _particles(masses, positions)
@@ -275,8 +262,7 @@ def reduce_translations(masses: ArrayLike, positions: ArrayLike) -> ReducedBody:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> body = lie.reduce_translations([1.0, 3.0], [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
+    >>> body = sp.rigid_body.lie.reduce_translations([1.0, 3.0], [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
     >>> body.centre.tolist(), body.inertia.diagonal().tolist()
     ([3.0, 0.0, 0.0], [0.0, 12.0, 12.0])
     """

@@ -50,8 +50,7 @@ class LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> algebra = lie.so3()
+    >>> algebra = sp.rigid_body.lie.so3()
     >>> algebra.name, algebra.structure.shape
     ('so(3)', (3, 3, 3))
     """
@@ -175,8 +174,7 @@ def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra"
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> plane = lie.lie_algebra_from_matrices([[[0.0, -1.0], [1.0, 0.0]]], "so(2)")
+    >>> plane = sp.rigid_body.lie.lie_algebra_from_matrices([[[0.0, -1.0], [1.0, 0.0]]], "so(2)")
     >>> plane.structure.tolist()
     [[[0.0]]]
     """
@@ -201,8 +199,7 @@ def so3() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.so3().structure[0, 1].tolist()  # [e_1, e_2] = e_3
+    >>> sp.rigid_body.lie.so3().structure[0, 1].tolist()  # [e_1, e_2] = e_3
     [0.0, 0.0, 1.0]
     """
     return so(3)
@@ -220,8 +217,7 @@ def so(n: int) -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.so(4).structure.shape
+    >>> sp.rigid_body.lie.so(4).structure.shape
     (6, 6, 6)
     """
     _whole(n, 2, "n")
@@ -234,8 +230,7 @@ def sl2r() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.sl2r().structure[0, 1].tolist()  # [H, X] = 2 X
+    >>> sp.rigid_body.lie.sl2r().structure[0, 1].tolist()  # [H, X] = 2 X
     [0.0, 2.0, 0.0]
     """
     return lie_algebra_from_matrices(np.stack([np.diag([1.0, -1.0]), _unit(2, 0, 1), _unit(2, 1, 0)]), "sl(2, R)")
@@ -246,8 +241,7 @@ def se2() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.se2().structure.shape, lie.linear_casimirs(lie.se2()).shape
+    >>> sp.rigid_body.lie.se2().structure.shape, sp.rigid_body.lie.linear_casimirs(sp.rigid_body.lie.se2()).shape
     ((3, 3, 3), (0, 3))
     """
     return lie_algebra_from_matrices(
@@ -263,8 +257,7 @@ def se3() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.se3().structure.shape
+    >>> sp.rigid_body.lie.se3().structure.shape
     (6, 6, 6)
     """
     turns = np.zeros((3, 4, 4))
@@ -277,8 +270,7 @@ def su2() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.su2().structure[0, 1].round(12).tolist()
+    >>> sp.rigid_body.lie.su2().structure[0, 1].round(12).tolist()
     [0.0, 0.0, 1.0]
     """
     sigma = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
@@ -290,8 +282,7 @@ def heisenberg() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.linear_casimirs(lie.heisenberg()).round(9).tolist()  # the centre, z
+    >>> sp.rigid_body.lie.linear_casimirs(sp.rigid_body.lie.heisenberg()).round(9).tolist()  # the centre, z
     [[0.0, 0.0, 1.0]]
     """
     return lie_algebra_from_matrices(np.stack([_unit(3, 0, 1), _unit(3, 1, 2), _unit(3, 0, 2)]), "Heisenberg")
@@ -311,8 +302,7 @@ def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.inertia_operator(lie.so3(), np.diag([1.0, 2.0, 4.0])).shape
+    >>> sp.rigid_body.lie.inertia_operator(sp.rigid_body.lie.so3(), np.diag([1.0, 2.0, 4.0])).shape
     (3, 3)
     """
     check_object(algebra, "LieAlgebra", "algebra")
@@ -333,8 +323,7 @@ def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.complex_or_real([1.0, 2.0j], "z", (2,)).tolist()
+    >>> sp.rigid_body.lie.complex_or_real([1.0, 2.0j], "z", (2,)).tolist()
     [(1+0j), 2j]
     """
     if not isinstance(trailing, tuple):
@@ -354,8 +343,7 @@ def linear_solution(operator: Array, right: Array) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.linear_solution(np.diag([2.0, 4.0]), np.array([2.0, 8.0])).tolist()
+    >>> sp.rigid_body.lie.linear_solution(np.diag([2.0, 4.0]), np.array([2.0, 8.0])).tolist()
     [1.0, 2.0]
     """
     return np.linalg.solve(operator, right[..., None])[..., 0].astype(np.float64, copy=False)

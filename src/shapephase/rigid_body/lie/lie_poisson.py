@@ -37,8 +37,7 @@ def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> print(lie.poisson_tensor([1.0, 2.0, 3.0]) + 0.0)
+    >>> print(sp.rigid_body.lie.poisson_tensor([1.0, 2.0, 3.0]) + 0.0)
     [[ 0. -3.  2.]
      [ 3.  0. -1.]
      [-2.  1.  0.]]
@@ -55,9 +54,8 @@ def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, 
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> x, y, z = np.eye(3)
-    >>> lie.lie_poisson_bracket(x, y, [0.0, 0.0, 5.0]).item()  # {Pi_1, Pi_2} = -Pi_3
+    >>> sp.rigid_body.lie.lie_poisson_bracket(x, y, [0.0, 0.0, 5.0]).item()  # {Pi_1, Pi_2} = -Pi_3
     -5.0
     """
     check_object(algebra, "LieAlgebra", "algebra")
@@ -83,9 +81,8 @@ def bracket_gradient(
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> flat = np.zeros((3, 3))
-    >>> lie.bracket_gradient(([1.0, 0.0, 0.0], flat), ([0.0, 1.0, 0.0], flat), [1.0, 2.0, 3.0]).tolist()
+    >>> sp.rigid_body.lie.bracket_gradient(([1.0, 0.0, 0.0], flat), ([0.0, 1.0, 0.0], flat), [1.0, 2.0, 3.0]).tolist()
     [0.0, 0.0, -1.0]
     """
     check_object(algebra, "LieAlgebra", "algebra")
@@ -106,8 +103,7 @@ def hamiltonian_vector_field(hamiltonian: Gradient, momentum: ArrayLike, algebra
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.hamiltonian_vector_field([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]).tolist()  # Pi x grad H
+    >>> sp.rigid_body.lie.hamiltonian_vector_field([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]).tolist()  # Pi x grad H
     [0.0, -1.0, 0.0]
     """
     check_object(algebra, "LieAlgebra", "algebra")
@@ -132,9 +128,8 @@ def lie_poisson_motion(
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> inverse = np.array([1.0, 0.5, 0.25])
-    >>> pi = lie.lie_poisson_motion(lambda pi: inverse * pi, [0.3, 0.4, 1.2], [0.0, 1.0, 2.0])
+    >>> pi = sp.rigid_body.lie.lie_poisson_motion(lambda pi: inverse * pi, [0.3, 0.4, 1.2], [0.0, 1.0, 2.0])
     >>> print(np.linalg.norm(pi, axis=-1).round(9))
     [1.3 1.3 1.3]
     """
@@ -159,8 +154,7 @@ def casimir_defect(function: Gradient, momentum: ArrayLike, algebra: LieAlgebra 
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.casimir_defect([0.3, 0.4, 1.2], [0.3, 0.4, 1.2]).item()  # of |Pi|^2/2, a Casimir
+    >>> sp.rigid_body.lie.casimir_defect([0.3, 0.4, 1.2], [0.3, 0.4, 1.2]).item()  # of |Pi|^2/2, a Casimir
     0.0
     """
     check_object(algebra, "LieAlgebra", "algebra")
@@ -172,8 +166,7 @@ def linear_casimirs(algebra: LieAlgebra) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.linear_casimirs(lie.so3()).shape  # none
+    >>> sp.rigid_body.lie.linear_casimirs(sp.rigid_body.lie.so3()).shape  # none
     (0, 3)
     """
     check_object(algebra, "LieAlgebra", "algebra")
@@ -188,8 +181,7 @@ def quadratic_casimirs(algebra: LieAlgebra) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> print((lie.quadratic_casimirs(lie.so3())[0] * np.sqrt(3.0)).round(9) + 0.0)
+    >>> print((sp.rigid_body.lie.quadratic_casimirs(sp.rigid_body.lie.so3())[0] * np.sqrt(3.0)).round(9) + 0.0)
     [[1. 0. 0.]
      [0. 1. 0.]
      [0. 0. 1.]]
@@ -224,9 +216,8 @@ def coadjoint_orbit_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLik
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> x, y, z = np.eye(3)
-    >>> lie.coadjoint_orbit_form([0.0, 0.0, 5.0], x, y).item()
+    >>> sp.rigid_body.lie.coadjoint_orbit_form([0.0, 0.0, 5.0], x, y).item()
     -0.2
     """
     check_object(algebra, "LieAlgebra", "algebra")
@@ -250,8 +241,7 @@ def sphere_area_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLike) -
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.sphere_area_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()
+    >>> sp.rigid_body.lie.sphere_area_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()
     1.0
     """
     pi, u, v = (finite_array(x, n, (3,)) for x, n in ((momentum, "momentum"), (first, "first"), (second, "second")))
@@ -267,8 +257,7 @@ def sphere_symplectic_form(momentum: ArrayLike, first: ArrayLike, second: ArrayL
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.sphere_symplectic_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()  # -dA/|Pi|
+    >>> sp.rigid_body.lie.sphere_symplectic_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()  # -dA/|Pi|
     -0.5
     """
     area = sphere_area_form(momentum, first, second)
@@ -283,8 +272,7 @@ def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.euler_equations(np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0]).tolist()  # Pi x I^-1 Pi
+    >>> sp.rigid_body.lie.euler_equations(np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0]).tolist()  # Pi x I^-1 Pi
     [0.0, 0.75, 0.0]
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -296,8 +284,7 @@ def kinetic_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.kinetic_energy(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0]).item()
+    >>> sp.rigid_body.lie.kinetic_energy(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0]).item()
     0.5
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -311,8 +298,7 @@ def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.angular_velocity(np.diag([1.0, 2.0, 4.0]), [1.0, 1.0, 1.0]).tolist()
+    >>> sp.rigid_body.lie.angular_velocity(np.diag([1.0, 2.0, 4.0]), [1.0, 1.0, 1.0]).tolist()
     [1.0, 0.5, 0.25]
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -324,8 +310,7 @@ def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.gradient_at(lambda mu: 2.0 * mu, "gradient", np.array([1.0, 2.0, 3.0])).tolist()
+    >>> sp.rigid_body.lie.gradient_at(lambda mu: 2.0 * mu, "gradient", np.array([1.0, 2.0, 3.0])).tolist()
     [2.0, 4.0, 6.0]
     """
     if callable(gradient):

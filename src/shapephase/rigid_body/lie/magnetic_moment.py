@@ -44,8 +44,7 @@ def magnetic_hamiltonian(moment: ArrayLike, field: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.magnetic_hamiltonian([1.0, 2.0, 3.0], [0.0, 0.0, 2.0]).item()
+    >>> sp.rigid_body.lie.magnetic_hamiltonian([1.0, 2.0, 3.0], [0.0, 0.0, 2.0]).item()
     6.0
     """
     return np.sum(finite_array(moment, "moment", (3,)) * finite_array(field, "field", (3,)), axis=-1)
@@ -56,8 +55,7 @@ def magnetic_precession_rate(moment: ArrayLike, field: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.magnetic_precession_rate([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]).tolist()
+    >>> sp.rigid_body.lie.magnetic_precession_rate([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]).tolist()
     [0.0, -2.0, 0.0]
     """
     return np.cross(finite_array(moment, "moment", (3,)), finite_array(field, "field", (3,)))
@@ -70,8 +68,7 @@ def magnetic_precession(moment: ArrayLike, field: ArrayLike, t: ArrayLike) -> Ar
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> turned = lie.magnetic_precession([1.0, 0.0, 0.0], [0.0, 0.0, 2.0], [np.pi / 4.0])
+    >>> turned = sp.rigid_body.lie.magnetic_precession([1.0, 0.0, 0.0], [0.0, 0.0, 2.0], [np.pi / 4.0])
     >>> print(turned.round(9) + 0.0)  # a quarter turn, against the right-hand rule
     [[ 0. -1.  0.]]
     """
@@ -96,8 +93,7 @@ def magnetic_equilibria(magnitude: float, field: ArrayLike) -> tuple[MagneticEqu
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> [float(point.moment[2]) for point in lie.magnetic_equilibria(3.0, [0.0, 0.0, 2.0])]
+    >>> [float(point.moment[2]) for point in sp.rigid_body.lie.magnetic_equilibria(3.0, [0.0, 0.0, 2.0])]
     [3.0, -3.0]
     """
     axis, radius = finite_array(field, "field", (3,)), finite_array(magnitude, "magnitude")

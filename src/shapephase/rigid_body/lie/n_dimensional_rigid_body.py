@@ -36,8 +36,7 @@ def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.n_dimensional_inertia(np.diag([1.0, 2.0, 3.0])).diagonal().tolist()  # J_i + J_j
+    >>> sp.rigid_body.lie.n_dimensional_inertia(np.diag([1.0, 2.0, 3.0])).diagonal().tolist()  # J_i + J_j
     [5.0, 4.0, 3.0]
     """
     j = _second_moment(second_moment)
@@ -50,9 +49,8 @@ def n_dimensional_momentum(second_moment: ArrayLike, angular_velocity: ArrayLike
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> omega = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> lie.n_dimensional_momentum(np.diag([1.0, 2.0, 3.0]), omega)[1, 0].item()
+    >>> sp.rigid_body.lie.n_dimensional_momentum(np.diag([1.0, 2.0, 3.0]), omega)[1, 0].item()
     3.0
     """
     j = _second_moment(second_moment)
@@ -67,9 +65,8 @@ def n_dimensional_angular_velocity(second_moment: ArrayLike, momentum: ArrayLike
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> lie.n_dimensional_angular_velocity(np.diag([1.0, 2.0, 3.0]), momentum)[1, 0].item()
+    >>> sp.rigid_body.lie.n_dimensional_angular_velocity(np.diag([1.0, 2.0, 3.0]), momentum)[1, 0].item()
     1.0
     """
     j = _second_moment(second_moment)
@@ -83,9 +80,8 @@ def n_dimensional_rate(second_moment: ArrayLike, momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> float(np.abs(lie.n_dimensional_rate(np.diag([1.0, 2.0, 3.0]), momentum)).max())  # a steady turn
+    >>> float(np.abs(sp.rigid_body.lie.n_dimensional_rate(np.diag([1.0, 2.0, 3.0]), momentum)).max())  # a steady turn
     0.0
     """
     omega = n_dimensional_angular_velocity(second_moment, momentum)
@@ -100,9 +96,8 @@ def momentum_traces(momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> lie.momentum_traces(momentum).tolist()
+    >>> sp.rigid_body.lie.momentum_traces(momentum).tolist()
     [-18.0]
     """
     m = _antisymmetric(momentum, "momentum")
@@ -124,9 +119,8 @@ def pfaffian(momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0, 2, 0, 0], [-2, 0, 0, 0], [0, 0, 0, 3], [0, 0, -3, 0]])
-    >>> print(f"{lie.pfaffian(momentum):.6f}, {np.linalg.det(momentum):.6f}")
+    >>> print(f"{sp.rigid_body.lie.pfaffian(momentum):.6f}, {np.linalg.det(momentum):.6f}")
     6.000000, 36.000000
     """
     m = _antisymmetric(momentum, "momentum")
@@ -154,9 +148,8 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> lie.manakov_integrals(np.diag([1.0, 2.0, 3.0]), momentum, 2).tolist()
+    >>> sp.rigid_body.lie.manakov_integrals(np.diag([1.0, 2.0, 3.0]), momentum, 2).tolist()
     [-18.0, 0.0, 98.0]
     """
     if isinstance(power, bool) or not isinstance(power, int | np.integer) or power < 1:
