@@ -2,12 +2,11 @@
 
 The order of principal moments inside the library is ascending everywhere, I1 <= I2 <= I3: axis 1 (index 0) has the
 smallest moment, axis 2 the intermediate one, axis 3 (index 2) the largest. Public functions take moments in any order
-and answer on the caller's axes; `ascending_moments` and `principal_axes` lead from these to the inner order.
+and return results on the caller's axes; `ascending_moments` and `principal_axes` lead from these to the inner order.
 
-The literature differs, and docstrings that quote it say which symbol is which. Marsden and Ratiu have I1 >= I2 >= I3
-in section 15.8 (their I1, I2, I3 are the I3, I2, I1 of here) and I1 < I2 < I3 in section 15.11 (as here); Bonnard, Cots
-and Shcherbakova have I1 > I2 > I3, and A < B < C for the inverse moments. To read three axes backwards is an odd
-permutation, which a formula pays for by one change of sign.
+The literature differs. Marsden and Ratiu have I1 >= I2 >= I3 in section 15.8 (their I1, I2, I3 are our I3, I2, I1) and
+I1 < I2 < I3 in section 15.11; Bonnard, Cots and Shcherbakova have I1 > I2 > I3, and A < B < C for the inverse moments.
+Reversing three axes is an odd permutation, which changes one sign in a formula.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ from numpy.typing import NDArray
 from .arrays import Array
 from .errors import SingularInertiaError
 
-_WELL_CONDITIONED = 1e-3
-"""Determinant, relative to the cube of the trace, above which the condition number is at most some hundred, and so is
-the factor by which the adjugate magnifies rounding."""
+_WELL_CONDITIONED = (
+    1e-3  # of trace^3: with a larger determinant the adjugate magnifies rounding some hundredfold at most
+)
 _SINGULAR = 1e-12  # least ratio of the smallest to the largest moment: below it the inverse has no correct digits left
 
 
@@ -128,6 +127,31 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
     """
     moments, axes = np.linalg.eigh(inertia)
     axes[..., :, 2] *= np.where(np.linalg.det(axes) < 0.0, -1.0, 1.0)[..., None]
+    return moments, axes
+
+
+def body_principal_axes(tensor: Array) -> tuple[Array, Array]:
+    """Ascending moments and axes of one body: exact for a diagonal tensor, else equal moments are made equal.
+
+    Moments of other tensors count as equal up to four roundings of the largest, the error of `eigh`.
+
+    Examples
+    --------
+    >>> sp.inertia_tensor.body_principal_axes(np.diag([3.0, 1.0, 2.0]))[0].tolist()
+    [1.0, 2.0, 3.0]
+    """
+    diagonal = np.diagonal(tensor)
+    if np.array_equal(tensor, np.diag(diagonal)):
+        moments, order, parity = ascending_moments(diagonal)
+        axes = np.eye(3)[:, order]
+        axes[:, 2] *= parity
+        return moments, axes
+    moments, axes = principal_axes(tensor)
+    close = np.diff(moments) < 4.0 * np.finfo(float).eps * moments[2]
+    if close[0]:
+        moments[0] = moments[1]
+    if close[1]:
+        moments[2] = moments[1]
     return moments, axes
 
 

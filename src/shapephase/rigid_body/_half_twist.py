@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import root_scalar
 from scipy.special import elliprf, elliprj
 
 from ..arrays import Array, common_shape, finite_array
@@ -19,10 +18,8 @@ from ..display import short_repr
 from ..elliptic import complete_k
 from ..errors import ShapeError, SingularInertiaError
 from ..inertia_tensor import ascending_moments
-from ..roots import safe_newton
+from ..roots import bracketed_root, safe_newton
 from ._momentum_orbit import momentum_orbit
-
-_FARTHEST = 300.0  # logarithm of the largest tan(psi), and cot(psi), that matter: squares of both are numbers
 
 
 @dataclass(frozen=True)
@@ -71,10 +68,7 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     >>> print(f"{flip.time:.6f} s, half of the period {top.period:.6f} s")
     28.731424 s, half of the period 57.462849 s
     """
-    inertia, vector = _broadcast(_moments(moments), finite_array(momentum, "momentum", (3,), unit="kg m^2/s"))
-    # Whether the ordered axes are right-handed makes no difference to times.
-    inertia, order, _ = ascending_moments(inertia)
-    vector = np.take_along_axis(vector, order, -1)
+    inertia, vector = _ordered(moments, momentum)
     rows = [_flip(i, x) for i, x in zip(inertia.reshape(-1, 3), vector.reshape(-1, 3))]
     table = np.array(rows, dtype=float).reshape(*inertia.shape[:-1], 5)
     time, asymptote, complement, rate, growth_rate = (table[..., k][()] for k in range(5))
@@ -137,11 +131,7 @@ def twist_defect(moments: ArrayLike) -> Array:
     >>> print(f"{np.degrees(sp.rigid_body.twist_defect([1.0, 2.0, 2.1])):.3f} degrees")
     51.506 degrees
     """
-    inertia, _, _ = ascending_moments(_moments(moments))
-    low, middle, high = np.moveaxis(inertia, -1, 0)
-    if np.any((low == middle) | (middle == high)):
-        raise ShapeError("moments: two are equal; a tennis racket needs three different principal moments")
-    a, b = (middle - low) / low, (high - middle) / high
+    a, b = _asymmetries(ascending_moments(_moments(moments))[0])
     share, scale = b / (a + b), np.sqrt(a * b)
     lower, upper = scale * np.pi, scale * (np.pi + np.arcsin(np.sqrt(share)))
 
@@ -193,33 +183,27 @@ def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
     >>> print(f"{np.degrees(twist):.3f} degrees; on the separatrix {180.0 - 2.0 * 51.506:.3f}")
     84.617 degrees; on the separatrix 76.988
     """
-    inertia, vector = _broadcast(_moments(moments), finite_array(momentum, "momentum", (3,), unit="kg m^2/s"))
-    inertia, order, _ = ascending_moments(inertia)
-    vector = np.take_along_axis(vector, order, -1)
-    low, middle, high = np.moveaxis(inertia, -1, 0)
-    if np.any((low == middle) | (middle == high)):
-        raise ShapeError("moments: two are equal; a tennis racket needs three different principal moments")
+    inertia, vector = _ordered(moments, momentum)
+    a, b = _asymmetries(inertia)
     length = np.linalg.norm(vector, axis=-1)
     if np.any(length == 0.0):
         raise ShapeError("momentum: a tennis racket needs a momentum")
-    a, b = (middle - low) / low, (high - middle) / high
     c = a * (vector[..., 0] / length) ** 2 - b * (vector[..., 2] / length) ** 2
     twists = [_racket_twist(*row) for row in zip(*(np.ravel(x).tolist() for x in (a, b, c)), strict=True)]
     return np.reshape(twists, c.shape)[()]
 
 
 def _racket_twist(a: float, b: float, c: float) -> float:
-    """For one racket."""
-    # The end of a swing, or a quarter turn, at tan(psi) = exp(-low).
-    low = 0.5 * math.log(-c / (b + c)) if c < 0.0 and b + c > 0.0 else -_FARTHEST
+    """Twist of one racket [rad]."""
+    # The end of a swing, or a quarter turn, at tan(psi) = exp(-low); the square of exp(300) is a number.
+    low = 0.5 * math.log(-c / (b + c)) if c < 0.0 and b + c > 0.0 else -300.0
     if b + c <= 0.0:
         return 0.0
     quarter = _azimuth(math.exp(2.0 * low) if c < 0.0 else 0.0, a, b, c) if c else math.inf
     swings, rest = divmod(math.pi, 2.0 * quarter) if c else (0.0, math.pi)
     back = rest > quarter
     part = 2.0 * quarter - rest if back else rest
-    found = root_scalar(lambda x: _azimuth(math.exp(2.0 * x), a, b, c) - part, bracket=(low, _FARTHEST), xtol=1e-15)
-    angle = math.atan2(1.0, math.exp(found.root))
+    angle = math.atan2(1.0, math.exp(bracketed_root(lambda x: _azimuth(math.exp(2.0 * x), a, b, c) - part, low, 300.0)))
     if c > 0.0:
         return 2.0 * (math.pi * swings + (math.pi - angle if back else angle))
     return 2.0 * (angle if swings % 2.0 == 0.0 else -angle)
@@ -257,6 +241,17 @@ def _moments(moments: ArrayLike) -> Array:
     return inertia
 
 
-def _broadcast(moments: Array, momentum: Array) -> tuple[Array, Array]:
-    shape = common_shape(moments=moments, momentum=momentum)
-    return np.broadcast_to(moments, shape), np.broadcast_to(momentum, shape)
+def _ordered(moments: ArrayLike, momentum: ArrayLike) -> tuple[Array, Array]:
+    """Ascending moments and the momentum along their axes, whose handedness makes no difference to times."""
+    inertia, vector = _moments(moments), finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    shape = common_shape(moments=inertia, momentum=vector)
+    inertia, order, _ = ascending_moments(np.broadcast_to(inertia, shape))
+    return inertia, np.take_along_axis(np.broadcast_to(vector, shape), order, -1)
+
+
+def _asymmetries(ascending: Array) -> tuple[Array, Array]:
+    """I2/I1 - 1 and 1 - I2/I3 of ascending moments, which must be different."""
+    low, middle, high = np.moveaxis(ascending, -1, 0)
+    if np.any((low == middle) | (middle == high)):
+        raise ShapeError("moments: two are equal; a tennis racket needs three different principal moments")
+    return (middle - low) / low, (high - middle) / high

@@ -16,17 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import inertia_argument
-from ..arrays import Array, finite_array
-from ..errors import ShapeError
+from ..arrays import Array
+from ..inertia_tensor import body_principal_axes
+from ._arguments import one_array, one_attitude, one_tensor, times_within_turns
 from ._gyrostat_orbit import GyrostatOrbit, Swing, best_axis, gyrostat_orbit, swing_about
-from .euler_top import _array, _attitude, _principal
 
-_TURNS = 1e12  # turns of the body [1] after which times are refused, as of `EulerTop`
-_STILL = 16.0 * float(np.finfo(float).eps)
-"""Of the momentum's speed, relative to its terms: below it the momentum stands still to rounding."""
-_SYMMETRIC = 4.0 * float(np.finfo(float).eps)
-"""Relative difference of moments, or of the rotor from their axis, that is taken for rounding."""
+_ROUNDING = 4.0 * float(np.finfo(float).eps)  # relative difference of moments, or part of the rotor off their axis
 
 
 class Gyrostat:
@@ -68,22 +63,13 @@ class Gyrostat:
     one oval, period 25.223914 s, 0.281667 J
     """
 
-    inertia: Array
-    rotor: Array
-    momentum: Array
-    initial_attitude: Array
-    moments: Array
-    axes: Array
-    regime: str
-
     def __init__(
         self, inertia: ArrayLike, rotor: ArrayLike, momentum: ArrayLike, attitude: ArrayLike | None = None
     ) -> None:
-        self.inertia = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
-        self.rotor = _array(rotor, "rotor", (3,), "kg m^2/s")
-        self.momentum = _array(momentum, "momentum", (3,), "kg m^2/s")
-        self.initial_attitude = _attitude(attitude)
-        self.moments, self.axes = _principal(self.inertia)
+        self.inertia, self.initial_attitude = one_tensor(inertia), one_attitude(attitude)
+        self.rotor = one_array(rotor, "rotor", (3,), "kg m^2/s")
+        self.momentum = one_array(momentum, "momentum", (3,), "kg m^2/s")
+        self.moments, self.axes = body_principal_axes(self.inertia)
         self._start = self.axes.T @ (self.initial_attitude.T @ self.momentum)
         self._rotor = self.axes.T @ self.rotor
         self._outward = self.initial_attitude @ self.axes
@@ -91,18 +77,17 @@ class Gyrostat:
         self._swing: Swing | None = None
         self._turning = np.zeros(3)
         omega = (self._start - self._rotor) / self.moments
-        speed = float(np.linalg.norm(np.cross(self._start, omega)))
-        terms = self.magnitude * float(np.max((np.abs(self._start) + np.abs(self._rotor)) / self.moments))
-        if speed <= _STILL * terms:
+        self._fastest = float(np.max((np.abs(self._start) + np.abs(self._rotor)) / self.moments))
+        # Its terms cancel to rounding where the momentum stands still.
+        speed, circling = float(np.linalg.norm(np.cross(self._start, omega))), self._circling()
+        if speed <= 4.0 * _ROUNDING * self.magnitude * self._fastest:
             self.regime = "steady"
-            return
-        circling = self._circling()
-        if circling is not None:
+        elif circling is not None:
             self.regime, self._turning = "circle", circling
-            return
-        self._follow()
+        else:
+            self._find_orbit()
 
-    def _follow(self) -> None:
+    def _find_orbit(self) -> None:
         """Find the curve, and the angle about the momentum."""
         size = self.magnitude
         rates, shift, start = 1.0 / self.moments, self._rotor / size, self._start / size
@@ -120,18 +105,16 @@ class Gyrostat:
             self.regime = "one of two ovals" if orbit.is_oscillating else "one oval"
 
     def _circling(self) -> Array | None:
-        """The rate at which x goes round: x(t) = exp(-t rate) x(0), where the curve is a circle of constant rate."""
+        """Rate of x(t) = exp(-t rate) x(0) where the curve is a circle of constant rate, else None."""
         least, middle, most = self.moments
         rotor, start = self._rotor, self._start
-        close = _SYMMETRIC * most
+        close = _ROUNDING * most
         if most - least <= close:
             return -rotor / most
         for axis, equal in ((0, most - middle), (2, middle - least)):
             across = np.delete(rotor, axis)
-            if equal <= close and np.abs(across).max() <= _SYMMETRIC * np.abs(rotor).max():
-                unit = np.eye(3)[axis]
-                other = self.moments[1]
-                return ((start[axis] - rotor[axis]) / self.moments[axis] - start[axis] / other) * unit
+            if equal <= close and np.abs(across).max() <= _ROUNDING * np.abs(rotor).max():
+                return ((start - rotor)[axis] / self.moments[axis] - start[axis] / middle) * np.eye(3)[axis]
         return None
 
     def __repr__(self) -> str:  # noqa: D105
@@ -165,7 +148,7 @@ class Gyrostat:
             inner = so3.quat_product(turn, _shortest(self._directions(times), self._axis))
             inner = so3.quat_product(np.broadcast_to(self._opposite, inner.shape), inner)
         ends = so3.quat_from_matrix(self._outward), so3.quat_inverse(so3.quat_from_matrix(self.axes))
-        left, right = (np.broadcast_to(one, inner.shape) for one in ends)
+        left, right = (np.broadcast_to(end, inner.shape) for end in ends)
         return so3.positive_scalar(so3.normalised(so3.quat_product(so3.quat_product(left, inner), right)))
 
     @property
@@ -175,7 +158,7 @@ class Gyrostat:
 
     @property
     def energy(self) -> float:
-        """omega.I omega/2, what the body's turning has of energy; the rotor's own is constant beside it [J]."""
+        """omega.I omega/2, the energy without the rotor's own, which is constant [J]."""
         return 0.5 * float(np.sum((self._start - self._rotor) ** 2 / self.moments))
 
     @property
@@ -185,7 +168,7 @@ class Gyrostat:
 
     @property
     def period(self) -> float:
-        """After which Pi is in the body what it was [s]; infinite on a separatrix and where it stands still."""
+        """Period of Pi in the body [s]; infinite on a separatrix and where it stands still."""
         if self._orbit is None:
             rate = float(np.linalg.norm(self._turning))
             return 2.0 * np.pi / rate if rate else np.inf
@@ -200,15 +183,7 @@ class Gyrostat:
         return float(so3.log(turned) @ self.momentum) / self.magnitude
 
     def _times(self, t: ArrayLike) -> Array:
-        times = finite_array(t, "t", unit="s")
-        rate = float(np.max((np.abs(self._start) + np.abs(self._rotor)) / self.moments))
-        far = float(np.abs(times).max(initial=0.0))
-        if far * rate > _TURNS:
-            raise ShapeError(
-                f"t: {far:.6g} s is more than 1e12 turns of this body away, where rounding leaves no digits of the "
-                f"attitude; the largest time accepted is {_TURNS / rate:.6g} s"
-            )
-        return times
+        return times_within_turns(t, 1.0 / self._fastest if self._fastest else np.inf)
 
     def _directions(self, times: Array) -> Array:
         """x in principal axes."""

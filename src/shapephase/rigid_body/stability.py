@@ -14,21 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import inertia_argument
+from ..arguments import magnitude_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
 from ..letters import what_came
+from ._arguments import one_tensor
 from .euler_top import EulerTop
 
-_ROUNDING = 16.0 * np.finfo(float).eps
-"""Moments of a tensor that is not diagonal closer than this, relative to its trace, may be equal but for rounding."""
-_ALIGNED = 1e-12
-"""Distance of I n from the line of n, relative to the trace of I, up to which n is a principal axis: what rounding
-leaves of axes that were computed."""
-_LEAST = 1e-100  # smallest momentum taken [kg m^2/s]: its square and the curvature, its inverse square, must be finite
-_MOST = 1e100  # largest momentum taken [kg m^2/s], for the same reason
+_ALIGNED = 1e-12  # of the trace of I: rounding leaves I n as far from n for a computed principal axis n
+_LARGEST = 1e100  # [kg m^2/s] and its inverse: the momentum's square and inverse square must be finite
 
 
 @dataclass(frozen=True)
@@ -106,14 +102,11 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     >>> print(f"{spin.eigenvalues.real.max():.6f} = sqrt((1 - 1/2)(1/2 - 1/3))")
     0.288675 = sqrt((1 - 1/2)(1/2 - 1/3))
     """
-    tensor = _tensor(inertia)
-    vector = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-    if vector.shape != (3,):
-        raise ShapeError(f"momentum: one steady rotation has one momentum (3,), got {vector.shape}")
+    tensor, vector = one_tensor(inertia), vector_argument(momentum, "momentum", unit="kg m^2/s")
     largest = np.abs(vector).max()
     if largest == 0.0:
         raise ShapeError("momentum: the body is at rest; a steady rotation needs a momentum other than zero")
-    if not _LEAST < largest < _MOST:
+    if not 1.0 / _LARGEST < largest < _LARGEST:
         raise ShapeError(f"momentum: {largest:.3g} kg m^2/s is out of range, 1e-100 to 1e100; take other units")
     magnitude = float(largest * np.linalg.norm(vector / largest))
     axis = vector / magnitude
@@ -153,10 +146,7 @@ def steady_rotations(
     >>> [spin.verdict for spin in sp.rigid_body.steady_rotations(np.diag([1.0, 2.0, 3.0]))]
     ['stable', 'unstable', 'stable']
     """
-    tensor = _tensor(inertia)
-    norm = finite_array(magnitude, "magnitude", unit="kg m^2/s")
-    if norm.shape != () or norm <= 0.0:
-        raise ShapeError(f"magnitude: one number above 0 kg m^2/s is needed, got {what_came(magnitude)}")
+    tensor, norm = one_tensor(inertia), magnitude_argument(magnitude)
     _, axes = principal_axes(tensor)
     smallest, intermediate, largest = (steady_rotation(tensor, norm * axes[:, k]) for k in range(3))
     return smallest, intermediate, largest
@@ -216,15 +206,14 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
     tilt 0.5729 degrees, drift 2.50e-05 rad/s
     """
     steady = steady_rotation(inertia, momentum)
-    vector = finite_array(disturbed, "disturbed", unit="kg m^2/s")
-    if vector.shape != (3,) or not vector.any():
+    vector = vector_argument(disturbed, "disturbed", unit="kg m^2/s")
+    if not vector.any():
         raise ShapeError(f"disturbed: one momentum (3,) other than zero is needed, got {what_came(disturbed)}")
     axis = steady.momentum / np.linalg.norm(steady.momentum)
-    top = EulerTop(inertia, np.asarray(vector), None)
-    stable = steady.verdict == "stable"
+    top, stable = EulerTop(inertia, vector), steady.verdict == "stable"
     return SpinInSpace(
         steady=steady,
-        momentum=np.asarray(vector),
+        momentum=vector,
         tilt=_farthest(top, axis),
         drift=_mean_turn(top, axis) - float(np.linalg.norm(steady.momentum)) / steady.moment,
         verdict="stable up to the turn about the momentum" if stable else "unstable",
@@ -232,7 +221,7 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
 
 
 def _farthest(top: EulerTop, axis: Array) -> float:
-    """The greatest angle between Pi and a principal axis [rad]."""
+    """Greatest angle between Pi and a principal axis [rad]."""
     orbit, own = top.orbit, top.axes.T @ axis
     if orbit.circled < 0:
         return float(so3.angle_between(orbit.direction, own))
@@ -256,13 +245,6 @@ def _mean_turn(top: EulerTop, axis: Array) -> float:
     return top.montgomery_phase / top.period
 
 
-def _tensor(inertia: ArrayLike) -> Array:
-    tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
-    if tensor.shape != (3, 3):
-        raise ShapeError(f"inertia: one tensor (3, 3) is needed, got {tensor.shape}")
-    return inertia_argument(tensor[None])[0]
-
-
 def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
     """Moments and principal axes in the plane at right angles to a principal axis, right-handed with it."""
     first = so3.perpendicular(axis)
@@ -274,9 +256,9 @@ def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
 
 
 def _tie(tensor: Array, axis: Array) -> float:
-    """Largest difference of equal moments [kg m^2]: none for a diagonal tensor, whose moments are exact."""
+    """Largest difference of equal moments [kg m^2]: 0 for a diagonal tensor, else 16 roundings of the trace."""
     exact = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0 and np.count_nonzero(axis) == 1
-    return 0.0 if exact else _ROUNDING * float(np.trace(tensor))
+    return 0.0 if exact else 16.0 * float(np.finfo(float).eps * np.trace(tensor))
 
 
 def _classified(

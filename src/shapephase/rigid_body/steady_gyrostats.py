@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
-from ..arguments import inertia_argument, positive_argument, whole_argument
+from ..arguments import positive_argument, whole_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..display import short_repr
 from ..errors import ShapeError
-from .euler_top import _array, _principal
+from ..inertia_tensor import body_principal_axes
+from ..roots import bracketed_root
+from ._arguments import one_array, one_tensor
 
-_EPS = float(np.finfo(float).eps)
-_ABSENT = 4.0 * _EPS  # part of the rotor along an axis, relative to all of it, that is rounding
-_SAME = 4.0 * _EPS  # relative difference of inverse moments that is rounding
+_ROUNDING = 4.0 * float(
+    np.finfo(float).eps
+)  # relative difference of inverse moments, or part of the rotor along an axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +63,13 @@ def gyrostat_equilibria(inertia: ArrayLike, rotor: ArrayLike, magnitude: float) 
     >>> len(sp.rigid_body.gyrostat_equilibria(np.diag([1.0, 2.0, 3.0]), [1.0, 2.0, 1.0], 1.0))
     2
     """
-    tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
-    momentum = _array(rotor, "rotor", (3,), "kg m^2/s")
+    momentum = one_array(rotor, "rotor", (3,), "kg m^2/s")
     size = positive_argument(magnitude, "magnitude", "a momentum in kg m^2/s")
-    moments, axes = _principal(tensor)
+    moments, axes = body_principal_axes(one_tensor(inertia))
     a, b = 1.0 / moments, axes.T @ momentum / size
-    b = np.where(np.abs(b) <= _ABSENT * np.abs(b).max(), 0.0, b)
-    found = [_described(a, b, x, size, axes) for x in _directions(a, b)]
-    return tuple(sorted(found, key=lambda one: one.energy))
+    b = np.where(np.abs(b) <= _ROUNDING * np.abs(b).max(), 0.0, b)
+    equilibria = [_described(a, b, x, size, axes) for x in _directions(a, b)]
+    return tuple(sorted(equilibria, key=lambda equilibrium: equilibrium.energy))
 
 
 def bifurcation_rotors(inertia: ArrayLike, rotor_axis: ArrayLike) -> Array:
@@ -89,18 +87,13 @@ def bifurcation_rotors(inertia: ArrayLike, rotor_axis: ArrayLike) -> Array:
     >>> sp.rigid_body.bifurcation_rotors(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 1.0])  # |1 - I3/I|
     array([1., 3.])
     """
-    tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
-    moments, axes = _principal(tensor)
+    moments, axes = body_principal_axes(one_tensor(inertia))
     n = axes.T @ _unit(rotor_axis)
-    n = np.where(np.abs(n) <= _ABSENT, 0.0, n)
+    n = np.where(np.abs(n) <= _ROUNDING, 0.0, n)
     a = 1.0 / moments
     weights, poles = _poles(a, n)
-    found = []
-    for left, right in pairwise(poles):
-        found.append(1.0 / np.sqrt(_sum(_least(weights, poles, left, right), weights, poles)))
-    for place in _bare(a, n):
-        found.append(1.0 / np.sqrt(_sum(place, weights, poles)))
-    return np.sort(np.array(found))
+    places = [_least(weights, poles, left, right) for left, right in pairwise(poles)] + _bare(a, n)
+    return np.sort([1.0 / np.sqrt(_sum(place, weights, poles)) for place in places])
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,12 +141,11 @@ def dual_spin_turn(inertia: ArrayLike, rotor_axis: ArrayLike, magnitude: float, 
     >>> turn.rotor.round(6).tolist()
     [0.0, 0.606339, 1.0]
     """
-    tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
     size = positive_argument(magnitude, "magnitude", "a momentum in kg m^2/s")
     steps = whole_argument(count, "count", 2)
-    moments, axes = _principal(tensor)
+    moments, axes = body_principal_axes(one_tensor(inertia))
     n, a = axes.T @ _unit(rotor_axis), 1.0 / moments
-    if abs(n[2]) <= _ABSENT:
+    if abs(n[2]) <= _ROUNDING:
         raise ShapeError("rotor_axis: it is at right angles to the axis of the largest moment, and nothing turns it")
     c = a[2] * np.linspace(1.0, 0.0, steps)
     # x_i = k a_i n_i/(a_i - c); both divided by the term that is infinite at the start.
@@ -174,13 +166,13 @@ def _unit(axis: ArrayLike) -> Array:
 
 
 def _poles(a: Array, b: Array) -> tuple[Array, Array]:
-    """Where terms (a_i b_i)^2/(a_i - c)^2 are infinite, ascending, equal ones together: their weights, and places."""
+    """Weights and poles, ascending, of the terms (a_i b_i)^2/(a_i - c)^2; terms of equal poles are added."""
     weights: list[float] = []
     poles: list[float] = []
     for k in np.argsort(a):
         if b[k] == 0.0:
             continue
-        if poles and abs(a[k] - poles[-1]) <= _SAME * a[k]:
+        if poles and abs(a[k] - poles[-1]) <= _ROUNDING * a[k]:
             weights[-1] += float((a[k] * b[k]) ** 2)
         else:
             weights.append(float((a[k] * b[k]) ** 2))
@@ -189,45 +181,40 @@ def _poles(a: Array, b: Array) -> tuple[Array, Array]:
 
 
 def _bare(a: Array, b: Array) -> list[float]:
-    """Inverse moments of axes along which the rotor has no part, where these are none of the poles."""
+    """Inverse moments of axes along which the rotor has no component, if they are not poles."""
     poles = a[b != 0.0]
-    return [float(a[k]) for k in range(3) if b[k] == 0.0 and np.all(np.abs(poles - a[k]) > _SAME * a[k])]
+    return [float(a[k]) for k in range(3) if b[k] == 0.0 and np.all(np.abs(poles - a[k]) > _ROUNDING * a[k])]
 
 
 def _sum(place: float, weights: Array, poles: Array) -> float:
     return float(np.sum(weights / (poles - place) ** 2))
 
 
-def _root(function: Callable[[float], float], left: float, right: float) -> float:
-    found: Any = brentq(function, left, right, xtol=1e-300, rtol=np.float64(4.0 * _EPS))
-    return float(found)
-
-
 def _least(weights: Array, poles: Array, left: float, right: float) -> float:
-    """Where the sum is least between two poles: its slope ascends there."""
+    """Minimum of the sum between two poles, a root of its slope, which ascends."""
 
     def slope(place: float) -> float:
         return float(np.sum(weights / (poles - place) ** 3))
 
     inset = 1e-9 * (right - left)
-    return _root(slope, left + inset, right - inset)
+    return bracketed_root(slope, left + inset, right - inset)
 
 
 def _directions(a: Array, b: Array) -> list[Array]:
     """All x with x_i = a_i b_i/(a_i - c) and |x| = 1."""
-    found: list[Array] = []
+    directions: list[Array] = []
     weights, poles = _poles(a, b)
     for place in _bare(a, b):
-        others = np.abs(a - place) > _SAME * a
+        others = np.abs(a - place) > _ROUNDING * a
         x = np.where(others, a * b / np.where(others, a - place, 1.0), 0.0)
         rest = 1.0 - float(x @ x)
         if rest > 0.0:
             free = int(np.argmin(np.abs(a - place)))
-            found += [x + sign * np.sqrt(rest) * np.eye(3)[free] for sign in (1.0, -1.0)]
+            directions += [x + sign * np.sqrt(rest) * np.eye(3)[free] for sign in (1.0, -1.0)]
     if not len(poles):
-        return found
+        return directions
     reach = float(np.sqrt(weights.sum()))
-    # Each root by its distance from a pole, which has all digits: sides outside, and both sides of the least between.
+    # Each root by its distance from a pole, which keeps all digits: outside the poles, on both sides of each minimum.
     sides = [(poles[0], -1.0, reach), (poles[-1], 1.0, reach)]
     for left, right in pairwise(poles):
         middle = _least(weights, poles, left, right)
@@ -240,10 +227,10 @@ def _directions(a: Array, b: Array) -> list[Array]:
         def excess(distance: float, gaps: Array = gaps, side: float = side) -> float:
             return float(np.sum(weights / (gaps - side * distance) ** 2)) - 1.0
 
-        at = near if excess(near) <= 0.0 else _root(excess, near, far * (1.0 + 4.0 * _EPS))
+        at = near if excess(near) <= 0.0 else bracketed_root(excess, near, far * (1.0 + _ROUNDING))
         x = a * b / np.where(b == 0.0, 1.0, (a - pole) - side * at)
-        found.append(x / np.linalg.norm(x))
-    return found
+        directions.append(x / np.linalg.norm(x))
+    return directions
 
 
 def _described(a: Array, b: Array, x: Array, magnitude: float, axes: Array) -> GyrostatEquilibrium:

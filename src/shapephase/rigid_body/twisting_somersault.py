@@ -25,7 +25,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import root_scalar
 
 from .. import elliptic, so3
 from ..arguments import moments_argument
@@ -33,19 +32,14 @@ from ..arrays import Array, Integers, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 from ..letters import what_came
+from ..roots import bracketed_root
 from ..sphere import gauss_nodes
+from ._arguments import above_zero
 from .euler_top import EulerTop
 from .gyrostat import Gyrostat
 
-_CELLS = 16  # in a period or less, whose quadrature counts whole turns: its error is far below half of one
-_SLOWEST = 0.3  # least momentum that a dive is looked for with, of that which does all somersaults without a twist
-_FASTEST = 4.0  # largest momentum that a dive is looked for with, likewise
-_TRIALS = 24  # momenta among which a dive of given duration is looked for
-_EDGE = 1e-9  # [rad] From the long axis and from the separatrix, between which the tilt of a twist is looked for
-_ROUNDED = 1.0 + 1e-12  # of the duration: times up to which are the end, but for rounding
-_FORWARD = np.array([1.0, 0.0, 0.0])  # x, about which the rotor turns
-_ACROSS = np.array([0.0, 1.0, 0.0])  # y, about which the body somersaults
-_TWIST = 2  # the stage in which the body twists
+_MOMENTA = np.geomspace(0.3, 4.0, 24)  # tried for a duration, relative to the momentum of the somersaults alone
+_FORWARD, _ACROSS, _ = np.eye(3)  # x, about which the rotor turns; y, about which the body somersaults
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -59,7 +53,7 @@ class RotorDive:
     rotor : h, about x, in the second stage [kg m^2/s]
     somersaults, twists : m and n
     times : (6,) at which the stages begin and the dive ends [s]
-    turns : (5,) what the long axis turns through about the momentum in each stage [rad], of sum 2 pi m
+    turns : (5,) angles of the long axis about the momentum in each stage [rad], of sum 2 pi m
     tilt : the angle of the momentum from the plane of x and y halfway [rad]
     """
 
@@ -77,12 +71,12 @@ class RotorDive:
 
     @property
     def duration(self) -> float:
-        """Of the whole dive [s]."""
+        """Duration of the whole dive [s]."""
         return float(self.times[-1])
 
     @property
     def landing(self) -> Array:
-        """Where a dive of m somersaults and n twists has to end, exactly: (3, 3), body axes to inertial axes."""
+        """Exact last attitude of a dive of m somersaults and n twists: (3, 3), body axes to inertial axes."""
         turn, twist = 2.0 * np.pi * self.somersaults, 2.0 * np.pi * self.twists
         return so3.exp(turn * _ACROSS) @ so3.exp(np.array([0.0, 0.0, twist]))
 
@@ -106,9 +100,9 @@ class RotorDive:
         return self._by_stage(t, (3,), lambda body, since: body.body_momentum(since), alone)
 
     def rotor_momentum(self, t: ArrayLike) -> Array:
-        """What the rotor has, L_o of the body as a deforming one: times (...) -> (..., 3), body axes [kg m^2/s].
+        """Momentum of the rotor, L_o of the body as a deforming one: times (...) -> (..., 3), body axes [kg m^2/s].
 
-        At a time when it is switched, what it has then on.
+        Switching times belong to the stage that begins.
         """
         times = self._checked(t)
         spins = np.array([0.0, self.rotor, 0.0, float(self._bodies[2].rotor[0]), 0.0])
@@ -138,7 +132,7 @@ class RotorDive:
         """
         times, sense = self._checked(t), np.sign(self.rotor)
         pi, period = self.body_momentum(times), self._bodies[1].period
-        start, end = self.times[_TWIST : _TWIST + 2]
+        start, end = self.times[2:4]
         gone = times - start + 0.5 * (self.twists * period - (end - start))
         # Before and after, the momentum has left or reached the y axis by less than half a turn.
         turns = np.where(times < start, 0.0, np.where(times > end, self.twists, gone / period))
@@ -147,7 +141,7 @@ class RotorDive:
 
     def _checked(self, t: ArrayLike) -> Array:
         times = finite_array(t, "t", unit="s")
-        if np.any((times < 0.0) | (times > self.duration * _ROUNDED)):
+        if np.any((times < 0.0) | (times > self.duration * (1.0 + 1e-12))):
             raise ShapeError(f"t: {times.min():.6g} to {times.max():.6g} s; the dive is on [0, {self.duration:.6g}] s")
         return np.minimum(times, self.duration)
 
@@ -161,14 +155,14 @@ class RotorDive:
         of_body: Callable[[Gyrostat | EulerTop, Array], Array],
         alone: Callable[[int, Array], Array],
     ) -> Array:
-        """What a stage has at its times; `alone` is for the somersault without twist, first and last."""
+        """Values of each stage at its times; `alone` is for the somersaults without twist, first and last."""
         times = self._checked(t)
-        found, stages = np.empty((*times.shape, *shape)), self._stage(times)
+        values, stages = np.empty((*times.shape, *shape)), self._stage(times)
         for stage in range(5):
             here = stages == stage
             since = times[here] - self.times[stage]
-            found[here] = alone(stage, since) if stage in (0, 4) else of_body(self._bodies[stage - 1], since)
-        return found
+            values[here] = alone(stage, since) if stage in (0, 4) else of_body(self._bodies[stage - 1], since)
+        return values
 
 
 def rotor_dive(
@@ -243,26 +237,25 @@ def rotor_dive_lasting(
     >>> print(f"{dive.duration:.9f} s, {dive.momentum:.4f} kg m^2/s, tilt {np.degrees(dive.tilt):.3f} degrees")
     1.500000000 s, 74.1313 kg m^2/s, tilt 19.398 degrees
     """
-    span, values = _positive(duration, "duration", "s"), _moments(moments)
-    alone = 2.0 * np.pi * _positive(somersaults, "somersaults", "") * float(values[1]) / span
+    span, values = above_zero(duration, "duration", "s"), _moments(moments)
+    momenta = 2.0 * np.pi * above_zero(somersaults, "somersaults") * float(values[1]) / span * _MOMENTA
 
     def excess(momentum: float) -> float:
         return _parts(values, momentum, rotor, kick, somersaults, twists).duration - span
 
     last, reason = None, "none of them is a dive"
-    for momentum in alone * np.geomspace(_SLOWEST, _FASTEST, _TRIALS):
+    for momentum in momenta:
         try:
             now = (float(momentum), excess(float(momentum)))
         except TrajectoryError as error:
             last, reason = None, str(error)
             continue
         if last is not None and (last[1] > 0.0) != (now[1] > 0.0):
-            return rotor_dive(
-                values, _root(excess, last[0], now[0]), rotor, kick, somersaults=somersaults, twists=twists
-            )
+            found = bracketed_root(excess, last[0], now[0])
+            return rotor_dive(values, found, rotor, kick, somersaults=somersaults, twists=twists)
         last = now
     raise TrajectoryError(
-        f"duration: no momentum from {_SLOWEST * alone:.6g} to {_FASTEST * alone:.6g} kg m^2/s makes the dive last "
+        f"duration: no momentum from {momenta[0]:.6g} to {momenta[-1]:.6g} kg m^2/s makes the dive last "
         f"{span:.6g} s ({reason})"
     )
 
@@ -292,7 +285,7 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
     >>> print(f"{np.degrees(tilt):.4f} degrees, {10.0 * top.long_axis_precession_per_period / np.pi:.9f} pi")
     39.3758 degrees, 3.000000000 pi
     """
-    values, ratio = _moments(moments), _positive(somersaults_per_twist, "somersaults_per_twist", "")
+    values, ratio = _moments(moments), above_zero(somersaults_per_twist, "somersaults_per_twist")
     rates = 1.0 / values
     least = np.arcsin(np.sqrt(max(0.0, (rates[0] - rates[1]) / (rates[2] - rates[1]))))
 
@@ -300,24 +293,19 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
         top = EulerTop.principal(values, [0.0, np.cos(tilt), np.sin(tilt)])
         return top.long_axis_precession_per_period / (2.0 * np.pi) - ratio
 
-    low, high = float(least) + _EDGE, 0.5 * np.pi - _EDGE
+    # Off the separatrix and the long axis, where the rotation number is not defined.
+    low, high = float(least) + 1e-9, 0.5 * np.pi - 1e-9
     if excess(low) < 0.0 or excess(high) > 0.0:
         raise TrajectoryError(
             f"somersaults_per_twist: from {excess(high) + ratio:.6g} to {excess(low) + ratio:.6g} are possible for "
             f"this body, got {ratio:.6g}"
         )
-    return _root(excess, low, high)
-
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function changes its sign, to rounding."""
-    found = root_scalar(function, bracket=(low, high), method="brentq", xtol=1e-15 * high)
-    return float(found.root)
+    return bracketed_root(excess, low, high)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Parts:
-    """What stages take and turn, before the bodies of the stages are made."""
+    """Durations [s] and turns [rad] of the stages, before their bodies are made."""
 
     arguments: tuple[Array, float, float, float, float, float]
     tilting: Gyrostat
@@ -328,7 +316,7 @@ class _Parts:
 
     @property
     def alone(self) -> float:
-        """Of the first and of the last stage [s]."""
+        """Duration of the first and of the last stage [s]."""
         values, size = self.arguments[:2]
         return 0.5 * self.left * float(values[1]) / size
 
@@ -340,8 +328,8 @@ class _Parts:
 def _parts(moments: ArrayLike, momentum: float, rotor: float, kick: float, somersaults: float, twists: float) -> _Parts:
     """The stages of a dive; see `rotor_dive`."""
     values = _moments(moments)
-    size, on = _positive(momentum, "momentum", "kg m^2/s"), _positive(kick, "kick", "s")
-    count, around = _positive(somersaults, "somersaults", ""), _positive(twists, "twists", "")
+    size, on = above_zero(momentum, "momentum", "kg m^2/s"), above_zero(kick, "kick", "s")
+    count, around = above_zero(somersaults, "somersaults"), above_zero(twists, "twists")
     spin = finite_array(rotor, "rotor", unit="kg m^2/s")
     if (2.0 * around) % 1.0 or spin.shape or not spin:
         raise ShapeError("twists: a multiple of a half is needed; rotor: one momentum other than 0")
@@ -377,23 +365,17 @@ def _moments(moments: ArrayLike) -> Array:
     return values
 
 
-def _positive(value: ArrayLike, name: str, unit: str) -> float:
-    number = finite_array(value, name, unit=unit)
-    if number.shape or number <= 0.0:
-        raise ShapeError(f"{name}: one number above 0 is needed, got {what_came(value)}")
-    return float(number)
-
-
 def _azimuth(attitude: Array) -> Array:
-    """Of the long axis about y, from z: (..., 3, 3) -> (...) [rad]."""
+    """Azimuth of the long axis about y, from z: (..., 3, 3) -> (...) [rad]."""
     return np.arctan2(attitude[..., 0, 2], attitude[..., 2, 2])
 
 
 def _turned(body: Gyrostat | EulerTop, since: ArrayLike) -> Array:
-    """What the long axis has turned through about the momentum: times (...) from 0 on -> (...) [rad]."""
+    """Angle that the long axis has turned through about the momentum: times (...) from 0 on -> (...) [rad]."""
     times = np.asarray(since, dtype=float)
     span = float(times.max(initial=0.0))
-    cells = _CELLS * (1 + int(min(span / body.period, 1e4)))
+    # 16 cells a period: the error of the quadrature, which counts whole turns, is far below half of one.
+    cells = 16 * (1 + int(min(span / body.period, 1e4)))
     edges = np.linspace(0.0, span, cells + 1)
     nodes, weights = gauss_nodes(edges[:-1], edges[1:])
     pi, omega = body.body_momentum(nodes), body.angular_velocity(nodes)
@@ -404,7 +386,7 @@ def _turned(body: Gyrostat | EulerTop, since: ArrayLike) -> Array:
 
 
 def _since_the_plane(top: EulerTop) -> float:
-    """How long before t = 0 the momentum crossed Pi_x = 0 with Pi_y > 0 [s]."""
+    """Time since the momentum crossed Pi_x = 0 with Pi_y > 0, at t = 0 [s]."""
     quarter = float(elliptic.complete_k(top.complement))
     forward = int(np.argmax(np.abs(top.axes[0])))
     crossing = 0.0 if forward == 1 else quarter

@@ -19,16 +19,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from ... import so3
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...letters import what_came
-from ...roots import safe_newton
-
-_SAMPLES = 129  # axial parts of momenta, among which the longest geodesic up to its cut is looked for
+from ...roots import bracketed_root, safe_newton
 
 
 @dataclass(frozen=True)
@@ -80,10 +78,10 @@ class AxisymmetricMetric:
             stretch = np.sqrt(1.0 + self.eta * axial**2)
             return 2.0 * np.sqrt(self.equatorial) * self._first_root(axial, on_su2=True) * stretch
 
-        samples = np.linspace(0.0, 1.0, _SAMPLES)
+        samples = np.linspace(0.0, 1.0, 129)
         lengths = length(samples)
         best = int(np.argmax(lengths))
-        low, high = samples[max(best - 1, 0)], samples[min(best + 1, _SAMPLES - 1)]
+        low, high = samples[max(best - 1, 0)], samples[min(best + 1, len(samples) - 1)]
         found = minimize_scalar(lambda p: -float(length(np.asarray(p))), bounds=(low, high), method="bounded")
         return float(max(lengths[best], -found.fun))
 
@@ -122,7 +120,7 @@ class AxisymmetricMetric:
         return self._first_root(axial, on_su2=False) * unit_time
 
     def cut_time_on_su2(self, momentum: ArrayLike) -> Array:
-        """The same on the unit quaternions, where q and −q are two points: (..., 3) -> (...) [s].
+        """Cut time on the unit quaternions, where q and −q are two points: (..., 3) -> (...) [s].
 
         tau = pi for I_3 >= I_1, else the first zero of q_3 if that is earlier.
         """
@@ -168,7 +166,7 @@ class AxisymmetricMetric:
         return self._length(self.shortest_momentum_on_su2(quat_xyzw))
 
     def shortest_momentum_on_su2(self, quat_xyzw: ArrayLike) -> Array:
-        """As `shortest_momentum`, to a unit quaternion and not to its negative: (..., 4) -> (..., 3)."""
+        """The momentum of a shortest geodesic to a unit quaternion, not to its negative: (..., 4) -> (..., 3)."""
         so3.quat_argument(quat_xyzw, "quat_xyzw")
         return self._shortest_of_each(so3.normalised(np.asarray(quat_xyzw, dtype=float)))
 
@@ -177,7 +175,7 @@ class AxisymmetricMetric:
         return np.array(flat).reshape(*quats.shape[:-1], 3)
 
     def _length(self, momentum: Array) -> Array:
-        """Of the geodesic in a unit of time."""
+        """Length of the geodesic in a unit of time."""
         equator, axis = np.sum(momentum[..., :2] ** 2, axis=-1), momentum[..., 2] ** 2
         return np.sqrt(equator / self.equatorial + axis / self.axial)
 
@@ -198,7 +196,7 @@ class AxisymmetricMetric:
         side = 1.0 if way(quarter, 1.0)[2] >= target else -1.0
         angle = 0.0
         if target > 0.0:
-            angle = float(brentq(lambda nu: way(nu, side)[2] - target, 0.0, quarter, xtol=1e-300, rtol=1e-15))  # type: ignore[arg-type]
+            angle = bracketed_root(lambda nu: way(nu, side)[2] - target, 0.0, quarter)
         sine, turn, _ = way(angle, side)
         tau = float(np.arctan2(sine, side * along * np.cos(angle)))
         # tau near pi has fewer digits than its sine.
