@@ -262,7 +262,7 @@ def test_heavy_tops_refuse_bad_input():
         (lambda: stability_chart([1.0], [2.0], tilt=0.5), "tilt"),
         (lambda: nutation(LagrangeTop(1.0, 2.0, -1.0), UP, UP), "Mgl > 0"),
         (lambda: nutation(LagrangeTop(1.0, 2.0, 1.0), UP, 2.0 * UP), "length 1"),
-        (lambda: nutation(LagrangeTop(1.0, 2.0, 1.0), [UP], UP), "are needed"),
+        (lambda: nutation(LagrangeTop(1.0, 2.0, 1.0), [UP], UP), "is needed"),
     ):
         with pytest.raises(ShapeError, match=message):
             build()

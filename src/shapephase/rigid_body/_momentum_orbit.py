@@ -26,10 +26,7 @@ from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
-from ..letters import what_came
-
-_NEGLIGIBLE = 1e-140
-"""Components of Pi below this (in units of its own power of two) count as zero: squares of smaller ones underflow."""
+from ._arguments import axis_index
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +50,7 @@ class MomentumOrbit:
     excess : 2 E/L − L/I_2, by which the turn about Pi differs from it [rad/s]; 0 on the separatrix
     precession : (L/I_a − L/I_k)/rate
     sense : +1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still
-    condition : how much a small change of inertia or momentum is magnified, see `EulerTop.condition`
+    condition : factor that magnifies a small change of inertia or momentum, see `EulerTop.condition`
     """
 
     moments: Array
@@ -90,7 +87,7 @@ class MomentumOrbit:
 
     @property
     def third_kind(self) -> float:
-        """What psi + sense azimuth gains in a period in excess of spin t [rad]."""
+        """Gain of psi + sense azimuth in a period in excess of spin t [rad]."""
         return 4.0 * self.precession * float(elliptic.complete_pi_excess(self.characteristic, self.complement))
 
     def _direction(self, sn: Array, cn: Array, dn: Array) -> Array:
@@ -118,7 +115,7 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
     # Powers of two, so that squares neither overflow nor round.
     momentum_unit, inertia_unit = np.exp2(np.frexp([magnitude or 1.0, moments[2]])[1])
     x = start / momentum_unit
-    x = np.where(np.abs(x) < _NEGLIGIBLE, 0.0, x)
+    x = np.where(np.abs(x) < 1e-140, 0.0, x)  # squares of smaller components underflow
     i1, i2, i3 = i = (moments / inertia_unit).tolist()
     if not magnitude or i1 == i3 or not (x[0] or x[2]) or (i1 == i2 and not x[2]) or (i2 == i3 and not x[0]):
         return _stationary_orbit(moments, start, magnitude)
@@ -173,11 +170,6 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     moments : (3,) in any order, above 0, not all equal [kg m^2]
     axis : 0, 1 or 2, one of these axes, with the smallest or the largest moment
 
-    Raises
-    ------
-    ShapeError
-        If the moments are not such numbers, or the axis is the intermediate one.
-
     Examples
     --------
     >>> areas = [sp.rigid_body.separatrix_solid_angle([1.0, 2.0, 3.0], axis) for axis in (0, 2)]
@@ -186,14 +178,11 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     """
     values = finite_array(moments, "moments", (3,), unit="kg m^2")
     if values.ndim != 1 or values.min() <= 0.0 or values.min() == values.max():
-        raise ShapeError(f"moments: three numbers above 0, not all equal, are needed, got {what_came(values)}")
-    (low, middle, high), _, _ = ascending_moments(values)
-    if not isinstance(axis, int | np.integer) or axis not in (0, 1, 2) or values[axis] not in (low, high):
-        raise ShapeError(
-            f"axis: one of 0, 1, 2 with the smallest or the largest of the moments {values} is needed, got "
-            f"{what_came(axis)}"
-        )
-    circled, other = (low, high) if values[axis] == low else (high, low)
+        raise ShapeError(f"moments: three numbers above 0, not all equal, are needed, got {values}")
+    (low, middle, high), own_moment = ascending_moments(values)[0], values[axis_index(axis)]
+    if own_moment not in (low, high):
+        raise ShapeError(f"axis: that of the smallest or the largest of the moments {values} is needed, got {axis}")
+    circled, other = (low, high) if own_moment == low else (high, low)
     own, opposite = np.sqrt(abs(middle - circled) / circled), np.sqrt(abs(other - middle) / other)
     return 4.0 * float(np.arctan2(own, opposite))
 

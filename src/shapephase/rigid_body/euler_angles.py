@@ -6,8 +6,7 @@ Bonnard et al. (their phi_1, phi_2, phi_3). They differ in the axis of the middl
 
 A chart is regular for 0 < theta < pi. At its poles, theta = 0 and pi, phi and psi turn about one line: an attitude
 still has angles there (see `EulerChart.angles`), and rates still give an angular velocity; but some velocities have no
-rates, and (phi, theta, psi) and their momenta are not coordinates. Functions that need coordinates raise
-`ChartPoleError` within 1e-8 of a pole, where half of the digits are gone.
+rates, and (phi, theta, psi) and their momenta are not coordinates.
 
 Sources: Marsden and Ratiu, sections 15.6 and 15.7 (whose (15.6.6) gives the inverse of the attitude); Bonnard, Cots and
 Shcherbakova 2013, section 3.3 (whose H_3 has the wrong sign); theory.md J1 to J10.
@@ -26,15 +25,18 @@ from ..arrays import Array, Mask, common_batch, finite_array
 from ..display import short_repr
 from ..errors import ChartPoleError, ShapeError
 from ..inertia_tensor import inverse_inertia
+from ._arguments import check_entries
 
 _NEAREST = 1e-8  # sine of theta up to which angles are not coordinates: dividing by it costs half of the sixteen digits
-_AT_POLE = 1e-15
-"""Sine of half the angle to a pole, up to which an attitude is at it: the rounding of an attitude is as large."""
+_AT_POLE = 1e-15  # sine of half the angle to a pole, up to which an attitude is at it: that of rounding
 
 
 @dataclass(frozen=True)
 class EulerChart:
     """Euler angles (phi, theta, psi) with R = R_z(phi) R_node(theta) R_z(psi); use `ZXZ` or `ZYZ`.
+
+    Rates and momenta of given vectors, and what is made of momenta, need coordinates and raise `ChartPoleError` within
+    1e-8 of a pole.
 
     Examples
     --------
@@ -140,13 +142,7 @@ class EulerChart:
         return so3.apply(self.spatial_rate_matrix(angles), rates)
 
     def rates(self, angles: ArrayLike, angular_velocity: ArrayLike) -> Array:
-        """(phi', theta', psi') of an angular velocity in body axes: (..., 3), (..., 3) -> (..., 3) [rad/s].
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-        """
+        """(phi', theta', psi') of an angular velocity in body axes: (..., 3), (..., 3) -> (..., 3) [rad/s]."""
         angles, velocity = _pair(angles, angular_velocity, "angular_velocity", "rad/s")
         self._refuse_poles(angles)
         node, across, sine, cosine = self._body_frame(angles)
@@ -154,13 +150,7 @@ class EulerChart:
         return np.stack([phi_rate, _dot(node, velocity), velocity[..., 2] - cosine[..., 0] * phi_rate], axis=-1)
 
     def rates_from_spatial(self, angles: ArrayLike, angular_velocity: ArrayLike) -> Array:
-        """(phi', theta', psi') of an angular velocity in inertial axes: (..., 3), (..., 3) -> (..., 3) [rad/s].
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-        """
+        """(phi', theta', psi') of an angular velocity in inertial axes: (..., 3), (..., 3) -> (..., 3) [rad/s]."""
         angles, velocity = _pair(angles, angular_velocity, "angular_velocity", "rad/s")
         self._refuse_poles(angles)
         node = self._node(angles[..., 0])
@@ -175,11 +165,6 @@ class EulerChart:
         along the line of nodes.
 
         Source: Marsden and Ratiu (15.7.3).
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
         """
         angles, momentum = _pair(angles, body_momentum, "body_momentum", "kg m^2/s")
         self._refuse_poles(angles)
@@ -189,11 +174,6 @@ class EulerChart:
         """Pi of (p_phi, p_theta, p_psi), the inverse of `conjugate_momenta`: (..., 3), (..., 3) -> (..., 3) [kg m^2/s].
 
         Source: Marsden and Ratiu (15.7.4); for ZYZ the brackets in Bonnard et al., proposition 6.
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
         self._refuse_poles(angles)
@@ -208,11 +188,6 @@ class EulerChart:
         the canonical bracket to the minus Lie-Poisson bracket.
 
         Source: Marsden and Ratiu, exercise 15.7-1.
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
         self._refuse_poles(angles)
@@ -220,15 +195,8 @@ class EulerChart:
         momentum = self.body_momentum(angles, momenta)
         third = np.broadcast_to([0.0, 0.0, 1.0], node.shape)
         slope = (momenta[..., 2:3] - momenta[..., 0:1] * cosine) / sine**2
-        columns = [
-            np.zeros(node.shape),
-            slope * across,
-            np.cross(momentum, third),
-            across / sine,
-            node,
-            third - cosine / sine * across,
-        ]
-        return np.stack(columns, axis=-1)
+        by_angles = [np.zeros(node.shape), slope * across, np.cross(momentum, third)]
+        return np.stack([*by_angles, across / sine, node, third - cosine / sine * across], axis=-1)
 
     def kinetic_energy(self, inertia: ArrayLike, angles: ArrayLike, rates: ArrayLike) -> Array:
         """Omega.I Omega / 2 of angles and their rates: (..., 3, 3), (..., 3), (..., 3) -> (...) [J]. Poles included.
@@ -244,11 +212,6 @@ class EulerChart:
         """The kinetic energy of angles and conjugate momenta: (..., 3, 3), (..., 3), (..., 3) -> (...) [J].
 
         Source: Marsden and Ratiu (15.7.5), (15.7.6); Bonnard et al., proposition 6.
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
         """
         momentum = self.body_momentum(angles, momenta)
         inverse = inverse_inertia(_inertia(inertia, momentum))
@@ -260,11 +223,6 @@ class EulerChart:
         [rad/s], [kg m^2/s^2]; the inertia [kg m^2] in body axes.
 
         Source: Marsden and Ratiu, section 15.7, Hamilton's canonical equations.
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
         momentum = self.body_momentum(angles, momenta)
@@ -313,25 +271,22 @@ class EulerChart:
         return node, _across(node), np.sin(angles[..., 1:2]), np.cos(angles[..., 1:2])
 
     def _refuse_poles(self, angles: Array) -> None:
-        bad = np.abs(np.sin(angles[..., 1])) <= _NEAREST
-        if bad.any():
-            where = tuple(int(i) for i in np.argwhere(bad)[0])
-            raise ChartPoleError(
-                f"angles: entry {list(where)} has theta = {angles[where][1]:.17g}, a pole of the {self.name.upper()} "
-                f"chart to {_NEAREST:g}, where the angles are not coordinates; turn the inertial or the body axes by a "
-                "constant rotation, or use attitudes and body momenta"
-            )
+        theta = angles[..., 1]
+        requirement = (
+            f"a pole of the {self.name.upper()} chart to {_NEAREST:g}, where the angles are not coordinates; turn the "
+            "inertial or the body axes by a constant rotation, or use attitudes and body momenta"
+        )
+        check_entries(np.abs(np.sin(theta)) <= _NEAREST, theta, "theta", requirement, ChartPoleError)
 
 
 ZXZ = EulerChart("zxz", (1.0, 0.0))  # R = R_z(phi) R_x(theta) R_z(psi): Marsden and Ratiu, section 15.6
-
 ZYZ = EulerChart("zyz", (0.0, 1.0))  # R = R_z(phi) R_y(theta) R_z(psi): Bonnard et al., section 3.3
 
 
 def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Array:
     """phi', the rate at which the body's third axis turns about the momentum: (..., 3), (..., 3) -> (...) [rad/s].
 
-    The same in both charts, for the inertial third axis along the momentum.
+    Both charts have the same, for the inertial third axis along the momentum.
 
     Source: Bonnard et al. (4), its last form, which needs no distinction of cases.
 
@@ -348,13 +303,10 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
     momentum, velocity = _pair(body_momentum, angular_velocity, "angular_velocity", "rad/s", first="body_momentum")
     magnitude = np.linalg.norm(momentum, axis=-1)
     across = np.hypot(momentum[..., 0], momentum[..., 1])
-    bad = across <= _NEAREST * magnitude
-    if bad.any():
-        where = tuple(int(i) for i in np.argwhere(bad)[0])
-        raise ChartPoleError(
-            f"body_momentum: entry {list(where)} is {momentum[where]}, along the body's third axis, whose azimuth is "
-            "then undefined; turn the body axes, so that another axis is the third"
-        )
+    requirement = (
+        "along it, the azimuth of the body's third axis is undefined; turn the body axes to have another third"
+    )
+    check_entries(across <= _NEAREST * magnitude, momentum, "body_momentum", requirement, ChartPoleError)
     unit = momentum[..., :2] / across[..., None]
     return magnitude * _dot(unit, velocity[..., :2]) / across
 
@@ -389,10 +341,10 @@ def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
 
 def _pair(angles: ArrayLike, other: ArrayLike, name: str, unit: str, first: str = "angles") -> tuple[Array, Array]:
     """Two checked arguments (..., 3), broadcast together."""
-    one = finite_array(angles, first, (3,), unit="rad" if first == "angles" else "kg m^2/s")
-    two = finite_array(other, name, (3,), unit=unit)
-    shape = common_batch(**{first: one.shape[:-1], name: two.shape[:-1]})
-    return np.broadcast_to(one, (*shape, 3)), np.broadcast_to(two, (*shape, 3))
+    left = finite_array(angles, first, (3,), unit="rad" if first == "angles" else "kg m^2/s")
+    right = finite_array(other, name, (3,), unit=unit)
+    shape = common_batch(**{first: left.shape[:-1], name: right.shape[:-1]})
+    return np.broadcast_to(left, (*shape, 3)), np.broadcast_to(right, (*shape, 3))
 
 
 def _inertia(inertia: ArrayLike, vectors: Array) -> Array:

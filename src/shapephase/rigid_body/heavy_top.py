@@ -17,26 +17,19 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 
 from .. import so3
-from ..arguments import check_pair, inertia_argument
+from ..arguments import check_pair, inertia_argument, number_argument
 from ..arrays import Array, common_batch, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..letters import what_came
+from ._arguments import above_zero, unit_vectors
 
 _FLOOR = 3e-14  # relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14
-_RATIO = 32.0
-"""Ratio of the local tolerances of the two runs of a motion, far enough apart that their difference shows the error."""
-_SHARE = 0.1
-"""Share of the runs' difference given as the error of the finer one: measured it is about 1/32, so this is cautious."""
-_FIRST = 0.01  # local tolerance of the first try, relative to that of the whole motion: errors of steps add up
-_AIM = 0.3  # error aimed at when a try is repeated, relative to the tolerance, so that one repetition mostly suffices
-_DROP = 1e-3  # most that the local tolerance is lowered from one try to the next, as estimates of coarse runs are rough
+_RATIO = 32.0  # of the local tolerances of the two runs of a motion, whose difference shows the error
 _STEPS = 200_000  # most steps of one run, some minutes of computing
-_UNIT = 1e-6  # farthest from 1 that the length of a unit vector may be: six digits, as people write them, are enough
-_UP = np.array([0.0, 0.0, 1.0])  # the upward vertical e_z, inertial axes
 
-Pair = tuple[Array, Array]  # A point of se(3)*, or a gradient there: its Pi part and its Gamma part, each (..., 3)
+Pair = tuple[Array, Array]  # a point of se(3)*, or a gradient there: its Pi part and its Gamma part, each (..., 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,18 +67,10 @@ class HeavyTop:
     def __init__(self, inertia: ArrayLike, mgl: ArrayLike, chi: ArrayLike = (0.0, 0.0, 1.0)) -> None:
         tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
         tensor = inertia_argument(tensor.reshape(-1, 3, 3)).reshape(tensor.shape)
-        direction = finite_array(chi, "chi", (3,))
-        length = np.linalg.norm(direction, axis=-1)
-        if np.any(np.abs(length - 1.0) > _UNIT):
-            raise ShapeError(f"chi: must have length 1 (the distance belongs to mgl), got {np.ravel(length)[0]:.6g}")
-        strength = finite_array(mgl, "mgl", unit="J")
+        direction, strength = unit_vectors(chi, "chi"), finite_array(mgl, "mgl", unit="J")
         common_batch(inertia=tensor.shape[:-2], mgl=strength.shape, chi=direction.shape[:-1])
-        for name, value in (
-            ("inertia", tensor),
-            ("mgl", strength),
-            ("chi", so3.normalised(direction)),
-            ("inverse", inverse_inertia(tensor)),
-        ):
+        values = {"inertia": tensor, "mgl": strength, "chi": direction, "inverse": inverse_inertia(tensor)}
+        for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def angular_velocity(self, momentum: ArrayLike) -> Array:
@@ -177,11 +162,12 @@ class HeavyTop:
         """
         start, body, time, requested = self._arguments(momentum, gamma, attitude, duration, tolerance)
         least = _RATIO * _FLOOR
-        local = max(_FIRST * requested, least)
+        local = max(0.01 * requested, least)  # errors of steps add up
         while True:
             coarse = _integrated(self, start, body, time, local)
             fine = _integrated(self, start, body, time, local / _RATIO)
-            estimate = _SHARE * _difference(coarse, fine)
+            # Measured, the error of the finer run is about 1/32 of the difference.
+            estimate = 0.1 * _difference(coarse, fine)
             worst = float(np.max(estimate, initial=0.0))
             if worst <= requested:
                 return HeavyTopMotion(
@@ -197,7 +183,8 @@ class HeavyTop:
                     f"heavy top: the attitude is known to {worst:.2g} rad over {time:.6g} s, tolerance "
                     f"{requested:.2g}; shorten the motion or loosen the tolerance (unstable motions magnify rounding)"
                 )
-            local = max(local * max(_AIM * requested / worst, _DROP), least)
+            # Mostly one repetition suffices; estimates of coarse runs are too rough for larger changes.
+            local = max(local * max(0.3 * requested / worst, 1e-3), least)
 
     def _arguments(
         self,
@@ -211,18 +198,12 @@ class HeavyTop:
         if gamma is not None and attitude is not None:
             raise ShapeError("gamma, attitude: give one of them; each determines where the vertical is")
         if gamma is not None:
-            vertical = finite_array(gamma, "gamma", (3,))
-            length = np.linalg.norm(vertical, axis=-1)
-            if np.any(np.abs(length - 1.0) > _UNIT):
-                raise ShapeError(f"gamma: the vertical must have length 1, got {np.ravel(length)[0]:.6g}")
-            start = so3.between(so3.normalised(vertical), np.broadcast_to(_UP, vertical.shape))
+            vertical = unit_vectors(gamma, "gamma")
+            start = so3.between(vertical, np.broadcast_to(np.eye(3)[2], vertical.shape))
         else:
             start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
-        time = finite_array(duration, "duration", unit="s")
-        requested = finite_array(tolerance, "tolerance", unit="rad")
-        if time.shape != () or time <= 0.0:
-            raise ShapeError(f"duration: one number above 0 s is needed, got {what_came(duration)}")
-        if requested.shape != () or not 1e-12 <= requested <= 1e-2:
+        time, requested = above_zero(duration, "duration", "s"), number_argument(tolerance, "tolerance", "rad")
+        if not 1e-12 <= requested <= 1e-2:
             raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {what_came(tolerance)}")
         shape = common_batch(
             inertia=self.inertia.shape[:-2],
@@ -231,12 +212,7 @@ class HeavyTop:
             momentum=body.shape[:-1],
             attitude=start.shape[:-2],
         )
-        return (
-            np.broadcast_to(start, (*shape, 3, 3)),
-            np.broadcast_to(body, (*shape, 3)),
-            float(time),
-            float(requested),
-        )
+        return np.broadcast_to(start, (*shape, 3, 3)), np.broadcast_to(body, (*shape, 3)), time, requested
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,9 +255,8 @@ class HeavyTopMotion:
 
     def angular_velocity(self, t: ArrayLike) -> Array:
         """Omega(t), body axes: (...) -> (..., 3) [rad/s]."""
-        momentum = self.body_momentum(t)
-        inverse = self.top.inverse
-        return so3.apply(inverse[(..., *(None,) * np.ndim(t), slice(None), slice(None))], momentum)
+        inverse = self.top.inverse[(..., *(None,) * np.ndim(t), slice(None), slice(None))]
+        return so3.apply(inverse, self.body_momentum(t))
 
     def _state(self, t: ArrayLike) -> tuple[Array, Array]:
         times = finite_array(t, "t", unit="s")
@@ -294,12 +269,9 @@ class HeavyTopMotion:
 class _Run:
     """One integration of a motion: what belongs to its states, and the interpolant of its steps."""
 
-    vertical: Array
-    """(...) vertical momentum, constant [kg m^2/s]."""
-    scale: Array
-    """(...) unit of the horizontal momentum in the state [kg m^2/s]."""
-    energy_drift: Array
-    """(...) largest |H(t) - H(0)| at the ends of the steps [J]."""
+    vertical: Array  # (...) vertical momentum, constant [kg m^2/s]
+    scale: Array  # (...) unit of the horizontal momentum in the state [kg m^2/s]
+    energy_drift: Array  # (...) [J]
     solution: OdeSolution
 
     def state(self, times: Array) -> tuple[Array, Array]:
@@ -360,25 +332,7 @@ def heavy_top_steps(
     """Steps of the integration: time, attitude (quaternions xyzw) and spatial momentum after each, and its interpolant.
 
     All tops of the batch take the same steps. The tolerance of one step applies to the attitude [rad] and to the
-    momentum relative to max(|Pi|, sqrt(Mgl I)).
-
-    Parameters
-    ----------
-    attitude : (..., 3, 3) at the start, body to inertial axes
-    momentum : (..., 3) body momentum at the start [kg m^2/s]
-    duration : [s]
-
-    Raises
-    ------
-    AccuracyNotReached
-        After 200 000 steps, or where the step shrinks to nothing.
-
-    Examples
-    --------
-    >>> top = sp.rigid_body.HeavyTop(np.diag([1.0, 1.0, 0.5]), 2.0)
-    >>> steps = list(sp.rigid_body.heavy_top_steps(top, np.eye(3), np.array([0.0, 0.0, 3.0]), 1.0, 1e-9))
-    >>> print(f"{steps[-1][0]:.6f} s")
-    1.000000 s
+    momentum relative to max(|Pi|, sqrt(Mgl I)). Raises AccuracyNotReached after 200 000 steps.
     """
     vertical, scale, start = _packed(top, attitude, momentum)
     strength = top.mgl / scale
@@ -447,9 +401,8 @@ def _difference(coarse: _Run, fine: _Run) -> Array:
     """Largest angle between the attitudes, at the ends and middles of the finer steps [rad]."""
     ends = fine.solution.ts
     times = np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])
-    before, after = (so3.matrix_from_quat(run.state(times)[0]) for run in (coarse, fine))
-    turn = so3.transpose(before) @ after
-    return so3.angle(turn).max(axis=-1)
+    rough, accurate = (so3.matrix_from_quat(run.state(times)[0]) for run in (coarse, fine))
+    return so3.angle(so3.transpose(rough) @ accurate).max(axis=-1)
 
 
 def _point(momentum: ArrayLike, gamma: ArrayLike) -> Pair:

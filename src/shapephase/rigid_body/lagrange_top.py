@@ -14,20 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object
+from ..arguments import check_object, number_argument
 from ..arrays import Array, Mask, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, SingularInertiaError
 from .heavy_top import HeavyTop, heavy_top_steps
 
-_GROWTH = 50.0
-"""Tilt, relative to the first one, up to which a simulated spin counts as stable: room for the wide
-nutation of stable spins next to the threshold."""
-_LARGEST_TILT = 0.01
-"""Largest first tilt of a simulation [rad]: its growth by the factor above is still less than a right angle."""
-_LOCAL_TOLERANCE = 1e-9  # local tolerance of a simulation [rad], far below the least sensible tilt
-_THRESHOLD = 8.0 * float(np.finfo(float).eps)
-"""Of p^2 - 4 Mgl I1, relative to p^2: closer to the threshold, the momentum is `critical_momentum` but for rounding."""
+_GROWTH = 50.0  # of the tilt, up to which a simulated spin counts as stable: stable spins next to the threshold nutate
+_LARGEST_TILT = 0.5 / _GROWTH  # [rad] at the start of a simulation: its growth stays far below a right angle
 
 
 @dataclass(frozen=True)
@@ -50,7 +44,7 @@ class LagrangeTop:
     def __post_init__(self) -> None:
         """Check the numbers."""
         for name in ("transverse", "axial", "mgl"):
-            object.__setattr__(self, name, _number(getattr(self, name), name))
+            object.__setattr__(self, name, number_argument(getattr(self, name), name))
         if min(self.transverse, self.axial) <= 0.0:
             raise SingularInertiaError(f"moments must be above 0, got {self.transverse:.6g}, {self.axial:.6g} kg m^2")
 
@@ -130,7 +124,7 @@ class StabilityChart:
 def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     """The upright spin with Pi_3 = `momentum` [kg m^2/s], and its stability: stable if Pi_3^2 >= 4 Mgl I1, else not.
 
-    At equality, of which the theorem says nothing, the energy has a strict minimum among the motions of the same Pi_3
+    At equality, which the theorem leaves open, the energy has a strict minimum among the motions of the same Pi_3
     and Pi.Gamma (see `upright_potential`), and an isolated level of conserved quantities is stable.
     The free number e = -Phi_dot/p is taken where the e-quadratic is largest, at 1/(2 I1).
 
@@ -143,7 +137,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     [False, True]
     """
     check_object(top, "LagrangeTop", "top")
-    p = _number(momentum, "momentum")
+    p = number_argument(momentum, "momentum")
     i1, i3, mgl = top.transverse, top.axial, top.mgl
     phi_dot = -0.5 * p / i1
     phi_prime = -0.5 * (mgl + phi_dot * p)
@@ -151,7 +145,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     b = -2.0 * phi_prime + 2.0 * i3 * phi_dot**2 + abs(mgl) + p * p / i1
     second = second_variation(top, p, phi_dot, b=b)
     excess = p * p - 4.0 * mgl * i1
-    at_threshold = abs(excess) <= _THRESHOLD * p * p
+    at_threshold = abs(excess) <= 8.0 * np.finfo(float).eps * p * p  # `critical_momentum`, but for rounding
     stable = bool(np.all(spectrally_stable([i1, i1, i3], mgl, p)))
     return SleepingTop(
         momentum=p,
@@ -193,7 +187,7 @@ def upright_potential(top: LagrangeTop, momentum: float, tilt: ArrayLike) -> Arr
     16.0, nearly 2^4
     """
     check_object(top, "LagrangeTop", "top")
-    p, angle = _number(momentum, "momentum"), finite_array(tilt, "tilt", unit="rad")
+    p, angle = number_argument(momentum, "momentum"), finite_array(tilt, "tilt", unit="rad")
     if np.any(np.abs(angle) >= np.pi):
         raise ShapeError(
             f"tilt: {np.abs(angle).max():.6g} rad; between -pi and pi the axis points away from straight down"
@@ -226,7 +220,7 @@ def second_variation(
     0.500000 -0.427051
     """
     check_object(top, "LagrangeTop", "top")
-    p, phi_dot, a, b, c, d = (_number(v, "second variation") for v in (momentum, phi_dot, a, b, c, d))
+    p, phi_dot, a, b, c, d = (number_argument(v, "second variation") for v in (momentum, phi_dot, a, b, c, d))
     vertical = -(top.mgl + phi_dot * p)
     matrix = np.diag([1.0 / top.transverse, 1.0 / top.transverse, 1.0 / top.axial + a + c, vertical, vertical, 0.0])
     matrix[0, 3] = matrix[3, 0] = matrix[1, 4] = matrix[4, 1] = phi_dot
@@ -247,7 +241,7 @@ def e_quadratic(top: LagrangeTop, momentum: float) -> Array:
     [-9.0, 9.0, -2.0]
     """
     check_object(top, "LagrangeTop", "top")
-    p, i1 = _number(momentum, "momentum"), top.transverse
+    p, i1 = number_argument(momentum, "momentum"), top.transverse
     return np.array([-p * p, p * p / i1, -top.mgl / i1])
 
 
@@ -283,7 +277,7 @@ def characteristic_polynomial(moments: ArrayLike, mgl: ArrayLike, momentum: Arra
     For I1 = I2 the discriminant is (2 I1 - I3)^2 (p/I3)^2 (p^2 - 4 Mgl I1)/I1^4. For I3 = 2 I1 it vanishes for every
     p: the two pairs of roots coincide, and the sign of B decides.
 
-    Source: Marsden and Ratiu (15.10.16) with theory.md M-E10. Arguments and errors as `sleeping_matrix`.
+    Source: Marsden and Ratiu (15.10.16) with theory.md M-E10. Arguments as `sleeping_matrix`.
 
     Examples
     --------
@@ -301,7 +295,7 @@ def characteristic_polynomial(moments: ArrayLike, mgl: ArrayLike, momentum: Arra
 
 
 def sleeping_spectrum(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> np.ndarray:
-    """The four eigenvalues of `sleeping_matrix`: (..., 4) complex [1/s]. Arguments and errors as there.
+    """The four eigenvalues of `sleeping_matrix`: (..., 4) complex [1/s]. Arguments as there.
 
     Found through their squares (-B +- sqrt(B^2 - 4C))/2, so they come in pairs of opposite sign.
 
@@ -363,7 +357,7 @@ def stability_chart(
     ([[False, True]], [[False, True]])
     """
     ratios, spins = finite_array(axial_ratios, "axial_ratios"), finite_array(momenta, "momenta")
-    lean, time = _number(tilt, "tilt"), _number(duration, "duration")
+    lean, time = number_argument(tilt, "tilt"), number_argument(duration, "duration")
     if ratios.ndim != 1 or spins.ndim != 1 or not ratios.size or not spins.size:
         raise ShapeError(f"axial_ratios, momenta: two lists are needed, got shapes {ratios.shape}, {spins.shape}")
     if not 0.0 < lean <= _LARGEST_TILT or time <= 0.0:
@@ -385,9 +379,9 @@ def stability_chart(
 def _largest_tilt(top: HeavyTop, spins: Array, tilt: float, duration: float) -> Array:
     shape = np.broadcast_shapes(top.inertia.shape[:-2], spins.shape)
     attitude = np.broadcast_to(so3.exp(np.array([tilt, 0.0, 0.0])), (*shape, 3, 3))
-    momentum = np.broadcast_to(spins[:, None] * np.array([0.0, 0.0, 1.0]), (*shape, 3))
+    momentum = np.broadcast_to(spins[:, None] * np.eye(3)[2], (*shape, 3))
     largest = np.full(shape, tilt)
-    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, duration, _LOCAL_TOLERANCE):
+    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, duration, 1e-9):
         # The parts of the quaternion are sine and cosine of half the angle between body axis 3 and the vertical.
         across, along = np.hypot(quat[..., 0], quat[..., 1]), np.hypot(quat[..., 2], quat[..., 3])
         largest = np.maximum(largest, 2.0 * np.arctan2(across, along))
@@ -406,10 +400,3 @@ def _upright(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> tuple[A
         raise ShapeError(
             f"moments {inertia.shape}, mgl {weight.shape}, momentum {spin.shape}: leading axes cannot be broadcast"
         ) from None
-
-
-def _number(value: ArrayLike, name: str) -> float:
-    array = finite_array(value, name)
-    if array.shape != ():
-        raise ShapeError(f"{name}: one number is needed, got shape {array.shape}")
-    return float(array)

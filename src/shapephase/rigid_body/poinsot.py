@@ -24,11 +24,8 @@ from ..letters import what_came
 from .euler_top import EulerTop
 from .portrait import inverse_difference
 
-_TAIL = 60.0
-"""Argument u beyond which the separatrix is not integrated: the arc that is left is shorter than 1e-25 of it."""
-_QUADRATURE = 1e-14  # error of a panel, relative to the arc length, below which it is not halved again; near rounding
-_EQUAL = 1e-12
-"""Moments closer than this, relative to the larger, count as equal: inertias are seldom known to more digits."""
+_TAIL = 60.0  # argument u of the separatrix: the arc beyond it is shorter than exp(-60) = 1e-26 of the whole
+_EQUAL = 1e-12  # relative difference of moments that count as equal: inertias are seldom known to more digits
 
 
 @dataclass(frozen=True)
@@ -178,7 +175,7 @@ class Poinsot:
         times = finite_array(t, "t", unit="s")
         if self._is_point:
             return np.zeros(times.shape)[()]
-        return self._radius(self._direction(self.top.rate * times + self.top.orbit.phase))
+        return self._radius(self.top.orbit.directions(self.top.rate * times + self.top.orbit.phase))
 
     def herpolhode_angle(self, t: ArrayLike) -> Array:
         """Angle of the herpolhode about mu from where it is at t = 0, unwrapped: (...) -> (...) [rad].
@@ -209,7 +206,7 @@ class Poinsot:
 
     @property
     def frequencies(self) -> tuple[float, float]:
-        """Of Pi in the body, and of the mean precession about mu [rad/s]; the first is 0 without a finite period.
+        """Frequencies of Pi in the body, 0 without a finite period, and of the mean precession about mu [rad/s].
 
         Every coordinate of the attitude is a Fourier series in the two. Their ratio, the second by the first, is
         `angle_per_period` / 2 pi. Source: Bonnard et al., section 3.5.
@@ -265,28 +262,15 @@ class Poinsot:
             return 0.0
         quarter = min(float(elliptic.complete_k(self.top.complement)), _TAIL)
         half = self._integral(self._polhode_speed, -quarter, quarter)
-        return half if self._is_separatrix else 2.0 * half
+        return half if self.top.regime == "separatrix" else 2.0 * half
 
     @property
     def _is_point(self) -> bool:
         return self.top.regime in ("spherical", "steady")
 
     @property
-    def _is_separatrix(self) -> bool:
-        return self.top.regime == "separatrix"
-
-    @property
     def _start(self) -> Array:
         return self.top.orbit.start / self.top.magnitude
-
-    def _direction(self, u: Array) -> Array:
-        """Pi/|Pi| along the principal axes at u = rate t + phase, where Pi circles an axis: (...) -> (..., 3)."""
-        orbit = self.top.orbit
-        sn, cn, dn, _ = elliptic.jacobi(u, orbit.complement)
-        direction = np.empty((*np.shape(u), 3))
-        for index, function in ((orbit.circled, dn), (orbit.other, cn), (1, sn)):
-            direction[..., index] = orbit.amplitudes[index] * function
-        return direction
 
     def _angle(self, times: Array) -> Array:
         """Azimuth about mu of the circled axis, and of Omega from there, each up to a constant: (...) [rad]."""
@@ -328,7 +312,7 @@ class Poinsot:
         if self._is_point:
             return 0.0
         left, right = (float(self.top.rate * t + self.top.orbit.phase) for t in (first, last))
-        if self._is_separatrix:
+        if self.top.regime == "separatrix":
             return self._integral(speed, *np.clip([left, right], -_TAIL, _TAIL))
         half = 2.0 * float(elliptic.complete_k(self.top.complement))
         whole = float(np.trunc((right - left) / half))
@@ -340,12 +324,12 @@ class Poinsot:
 
         def panels(starts: Array, ends: Array) -> Array:
             nodes, weights = sphere.gauss_nodes(starts, ends)
-            return np.sum(weights * speed(self._direction(nodes)), axis=-1)
+            return np.sum(weights * speed(self.top.orbit.directions(nodes)), axis=-1)
 
         edges = np.linspace(left, right, max(4, int(np.ceil(2.0 * abs(right - left)))) + 1)
         starts, ends = edges[:-1], edges[1:]
         whole, total = panels(starts, ends), 0.0
-        allowed = _QUADRATURE * abs(whole.sum())
+        allowed = 1e-14 * abs(whole.sum())
         while len(starts):
             middle = 0.5 * (starts + ends)
             first, second = panels(starts, middle), panels(middle, ends)
@@ -399,7 +383,5 @@ def cones(top: EulerTop) -> Cones:
 
 def _across(direction: Array, moments: Array) -> Array:
     """n x I^-1 n along the principal axes, by differences of moments: (..., 3) -> (..., 3)."""
-    gaps = np.array(
-        [inverse_difference(moments, 2, 1), inverse_difference(moments, 0, 2), inverse_difference(moments, 1, 0)]
-    )
+    gaps = np.array([inverse_difference(moments, *pair) for pair in ((2, 1), (0, 2), (1, 0))])
     return gaps * direction[..., [1, 2, 0]] * direction[..., [2, 0, 1]]

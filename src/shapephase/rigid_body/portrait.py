@@ -17,9 +17,6 @@ from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from ..letters import what_came
 
-_ROUNDED = 1e-12
-"""An energy outside its range by no more than this, relative to the bound, is taken for the bound, rounded."""
-
 
 @dataclass(frozen=True)
 class Equilibrium:
@@ -51,20 +48,19 @@ def equilibria(moments: ArrayLike) -> tuple[Equilibrium, ...]:
     ('saddle', [0.0, 1.0, 0.0])
     """
     inertia = moments_argument(moments)
-    found = []
+    points = []
     for axis in range(3):
         product = inverse_difference(inertia, (axis + 1) % 3, axis) * inverse_difference(inertia, (axis + 2) % 3, axis)
         kind = "degenerate" if product == 0.0 else "centre" if product > 0.0 else "saddle"
         rate = float(np.sqrt(abs(product)))
-        found += [Equilibrium(direction=side * np.eye(3)[axis], kind=kind, rate=rate) for side in (1.0, -1.0)]
-    return tuple(found)
+        points += [Equilibrium(direction=side * np.eye(3)[axis], kind=kind, rate=rate) for side in (1.0, -1.0)]
+    return tuple(points)
 
 
 def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     """The four great half-circles from saddle to saddle, each along its motion: (4, count, 3) unit vectors.
 
-    For moments in any order, on the axes as they were given. In axes of ascending moments each lies in a
-    plane, |Pi_1/Pi_3| = sqrt((1/I2 - 1/I3)/(1/I1 - 1/I2)).
+    In axes of ascending moments each lies in a plane, |Pi_1/Pi_3| = sqrt((1/I2 - 1/I3)/(1/I1 - 1/I2)).
 
     Source: Marsden and Ratiu (15.8.10), whose I1, I2, I3 are our I3, I2, I1, with the signs of theory.md M-E4.
 
@@ -125,7 +121,8 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     lowest, highest = 0.5 / ascending[2], 0.5 / ascending[0]
     if lowest == highest:
         raise ShapeError(f"moments: all are {lowest} kg m^2, and every point of the sphere is at rest; no curves")
-    if levels.ndim != 1 or np.any((levels < lowest * (1.0 - _ROUNDED)) | (levels > highest * (1.0 + _ROUNDED))):
+    rounding = 1e-12
+    if levels.ndim != 1 or np.any((levels < lowest * (1.0 - rounding)) | (levels > highest * (1.0 + rounding))):
         raise ShapeError(
             f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {what_came(levels)}"
         )

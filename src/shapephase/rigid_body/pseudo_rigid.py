@@ -20,23 +20,20 @@ from numpy.typing import ArrayLike
 from scipy.optimize import root
 
 from .. import so3
-from ..arguments import check_object
+from ..arguments import check_object, number_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, UnphysicalInertiaError
-from ..letters import what_came
+from ._arguments import axis_index
 
-_GROWTH = 30.0 * float(np.sqrt(np.finfo(float).eps))
-"""Of the fastest mode: real parts of eigenvalues below it come from double eigenvalues and rounding."""
-_FLAT = 1e3 * float(np.finfo(float).eps)  # of the largest second derivative: smaller ones are zero but for rounding
-_RESIDUAL = 1e-10  # of the forces that balance in a steady spin, relative to their size
+_EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
 class PseudoRigidBody:
     """A homogeneously deforming body of neo-Hookean material.
 
-    Of a rigid body with principal moments I_i, E_i = (I_j + I_k - I_i)/2 (`inertia_tensor.second_moment`).
+    A rigid body with principal moments I_i has E_i = (I_j + I_k - I_i)/2 (`inertia_tensor.second_moment`).
 
     Parameters
     ----------
@@ -161,25 +158,21 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
     1.017854 rad/s, as rigid 1.200000 rad/s
     """
     check_object(body, "PseudoRigidBody", "body")
-    if not isinstance(axis, int | np.integer) or axis not in (0, 1, 2):
-        raise ShapeError(f"axis: one of 0, 1, 2 is needed, got {what_came(axis)}")
-    value = finite_array(momentum, "momentum", unit="kg m^2/s")
-    if value.shape:
-        raise ShapeError(f"momentum: one number is needed, got {what_came(momentum)}")
-    size = float(value)
-    stretches = _stretched(body, int(axis), size)
-    rate = size / float(body.moments(stretches)[axis])
-    curvatures = _curvatures(body, int(axis), size, stretches)
-    eigenvalues = _spectrum(body, int(axis), rate, stretches)
-    if curvatures[0] > _FLAT * curvatures[-1]:
+    index, size = axis_index(axis), number_argument(momentum, "momentum", "kg m^2/s")
+    stretches = _stretched(body, index, size)
+    rate = size / float(body.moments(stretches)[index])
+    curvatures = _curvatures(body, index, size, stretches)
+    eigenvalues = _spectrum(body, index, rate, stretches)
+    # Double eigenvalues are split by the root of the rounding; curvatures have its thousandfold.
+    if curvatures[0] > 1e3 * _EPS * curvatures[-1]:
         verdict = "stable"
-    elif np.real(eigenvalues).max() > _GROWTH * np.abs(eigenvalues).max():
+    elif np.real(eigenvalues).max() > 30.0 * np.sqrt(_EPS) * np.abs(eigenvalues).max():
         verdict = "unstable"
     else:
         verdict = "spectrally stable"
     return PseudoRigidSpin(
         body=body,
-        axis=int(axis),
+        axis=index,
         momentum=size,
         rate=rate,
         stretches=stretches,
@@ -197,7 +190,7 @@ def _stretches(value: ArrayLike) -> Array:
 
 
 def _stretched(body: PseudoRigidBody, axis: int, momentum: float) -> Array:
-    """The stretches of a steady spin: by their logarithms, so that they stay positive."""
+    """Stretches of a steady spin, solved for by their logarithms, so that they stay positive."""
     across = np.where(np.arange(3) == axis, 0.0, body.second_moments)
 
     def balance(logs: Array) -> Array:
@@ -205,10 +198,10 @@ def _stretched(body: PseudoRigidBody, axis: int, momentum: float) -> Array:
         pulled = momentum**2 * across * q * q / float(across @ (q * q)) ** 2
         return (body.shear * (q * q - 1.0) + body.bulk * logs.sum() - pulled) / body.shear
 
-    found = root(balance, np.zeros(3), tol=1e-15)
-    stretches = np.exp(found.x)
-    if np.abs(balance(found.x)).max() > _RESIDUAL * (1.0 + float((stretches**2).max())):
-        raise AccuracyNotReached(f"no steady spin with momentum {momentum:.6g} kg m^2/s was found: {found.message}")
+    solution = root(balance, np.zeros(3), tol=1e-15)
+    stretches = np.exp(solution.x)
+    if np.abs(balance(solution.x)).max() > 1e-10 * (1.0 + float((stretches**2).max())):
+        raise AccuracyNotReached(f"no steady spin with momentum {momentum:.6g} kg m^2/s was found: {solution.message}")
     return stretches
 
 
