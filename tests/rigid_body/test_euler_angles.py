@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from shapephase import so3
 from shapephase.errors import ChartPoleError, ShapeError, ShapePhaseError, SingularInertiaError, UnphysicalInertiaError
-from shapephase.rigid_body.euler_angles import ZXZ, ZYZ, canonical_bracket, precession_rate
+from shapephase.rigid_body import ZXZ, ZYZ, canonical_bracket, precession_rate
 from support.independent import cross
 
 CHARTS = pytest.mark.parametrize("chart", [ZXZ, ZYZ], ids=["zxz", "zyz"])

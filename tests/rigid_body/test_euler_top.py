@@ -12,8 +12,7 @@ from scipy.special import ellipj, ellipk
 import shapephase as sp
 from shapephase import so3, sphere
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError
-from shapephase.rigid_body._momentum_orbit import separatrix_solid_angle
-from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body import EulerTop, separatrix_solid_angle
 from support.independent import cross
 from support.long_runs import full_but
 

@@ -11,10 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
-from shapephase.rigid_body._nutation import nutation
-from shapephase.rigid_body.heavy_top import HeavyTop, casimirs, semidirect_bracket
-from shapephase.rigid_body.lagrange_top import (
+from shapephase.rigid_body import (
+    HeavyTop,
     LagrangeTop,
+    casimirs,
+    nutation,
+    semidirect_bracket,
     sleeping_matrix,
     sleeping_spectrum,
     sleeping_top,

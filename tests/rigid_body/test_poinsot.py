@@ -13,8 +13,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from shapephase.errors import ShapeError
-from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.poinsot import Closure, Poinsot, cones
+from shapephase.rigid_body import Closure, EulerTop, Poinsot, cones
 from support.independent import cross
 from support.long_runs import full_but
 

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from shapephase import so3
 from shapephase.errors import ShapeError, SingularInertiaError, UnphysicalInertiaError
-from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.stability import spin_in_space, steady_rotation, steady_rotations
+from shapephase.rigid_body import EulerTop, spin_in_space, steady_rotation, steady_rotations
 from support.independent import cross
 from support.long_runs import full_but
 

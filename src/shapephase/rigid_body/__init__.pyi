@@ -1,6 +1,6 @@
 from . import geodesics, lie
 from ._andoyer_pendulum import AndoyerPendulum, andoyer_pendulum
-from ._flow import ascending_times, flow
+from ._flow import flow
 from ._half_twist import HalfTwist, half_twist, half_twist_from_tilt, racket_twist, twist_defect
 from ._momentum_orbit import (
     MomentumOrbit,
@@ -13,7 +13,7 @@ from ._nutation import Nutation, nutation
 from .euler_angles import ZXZ, ZYZ, EulerChart, canonical_bracket, precession_rate
 from .euler_top import EulerTop
 from .gyrostat import Gyrostat
-from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, heavy_top_steps, semidirect_bracket
+from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, semidirect_bracket
 from .lagrange_top import (
     LagrangeTop,
     SleepingTop,
@@ -73,7 +73,6 @@ __all__ = [
     "SteadyRotation",
     "WeierstrassForm",
     "andoyer_pendulum",
-    "ascending_times",
     "bifurcation_rotors",
     "canonical_bracket",
     "casimirs",
@@ -87,7 +86,6 @@ __all__ = [
     "gyrostat_equilibria",
     "half_twist",
     "half_twist_from_tilt",
-    "heavy_top_steps",
     "heteroclinics",
     "inverse_difference",
     "lie",

@@ -26,12 +26,6 @@ class Start:
     """Where extremals start, in the form the integrals need: all (...) of one shape.
 
     Extremals that start southward are mirrored in the equator, so that the start phase is in [-pi/2, pi/2].
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> geodesics.start_of(geodesics.ellipsoid(1.0), [0.0, np.pi / 2.0]).momentum.round(9).tolist()
-    [1.0, 0.0]
     """
 
     momentum: Array
@@ -165,14 +159,7 @@ def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
 
 def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Start:
-    """`Start` of directions (...) [rad] at a latitude. Raises ShapeError, see `extremal`.
-
-    Examples
-    --------
-    >>> start = sp.rigid_body.geodesics.start_of(sp.rigid_body.geodesics.ellipsoid(1.0), 0.5)
-    >>> print(f"{start.momentum:.9f} = cos 0.5")
-    0.877582562 = cos 0.5
-    """
+    """`Start` of directions (...) [rad] at a latitude. Raises ShapeError, see `extremal`."""
     check_object(surface, "SurfaceOfRevolution", "surface")
     angle = finite_array(direction, "direction", unit="rad")
     if np.ndim(latitude) != 0:
@@ -190,15 +177,7 @@ def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
 
 def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array) -> tuple[Array, Array, Array]:
-    """D, D' and D'' at phases of extremals: (...) x 3 -> (...) x 3.
-
-    Examples
-    --------
-    >>> surface = sp.rigid_body.geodesics.ellipsoid(1.0)
-    >>> start = sp.rigid_body.geodesics.start_of(surface, 0.5)
-    >>> float(sp.rigid_body.geodesics.stretch_at(surface, start.q, start.room, start.phase)[0])
-    1.0
-    """
+    """D, D' and D'' at phases of extremals: (...) x 3 -> (...) x 3."""
     check_object(surface, "SurfaceOfRevolution", "surface")
     q, room, phase = np.broadcast_arrays(q, room, phase)
     sine2, cosine2 = np.sin(phase) ** 2, np.cos(phase) ** 2

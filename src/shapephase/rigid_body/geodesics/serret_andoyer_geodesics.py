@@ -40,7 +40,7 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ...letters import what_came
 from ...roots import safe_newton
-from ._checks import check_entries
+from .._arguments import check_entries
 from ._serret_andoyer_constants import GeodesicClass, GeodesicConstants, moment_gaps
 
 _NOT_ZERO = 1e-100

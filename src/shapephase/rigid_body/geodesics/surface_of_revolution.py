@@ -39,8 +39,8 @@ from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...letters import what_came
 from ...roots import ROUNDING, safe_newton
+from .._arguments import check_entries
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
-from ._checks import check_entries
 
 ClosedArcs = Callable[[Array, Array, Array, Array], Arcs]
 """p >= 0, q, depth - q and phases in [-pi/2, pi/2], all (N,) -> `Arcs`: what `quadrature` finds by nodes."""

@@ -1,6 +1,6 @@
 """Euler's equations as a cross product of two gradients, and the Lie groups behind them.
 
-With the energy H = Pi.I^-1 Pi / 2 and L = |Pi|^2 / 2, Euler's equations are Pi' = grad L x grad H. So they are
+With the energy H = Pi.I^-1 Pi / 2 and L = |Pi|^2 / 2, Euler's equations are Pi' = grad L x grad H. They have this form
 with K = a H + b L and N = c H + d L for every real matrix (a, b; c, d) of determinant -1 or 1, but for a sign:
 
     Pi' = grad K x grad N where ad - bc = -1,    Pi' = grad N x grad K where ad - bc = 1.
@@ -21,40 +21,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import inertia_argument, moments_argument
+from ...arguments import moments_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import principal_axes
+from .._arguments import one_array, one_tensor
+from .lie_algebra import WRITTEN_DIGITS
 
-_ZERO = 1e-14  # eigenvalue of a quadratic form, relative to the largest, that counts as zero: rounding leaves as much
-_CANCELLED = 16.0 * np.finfo(float).eps
-"""Sum, relative to its two terms, that counts as zero: the rounding of moments and of the matrix (a, b; c, d)."""
-_UNIT = 1e-9
-"""Farthest that a determinant may be from 1 or -1, relative to its terms: nine digits, as people write them."""
-_ASYMMETRY = 1e-9
-"""Largest difference of entries that mirror each other, relative to the largest entry: nine digits, as written."""
-
-_GROUPS = {
-    (3, 0): "SO(3)",
-    (2, 1): "SO(2,1)",
-    (2, 0): "SE(2)",
-    (1, 1): "SE(1,1)",
-    (1, 0): "Heisenberg",
-    (0, 0): "R^3",
-}
-"""Groups by the number of eigenvalues of the more frequent and of the less frequent sign."""
+# By the number of eigenvalues of the more frequent and of the less frequent sign.
+_GROUPS = {(3, 0): "SO(3)", (2, 1): "SO(2,1)", (2, 0): "SE(2)", (1, 1): "SE(1,1)", (1, 0): "Heisenberg", (0, 0): "R^3"}
 
 
 @dataclass(frozen=True, eq=False)
 class NambuPair:
     """K = Pi.casimir Pi / 2 and N = Pi.hamiltonian Pi / 2 with Pi' = orientation (grad K x grad N).
 
-    Examples
-    --------
-    >>> pair = sp.rigid_body.lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
-    >>> pair.orientation
-    -1.0
+    Made by `nambu_pair`.
     """
 
     casimir: Array
@@ -121,15 +104,10 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
     >>> pair.casimir.diagonal().tolist(), pair.hamiltonian.diagonal().tolist()
     ([1.0, 0.5, 0.25], [1.0, 1.0, 1.0])
     """
-    tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
-    if tensor.ndim != 2:
-        raise ShapeError(f"inertia: expected one tensor (3, 3), got {tensor.shape}")
-    entries = finite_array(matrix, "matrix", (2, 2))
-    if entries.ndim != 2:
-        raise ShapeError(f"matrix: expected one matrix (2, 2), got {entries.shape}")
+    tensor, entries = one_tensor(inertia), one_array(matrix, "matrix", (2, 2))
     (a, b), (c, d) = entries
     determinant = a * d - b * c
-    if abs(abs(determinant) - 1.0) > _UNIT * (1.0 + abs(a * d) + abs(b * c)):
+    if abs(abs(determinant) - 1.0) > WRITTEN_DIGITS * (1.0 + abs(a * d) + abs(b * c)):
         raise ShapeError(
             f"matrix: (a, b; c, d) = {entries.tolist()} has ad - bc = {determinant:.9g}; it must be -1, or 1 for the "
             "reversed cross product: divide a row by it"
@@ -203,7 +181,7 @@ def lie_group(form: ArrayLike) -> str:
     ['SO(3)', 'SO(2,1)', 'SE(2)']
     """
     values = np.linalg.eigvalsh(_form(form))
-    threshold = _ZERO * np.max(np.abs(values))
+    threshold = 1e-14 * np.max(np.abs(values))
     positive, negative = int(np.sum(values > threshold)), int(np.sum(values < -threshold))
     return _GROUPS[max(positive, negative), min(positive, negative)]
 
@@ -240,15 +218,15 @@ def _coefficients(moments: Array, row: Array, rounding: Array) -> Array:
     """a / I_i + b, zero where the terms cancel up to rounding."""
     inverse = row[0] / moments
     total = inverse + row[1]
-    return np.where(np.abs(total) <= _CANCELLED * (np.abs(inverse) * rounding + abs(row[1])), 0.0, total)
+    return np.where(
+        np.abs(total) <= 16.0 * np.finfo(float).eps * (np.abs(inverse) * rounding + abs(row[1])), 0.0, total
+    )
 
 
 def _form(form: ArrayLike) -> Array:
-    matrix = finite_array(form, "form", (3, 3))
-    if matrix.shape != (3, 3):
-        raise ShapeError(f"form: expected one matrix (3, 3), got {matrix.shape}")
+    matrix = one_array(form, "form", (3, 3))
     skew = np.abs(matrix - matrix.T).max()
-    if skew > _ASYMMETRY * np.abs(matrix).max():
+    if skew > WRITTEN_DIGITS * np.abs(matrix).max():
         raise ShapeError(f"form: the matrix of a quadratic form is symmetric; its entries differ by {skew:.3g}")
     return 0.5 * (matrix + matrix.T)
 

@@ -19,16 +19,14 @@ from numpy.typing import ArrayLike, NDArray
 from ...arguments import inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from .._flow import ascending_times, flow
+from .._arguments import ascending_times
+from .._flow import flow
 from .lie_algebra import complex_or_real, su2
 from .lie_poisson import angular_velocity, kinetic_energy
 
 Spinor = NDArray[np.complex128]  # vectors of C^2: (..., 2)
 
-_EQUAL_LENGTHS = 1e-6
-"""Largest relative difference of |z| and |start|, which a motion keeps equal: six digits, as people write them."""
-
-PAULI = 2j * su2().matrix_basis  # pauli's matrices sigma_k: (3, 2, 2)
+PAULI = 2j * su2().matrix_basis  # Pauli's matrices sigma_k: (3, 2, 2)
 PAULI.setflags(write=False)
 
 
@@ -42,12 +40,11 @@ def cayley_klein_momentum(z: ArrayLike) -> Array:
     >>> print(sp.rigid_body.lie.cayley_klein_momentum([2.0, 0.0]) + 0.0)
     [ 0.  0. -1.]
     """
-    spinor = _spinor(z, "z")
-    return -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
+    return _momentum_map(_spinor(z, "z"))
 
 
 def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
-    """A z with this momentum; its phase is the coordinate along the fibre: (..., 3), (...) -> (..., 2).
+    """Spinor z with this momentum; its phase is the coordinate along the fibre: (..., 3), (...) -> (..., 2).
 
     Raises ShapeError.
 
@@ -162,7 +159,7 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
     """
     first, last = _spinor(start, "start"), _spinor(z, "z")
     length, other = np.linalg.norm(first, axis=-1), np.linalg.norm(last, axis=-1)
-    if not np.all((length > 0.0) & (np.abs(length - other) <= _EQUAL_LENGTHS * length)):
+    if not np.all((length > 0.0) & (np.abs(length - other) <= 1e-6 * length)):
         raise ShapeError("z: not on the sphere |z| = |start| of a motion; equal lengths above 0 are needed")
     a, b = (np.stack(_frame(x / n[..., None]), axis=-1) for x, n in ((first, length), (last, other)))
     unitary = a @ np.swapaxes(b.conj(), -1, -2)
@@ -174,6 +171,10 @@ def _frame(unit: Spinor) -> tuple[Spinor, Spinor]:
     return unit, np.stack([-unit[..., 1].conj(), unit[..., 0].conj()], axis=-1)
 
 
+def _momentum_map(spinor: Spinor) -> Array:
+    return -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
+
+
 def _turned(omega: Array, spinor: Spinor) -> Spinor:
     return np.einsum("...k,kab,...b->...a", omega, PAULI, spinor)
 
@@ -181,8 +182,7 @@ def _turned(omega: Array, spinor: Spinor) -> Spinor:
 def _collective_flow(gradient: Callable[[Array], Array], start: Spinor, times: Array) -> Spinor:
     def rate(state: Array) -> Array:
         spinor = state[..., :2] + 1j * state[..., 2:]
-        pi = -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
-        change = 0.5j * _turned(gradient(pi), spinor)
+        change = 0.5j * _turned(gradient(_momentum_map(spinor)), spinor)
         return np.concatenate([change.real, change.imag], axis=-1)
 
     states = flow(rate, np.concatenate([start.real, start.imag], axis=-1), times)

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from ...arguments import inverse_inertia_argument
 from ...arrays import Array, finite_array
-from .._flow import ascending_times, flow
+from .._arguments import ascending_times
+from .._flow import flow
 from .lie_poisson import Gradient, angular_velocity, gradient_at
 
 

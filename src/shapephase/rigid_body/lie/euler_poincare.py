@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from ...arguments import check_object
 from ...arrays import Array, finite_array
 from ...display import short_repr
-from .._flow import ascending_times, flow
+from .._arguments import ascending_times
+from .._flow import flow
 from .lie_algebra import LieAlgebra, Matrices, inertia_operator, linear_solution
 
 

@@ -18,7 +18,8 @@ from ... import so3
 from ...arguments import check_function
 from ...arrays import Array, common_batch, finite_array
 from ...display import short_repr
-from .._flow import ascending_times, flow
+from .._arguments import ascending_times
+from .._flow import flow
 from .lie_poisson import gradient_at
 
 

@@ -18,13 +18,10 @@ from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 
-_SYMMETRIC_PART = 1e-6
-"""Largest symmetric part of R^T R', relative to its entries: six digits, as people write them, are enough."""
-
 
 @dataclass(frozen=True, eq=False)
 class ReducedBody:
-    """A rigid body with its translations reduced out: what is left turns on SO(3).
+    """A rigid body with its translations reduced out, which turns on SO(3). Made by `reduce_translations`.
 
     Attributes
     ----------
@@ -32,11 +29,6 @@ class ReducedBody:
     centre : (3,) centre of mass from the material origin [m]
     positions : (P, 3) from the centre of mass [m]
     inertia : (3, 3) about the centre of mass [kg m^2]
-
-    Examples
-    --------
-    >>> sp.rigid_body.lie.reduce_translations([1.0, 3.0], [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0]]).mass
-    4.0
     """
 
     mass: float
@@ -114,7 +106,7 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
     rotation, rate = so3.rotation_argument(attitude, "attitude"), finite_array(attitude_rate, "attitude_rate", (3, 3))
     spin = so3.transpose(rotation) @ rate
     symmetric = np.abs(spin + so3.transpose(spin)).max(initial=0.0)
-    if symmetric > _SYMMETRIC_PART * np.abs(spin).max(initial=0.0):
+    if symmetric > 1e-6 * np.abs(spin).max(initial=0.0):  # six digits, as people write them
         raise ShapeError(
             f"attitude_rate: not the rate of a rotation, R^T R' has a symmetric part of {symmetric:.3g}; "
             "R' = R hat(Omega) is needed"
@@ -268,12 +260,8 @@ def reduce_translations(masses: ArrayLike, positions: ArrayLike) -> ReducedBody:
     """
     m, points = _particles(masses, positions)
     centre = m @ points / m.sum()
-    return ReducedBody(
-        mass=float(m.sum()),
-        centre=centre,
-        positions=points - centre,
-        inertia=_inertia(m, points - centre),
-    )
+    inertia = _inertia(m, points - centre)
+    return ReducedBody(mass=float(m.sum()), centre=centre, positions=points - centre, inertia=inertia)
 
 
 def _inertia(masses: Array, points: Array) -> Array:
@@ -286,10 +274,8 @@ def _energy(masses: Array, speeds: Array) -> Array:
 
 
 def _particles(masses: ArrayLike, positions: ArrayLike) -> tuple[Array, Array]:
-    m, points = (
-        finite_array(masses, "masses", (None,), unit="kg"),
-        finite_array(positions, "positions", (None, 3), unit="m"),
-    )
+    m = finite_array(masses, "masses", (None,), unit="kg")
+    points = finite_array(positions, "positions", (None, 3), unit="m")
     if m.ndim != 1 or points.shape != (len(m), 3) or not len(m):
         raise ShapeError(f"positions: one (3,) for each mass is needed, got {points.shape} for masses {m.shape}")
     if not np.all(m > 0.0):

@@ -23,11 +23,8 @@ from ...letters import what_came
 Matrices = NDArray[Any]  # real or complex square matrices (..., n, n)
 
 _ROUNDING = 1e-12  # largest defect of antisymmetry, of Jacobi's identity and of a closed basis, relative to the entries
-_OUTSIDE = 1e-9
-"""Distance of a matrix from the span of the basis, relative to its largest entry, up to which it is an element of the
-algebra; also the largest asymmetry of an operator. Nine digits, as people write them, are enough."""
-_SINGULAR = 1e-14  # least ratio of an operator's eigenvalues, by magnitude: below it the smallest is rounding
-_INTEGER = 1e-14  # fitted structure constants closer than this to an integer, relative to the largest, are that integer
+WRITTEN_DIGITS = 1e-9  # relative error of the entries of a matrix that a user writes with nine digits
+_NEAR_ZERO = 1e-14  # ratio of eigenvalues, or distance of structure constants from integers, that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +138,7 @@ class LieAlgebra:
             )
         components = _flat(matrices) @ self._dual_basis
         left = np.abs(_flat(np.einsum("...i,imn->...mn", components, basis) - matrices)).max(axis=-1, initial=0.0)
-        if np.any(left > _OUTSIDE * np.abs(_flat(matrices)).max(axis=-1, initial=0.0)):
+        if np.any(left > WRITTEN_DIGITS * np.abs(_flat(matrices)).max(axis=-1, initial=0.0)):
             raise LieAlgebraError(f"matrix: not an element of {self.name}, off its span by {left.max():.3g}")
         return components
 
@@ -186,9 +183,8 @@ def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra"
     structure = _flat(_commutators(matrices)) @ np.linalg.pinv(_flat(matrices))
     # Constants that differ from integers by the rounding of the fit alone are integers.
     whole = np.round(structure)
-    structure = np.where(
-        np.abs(structure - whole) < _INTEGER * max(1.0, float(np.abs(structure).max())), whole, structure
-    )
+    near = np.abs(structure - whole) < _NEAR_ZERO * max(1.0, float(np.abs(structure).max()))
+    structure = np.where(near, whole, structure)
     return LieAlgebra(structure, matrices, name)
 
 
@@ -220,7 +216,8 @@ def so(n: int) -> LieAlgebra:
     >>> sp.rigid_body.lie.so(4).structure.shape
     (6, 6, 6)
     """
-    _whole(n, 2, "n")
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 2:
+        raise LieAlgebraError(f"n: a whole number from 2 up is needed, got {what_came(n)}")
     pairs = [(1, 2), (2, 0), (0, 1)] if n == 3 else list(combinations(range(n), 2))
     return lie_algebra_from_matrices(np.stack([_unit(n, j, i) - _unit(n, i, j) for i, j in pairs]), f"so({n})")
 
@@ -244,9 +241,8 @@ def se2() -> LieAlgebra:
     >>> sp.rigid_body.lie.se2().structure.shape, sp.rigid_body.lie.linear_casimirs(sp.rigid_body.lie.se2()).shape
     ((3, 3, 3), (0, 3))
     """
-    return lie_algebra_from_matrices(
-        np.stack([_unit(3, 1, 0) - _unit(3, 0, 1), _unit(3, 0, 2), _unit(3, 1, 2)]), "se(2)"
-    )
+    turn = _unit(3, 1, 0) - _unit(3, 0, 1)
+    return lie_algebra_from_matrices(np.stack([turn, _unit(3, 0, 2), _unit(3, 1, 2)]), "se(2)")
 
 
 def se3() -> LieAlgebra:
@@ -299,35 +295,22 @@ def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
         If the shape is wrong or an entry is not finite.
     LieAlgebraError
         If it is not symmetric to 1e-9 of its largest entry, or singular.
-
-    Examples
-    --------
-    >>> sp.rigid_body.lie.inertia_operator(sp.rigid_body.lie.so3(), np.diag([1.0, 2.0, 4.0])).shape
-    (3, 3)
     """
     check_object(algebra, "LieAlgebra", "algebra")
     d = algebra.dimension
     operator = finite_array(inertia, "inertia", (d, d))
     if operator.ndim != 2:
         raise ShapeError(f"inertia: one ({d}, {d}) operator is needed, got {operator.shape}")
-    if np.abs(operator - operator.T).max() > _OUTSIDE * float(np.abs(operator).max()):
+    if np.abs(operator - operator.T).max() > WRITTEN_DIGITS * float(np.abs(operator).max()):
         raise LieAlgebraError("inertia: the operator is not symmetric; <I a, b> = <I b, a> is needed")
     values = np.abs(np.linalg.eigvalsh(operator))
-    if values.min() <= _SINGULAR * values.max():
+    if values.min() <= _NEAR_ZERO * values.max():
         raise LieAlgebraError(f"inertia: the operator is singular, its eigenvalues have magnitudes {np.sort(values)}")
     return 0.5 * (operator + operator.T)
 
 
 def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...]) -> NDArray[Any]:
-    """A user's finite array that may hold complex numbers, its last axes as in `finite_array`. Raises ShapeError.
-
-    Examples
-    --------
-    >>> sp.rigid_body.lie.complex_or_real([1.0, 2.0j], "z", (2,)).tolist()
-    [(1+0j), 2j]
-    """
-    if not isinstance(trailing, tuple):
-        raise ShapeError(f"trailing: a tuple of lengths is needed, got {what_came(trailing)}")
+    """A user's finite array that may hold complex numbers, its last axes as in `finite_array`. Raises ShapeError."""
     try:
         # asanyarray keeps the mask of a masked array, which `finite_array` refuses.
         entries = np.asanyarray(value)
@@ -339,13 +322,7 @@ def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...
 
 
 def linear_solution(operator: Array, right: Array) -> Array:
-    """x with operator x = right: (..., d, d), (..., d) -> (..., d).
-
-    Examples
-    --------
-    >>> sp.rigid_body.lie.linear_solution(np.diag([2.0, 4.0]), np.array([2.0, 8.0])).tolist()
-    [1.0, 2.0]
-    """
+    """x with operator x = right: (..., d, d), (..., d) -> (..., d)."""
     return np.linalg.solve(operator, right[..., None])[..., 0].astype(np.float64, copy=False)
 
 
@@ -353,12 +330,6 @@ def _unit(n: int, row: int, column: int) -> Array:
     matrix = np.zeros((n, n))
     matrix[row, column] = 1.0
     return matrix
-
-
-def _whole(value: int, least: int, name: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise LieAlgebraError(f"{name}: a whole number from {least} up is needed, got {what_came(value)}")
-    return int(value)
 
 
 def _commutators(basis: Matrices) -> Matrices:

@@ -17,17 +17,14 @@ from numpy.typing import ArrayLike
 from ...arguments import check_function, check_object, check_pair, inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from .._flow import ascending_times, flow
-from .lie_algebra import LieAlgebra, so3
+from .._arguments import ascending_times
+from .._flow import flow
+from .lie_algebra import WRITTEN_DIGITS, LieAlgebra, so3
 
-Gradient = ArrayLike | Callable[[Array], ArrayLike]
-"""The gradient of a function on the dual: values (..., d), or a callable of momenta (..., d)."""
+Gradient = ArrayLike | Callable[[Array], ArrayLike]  # on the dual: values (..., d), or a callable of momenta (..., d)
 
 _SO3 = so3()  # the algebra of a function that is not given one
-_TANGENT = 1e-9
-"""Part of a vector off the orbit's tangent plane, relative to its length, that is allowed: nine digits, as written."""
-_RANK = 1e-12  # singular values of the Poisson tensor below this share of the largest are zero, and the leaf is smaller
-_NULL = 1e-10  # singular values of a linear system below this share of the largest (or of 1) belong to its null space
+_RANK = 1e-12  # singular values below this share of the largest are zero
 
 
 def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
@@ -227,10 +224,8 @@ def coadjoint_orbit_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLik
     u, v = finite_array(first, "first", mu.shape[-1:]), finite_array(second, "second", mu.shape[-1:])
     for name, vector in (("first", u), ("second", v)):
         off = np.linalg.norm((tensor @ inverse @ vector[..., None])[..., 0] - vector, axis=-1)
-        if np.any(off > _TANGENT * np.linalg.norm(vector, axis=-1)):
-            raise ShapeError(
-                f"{name}: not tangent to the coadjoint orbit, {off.max():.3g} of it points out of the leaf"
-            )
+        if np.any(off > WRITTEN_DIGITS * np.linalg.norm(vector, axis=-1)):
+            raise ShapeError(f"{name}: not tangent to the coadjoint orbit, {off.max():.3g} of it is off the leaf")
     return np.einsum("...ij,...j,...i->...", inverse, u, v)
 
 
@@ -306,13 +301,7 @@ def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
 
 def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
-    """A user's gradient, values or a callable, at momenta (..., d). Raises ShapeError, WrongObjectError.
-
-    Examples
-    --------
-    >>> sp.rigid_body.lie.gradient_at(lambda mu: 2.0 * mu, "gradient", np.array([1.0, 2.0, 3.0])).tolist()
-    [2.0, 4.0, 6.0]
-    """
+    """Gradient, given by values or a callable, at momenta (..., d). Raises ShapeError, WrongObjectError."""
     if callable(gradient):
         check_function(gradient, name, "a gradient, or a function that gives it,")
     value = gradient(mu) if callable(gradient) else gradient
@@ -334,5 +323,5 @@ def _null_space(equations: Array) -> Array:
     """Orthonormal solutions of a homogeneous linear system: (m, n) -> (count, n)."""
     # The triangular factor comes first because there are many more equations than unknowns.
     _, values, vectors = np.linalg.svd(np.linalg.qr(equations, mode="r"))
-    rank = int(np.sum(values > _NULL * max(float(values.max(initial=0.0)), 1.0)))
+    rank = int(np.sum(values > _RANK * max(float(values.max(initial=0.0)), 1.0)))
     return vectors[rank:]

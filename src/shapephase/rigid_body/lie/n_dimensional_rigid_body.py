@@ -12,16 +12,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import whole_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError, SingularInertiaError
-from ...letters import what_came
-from .lie_algebra import so
+from .lie_algebra import WRITTEN_DIGITS, so
 
-_ASYMMETRY = 1e-9
-"""Largest difference of entries that mirror each other, relative to the largest entry: nine digits, as written."""
-_NO_INERTIA = 1e-14
-"""Least inertia of a plane, relative to the largest eigenvalue of J: below it the sum of two is rounding."""
-_LARGEST_PFAFFIAN = 10  # largest dimension of a Pfaffian: its expansion has (n - 1)!! terms, 945 for ten
+_LARGEST_PFAFFIAN = 10  # its expansion has (n - 1)!! terms, 945 for ten
 
 
 def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
@@ -152,12 +148,11 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
     >>> sp.rigid_body.lie.manakov_integrals(np.diag([1.0, 2.0, 3.0]), momentum, 2).tolist()
     [-18.0, 0.0, 98.0]
     """
-    if isinstance(power, bool) or not isinstance(power, int | np.integer) or power < 1:
-        raise ShapeError(f"power: a whole number from 1 up is needed, got {what_came(power)}")
+    count = whole_argument(power, "power", 1)
     j = _second_moment(second_moment)
     m = _antisymmetric(momentum, "momentum", len(j))
     coefficients = [m, np.broadcast_to(j @ j, m.shape)]
-    for _ in range(power - 1):
+    for _ in range(count - 1):
         lower = [np.zeros(m.shape), *coefficients]
         coefficients = [a @ m + b @ (j @ j) for a, b in zip([*coefficients, np.zeros(m.shape)], lower)]
     return np.stack([np.trace(c, axis1=-2, axis2=-1) for c in coefficients], axis=-1)
@@ -178,10 +173,10 @@ def _second_moment(value: ArrayLike) -> Array:
     j = finite_array(value, "second_moment", (None, None), unit="kg m^2")
     if j.ndim != 2 or j.shape[0] != j.shape[1] or len(j) < 2:
         raise ShapeError(f"second_moment: one symmetric matrix (n, n), n >= 2, is needed, got {j.shape}")
-    if np.abs(j - j.T).max() > _ASYMMETRY * np.abs(j).max():
+    if np.abs(j - j.T).max() > WRITTEN_DIGITS * np.abs(j).max():
         raise ShapeError(f"second_moment: not symmetric, off by {np.abs(j - j.T).max():.3g}")
     moments = np.linalg.eigvalsh(j)
-    if not moments[0] + moments[1] > _NO_INERTIA * np.abs(moments).max():
+    if not moments[0] + moments[1] > 1e-14 * np.abs(moments).max():
         raise SingularInertiaError(
             f"second_moment: the two least eigenvalues {moments[:2]} give a plane no inertia; their sum must be above 0"
         )
@@ -193,6 +188,6 @@ def _antisymmetric(value: ArrayLike, name: str, n: int | None = None) -> Array:
     if m.shape[-1] != m.shape[-2] or m.shape[-1] < 2:
         raise ShapeError(f"{name}: matrices (..., n, n), n >= 2, are needed, got {m.shape}")
     symmetric = np.abs(m + np.swapaxes(m, -1, -2)).max(initial=0.0)
-    if symmetric > _ASYMMETRY * np.abs(m).max(initial=0.0):
+    if symmetric > WRITTEN_DIGITS * np.abs(m).max(initial=0.0):
         raise ShapeError(f"{name}: not antisymmetric, off by {symmetric:.3g}")
     return 0.5 * (m - np.swapaxes(m, -1, -2))
