@@ -28,10 +28,10 @@ from ..arrays import Array, common_shape, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
+from ._arguments import check_entries
 from .pendulum import RigidBodyPendulum, rigid_body_pendulum
 
-_REGIME_NAMES = {"libration": "oscillating", "rotation": "rotating"}
-"""What the paper calls the pendulum's regimes; the others have the same name."""
+_REGIME_NAMES = {"libration": "oscillating", "rotation": "rotating"}  # the paper's names, where they differ
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,13 +56,8 @@ class AndoyerPendulum:
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         smallest, middle, largest = np.moveaxis(pi[..., self._order], -1, 0)
-        bad = (largest == 0.0) & (middle == 0.0)
-        if bad.any():
-            where = tuple(int(i) for i in np.argwhere(bad)[0])
-            raise ShapeError(
-                f"momentum: entry {list(where)} is {pi[where]}, along the axis of the smallest moment, "
-                "where y is undefined"
-            )
+        along = (largest == 0.0) & (middle == 0.0)
+        check_entries(along, pi, "momentum", "along the axis of the smallest moment y is undefined")
         # Adding zero takes the sign off a zero, of which arctan2 would make minus a half turn.
         return np.linalg.norm(pi, axis=-1), np.arctan2(largest + 0.0, -self._parity * middle), smallest
 
@@ -72,7 +67,7 @@ class AndoyerPendulum:
         Raises
         ------
         ShapeError
-            If |p_y| is larger than G; so do the other methods.
+            If |p_y| is larger than G, here and in the other methods.
         """
         magnitude, y, p_y = _variables(magnitude, y, p_y)
         across = np.sqrt((magnitude - p_y) * (magnitude + p_y))
@@ -135,12 +130,12 @@ class AndoyerPendulum:
 
     @property
     def _inverse(self) -> Array:
-        """a_i = 1/I_i of ascending moments, so descending."""
+        """(3,) a_i = 1/I_i, descending."""
         return 1.0 / ascending_moments(self.moments)[0]
 
     @property
     def _order(self) -> NDArray[np.intp]:
-        """(3,) which of the caller's axes have the smallest, the middle and the largest moment."""
+        """(3,) indices of the caller's axes by ascending moment."""
         return ascending_moments(self.moments)[1]
 
     @property
@@ -181,9 +176,5 @@ def _variables(magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> tuple[Arra
     magnitude, y, p_y = (finite_array(v, name) for v, name in ((magnitude, "magnitude"), (y, "y"), (p_y, "p_y")))
     common_shape(magnitude=magnitude, y=y, p_y=p_y)
     magnitude, y, p_y = np.broadcast_arrays(magnitude, y, p_y)
-    if np.any(np.abs(p_y) > magnitude):
-        where = tuple(int(i) for i in np.argwhere(np.abs(p_y) > magnitude)[0])
-        raise ShapeError(
-            f"p_y: entry {list(where)} is {p_y[where]:.9g}, beyond the momentum's magnitude {magnitude[where]:.9g}"
-        )
+    check_entries(np.abs(p_y) > magnitude, p_y, "p_y", "that is beyond the momentum's magnitude")
     return magnitude, y, p_y

@@ -28,15 +28,15 @@ from numpy.typing import ArrayLike
 from scipy.special import elliprf
 
 from .. import elliptic
-from ..arguments import moments_argument
+from ..arguments import moments_argument, vector_argument
 from ..arrays import Array, common_shape, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from ..letters import what_came
+from ._arguments import check_entries
 
-_FAINT = 1e-140
-"""Least part of a momentum, relative to the largest, that is not zero: squares of smaller parts underflow."""
+_FAINT = 1e-140  # of the largest component of a momentum: squares of smaller ones underflow
 
 
 @dataclass(frozen=True)
@@ -86,13 +86,7 @@ class RigidBodyPendulum:
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         first, second, third = np.moveaxis(pi[..., list(self.axes)], -1, 0)
-        bad = (first == 0.0) & (second == 0.0)
-        if bad.any():
-            where = tuple(int(i) for i in np.argwhere(bad)[0])
-            raise ShapeError(
-                f"momentum: entry {list(where)} is {pi[where]}, along the cylinders' axis {self.axes[2]}, where theta "
-                "is undefined; choose an order of the axes with another one last"
-            )
+        requirement = f"along the cylinders' axis {self.axes[2]} theta is undefined; put another axis last"check_entries((first == 0.0) & (second == 0.0), pi, "momentum", requirement)
         cosine, sine = first / self.k1, second / self.k2
         # Adding zero takes the sign off a zero, of which arctan2 would make minus a half turn.
         return np.hypot(cosine, sine), np.arctan2(sine + 0.0, cosine), third
@@ -153,14 +147,13 @@ class RigidBodyPendulum:
 
         Source: Marsden and Ratiu, after corollary 15.11.2.
         """
-        at_zero = "neutral" if self.stiffness == 0.0 else "stable" if self.stiffness > 0.0 else "unstable"
-        across = {"neutral": "neutral", "stable": "unstable", "unstable": "stable"}[at_zero]
-        first, second, _ = self.axes
-        return (
-            PendulumEquilibrium(angle=0.0, axis=first, sign=1, stability=at_zero),
-            PendulumEquilibrium(angle=0.5 * np.pi, axis=second, sign=1, stability=across),
-            PendulumEquilibrium(angle=np.pi, axis=first, sign=-1, stability=at_zero),
-            PendulumEquilibrium(angle=1.5 * np.pi, axis=second, sign=-1, stability=across),
+        kinds = {1.0: ("stable", "unstable"), 0.0: ("neutral", "neutral"), -1.0: ("unstable", "stable")}
+        pair = kinds[float(np.sign(self.stiffness))]
+        return tuple(
+            PendulumEquilibrium(
+                angle=0.5 * np.pi * k, axis=self.axes[k % 2], sign=1 if k < 2 else -1, stability=pair[k % 2]
+            )
+            for k in range(4)
         )
 
     def motion(self, momentum: ArrayLike) -> PendulumMotion:
@@ -176,9 +169,7 @@ class RigidBodyPendulum:
         ShapeError
             For a momentum along the third axis, or with a part below 1e-140 of its largest that is not zero.
         """
-        pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-        if pi.shape != (3,):
-            raise ShapeError(f"momentum: expected one momentum (3,), got {pi.shape}")
+        pi = vector_argument(momentum, "momentum", unit="kg m^2/s")
         r, _, _ = self.coordinates(pi)
         faint = (pi != 0.0) & (np.abs(pi) < _FAINT * np.max(np.abs(pi)))
         if faint.any():
@@ -215,7 +206,7 @@ class PendulumMotion:
 
     @property
     def period(self) -> float:
-        """Of Pi, 4 K(k)/|rate| [s]: one libration, or one turn of theta. Infinite on the separatrix and at rest."""
+        """Period of Pi, 4 K(k)/|rate| [s]: a libration, or a turn of theta; infinite on the separatrix and at rest."""
         if self.regime == "separatrix" or self.rate == 0.0:
             return float("inf")
         return float(4.0 * elliptic.complete_k(self.complement) / abs(self.rate))

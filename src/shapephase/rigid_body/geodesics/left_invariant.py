@@ -9,7 +9,7 @@ and their speed is sqrt(2 H): with H = 1/2 time is length. A moment may be infin
 forbidden, a has a zero, and the metric is sub-Riemannian. `momentum_flow` has both cases in one closed form.
 
 Principal moments ascend, I_1 <= I_2 <= I_3, so that an infinite one is I_3; those of Bonnard et al. descend: their I_1,
-I_2, I_3 are our I_3, I_2, I_1. Inertias are given, and momenta and attitudes answered, in the caller's body axes.
+I_2, I_3 are our I_3, I_2, I_1. Inertias, momenta and attitudes are in the caller's body axes.
 
 Sources: Bonnard, Cots and Shcherbakova 2013, section 3; theory.md Q1-Q6.
 """
@@ -22,17 +22,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import inertia_argument, moments_argument
+from ...arguments import inertia_argument, moments_argument, whole_argument
 from ...arrays import Array, common_batch, finite_array, real_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments, principal_axes
-from ...letters import what_came
+from .._arguments import check_entries
 from ._conjugate_search import conjugate_times
 from ._momentum_flow import attitude_flow, exponential_derivative
 
-_LEAST_SPEED = 1e-12
-"""In parts of the largest speed of such a momentum: below, rounding decides whether it is along the forbidden axis."""
+_LEAST_SPEED = 1e-12  # of the largest speed of such a momentum: below, rounding decides whether it moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,9 +150,8 @@ class LeftInvariantMetric:
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         self._moving(pi)
-        if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
-            raise ShapeError(f"order: a whole number of 1 or more is needed, got {what_came(order)}")
-        times = conjugate_times(self.inverse_moments, pi.reshape(-1, 3) @ self.axes, int(order))
+        count = whole_argument(order, "order", 1)
+        times = conjugate_times(self.inverse_moments, pi.reshape(-1, 3) @ self.axes, count)
         return times.reshape(pi.shape[:-1])[()]
 
     def conjugate_locus(self, momentum: ArrayLike, order: int = 1) -> Array:
@@ -167,12 +165,8 @@ class LeftInvariantMetric:
         """The speeds; raises unless all are above 0."""
         speed = self.speed(momentum)
         still = ~(speed > _LEAST_SPEED * np.sqrt(self.inverse_moments[0]) * np.linalg.norm(momentum, axis=-1))
-        if still.any():
-            where = tuple(int(i) for i in np.argwhere(still)[0])
-            raise ShapeError(
-                f"momentum: entry {list(where)} is {momentum[where]}, with which nothing moves; it must not be zero"
-                + (f", nor along the forbidden direction {self.axes[:, 2]}" if self.is_sub_riemannian else "")
-            )
+        forbidden = f", nor along the forbidden direction {self.axes[:, 2]}" if self.is_sub_riemannian else ""
+        check_entries(still, momentum, "momentum", "nothing moves with it; it must not be zero" + forbidden)
         return speed
 
     def _flat(self, momentum: ArrayLike, t: ArrayLike) -> tuple[Array, Array, tuple[int, ...]]:
