@@ -86,7 +86,8 @@ class RigidBodyPendulum:
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         first, second, third = np.moveaxis(pi[..., list(self.axes)], -1, 0)
-        requirement = f"along the cylinders' axis {self.axes[2]} theta is undefined; put another axis last"check_entries((first == 0.0) & (second == 0.0), pi, "momentum", requirement)
+        requirement = f"along the cylinders' axis {self.axes[2]} theta is undefined; put another axis last"
+        check_entries((first == 0.0) & (second == 0.0), pi, "momentum", requirement)
         cosine, sine = first / self.k1, second / self.k2
         # Adding zero takes the sign off a zero, of which arctan2 would make minus a half turn.
         return np.hypot(cosine, sine), np.arctan2(sine + 0.0, cosine), third

@@ -92,17 +92,14 @@ def _roots(inverse_moments: Array, directions: Array, order: int, left: _StepSta
         missing = order - _count(_continued(left.total[rows], angles), angles)
         index = np.arange(len(rows))
         ahead = angles[index, 3 - np.clip(missing, 1, 3)] - _TURN
-        return np.where(missing > 0, ahead, angles[index, np.clip(-missing, 0, 2)])
+        value = np.where(missing > 0, ahead, angles[index, np.clip(-missing, 0, 2)])
+        # At t = 0 all angles are whole turns.
+        return np.where(times > 0.0, value, -_TURN)
 
-    every = np.arange(len(directions))
-    low, high = left.time, left.time + step
-    # A conjugate time may be at the beginning of a step, to rounding, and at t = 0 all angles are whole turns.
-    passed = np.where(low > 0.0, crossing(low, every), -_TURN) > 0.0
-    first = np.where(low > 0.0, low, step * 1e-9)
-    solution = find_root(
-        crossing, (first, high), args=(every,), tolerances={"xatol": 0.0, "xrtol": np.finfo(float).eps}
-    )
-    return np.where(passed, low, np.where(solution.success, solution.x, high))
+    every, low, high = np.arange(len(directions)), left.time, left.time + step
+    solution = find_root(crossing, (low, high), args=(every,), tolerances={"xatol": 0.0, "xrtol": np.finfo(float).eps})
+    # A conjugate time may be at an end of a step, to rounding.
+    return np.where(crossing(low, every) > 0.0, low, np.where(solution.success, solution.x, high))
 
 
 def _frame(inverse_moments: Array, directions: Array, left: _StepStart, rows: Integers, times: Array) -> Array:
