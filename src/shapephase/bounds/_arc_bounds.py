@@ -126,17 +126,13 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
 
     Equation :eq:`azimuth` of the documentation.
     Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
+    Raises ShapeError along the axis, where there is no azimuth, and for a moment that is not above zero.
 
     Parameters
     ----------
     moments : (..., 3) about the three axes [kg m^2]
     momentum : (..., 3) Pi in those axes [kg m^2/s], not along axis k
     axis : k, 0 to 2
-
-    Raises
-    ------
-    ShapeError
-        Along the axis, where there is no azimuth, and for a moment that is not above zero.
 
     Examples
     --------
@@ -164,11 +160,7 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
     direction of Pi in it, and w = I^-1 L_o, phi' = Pi_k (p.A'p - 1/I_k) up to (l |n| + |w|)/sin(theta).
 
     Source: Cabrera 2006, equation (14) with theory.md C-E4; E10, E12.
-
-    Raises
-    ------
-    ShapeError
-        If no axis is certain.
+    Raises ShapeError if no axis is certain.
 
     Examples
     --------

@@ -178,6 +178,7 @@ def enclosure(
     """Bounds of the channels of a deformation and of their rates over an interval.
 
     Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
+    Raises AccuracyNotReached if the deformation is too rough between its breaks to be sampled.
 
     Parameters
     ----------
@@ -186,11 +187,6 @@ def enclosure(
     tolerance : as for `reconstruct` [rad]
     resolution : cells are halved until, on each, I^-1 varies by less than this fraction of its norm, w by that
         fraction of its own norm or of the rate of rotation, and the rate of I^-1 by a twentieth of the steepest
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the deformation is too rough between its breaks to be sampled.
     """
     start, end = interval_argument(interval, deformation.duration)
     sampled = deformation.sampler().samples(magnitude or 1.0, tolerance).interpolant

@@ -106,11 +106,7 @@ def solid_angle_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     axis of the smallest moment.
 
     Source: theory.md E8, E13.
-
-    Raises
-    ------
-    ShapeError
-        If no axis is certain, or the sense in which Pi circles it is not.
+    Raises ShapeError if no axis is certain, or the sense in which Pi circles it is not.
 
     Examples
     --------

@@ -69,17 +69,13 @@ def bounds(
     Bounds that need a certain axis, or a full turn about it, are listed only where there is one.
 
     Source: theory.md E3, E6 to E14.
+    Raises ShapeError if the motion is a batch, or has no momentum, so that there is nothing to bound.
 
     Parameters
     ----------
     motion : of one momentum, no batch
     interval : (start, end) [s]; None: [0, duration]
     resolution : as for `enclosure`
-
-    Raises
-    ------
-    ShapeError
-        If the motion is a batch, or has no momentum, so that there is nothing to bound.
 
     Examples
     --------

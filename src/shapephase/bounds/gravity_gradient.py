@@ -84,10 +84,7 @@ class KeplerOrbit:
     ) -> KeplerOrbit:
         """The orbit through a position (3,) [m] with a velocity (3,) [m/s] at t = 0.
 
-        Raises
-        ------
-        ShapeError
-            For a velocity along the position, or a parabola (eccentricity 1 to within 1e-12).
+        Raises ShapeError for a velocity along the position, or a parabola (eccentricity 1 to within 1e-12).
         """
         pull = positive_argument(gm, "gm", "a number in m^3/s^2")
         middle = vector_argument(centre, "centre", unit="m")
@@ -129,6 +126,8 @@ class KeplerOrbit:
     ) -> KeplerOrbit:
         """The orbit with these elements at t = 0.
 
+        Raises ShapeError if axis and eccentricity contradict each other, or the orbit is a parabola.
+
         Parameters
         ----------
         semi_major_axis : [m], negative for a hyperbola
@@ -136,11 +135,6 @@ class KeplerOrbit:
         inclination, node, argument : turns about z by the node, x by the inclination, z by the argument of the
             pericentre [rad]
         mean_anomaly : [rad]
-
-        Raises
-        ------
-        ShapeError
-            If axis and eccentricity contradict each other, or the orbit is a parabola.
         """
         numbers = finite_array(
             [semi_major_axis, eccentricity, inclination, node, argument, mean_anomaly], "elements", (6,)
@@ -241,15 +235,12 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
 
     Newton's method from above the root, where the function is convex, so that it always converges.
 
+    Raises ShapeError for a negative eccentricity, or 1.
+
     Parameters
     ----------
     mean_anomaly : (...) [rad]; E is in the same revolution
     eccentricity : 0 or more, not 1
-
-    Raises
-    ------
-    ShapeError
-        For a negative eccentricity, or 1.
 
     Examples
     --------

@@ -47,12 +47,8 @@ class AndoyerPendulum:
         """G, y in (-pi, pi] and p_y of body momenta: (..., 3) -> (...), (...) [rad], (...) [kg m^2/s].
 
         Source: Bonnard et al., before (5).
-
-        Raises
-        ------
-        ShapeError
-            If a momentum is along the axis of the smallest moment, where y is undefined, or is not three finite
-            numbers.
+        Raises ShapeError if a momentum is along the axis of the smallest moment, where y is undefined, or is not three
+        finite numbers.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         smallest, middle, largest = np.moveaxis(pi[..., self._order], -1, 0)
@@ -64,10 +60,7 @@ class AndoyerPendulum:
     def body_momentum(self, magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> Array:
         """Pi of G, y and p_y, the inverse of `coordinates`: (...) each -> (..., 3) [kg m^2/s].
 
-        Raises
-        ------
-        ShapeError
-            If |p_y| is larger than G, here and in the other methods.
+        Raises ShapeError if |p_y| is larger than G, here and in the other methods.
         """
         magnitude, y, p_y = _variables(magnitude, y, p_y)
         across = np.sqrt((magnitude - p_y) * (magnitude + p_y))
@@ -151,14 +144,11 @@ class AndoyerPendulum:
 def andoyer_pendulum(moments: ArrayLike) -> AndoyerPendulum:
     """The pendulum in Serret and Andoyer's variables of three different principal moments.
 
+    Raises ShapeError if the moments are not positive, or two of them are equal.
+
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
-
-    Raises
-    ------
-    ShapeError
-        If the moments are not positive, or two of them are equal.
 
     Examples
     --------

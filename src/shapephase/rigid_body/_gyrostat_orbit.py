@@ -175,10 +175,7 @@ def _side(rest: Array) -> Array:
 def gyrostat_orbit(rates: Array, shift: Array, start: Array, speed: float) -> GyrostatOrbit:
     """The orbit through a start: A's diagonal (3,) [1/(kg m^2)], b (3,), x (3,), and |Pi| [kg m^2/s].
 
-    Raises
-    ------
-    AccuracyNotReached
-        If no cone gives the curve, as next to an equilibrium.
+    Raises AccuracyNotReached if no cone gives the curve, as next to an equilibrium.
     """
     values, quadric = _pencil(rates, shift, start)
     found: list[tuple[float, GyrostatOrbit]] = []

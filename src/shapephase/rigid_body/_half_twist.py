@@ -112,6 +112,7 @@ def twist_defect(moments: ArrayLike) -> Array:
         pi = artanh(u sqrt(a)/sqrt(a + b - b u^2))/sqrt(a b) - arcsin(u sqrt(b/(a + b))).
 
     Source: Van Damme, Mardesic and Sugny 2017; Ashbaugh, Chicone and Cushman 1991; theory.md section 7.
+    Raises ShapeError if two moments are equal: there is no intermediate axis.
 
     Parameters
     ----------
@@ -120,11 +121,6 @@ def twist_defect(moments: ArrayLike) -> Array:
     Returns
     -------
     (...) eps in (0, pi/2) [rad]; 0 where it would be below 1e-308
-
-    Raises
-    ------
-    ShapeError
-        If two moments are equal: there is no intermediate axis.
 
     Examples
     --------
@@ -162,6 +158,7 @@ def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
     an integral in Carlson's forms. For c > 0 the racket twists on and on; for c < 0 it swings to and fro.
 
     Source: Van Damme, Mardesic and Sugny 2017; theory.md section 7.
+    Raises ShapeError if two moments are equal, or there is no momentum.
 
     Parameters
     ----------
@@ -171,11 +168,6 @@ def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
     Returns
     -------
     (...) the twist, pi - 2 `twist_defect` on the separatrix; negative at the end of a swing back [rad]
-
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, or there is no momentum.
 
     Examples
     --------

@@ -229,16 +229,13 @@ def weierstrass_form(moments: ArrayLike, momentum: ArrayLike) -> WeierstrassForm
     of Euler's equations says y'^2 = 4 (y - e_1)(y - e_2)(y - e_3).
 
     Source: Bonnard, Cots and Shcherbakova 2013, section 3.5; Lawden 1989; theory.md H14.
+    Raises ShapeError if two moments are equal, or the momentum stands still or is on the separatrix, where P has no
+    period.
 
     Parameters
     ----------
     moments : (3,) three different principal moments by body axis [kg m^2]
     momentum : (3,) Pi at t = 0, body axes, along none of them and not on the separatrix [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, or the momentum stands still or is on the separatrix, where P has no period.
 
     Examples
     --------

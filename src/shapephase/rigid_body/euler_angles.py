@@ -81,10 +81,7 @@ class EulerChart:
         attitude. Samples at a pole keep the other combination from the sample before. Successive attitudes must be
         less than half a turn apart.
 
-        Raises
-        ------
-        ShapeError
-            If there is no axis of samples, or a matrix is not a rotation.
+        Raises ShapeError if there is no axis of samples, or a matrix is not a rotation.
         """
         matrices = finite_array(attitudes, "attitudes", (None, 3, 3))
         if matrices.shape[-3] == 0:
@@ -236,11 +233,7 @@ class EulerChart:
         The two angles that Pi alone determines; phi advances by `precession_rate`. At a pole psi is 0.
 
         Source: Bonnard et al., before (4), with H_3 = +|H| cos phi_2; theory.md B-E3.
-
-        Raises
-        ------
-        ShapeError
-            If a momentum is zero.
+        Raises ShapeError if a momentum is zero.
         """
         momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
         if np.any(np.all(momentum == 0.0, axis=-1)):
@@ -289,11 +282,7 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
     Both charts have the same, for the inertial third axis along the momentum.
 
     Source: Bonnard et al. (4), its last form, which needs no distinction of cases.
-
-    Raises
-    ------
-    ChartPoleError
-        If the body's third axis is within 1e-8 of the momentum's line.
+    Raises ChartPoleError if the body's third axis is within 1e-8 of the momentum's line.
 
     Examples
     --------
@@ -315,11 +304,7 @@ def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
     """{F, G} = F_q.G_p - F_p.G_q from gradients by n coordinates and their n momenta: (..., 2n), (..., 2n) -> (...).
 
     Source: Marsden and Ratiu (15.7.7).
-
-    Raises
-    ------
-    ShapeError
-        If the gradients have different or odd lengths.
+    Raises ShapeError if the gradients have different or odd lengths.
 
     Examples
     --------

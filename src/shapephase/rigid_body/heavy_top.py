@@ -38,17 +38,13 @@ class HeavyTop:
 
     Equation :eq:`heavy-top` of the documentation.
     Source: Marsden and Ratiu (15.10.1-3).
+    Raises ShapeError if shapes or entries are wrong, or chi is no unit vector (to 1e-6).
 
     Parameters
     ----------
     inertia : (..., 3, 3) symmetric positive definite tensor about the fixed point, body axes [kg m^2]
     mgl : (...) mass times gravity times the distance of the centre of mass from the fixed point [J]
     chi : (..., 3) unit vector from the fixed point to the centre of mass, body axes
-
-    Raises
-    ------
-    ShapeError
-        If shapes or entries are wrong, or chi is no unit vector (to 1e-6).
 
     Examples
     --------

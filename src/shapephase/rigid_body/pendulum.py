@@ -78,11 +78,8 @@ class RigidBodyPendulum:
         """r, theta in (-pi, pi] and p of body momenta: (..., 3) -> (...), (...) [rad], (...) [kg m^2/s].
 
         Source: Marsden and Ratiu (15.11.12).
-
-        Raises
-        ------
-        ShapeError
-            If a momentum is along the third axis, where the angle is undefined, or is not three finite numbers.
+        Raises ShapeError if a momentum is along the third axis, where the angle is undefined, or is not three finite
+        numbers.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         first, second, third = np.moveaxis(pi[..., list(self.axes)], -1, 0)
@@ -164,11 +161,8 @@ class RigidBodyPendulum:
         or on it is as accurate as any other.
 
         Source: Marsden and Ratiu (15.11.18); the pendulum's solution in Jacobi's functions is standard.
-
-        Raises
-        ------
-        ShapeError
-            For a momentum along the third axis, or with a part below 1e-140 of its largest that is not zero.
+        Raises ShapeError for a momentum along the third axis, or with a part below 1e-140 of its largest that is not
+        zero.
         """
         pi = vector_argument(momentum, "momentum", unit="kg m^2/s")
         r, _, _ = self.coordinates(pi)
@@ -215,10 +209,7 @@ class PendulumMotion:
     def angle(self, time: ArrayLike) -> Array:
         """theta, continuous in time: (...) [s] -> (...) [rad]; in [-pi, pi] at t = 0.
 
-        Raises
-        ------
-        ShapeError
-            For times that are not finite, or longer than 1e12 periods; so do all methods.
+        Raises ShapeError for times that are not finite, or longer than 1e12 periods; so do all methods.
         """
         sn, _, dn, am = self._jacobi(time)
         return self.centre + (np.arctan2(self.swing * sn, dn) if self._swings else am)

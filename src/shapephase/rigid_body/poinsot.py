@@ -80,10 +80,7 @@ class Poinsot:
     point of contact: radius, angle and arc length are zero. On the separatrix the herpolhode comes from the foot of
     the normal, touches the outer circle once, and spirals back: the inner radius is 0, the angle per period infinite.
 
-    Raises
-    ------
-    ShapeError
-        For a top without momentum, which has no invariable plane.
+    Raises ShapeError for a top without momentum, which has no invariable plane.
 
     Examples
     --------
@@ -146,10 +143,7 @@ class Poinsot:
         The plane on the side of mu (1), the invariable plane, or its mirror image (-1). By Poinsot's theorem the points
         are the angular velocity and its negative. Inertial axes.
 
-        Raises
-        ------
-        ShapeError
-            If side is not 1 or -1.
+        Raises ShapeError if side is not 1 or -1.
         """
         if not isinstance(side, int | np.integer) or side not in (1, -1):
             raise ShapeError(f"side: expected 1 or -1, got {what_came(side)}")
@@ -219,10 +213,7 @@ class Poinsot:
         The numbers of lobes tried, half periods of Pi, are the denominators of the continued fraction of the turns per
         lobe: no smaller number comes nearer. On the separatrix the curve never closes.
 
-        Raises
-        ------
-        ShapeError
-            If the tolerance is not positive or `most_lobes` is below 1.
+        Raises ShapeError if the tolerance is not positive or `most_lobes` is below 1.
         """
         numbers = isinstance(tolerance, int | float | np.number) and isinstance(most_lobes, int | np.integer)
         if not numbers or not (tolerance > 0.0 and most_lobes >= 1):
@@ -348,11 +339,7 @@ def cones(top: EulerTop) -> Cones:
 
     Source: Marsden and Ratiu, 15.8 case 2, whose I1 = I2 are the equal moments and I3 the one about the axis of
     symmetry, with the signs of theory.md M-E6: Omega = Pi/I1 - lambda e.
-
-    Raises
-    ------
-    ShapeError
-        If no two moments are equal, or all three, or the momentum is zero.
+    Raises ShapeError if no two moments are equal, or all three, or the momentum is zero.
 
     Examples
     --------

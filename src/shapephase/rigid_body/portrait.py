@@ -63,11 +63,8 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     In axes of ascending moments each lies in a plane, |Pi_1/Pi_3| = sqrt((1/I2 - 1/I3)/(1/I1 - 1/I2)).
 
     Source: Marsden and Ratiu (15.8.10), whose I1, I2, I3 are our I3, I2, I1, with the signs of theory.md M-E4.
-
-    Raises
-    ------
-    ShapeError
-        If two moments are equal: the middle axis is then on a circle of equilibria and there is no separatrix.
+    Raises ShapeError if two moments are equal: the middle axis is then on a circle of equilibria and there is no
+    separatrix.
 
     Examples
     --------
@@ -94,6 +91,8 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
 def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array:
     """Curves of constant energy on the sphere of unit momentum, along their motion: (N,) -> (N, 2, count, 3).
 
+    Raises ShapeError if an energy is out of range, or the three moments are equal: then no point of the sphere moves.
+
     Parameters
     ----------
     moments : (3,) in any order [kg m^2]
@@ -102,11 +101,6 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
 
     The two curves of an energy circle the same axis on its two sides. At both ends of the range they are points; at
     1/(2 I_middle) each consists of two halves of separatrices.
-
-    Raises
-    ------
-    ShapeError
-        If an energy is out of range, or the three moments are equal: then no point of the sphere moves.
 
     Examples
     --------

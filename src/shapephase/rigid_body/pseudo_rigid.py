@@ -139,16 +139,12 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
     The stretches are a critical point of V + momentum^2/(2 I(q)), reached from the body at rest.
 
     Source: Lewis and Simo 1990; Marsden and Ratiu, section 15.9, remark 5 (theory.md L8).
+    Raises AccuracyNotReached if no equilibrium is found.
 
     Parameters
     ----------
     axis : 0, 1 or 2, of the reference's principal axes
     momentum : [kg m^2/s]
-
-    Raises
-    ------
-    AccuracyNotReached
-        If no equilibrium is found.
 
     Examples
     --------

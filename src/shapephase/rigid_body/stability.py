@@ -85,16 +85,12 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
 
     Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2 (I_e is their I1 in turn for each axis; where they
     order the moments, their I1 > I2 > I3 are our I3, I2, I1); theory.md L1-L3, L5, M-E13.
+    Raises ShapeError if a shape is wrong, or the momentum is zero or not along a principal axis (to 1e-12).
 
     Parameters
     ----------
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
     momentum : (3,) along a principal axis, not zero, body axes [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError
-        If a shape is wrong, or the momentum is zero or not along a principal axis (to 1e-12).
 
     Examples
     --------
@@ -187,17 +183,13 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
     equilibria, and the axis away from the momentum.
 
     Source: Marsden and Ratiu, section 15.9, remark 3 (theory.md L7); M-E1 and M-E7 for the farthest point.
+    Raises ShapeError, UnphysicalInertiaError, SingularInertiaError as `steady_rotation`; also if `disturbed` is zero.
 
     Parameters
     ----------
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
     momentum : (3,) of the steady rotation, along a principal axis [kg m^2/s]
     disturbed : (3,) Pi after the disturbance, not zero [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError, UnphysicalInertiaError, SingularInertiaError
-        As `steady_rotation`; also if `disturbed` is zero.
 
     Examples
     --------

@@ -122,6 +122,7 @@ def dual_spin_turn(inertia: ArrayLike, rotor_axis: ArrayLike, magnitude: float, 
     axis along the momentum.
 
     Source: Kaplan 1976, section 5.4; Hughes 1986, chapter 6.
+    Raises ShapeError if the rotor's axis is zero, or at right angles to that of the largest moment.
 
     Parameters
     ----------
@@ -129,11 +130,6 @@ def dual_spin_turn(inertia: ArrayLike, rotor_axis: ArrayLike, magnitude: float, 
     rotor_axis : (3,) body axes, not at right angles to the axis of the largest moment
     magnitude : of the momentum [kg m^2/s]
     count : of steps, 2 or more, evenly spaced in the body's rate
-
-    Raises
-    ------
-    ShapeError
-        If the rotor's axis is zero, or at right angles to that of the largest moment.
 
     Examples
     --------

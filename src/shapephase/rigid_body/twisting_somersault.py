@@ -174,6 +174,8 @@ def rotor_dive(
     duration. `rotor_dive_lasting` finds the momentum for a duration.
 
     Source: Bharadwaj et al. 2016; Cabrera 2006 (13); theory.md F10.
+    Raises TrajectoryError if there is no such dive: after the first shape change the momentum does not circle the long
+    axis, or has circled it too far already, or shape changes and twist alone are more somersaults.
 
     Parameters
     ----------
@@ -183,12 +185,6 @@ def rotor_dive(
     kick : time for which the rotor is on, twice [s]
     somersaults : m > 0
     twists : n, a positive multiple of a half
-
-    Raises
-    ------
-    TrajectoryError
-        If there is no such dive: after the first shape change the momentum does not circle the long axis, or has
-        circled it too far already, or shape changes and twist alone are more somersaults.
 
     Examples
     --------
@@ -267,16 +263,12 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
     times while the long axis goes round the momentum m times.
 
     Source: Dullin and Tong 2016, the kick model; theory.md F10.
+    Raises TrajectoryError if a twist takes more somersaults at any tilt.
 
     Parameters
     ----------
     moments : (3,) as for `rotor_dive` [kg m^2]
     somersaults_per_twist : m/n
-
-    Raises
-    ------
-    TrajectoryError
-        If a twist takes more somersaults at any tilt.
 
     Examples
     --------

@@ -64,10 +64,8 @@ class TurningBody(Protocol):
 class AndoyerVariables:
     """g, k, l [rad] and the momenta conjugate to them [kg m^2/s]; see `andoyer_variables`. They broadcast together.
 
-    Raises
-    ------
-    ShapeError
-        If their shapes do not go together, an entry is not finite, G is not above 0, or |L| or |K| is above G.
+    Raises ShapeError if their shapes do not go together, an entry is not finite, G is not above 0, or |L| or |K| is
+    above G.
 
     Examples
     --------
@@ -211,6 +209,8 @@ class AndoyerVariables:
 def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerVariables:
     """Andoyer's variables of a state: (..., 3, 3), (..., 3) -> (...) each.
 
+    Raises ShapeError if an argument is not a rotation or not a finite vector, or a momentum is zero.
+
     Parameters
     ----------
     attitude : (..., 3, 3) body to inertial axes
@@ -219,11 +219,6 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
     Returns
     -------
     AndoyerVariables, the angles in (-pi, pi]; singular cases as the module says
-
-    Raises
-    ------
-    ShapeError
-        If an argument is not a rotation or not a finite vector, or a momentum is zero.
 
     Examples
     --------

@@ -76,11 +76,7 @@ def conjugate_points(
     """The conjugate points of an order along extremals from a latitude, longitude 0: directions (...) [rad] -> (...).
 
     Source: Bonnard et al., lemma 2.7 and remark 2, in the form of the module `surface_of_revolution`.
-
-    Raises
-    ------
-    ShapeError
-        If the order is not in 1..1000 or a direction leads out of the band of oscillating extremals.
+    Raises ShapeError if the order is not in 1..1000 or a direction leads out of the band of oscillating extremals.
 
     Examples
     --------
@@ -118,6 +114,8 @@ def conjugate_locus(
 ) -> ConjugateLocus:
     """The conjugate locus of a point: all conjugate points of an order, and its cusps.
 
+    Raises ShapeError as `conjugate_points`; or for fewer than 8 directions.
+
     Parameters
     ----------
     directions : how many (the next multiple of 4), spread evenly over those that lead to oscillating extremals, none
@@ -127,11 +125,6 @@ def conjugate_locus(
 
     A cusp is where the conjugate time is extremal as the direction varies; two of them between neighbouring directions
     are missed.
-
-    Raises
-    ------
-    ShapeError
-        As `conjugate_points`; or for fewer than 8 directions.
 
     Examples
     --------
@@ -173,11 +166,7 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
     equator with 0 < p < sqrt(m(0)): (...) -> (...). Where it is not 0 the branch has no cusp, also where R'' < 0.
 
     Source: Bonnard et al., before proposition 3, which assumes R'' > 0; theory.md B-E9, O13.
-
-    Raises
-    ------
-    ShapeError
-        If p is that of the equator, where it is infinite, or of no oscillating extremal.
+    Raises ShapeError if p is that of the equator, where it is infinite, or of no oscillating extremal.
 
     Examples
     --------

@@ -43,11 +43,8 @@ class _StepStart:
 def conjugate_times(inverse_moments: Array, momenta: Array, order: int) -> Array:
     """The `order`-th conjugate time of each geodesic, counted with multiplicity: (3,) descending, (N, 3) -> (N,).
 
-    Raises
-    ------
-    AccuracyNotReached
-        If there is none in ten thousand steps times `order`, each of some tenths of a turn about the axis of the
-        smallest moment: the moments are too unequal.
+    Raises AccuracyNotReached if there is none in ten thousand steps times `order`, each of some tenths of a turn about
+    the axis of the smallest moment: the moments are too unequal.
     """
     magnitude = np.linalg.norm(momenta, axis=-1)
     directions = momenta / magnitude[:, None]

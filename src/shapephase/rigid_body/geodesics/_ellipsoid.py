@@ -72,11 +72,7 @@ def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolut
     """The ellipsoid of revolution with polar over equatorial axis `aspect`: below 1 oblate, above 1 prolate.
 
     Source: Bonnard et al., section 2 (F_1, F_2); theory.md P1.
-
-    Raises
-    ------
-    ShapeError
-        If the aspect is not between 0.001 and 1000, or the radius not positive.
+    Raises ShapeError if the aspect is not between 0.001 and 1000, or the radius not positive.
 
     Examples
     --------

@@ -142,10 +142,8 @@ class Extremal:
 def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Extremal:
     """Extremals from a latitude in directions (...), angles from east to north [rad].
 
-    Raises
-    ------
-    ShapeError
-        If a direction leads out of the band of extremals that oscillate about the equator within the chart.
+    Raises ShapeError if a direction leads out of the band of extremals that oscillate about the equator within the
+    chart.
 
     Examples
     --------
@@ -194,11 +192,7 @@ def variational_jacobi_field(
     The phase is integrated with it, by d chi/dt = 1/D, so that turning points are regular. Times ascend, from 0 on.
 
     Source: Bonnard et al., definition 2.2.
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the integration fails.
+    Raises AccuracyNotReached if the integration fails.
 
     Examples
     --------

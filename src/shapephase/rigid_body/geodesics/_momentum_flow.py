@@ -39,10 +39,7 @@ def momentum_flow(inverse_moments: Array, start: Array, times: Array) -> tuple[A
 
     In equal steps short enough that none is near a zero of c or d; errors grow as the flow itself does.
 
-    Raises
-    ------
-    ShapeError
-        For times so long that there would be more than 20,000 steps, each of a sixth of a period or more.
+    Raises ShapeError for times so long that there would be more than 20,000 steps, each of a sixth of a period or more.
     """
     p, q = _conserved(inverse_moments, start)
     longest = float((np.sqrt(np.maximum(p, q)) * np.abs(times)).max(initial=0.0))

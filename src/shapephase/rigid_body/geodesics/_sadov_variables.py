@@ -126,11 +126,7 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
     limits, of which the first is 0. The moments, in any order, are those about the momenta's axes.
 
     Source: theory.md R15.
-
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, or a momentum is zero.
+    Raises ShapeError if two moments are equal, or a momentum is zero.
 
     Examples
     --------
@@ -155,6 +151,8 @@ def andoyer_from_sadov(
     moment. Next to the separatrix angles lose digits as in `sadov_variables`.
 
     Source: Sadov 1970; theory.md R15.
+    Raises ShapeError if two moments are equal, an action is out of range, a side is another number, or J is that of the
+    separatrix.
 
     Parameters
     ----------
@@ -163,11 +161,6 @@ def andoyer_from_sadov(
     actions : (..., 3) J, G and K, 0 <= J <= G and |K| <= G [kg m^2/s]
     side : (...) 1 or -1: whether the momentum is on the positive side of the axis that it circles, which is that of
         the largest moment where J is below its value on the separatrix, and that of the smallest moment above
-
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, an action is out of range, a side is another number, or J is that of the separatrix.
 
     Examples
     --------

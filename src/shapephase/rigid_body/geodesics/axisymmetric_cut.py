@@ -91,10 +91,7 @@ class AxisymmetricMetric:
         tau = pi for I_3 >= I_1, where the geodesics of one p_3 meet; else the root in (pi/2, pi] of
         sin tau + kappa tau cos tau with kappa = eta (1 − p_3²)/(1 + eta p_3²), where their caustic is.
 
-        Raises
-        ------
-        ShapeError
-            If a momentum is not three finite numbers, or nothing moves with it; so do all methods.
+        Raises ShapeError if a momentum is not three finite numbers, or nothing moves with it; so do all methods.
         """
         axial, unit_time = self._direction(momentum)
         if self.eta <= 0.0:
@@ -257,16 +254,12 @@ def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
     """The metric of moments (I_1, I_1, I_3), I_3 about the axis of symmetry, which is the third.
 
     Equation :eq:`conjugate-time` of the documentation.
+    Raises ShapeError if a moment is not a number above 0, or I_1 is not finite.
 
     Parameters
     ----------
     equatorial : I_1 > 0 [kg m^2]
     axial : I_3 > 0 [kg m^2]; `inf` for the sub-Riemannian metric
-
-    Raises
-    ------
-    ShapeError
-        If a moment is not a number above 0, or I_1 is not finite.
 
     Examples
     --------

@@ -127,6 +127,8 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
     A set may be attitudes that look the same, such as those of a symmetric body, or many samples of a curve of goals.
     Distances of axisymmetric metrics bound those to each from below, so that few of them are searched for.
 
+    Raises ShapeError, AccuracyNotReached as `shortest_geodesic`; if there is no attitude.
+
     Parameters
     ----------
     metric : of `left_invariant_metric`
@@ -135,11 +137,6 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
     Returns
     -------
     its number in the set, and its `ShortestGeodesic`
-
-    Raises
-    ------
-    ShapeError, AccuracyNotReached
-        As `shortest_geodesic`; if there is no attitude.
 
     Examples
     --------

@@ -67,10 +67,7 @@ class LeftInvariantMetric:
     def pseudo_hamiltonian(self, momentum: ArrayLike, angular_velocity: ArrayLike) -> Array:
         """u.Pi − u.I u/2, of which the maximum over u is `hamiltonian`: (..., 3), (..., 3) -> (...) [J].
 
-        Raises
-        ------
-        ShapeError
-            If u has a component that the metric forbids.
+        Raises ShapeError if u has a component that the metric forbids.
         """
         pi, u = self._principal(momentum), self._principal(angular_velocity, "angular_velocity", "rad/s")
         if self.is_sub_riemannian and np.any(u[..., 2] != 0.0):
@@ -94,10 +91,8 @@ class LeftInvariantMetric:
     def unit_speed(self, momentum: ArrayLike) -> Array:
         """The momentum of the same direction with H = 1/2: (..., 3) -> (..., 3).
 
-        Raises
-        ------
-        ShapeError
-            Where H is 0: at zero momentum, and along the forbidden direction, to which no geodesic belongs.
+        Raises ShapeError where H is 0: at zero momentum, and along the forbidden direction, to which no geodesic
+        belongs.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         return pi / self._moving(pi)[..., None]
@@ -179,16 +174,12 @@ def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
     """The metric u.I u of an inertia, or of principal moments one of which may be infinite.
 
     Source: Bonnard et al., sections 3.1 and 3.2.
+    Raises ShapeError for another shape, moments not positive, or more than one infinite.
 
     Parameters
     ----------
     inertia : (3,) principal moments about the three body axes, in any order, one of them `inf` for the sub-Riemannian
         metric that forbids turns about this axis; or a tensor (3, 3), symmetric positive definite [kg m^2]
-
-    Raises
-    ------
-    ShapeError
-        For another shape, moments not positive, or more than one infinite.
 
     Examples
     --------

@@ -204,11 +204,7 @@ class SerretAndoyerMetric:
         """The geodesics of unit speed from the equator with these p_theta, |p_theta| <= sqrt(I_3): (...).
 
         Source: Bonnard et al., sections 4.2 and 4.3.
-
-        Raises
-        ------
-        ShapeError
-            If a p_theta is beyond `largest_momentum`.
+        Raises ShapeError if a p_theta is beyond `largest_momentum`.
         """
         return GeodesicFamily(constants=constants_of(self.moments, p_theta))
 
@@ -225,10 +221,7 @@ class SerretAndoyerMetric:
         In the caller's axes. The class follows from the momenta as given, so that it is right to rounding next to the
         separatrix too.
 
-        Raises
-        ------
-        ShapeError
-            If a momentum is zero.
+        Raises ShapeError if a momentum is zero.
         """
         momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
         if np.any(np.all(momentum == 0.0, axis=-1)):
@@ -264,15 +257,11 @@ def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
     """The Serret-Andoyer metric of three different principal moments.
 
     Equation :eq:`andoyer-metric` of the documentation.
+    Raises ShapeError if the moments are not positive, or two of them are equal.
 
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
-
-    Raises
-    ------
-    ShapeError
-        If the moments are not positive, or two of them are equal.
 
     Examples
     --------

@@ -235,12 +235,8 @@ class GeodesicFamily:
         tends to phi = -K/alpha, theta infinite, as p falls to sqrt(I_2).
 
         Source: Bonnard et al., section 4.4; theory.md R12.
-
-        Raises
-        ------
-        ShapeError
-            If the order is no such number, or a geodesic does not oscillate: the others have no conjugate point
-            (theory.md R13).
+        Raises ShapeError if the order is no such number, or a geodesic does not oscillate: the others have no conjugate
+        point (theory.md R13).
         """
         if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
             raise ShapeError(f"order: expected a whole number from 1 on, got {what_came(order)}")

@@ -168,10 +168,7 @@ class SurfaceOfRevolution:
     def parameters(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
         """p, q = 1 - p^2/m(0) and depth - q of extremals that oscillate: (...) -> (...) each.
 
-        Raises
-        ------
-        ShapeError
-            If the extremal with this p does not oscillate about the equator within the chart.
+        Raises ShapeError if the extremal with this p does not oscillate about the equator within the chart.
         """
         p = finite_array(momentum, "momentum")
         top, low = self.greatest_momentum, self.least_momentum

@@ -83,6 +83,7 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
     """K = a H + b L and N = c H + d L of a rigid body.
 
     Source: Marsden and Ratiu (15.11.5), (15.11.6); theory.md M-E11.
+    Raises ShapeError if the determinant differs from 1 and -1 by more than 1e-9.
 
     Parameters
     ----------
@@ -92,11 +93,6 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
     Returns
     -------
     NambuPair; coefficients of Pi^2 that vanish up to rounding are zero
-
-    Raises
-    ------
-    ShapeError
-        If the determinant differs from 1 and -1 by more than 1e-9.
 
     Examples
     --------
@@ -131,11 +127,7 @@ def cylinder_matrix(moments: ArrayLike) -> Array:
     ascending moments of the book. The determinant is 1, as there, so Pi' = grad N x grad K.
 
     Source: Marsden and Ratiu (15.11.7).
-
-    Raises
-    ------
-    ShapeError
-        If the moments are not positive, or the first equals the third.
+    Raises ShapeError if the moments are not positive, or the first equals the third.
 
     Examples
     --------

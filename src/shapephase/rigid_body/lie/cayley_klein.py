@@ -145,10 +145,7 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
 
     The U in SU(2) with z = U^H start, as a rotation: R^T takes the momentum of `start` to that of z.
 
-    Raises
-    ------
-    ShapeError
-        If the two lengths differ by more than 1e-6 of themselves, or are zero.
+    Raises ShapeError if the two lengths differ by more than 1e-6 of themselves, or are zero.
 
     Examples
     --------

@@ -64,16 +64,13 @@ def euler_poincare_rate(algebra: LieAlgebra, inertia: ArrayLike, momentum: Array
     """mu' = ad*_xi mu with xi = I^-1 mu: (..., d) -> (..., d).
 
     Source: Marsden and Ratiu, section 15.3 and chapter 13; theory.md G7.
+    Raises ShapeError, LieAlgebraError if the shapes do not fit, an entry is not finite, or the operator is not
+    symmetric or singular.
 
     Parameters
     ----------
     inertia : (d, d) symmetric isomorphism of the algebra with its dual
     momentum : (..., d) body momentum
-
-    Raises
-    ------
-    ShapeError, LieAlgebraError
-        If the shapes do not fit, an entry is not finite, or the operator is not symmetric or singular.
 
     Examples
     --------

@@ -76,10 +76,8 @@ class RollingContact:
 def invariable_hyperplane(algebra: LieAlgebra, inertia: ArrayLike, momentum: ArrayLike) -> InvariableHyperplane:
     """The hyperplane on which the energy quadric rolls, from the momentum at the identity: (..., d).
 
-    Raises
-    ------
-    ShapeError, LieAlgebraError
-        If the shapes or the operator are not right, or the momentum is zero: then there is no plane.
+    Raises ShapeError, LieAlgebraError if the shapes or the operator are not right, or the momentum is zero: then there
+    is no plane.
 
     Examples
     --------

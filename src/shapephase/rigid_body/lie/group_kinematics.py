@@ -37,10 +37,8 @@ def group_exponential(algebra: LieAlgebra, a: ArrayLike) -> Matrices:
 def adjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
     """Ad_g as a matrix, the components of g E_i g^-1: (..., n, n) -> (..., d, d).
 
-    Raises
-    ------
-    LieAlgebraError
-        If g has no inverse, or does not map the algebra to itself: then it is not an element of the group.
+    Raises LieAlgebraError if g has no inverse, or does not map the algebra to itself: then it is not an element of the
+    group.
 
     Examples
     --------
@@ -77,11 +75,7 @@ def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Arr
     """V^B = g^-1 V of a tangent vector at g: (..., n, n), (..., n, n) -> (..., d).
 
     Source: Marsden and Ratiu, equation (15.4.4).
-
-    Raises
-    ------
-    LieAlgebraError
-        If g^-1 V is not an element of the algebra: V is not tangent to the group.
+    Raises LieAlgebraError if g^-1 V is not an element of the algebra: V is not tangent to the group.
 
     Examples
     --------

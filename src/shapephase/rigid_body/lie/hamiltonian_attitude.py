@@ -58,6 +58,7 @@ def hamiltonian_motion(
     of the momentum and the gradient: the quadrature of the paper's (4).
 
     Source: Bonnard et al., remark 3, proposition 5 and (4); theory.md Q9.
+    Raises AccuracyNotReached if the motion is too rough to be followed.
 
     Parameters
     ----------
@@ -65,11 +66,6 @@ def hamiltonian_motion(
     body_momentum : (..., 3) Pi at the first time [kg m^2/s]
     times : (N,) strictly ascending [s]
     attitude : (..., 3, 3) at the first time; None: the identity
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the motion is too rough to be followed.
 
     Examples
     --------

@@ -92,11 +92,7 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
     """Omega, hat(Omega) = R^-1 R': (..., 3, 3), (..., 3, 3) -> (..., 3) [rad/s, body axes].
 
     Source: equation (15.2.8).
-
-    Raises
-    ------
-    ShapeError
-        If R is not a rotation, or R' is not tangent to the rotations at R.
+    Raises ShapeError if R is not a rotation, or R' is not tangent to the rotations at R.
 
     Examples
     --------

@@ -125,10 +125,8 @@ class LieAlgebra:
     def coordinates(self, matrix: ArrayLike) -> Array:
         """The components of a matrix of the algebra, the inverse of `matrix`: (..., n, n) -> (..., d).
 
-        Raises
-        ------
-        LieAlgebraError
-            If the matrix is further from the span of the basis than 1e-9 of its largest entry, or there is no basis.
+        Raises LieAlgebraError if the matrix is further from the span of the basis than 1e-9 of its largest entry, or
+        there is no basis.
         """
         basis = self.matrix_basis
         matrices = _matrices(matrix, "matrix")
@@ -160,14 +158,11 @@ class LieAlgebra:
 def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra") -> LieAlgebra:
     """The Lie algebra spanned over the reals by matrices, the bracket being AB - BA.
 
+    Raises LieAlgebraError if the matrices are linearly dependent, or a bracket leaves their span.
+
     Parameters
     ----------
     basis : (d, n, n) real or complex matrices, linearly independent and closed under the bracket
-
-    Raises
-    ------
-    LieAlgebraError
-        If the matrices are linearly dependent, or a bracket leaves their span.
 
     Examples
     --------
@@ -206,10 +201,7 @@ def so(n: int) -> LieAlgebra:
 
     For n = 3 the order is that of `so3.hat`. The basis is orthonormal for <A, B> = -tr(AB)/2.
 
-    Raises
-    ------
-    LieAlgebraError
-        For n below 2.
+    Raises LieAlgebraError for n below 2.
 
     Examples
     --------

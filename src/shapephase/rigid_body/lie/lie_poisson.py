@@ -113,15 +113,12 @@ def lie_poisson_motion(
 ) -> Array:
     """The motion mu' = ad*_{dH} mu from a momentum at the first time: (..., d), (N,) -> (..., N, d).
 
+    Raises AccuracyNotReached if the motion goes to infinity before the last time.
+
     Parameters
     ----------
     hamiltonian : gradient of H, momenta (..., d) -> (..., d)
     times : (N,) strictly ascending
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the motion goes to infinity before the last time.
 
     Examples
     --------
@@ -201,15 +198,12 @@ def coadjoint_orbit_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLik
     {F, G} = omega(X_F, X_G), and omega(X_H, v) = dH . v. Arguments in the order of all forms here, as
     `sphere_symplectic_form`, which it is on so(3).
 
+    Raises ShapeError if a vector is not tangent to the orbit, that is not an ad*_a mu, to 1e-9 of its length.
+
     Parameters
     ----------
     momentum : (..., d) the point mu
     first, second : (..., d) tangent vectors of the orbit
-
-    Raises
-    ------
-    ShapeError
-        If a vector is not tangent to the orbit, that is not an ad*_a mu, to 1e-9 of its length.
 
     Examples
     --------

@@ -81,15 +81,12 @@ def magnetic_precession(moment: ArrayLike, field: ArrayLike, t: ArrayLike) -> Ar
 def magnetic_equilibria(magnitude: float, field: ArrayLike) -> tuple[MagneticEquilibrium, MagneticEquilibrium]:
     """The two equilibria on a sphere, along the field and opposite to it: both stable centres.
 
+    Raises ShapeError if the field is zero, where every moment is an equilibrium, or the magnitude is not positive.
+
     Parameters
     ----------
     magnitude : |M|, positive
     field : (..., 3) B, not zero
-
-    Raises
-    ------
-    ShapeError
-        If the field is zero, where every moment is an equilibrium, or the magnitude is not positive.
 
     Examples
     --------

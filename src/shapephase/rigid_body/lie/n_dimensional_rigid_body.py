@@ -25,10 +25,8 @@ def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
 
     For `euler_poincare_motion(so(n), ...)`.
 
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If J is not symmetric, or two of its eigenvalues have no positive sum: their plane has no inertia.
+    Raises ShapeError, SingularInertiaError if J is not symmetric, or two of its eigenvalues have no positive sum: their
+    plane has no inertia.
 
     Examples
     --------
@@ -108,10 +106,7 @@ def momentum_traces(momentum: ArrayLike) -> Array:
 def pfaffian(momentum: ArrayLike) -> Array:
     """The Pfaffian, for even n the Casimir whose square is det M: (..., n, n) -> (...).
 
-    Raises
-    ------
-    ShapeError
-        If n is odd or above 10, or the matrix is not antisymmetric.
+    Raises ShapeError if n is odd or above 10, or the matrix is not antisymmetric.
 
     Examples
     --------
@@ -130,17 +125,13 @@ def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int)
     """The coefficients of 1, lambda, ... in tr (M + lambda J^2)^k, all constant: (..., n, n) -> (..., k + 1).
 
     Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
+    Raises ShapeError, SingularInertiaError as `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
 
     Parameters
     ----------
     second_moment : (n, n) symmetric J
     momentum : (..., n, n) antisymmetric M
     power : k, 1 or more
-
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        As `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
 
     Examples
     --------
