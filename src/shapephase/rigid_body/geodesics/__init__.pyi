@@ -3,12 +3,14 @@ from ._arc_quadrature import Arcs
 from ._conjugate_locus import (
     ConjugateLocus,
     ConjugatePoints,
+    CutLocus,
     conjugate_height_rate,
     conjugate_locus,
     conjugate_points,
     conjugate_points_of_momentum,
+    cut_locus,
+    cut_time,
 )
-from ._cut_locus import CutLocus, cut_locus, cut_time
 from ._ellipsoid import (
     EllipsoidStretch,
     astroid,

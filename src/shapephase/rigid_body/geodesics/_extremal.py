@@ -16,14 +16,10 @@ from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs
 from .surface_of_revolution import SurfaceOfRevolution
 
-_RELATIVE_TOLERANCE = 3e-14
-"""Just above the least that SciPy accepts: the integration is there to check the closed form."""
-_ABSOLUTE_TOLERANCE = 1e-15  # [rad, or length of a field that starts with slope 1]
-
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where extremals start, in the form the integrals need: all (...) of one shape.
+    """Start of extremals, in the form that the integrals need: all (...) of one shape.
 
     Extremals that start southward are mirrored in the equator, so that the start phase is in [-pi/2, pi/2].
     """
@@ -57,10 +53,7 @@ class Extremal:
     def phase(self, times: ArrayLike) -> Array:
         """chi at times t, increasing, of the mirrored extremal where it starts southward [rad]."""
         t = finite_array(times, "times")
-        p, q, room, phase = (
-            np.broadcast_to(_spread(a, t), np.shape(a) + t.shape)
-            for a in (self.start.momentum, self.start.q, self.start.room, self.start.phase)
-        )
+        p, q, room, phase = np.broadcast_arrays(*self._spread_start(t)[:4], t)[:4]
         quarter = self.surface.trusted_arcs(p, q, room, np.full(p.shape, 0.5 * np.pi)).time
         total = self.surface.trusted_arcs(p, q, room, phase).time + t
         turns = np.rint(total / (2.0 * quarter))
@@ -81,7 +74,7 @@ class Extremal:
         Source: Bonnard et al., section 2.1.
         """
         t = finite_array(times, "times")
-        p, q, _, first, side = (_spread(a, t) for a in _fields(self.start))
+        p, q, _, first, side = self._spread_start(t)
         chi = self.phase(t)
         longitude = self._arcs(chi, t).longitude - self.surface.arcs(p, first).longitude
         return (
@@ -101,7 +94,7 @@ class Extremal:
 
     def jacobi_field_at(self, phase: Array, times: Array) -> Array:
         """`jacobi_field` at known phases of the times."""
-        p, q, room, first, _ = (_spread(a, times) for a in _fields(self.start))
+        p, q, room, first, _ = self._spread_start(times)
         bend = self._arcs(phase, times).bend - self.surface.trusted_arcs(p, q, room, first).bend
         there, here = self._stretch(q, room, phase), self._stretch(q, room, first)
         return (
@@ -123,7 +116,7 @@ class Extremal:
         return field * p / distance, -field * slope / distance
 
     def poincare_field(self, times: ArrayLike) -> tuple[Array, Array]:
-        """J_2 = t dq/dt, of phi and theta: how the end moves with the magnitude of the initial momentum, at times t.
+        """J_2 = t dq/dt, of phi and theta: the end's derivative by the magnitude of the initial momentum, at times t.
 
         Source: Bonnard et al., section 2.2.
         """
@@ -132,11 +125,14 @@ class Extremal:
         return t * slope, t * _spread(self.start.momentum, t) / self.surface.metric(latitude)
 
     def _arcs(self, phase: Array, times: Array) -> Arcs:
-        p, q, room = (_spread(a, times) for a in (self.start.momentum, self.start.q, self.start.room))
-        return self.surface.trusted_arcs(*np.broadcast_arrays(p, q, room, phase))
+        return self.surface.trusted_arcs(*np.broadcast_arrays(*self._spread_start(times)[:3], phase))
 
     def _stretch(self, q: Array, room: Array, phase: Array) -> Array:
         return stretch_at(self.surface, q, room, phase)[0]
+
+    def _spread_start(self, times: Array) -> tuple[Array, ...]:
+        """p, q, depth - q, phase and side of the start, with an axis of length 1 for each axis of the times."""
+        return tuple(_spread(values, times) for values in vars(self.start).values())
 
 
 def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Extremal:
@@ -160,9 +156,7 @@ def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     """`Start` of directions (...) [rad] at a latitude. Raises ShapeError, see `extremal`."""
     check_object(surface, "SurfaceOfRevolution", "surface")
     angle = finite_array(direction, "direction", unit="rad")
-    if np.ndim(latitude) != 0:
-        raise ShapeError(f"latitude: expected one number, got shape {np.shape(latitude)}")
-    y = float(surface.height(latitude))
+    y = float(surface.height(number_argument(latitude, "latitude", "rad")))
     rest = (1.0 - y) * (1.0 + y)
     sine, cosine = np.sin(angle), np.cos(angle)
     p = surface.greatest_momentum * np.sqrt(rest) * cosine
@@ -176,11 +170,9 @@ def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
 def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array) -> tuple[Array, Array, Array]:
     """D, D' and D'' at phases of extremals: (...) x 3 -> (...) x 3."""
-    check_object(surface, "SurfaceOfRevolution", "surface")
     q, room, phase = np.broadcast_arrays(q, room, phase)
-    sine2, cosine2 = np.sin(phase) ** 2, np.cos(phase) ** 2
-    found = surface.stretch((q * sine2).ravel(), (room + q * cosine2).ravel())
-    value, slope, second = (a.reshape(q.shape) for a in found)
+    square, rest = q * np.sin(phase) ** 2, room + q * np.cos(phase) ** 2
+    value, slope, second = (a.reshape(q.shape) for a in surface.stretch(square.ravel(), rest.ravel()))
     return value, slope, second
 
 
@@ -214,16 +206,11 @@ def variational_jacobi_field(
 
     state = [float(start.phase), 0.0, 1.0]
     span = (0.0, max(float(t[-1]), np.finfo(float).tiny))
-    solution = solve_ivp(
-        rate, span, state, method="DOP853", t_eval=t, rtol=_RELATIVE_TOLERANCE, atol=_ABSOLUTE_TOLERANCE
-    )
+    # Just above the least tolerance that SciPy accepts: the integration is there to check the closed form.
+    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=3e-14, atol=1e-15)
     if not solution.success:
         raise AccuracyNotReached(f"Jacobi's equation could not be integrated: {solution.message}")
     return solution.y[1]
-
-
-def _fields(start: Start) -> tuple[Array, Array, Array, Array, Array]:
-    return start.momentum, start.q, start.room, start.phase, start.side
 
 
 def _spread(values: Array, times: Array) -> Array:
