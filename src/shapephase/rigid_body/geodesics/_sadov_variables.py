@@ -11,7 +11,7 @@ momentum circles the axis of I_3 or its opposite, angles count from l = pi/2 or 
 I_1, from l = pi/2. Along the axis of I_3 the angle of J is undefined, along that of I_1 it follows from l.
 `andoyer_from_sadov` goes the other way; the side of the axis on which the momentum is has to be given.
 
-With two equal moments there is nothing to be found: with the axis of symmetry as third, Andoyer's own variables are
+Two equal moments need no such variables: with the axis of symmetry as third, Andoyer's own variables are
 angles and actions, l, g, k and L, G, K. Of H = G²/(2 I_e) + L² (1/I_s − 1/I_e)/2 the rates are l' = L (1/I_s − 1/I_e)
 and g' = G/I_e, I_s being the moment about that axis and I_e the equal ones; with three equal moments l' = 0.
 
@@ -33,10 +33,9 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
 from ...letters import what_came
+from .._arguments import check_entries
 from ._andoyer_variables import AndoyerVariables, andoyer_variables
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
-
-_HALVINGS = 60  # of a right angle, which leave rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +93,11 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
         metric = _descending(metric)
     momentum = variables.body_momentum
     family = metric.geodesics_of(momentum)
-    lost = family.complement == 0.0
-    if lost.any():
-        where = tuple(int(i) for i in np.argwhere(lost)[0])
-        raise ShapeError(
-            f"variables: entry {list(where)} is on the separatrix or along the axis of the middle moment, where the "
-            "period is infinite and there are no angle variables; the action alone is "
-            "`SerretAndoyerMetric.separatrix().action`"
-        )
+    requirement = (
+        "on the separatrix and along the axis of the middle moment the period is infinite and there are no angle "
+        "variables; the action alone is `SerretAndoyerMetric.separatrix().action`"
+    )
+    check_entries(family.complement == 0.0, momentum, "variables", requirement)
     speed = np.sqrt(2.0 * variables.hamiltonian(np.diag(metric.moments)))
     u = _argument(metric.moments, momentum, variables.l, family.is_oscillating, family.complement)
     quarter = elliptic.complete_k(family.complement)
@@ -166,8 +162,7 @@ def andoyer_from_sadov(
     --------
     >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
     >>> sadov = sp.rigid_body.geodesics.sadov_variables([3.0, 2.0, 1.0], state)
-    >>> angles = [sadov.own, sadov.precession, sadov.node]
-    >>> actions = [sadov.action, sadov.total, sadov.vertical]
+    >>> angles, actions = [sadov.own, sadov.precession, sadov.node], [sadov.action, sadov.total, sadov.vertical]
     >>> again = sp.rigid_body.geodesics.andoyer_from_sadov([3.0, 2.0, 1.0], angles, actions)
     >>> print(again.body_momentum.round(9))
     [1.5 0.3 0.4]
@@ -183,9 +178,7 @@ def andoyer_from_sadov(
     enclosed, total, vertical = np.moveaxis(action, -1, 0)
     if np.any((total <= 0.0) | (enclosed < 0.0) | (enclosed > total)):
         raise ShapeError("actions: J must be between 0 and G, which must be above 0")
-    own, precession, node, enclosed, total, vertical, hemisphere = np.broadcast_arrays(
-        own, precession, node, enclosed, total, vertical, hemisphere
-    )
+    enclosed, hemisphere, _ = np.broadcast_arrays(enclosed, hemisphere, own)
     tilt = _tilt_of_action(metric, enclosed / total)
     across = _between_ends(tilt)
     family = metric.geodesics_of(across)
@@ -216,7 +209,7 @@ def andoyer_from_sadov(
 
 
 def _metric(moments: ArrayLike) -> SerretAndoyerMetric:
-    """As `serret_andoyer_metric`; of two equal moments the error says which variables to take."""
+    """`serret_andoyer_metric`, with an error for two equal moments that names the variables to use instead."""
     values = moments_argument(moments)
     if len(np.unique(values)) < 3:
         raise ShapeError(
@@ -240,7 +233,7 @@ def _between_ends(tilt: Array) -> Array:
 def _tilt_of_action(metric: SerretAndoyerMetric, share: Array) -> Array:
     """The angle from the axis of the largest moment at which the action is this share of G: (...) -> (...) [rad]."""
     low, high = np.zeros(share.shape), np.full(share.shape, 0.5 * np.pi)
-    for _ in range(_HALVINGS):
+    for _ in range(60):  # halvings of a right angle, which leave rounding
         middle = 0.5 * (low + high)
         momentum = _between_ends(middle)
         speed = np.sqrt(np.sum(momentum**2 / metric.moments, axis=-1))

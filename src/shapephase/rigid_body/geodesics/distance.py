@@ -33,23 +33,12 @@ from ._momentum_flow import attitude_flow, exponential_derivative
 from .axisymmetric_cut import axisymmetric_metric
 from .left_invariant import LeftInvariantMetric
 
-_FRACTIONS = (0.35, 0.7, 1.05, 1.4)
-"""Sizes of the starts, in parts of the largest momenta along the axes; a loop that closes is at about sqrt(2)."""
-_FEW = 48  # directions of a search
-_MANY = 384  # directions of the last, where the others find nothing as short as the upper bound
-_MOST_SEARCHES = 4  # searches with starts scaled to the last one's length; the second rarely finds anything shorter
-_STEPS = 60  # levenberg-Marquardt steps; Newton's last few square the error, the others only have to reach their basin
-_CLOSE = 1e-9  # in parts of how far such a way can turn: arrived, what the next step would leave is rounding
-_ROUNDING = 1e-15  # [rad] An attitude is no better known
-_MARGIN = 1e-7  # by so much, in parts, a length may be above its upper bound, or an end past the cut, for rounding
-_IMPROVED = 1e-9  # in parts: a length that is shorter by more is another way
-_FIRST_DAMPING = 1e-2
-"""Of the mean square of the differential: near Newton's step, but bounded where the differential is singular."""
-_LEAST_DAMPING = 1e-16
-_LARGEST_DAMPING = 1e6
-_HOPELESS_DAMPING = 1e5
-"""Above it a start is given up: ten steps in a row, each a tenth of the last, did not come closer."""
-_FIRST_AXIS_LAST = [1, 2, 0]  # A cyclic order of the axes, so right-handed, with that of the smallest moment as third
+_FEW, _MANY = 48, 384  # directions of a search, and of the last where it finds nothing as short as the upper bound
+_STEPS = 60  # of Levenberg and Marquardt; the last few square the error, the others have to reach their basin
+_CLOSE = 1e-9  # relative: of residuals of an arrival, where the next step squares them, and of different lengths
+_ROUNDING = 1e-15  # [rad] of an attitude
+_MARGIN = 1e-7  # relative, by which rounding may put a length above its upper bound, or an end past the cut
+_FIRST_AXIS_LAST = [1, 2, 0]  # a cyclic order of the axes, so right-handed, with that of the smallest moment as third
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,15 +173,16 @@ def _searched(metric: LeftInvariantMetric, target: Array, upper: float) -> Array
     near = float(np.linalg.norm(scaled)) < 0.5 * np.pi
     expected = float(axisymmetric_metric(mean, largest).distance(so3.exp(scaled))) if near else upper
     best = _shortest_arrival(metric, target, _FEW, min(expected, upper))
-    for _ in range(_MOST_SEARCHES):
+    # Starts are scaled to the last length; the second search rarely finds anything shorter.
+    for _ in range(4):
         other = _shortest_arrival(metric, target, _FEW, min(best[1], upper))
-        improved = other[1] < best[1] * (1.0 - _IMPROVED)
+        improved = other[1] < best[1] * (1.0 - _CLOSE)
         best = other if other[1] < best[1] else best
         if not improved:
             break
     most = upper * (1.0 + _MARGIN + _ROUNDING / _reach(metric, upper).min())
     if best[1] > most:
-        best = min(best, _shortest_arrival(metric, target, _MANY, upper), key=lambda found: found[1])
+        best = min(best, _shortest_arrival(metric, target, _MANY, upper), key=lambda arrival: arrival[1])
     if best[1] > most:
         raise AccuracyNotReached(
             f"distance: the shortest geodesic found has the length {best[1]:.9g}, but the distance is at most "
@@ -213,9 +203,9 @@ def _shortest_arrival(metric: LeftInvariantMetric, target: Array, count: int, le
 
 
 def _starts(count: int) -> Array:
-    """Momenta in units of the largest along each axis: all directions, several sizes."""
+    """Momenta in units of the largest along each axis: all directions, up to sqrt(2), where a loop closes."""
     directions = sphere.fibonacci_directions(count)
-    return np.concatenate([fraction * directions for fraction in _FRACTIONS])
+    return np.concatenate([fraction * directions for fraction in (0.35, 0.7, 1.05, 1.4)])
 
 
 def _reach(metric: LeftInvariantMetric, length: float) -> Array:
@@ -248,7 +238,9 @@ def _arrivals(
     largest = 1.5 * float(np.linalg.norm(starts, axis=-1).max())
     errors = _rotation_errors(inverse_moments, momenta, target) * weights
     sizes = np.linalg.norm(errors, axis=-1)
-    damping = np.full(len(momenta), _FIRST_DAMPING)
+    # Relative to the mean square of the differential: near Newton's step, but bounded where that is singular. Above 1e5
+    # a start is given up: several steps in a row, each a tenth of the last, did not come closer.
+    damping = np.full(len(momenta), 1e-2)
     rows = np.arange(len(momenta))
     derivative = exponential_derivative(inverse_moments, momenta, times)
     for _ in range(_STEPS):
@@ -267,8 +259,8 @@ def _arrivals(
         momenta[taken], errors[taken], sizes[taken] = trial[better], error[better], apart[better]
         derivative[taken] = exponential_derivative(inverse_moments, momenta[taken], times[taken])
         changed = np.where(better, 0.1 * damping[rows], 10.0 * damping[rows])
-        damping[rows] = np.clip(changed, _LEAST_DAMPING, _LARGEST_DAMPING)
-        rows = rows[(sizes[rows] > missed * weights.max()) & (damping[rows] < _HOPELESS_DAMPING)]
+        damping[rows] = np.clip(changed, 1e-16, 1e6)
+        rows = rows[(sizes[rows] > missed * weights.max()) & (damping[rows] < 1e5)]
         if not rows.size:
             break
     return momenta, sizes

@@ -35,18 +35,15 @@ from numpy.typing import ArrayLike
 from scipy.special import elliprd, hyp2f1
 
 from ... import elliptic
+from ...arguments import whole_argument
 from ...arrays import Array, Mask, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
-from ...letters import what_came
 from ...roots import safe_newton
 from .._arguments import check_entries
 from ._serret_andoyer_constants import GeodesicClass, GeodesicConstants, moment_gaps
 
-_NOT_ZERO = 1e-100
-"""Stands for a cn that vanishes, at a pole of S, where only f S is finite; its square does not underflow."""
-_SERIES_PARAMETER = 0.4
-"""m up to which the second derivative of K is a hypergeometric series; Legendre's equation would divide by m."""
+_NOT_ZERO = 1e-100  # for cn = 0, at a pole of S, where only f S is finite; its square does not underflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +102,7 @@ class GeodesicFamily:
 
     @property
     def first_return(self) -> Array:
-        """R, what theta gains in T/2, after which an oscillating geodesic is at the equator again: (...) [rad].
+        """R, the gain of theta in T/2, after which an oscillating geodesic is at the equator again: (...) [rad].
 
         Infinite on the separatrix. On oscillating geodesics decreasing and convex in p (proposition 9: see
         `first_return_slope`); odd in p.
@@ -158,10 +155,8 @@ class GeodesicFamily:
         Raises ShapeError for rotating geodesics, which have none.
         Source: Bonnard et al., section 4.2.
         """
-        bad = self.constants.kind < GeodesicClass.SEPARATRIX
-        check_entries(
-            bad, self.p_theta, "p_theta", "a largest phi needs an oscillating geodesic, |p_theta| >= sqrt(I_2)"
-        )
+        requirement = "a largest phi needs an oscillating geodesic, |p_theta| >= sqrt(I_2)"
+        check_entries(self.constants.kind < GeodesicClass.SEPARATRIX, self.p_theta, "p_theta", requirement)
         _, upper, whole = moment_gaps(self.constants.moments)
         # Y_+ = (1 - a_3 p^2)/((a_2 - a_3) p^2) and 1 - Y_+, up to a common factor.
         sine, cosine = np.sqrt(self.constants.at_equator), np.sqrt(np.maximum(-self.constants.at_crest, 0.0))
@@ -238,8 +233,7 @@ class GeodesicFamily:
         Raises ShapeError if the order is no such number, or a geodesic does not oscillate: the others have no conjugate
         point (theory.md R13).
         """
-        if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
-            raise ShapeError(f"order: expected a whole number from 1 on, got {what_came(order)}")
+        order = whole_argument(order, "order", 1)
         a3 = float(1.0 / self.constants.moments[2])
         level = -order * self._period_slopes()[0] * self.constants.rate * self.constants.at_equator
         v = _argument_of_level(a3, self.constants.second_kind, self.complement, level)
@@ -268,23 +262,19 @@ class GeodesicFamily:
 
     def _denominator(self, cn: Array, dn: Array) -> Array:
         """f of the module's table."""
-        return np.where(
-            self.constants.oscillating, cn, np.where(self.constants.kind >= GeodesicClass.ROTATING, dn, 1.0)
-        )
+        inner = np.where(self.constants.kind >= GeodesicClass.ROTATING, dn, 1.0)
+        return np.where(self.constants.oscillating, cn, inner)
 
     def _tangent(self, u: Array) -> tuple[Array, Array, Array]:
         """Half turns of am(alpha phi), and up to a common factor the sine and cosine >= 0 of the remainder."""
         sn, cn, dn, amplitude = elliptic.jacobi(u, self.complement)
         _, upper, whole = moment_gaps(self.constants.moments)
-        oscillating = self.constants.oscillating
+        oscillating, extended = self.constants.oscillating, self.constants.kind == GeodesicClass.EXTENDED
         odd, turns = _half_turns(amplitude, cn)
-        sign = 1.0 - 2.0 * odd
-        sine = sn * np.where(
-            self.constants.kind == GeodesicClass.EXTENDED, np.sqrt(self.complement), self.constants.modulus
-        )
-        factor = np.sqrt(upper / whole)
-        turned = np.where(oscillating, sine, sign * sine), factor * np.where(oscillating, dn, np.abs(cn))
-        return np.where(oscillating, 0.0, turns), *turned
+        sine = sn * np.where(extended, np.sqrt(self.complement), self.constants.modulus)
+        sine = np.where(oscillating, sine, (1.0 - 2.0 * odd) * sine)
+        cosine = np.sqrt(upper / whole) * np.where(oscillating, dn, np.abs(cn))
+        return np.where(oscillating, 0.0, turns), sine, cosine
 
     def _second_kind_integral(self, u: Array, sn: Array, cn: Array, dn: Array) -> Array:
         """f S, for oscillating geodesics continued past the poles of S, where cn = 0.
@@ -346,11 +336,11 @@ def _half_turns(amplitude: Array, cosine: Array) -> tuple[Array, Array]:
 
 
 def _second_derivative_of_k(m1: Array) -> Array:
-    """d^2 K/dm^2 by the hypergeometric series for small m, else by Legendre's equation."""
+    """d^2 K/dm^2 by the hypergeometric series for m up to 0.4, else by Legendre's equation, which divides by m."""
     m = 1.0 - m1
-    by_series = m <= _SERIES_PARAMETER
-    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, _SERIES_PARAMETER))
-    large = np.maximum(m, _SERIES_PARAMETER)
+    by_series = m <= 0.4
+    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, 0.4))
+    large = np.maximum(m, 0.4)
     small = np.where(by_series, 1.0 - large, m1)
     equation = (0.25 * elliptic.complete_k(small) - (small - large) * elliprd(0.0, 1.0, small) / 6.0) / (large * small)
     return np.where(by_series, series, equation)
