@@ -19,10 +19,7 @@ from ._enclosure import ROUND_UP
 from ._energy_bounds import EnergyBounds, cross_product_bound
 from .regimes import Regime, RegimeCertificate
 
-# Counterpart of ROUND_UP for lower bounds.
-_ROUND_DOWN = 1.0 - 1e-12
-# Of the fastest azimuth rate [1]: what a difference of two rates may have lost to rounding.
-_CANCELLATION = 1e-12
+_ROUND_DOWN = 1.0 - 1e-12  # counterpart of ROUND_UP for lower bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +115,7 @@ def arc_length_bounds(bounds: EnergyBounds) -> ArcLengthBounds:
 
 
 def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Array:
-    """How fast Pi circles a principal axis without internal momentum: (...) [rad/s].
+    """Rate at which Pi circles a principal axis without internal momentum: (...) [rad/s].
 
     With axes k, i, j in cyclic order and Pi = l (cos(theta), sin(theta) cos(phi), sin(theta) sin(phi)) in them,
 
@@ -181,16 +178,16 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
         stray = (magnitude * coupling + known.drift_magnitude) / sine
     near, far = along[:, 0] - across[:, 1], along[:, 1] - across[:, 0]
     fast = (magnitude * greatest * far + stray) * ROUND_UP
-    slow = (magnitude * np.where(near > 0.0, least, greatest) * near - stray) - _CANCELLATION * fast
+    slow = (magnitude * np.where(near > 0.0, least, greatest) * near - stray) - (ROUND_UP - 1.0) * fast
     return AzimuthBounds(sense=-sign, slow=slow, fast=fast, monotone=bool(np.all(slow > 0.0)))
 
 
 def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
-    """How soon Pi can be back at its start, for which it must go once round the certified axis.
+    """Lower bounds of the time until Pi is back at its start, for which it must go once round the certified axis.
 
     The formulas of the first two bounds hold for fixed principal axes without internal momentum. For other
-    deformations they are lowered where the fastest possible azimuth exceeds the rate they assume. About the axis of
-    the largest moment they are the same, with the least moment in them.
+    deformations they are lowered where the fastest possible azimuth exceeds the rate they assume. They hold about the
+    axis of the largest moment, too, with the least moment in them.
 
     Source: Cabrera 2006, remark 4.1, as corrected in theory.md C-E10; E12.
 

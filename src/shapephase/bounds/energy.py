@@ -16,13 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, number_argument, times_argument
+from ..arguments import check_object, number_argument, times_argument, whole_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
-from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
-from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.euler_top import EulerTop
 
@@ -120,10 +118,7 @@ def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
     shape = (*motion.batch, *times.shape)
     by_inertia = 0.5 * np.sum(pi * so3.apply(inverse_rate, pi), axis=-1)
     by_drift = np.sum(np.cross(pi, so3.apply(inverse, pi)) * drift, axis=-1)
-    return EnergyRate(
-        by_inertia=by_inertia.reshape(shape)[()],
-        by_internal_momentum=by_drift.reshape(shape)[()],
-    )
+    return EnergyRate(by_inertia.reshape(shape)[()], by_drift.reshape(shape)[()])
 
 
 def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
@@ -190,8 +185,7 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
     7.252223 s, 7.252223 s
     """
     check_object(deformation, "Deformation", "deformation")
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 2:
-        raise ShapeError(f"count: a whole number of 2 or more is needed, got {what_came(count)}")
+    count = whole_argument(count, "count", 2)
     inertia = deformation.inertia(number_argument(t, "t", "s"))
     top = EulerTop(inertia, momentum)
     orbit = top.orbit
