@@ -75,7 +75,7 @@ def local_coordinate(times: Array, left: Array, right: Array) -> Array:
 
 
 def exact_local_coordinate(times: Array, left: Array, right: Array) -> Array:
-    """As `local_coordinate`, to rounding for short intervals late in a long motion too."""
+    """`local_coordinate`, to rounding for short intervals late in a long motion, too."""
     # Differences of near times are exact; 2 t - left - right would lose digits.
     return np.clip(((times - left) - (right - times)) / (right - left), -1.0, 1.0)
 
@@ -95,7 +95,7 @@ def end_margin(width: Array, end: float) -> Array:
 
 
 def widest_margin(end: float) -> float:
-    """The same of wide intervals [s]."""
+    """`end_margin` of wide intervals [s]."""
     return 64.0 * float(np.spacing(end))
 
 

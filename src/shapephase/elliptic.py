@@ -22,12 +22,10 @@ from .arrays import Array, Mask, common_shape, finite_array
 from .errors import ShapeError
 
 _SMALL_ARGUMENT = 1e-9  # below it sn u = am u = u and cn u = 1 to the last digit
-_FLOOR = 1e-60
-"""Least m1 used in integrals that converge as m1 goes to 0: a smaller one changes no digit, but overflows."""
+_FLOOR = 1e-60  # least m1 in integrals that converge as m1 goes to 0: a smaller one changes no digit, but overflows
 _CHARACTERISTIC = 1e100  # largest -n: beyond it the integral of the third kind overflows
 _PERIODS = 1e12  # longest argument [periods 2K]: reducing it costs twelve of the sixteen digits
-_MEANS_AGREE = 1e-8
-"""Relative difference of two means below which the next step of the arithmetic-geometric mean makes them equal."""
+_MEANS_AGREE = 1e-8  # relative difference of two means that the next arithmetic-geometric step makes equal
 _FAR = 1e-3  # ratio y/p below which SciPy's R_J uses an asymptotic form that is accurate to 1e-12 only
 
 

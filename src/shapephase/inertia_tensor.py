@@ -98,7 +98,7 @@ def second_moment(inertia: Array) -> Array:
 
 
 def triangle_defect(inertia: Array) -> Array:
-    """By how much the triangle inequality fails, relative to the largest moment; negative where it holds: (...).
+    """Excess over the triangle inequality, relative to the largest moment; negative where it holds: (...).
 
     Examples
     --------

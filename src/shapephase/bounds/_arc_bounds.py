@@ -227,7 +227,7 @@ def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
 
 
 def _time_of_full_turn(rates: Array, widths: Array) -> float:
-    """When the integral of positive rates reaches 2 pi; infinite if it does not."""
+    """Time at which the integral of positive rates reaches 2 pi; infinite if it does not."""
     turned = np.concatenate([[0.0], np.cumsum(rates * widths)])
     if turned[-1] < 2.0 * np.pi:
         return np.inf

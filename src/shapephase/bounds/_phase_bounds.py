@@ -34,7 +34,7 @@ class PhaseBounds:
 
     @property
     def is_informative(self) -> bool:
-        """Whether they restrict the phase modulo 2 pi: width < 2 pi. Source: Cabrera 2006, remark 4.2."""
+        """True if they restrict the phase modulo 2 pi: width < 2 pi. Source: Cabrera 2006, remark 4.2."""
         return self.width < 2.0 * np.pi
 
     def of_loop(self, solid_angle: float) -> PhaseBounds:

@@ -199,7 +199,7 @@ class GravityTorque:
 
     @property
     def is_free(self) -> bool:
-        """Whether the free motion agrees with the true one within the tolerance."""
+        """True if the free motion agrees with the true one within the tolerance."""
         return self.attitude_error <= self.tolerance
 
 

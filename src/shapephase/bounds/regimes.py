@@ -1,4 +1,4 @@
-"""Which principal axis a free body's momentum circles: a certificate given before the motion is computed.
+"""Certificate of the principal axis that a free body's momentum circles, before the motion is computed.
 
 Pi can only get from one side of a plane through the body's centre to the other by crossing it, and there its energy is
 at most l^2/2 times the greatest eigenvalue of I^-1 in that plane. So as long as E_t stays above that, Pi stays on its
@@ -26,7 +26,7 @@ _CHUNK = 2_000_000  # directions times cells that are compared at once: some 100
 
 
 class Regime(StrEnum):
-    """Which principal axis the momentum circles; axis 1 is that of the smallest moment, axis 3 of the largest.
+    """Principal axis that the momentum circles; axis 1 is that of the smallest moment, axis 3 of the largest.
 
     Examples
     --------
@@ -73,7 +73,7 @@ class RegimeCertificate:
 
     @property
     def certain(self) -> bool:
-        """Whether Pi stays on one side of the plane across the axis."""
+        """True if Pi stays on one side of the plane across the axis."""
         return self.regime != Regime.MAY_CROSS
 
     @property
@@ -112,7 +112,7 @@ class CrownRegion:
     __repr__ = short_repr
 
     def contains(self, momenta: ArrayLike) -> Mask:
-        """Whether Pi may be there at some time of the interval: (..., 3), of any norm above 0 -> (...)."""
+        """True where Pi may be at some time of the interval: (..., 3), of any norm above 0 -> (...)."""
         low, high = self.certificate.bounds.quotients
         axis = self.certificate.axis if self.certificate.certain else None
         return self._between(
@@ -120,7 +120,7 @@ class CrownRegion:
         )
 
     def contains_as_printed(self, momenta: ArrayLike) -> Mask:
-        """Whether the paper's region R has these: (..., 3), of any norm above 0 -> (...).
+        """True in the paper's region R: (..., 3), of any norm above 0 -> (...).
 
         The union over time of the level sets of E_t between E_min and E_max, bounds over the whole interval, of which R
         is the connected component of the start. That is one side of a plane through the centre where E_min or E_max
@@ -170,7 +170,7 @@ def regime_certificate(
     *,
     resolution: float = 5e-3,
 ) -> RegimeCertificate:
-    """Which principal axis the momentum of a deforming body circles over an interval, or that this is not certain.
+    """Principal axis that the momentum of a deforming body circles over an interval, if that is certain.
 
     No motion is computed: E_t, and the energy at which Pi could cross to the other side, are bounded over the interval.
 

@@ -176,7 +176,7 @@ def yo_yo_rate(hub: float, mass: float, radius: float, length: ArrayLike, rate: 
 
 
 def yo_yo_stop(hub: float, mass: float, radius: float) -> float:
-    """The length of each cord that stops a hub, whatever its rate: sqrt(R^2 + hub/mass) [m]. As `yo_yo_rate`.
+    """The length of each cord that stops a hub, whatever its rate: sqrt(R^2 + hub/mass) [m]. Arguments of `yo_yo_rate`.
 
     Examples
     --------

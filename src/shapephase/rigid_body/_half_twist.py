@@ -149,8 +149,8 @@ def twist_defect(moments: ArrayLike) -> Array:
 def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
     """Tennis-racket effect off the separatrix: the twist about the handle while the handle goes round once.
 
-    Of the whole turn of the handle (the axis of the smallest moment) about the momentum, half is before and half
-    after the middle of the flip, where the momentum has no part along the intermediate axis. The equation
+    The whole turn of the handle (the axis of the smallest moment) about the momentum is half before and half after
+    the middle of the flip, where the momentum has no part along the intermediate axis. The equation
     is that of `twist_defect` with c = (a Pi_1^2 - b Pi_3^2)/|Pi|^2, ascending axes, which is 0 on the separatrix,
 
         dphi/dpsi = (1 - b cos^2 psi)/sqrt((a + b cos^2 psi)(c + b cos^2 psi)),

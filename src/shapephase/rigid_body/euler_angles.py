@@ -100,7 +100,7 @@ class EulerChart:
         return np.stack([half_sum + half_difference, theta, half_sum - half_difference], axis=-1)
 
     def is_regular(self, angles: ArrayLike) -> Mask:
-        """Whether the angles are coordinates there, that is further than 1e-8 from a pole: (..., 3) -> (...).
+        """True where the angles are coordinates, further than 1e-8 from a pole: (..., 3) -> (...).
 
         Source: Marsden and Ratiu, end of section 15.6; theory.md J8.
         """

@@ -148,7 +148,7 @@ class EulerTop:
 
     @property
     def regime(self) -> str:
-        """What Pi does in the body.
+        """Kind of motion of Pi in the body.
 
         "rest" without momentum; "spherical" with three equal moments; "steady" along a principal axis; "axisymmetric":
         at a constant rate round the symmetry axis; "circling" the axis of the largest or of the smallest moment;
@@ -182,7 +182,7 @@ class EulerTop:
 
     @property
     def condition(self) -> float:
-        """How much a change of inertia or momentum, relative to its largest entry, is magnified in each half turn.
+        """Factor by which each half turn magnifies a change of inertia or momentum, relative to its largest entry.
 
         I3/I1 or more; about 1/m1 near the separatrix, infinite on it and along the intermediate axis. Rounding of the
         input is magnified by it, such as that of a tensor given in other axes than the principal ones.

@@ -156,40 +156,6 @@ class HeavyTop:
         AccuracyNotReached
             If the tolerance cannot be met: unstable or chaotic motions magnify rounding exponentially.
         """
-        start, body, time, requested = self._arguments(momentum, gamma, attitude, duration, tolerance)
-        least = _RATIO * _FLOOR
-        local = max(0.01 * requested, least)  # errors of steps add up
-        while True:
-            coarse = _integrated(self, start, body, time, local)
-            fine = _integrated(self, start, body, time, local / _RATIO)
-            # Measured, the error of the finer run is about 1/32 of the difference.
-            estimate = 0.1 * _difference(coarse, fine)
-            worst = float(np.max(estimate, initial=0.0))
-            if worst <= requested:
-                return HeavyTopMotion(
-                    top=self,
-                    duration=time,
-                    vertical_momentum=fine.vertical,
-                    error_estimate=estimate,
-                    energy_drift=fine.energy_drift,
-                    _run=fine,
-                )
-            if local <= least:
-                raise AccuracyNotReached(
-                    f"heavy top: the attitude is known to {worst:.2g} rad over {time:.6g} s, tolerance "
-                    f"{requested:.2g}; shorten the motion or loosen the tolerance (unstable motions magnify rounding)"
-                )
-            # Mostly one repetition suffices; estimates of coarse runs are too rough for larger changes.
-            local = max(local * max(0.3 * requested / worst, 1e-3), least)
-
-    def _arguments(
-        self,
-        momentum: ArrayLike,
-        gamma: ArrayLike | None,
-        attitude: ArrayLike | None,
-        duration: float,
-        tolerance: float,
-    ) -> tuple[Array, Array, float, float]:
         body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         if gamma is not None and attitude is not None:
             raise ShapeError("gamma, attitude: give one of them; each determines where the vertical is")
@@ -201,14 +167,26 @@ class HeavyTop:
         time, requested = above_zero(duration, "duration", "s"), number_argument(tolerance, "tolerance", "rad")
         if not 1e-12 <= requested <= 1e-2:
             raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {what_came(tolerance)}")
-        shape = common_batch(
-            inertia=self.inertia.shape[:-2],
-            mgl=self.mgl.shape,
-            chi=self.chi.shape[:-1],
-            momentum=body.shape[:-1],
-            attitude=start.shape[:-2],
-        )
-        return np.broadcast_to(start, (*shape, 3, 3)), np.broadcast_to(body, (*shape, 3)), time, requested
+        own = np.broadcast_shapes(self.inertia.shape[:-2], self.mgl.shape, self.chi.shape[:-1])
+        shape = common_batch(top=own, momentum=body.shape[:-1], attitude=start.shape[:-2])
+        start, body = np.broadcast_to(start, (*shape, 3, 3)), np.broadcast_to(body, (*shape, 3))
+        least = _RATIO * _FLOOR
+        local = max(0.01 * requested, least)  # errors of steps add up
+        while True:
+            coarse = _integrated(self, start, body, time, local)
+            fine = _integrated(self, start, body, time, local / _RATIO)
+            # Measured, the error of the finer run is about 1/32 of the difference.
+            estimate = 0.1 * _difference(coarse, fine)
+            worst = float(np.max(estimate, initial=0.0))
+            if worst <= requested:
+                return HeavyTopMotion(self, time, fine.vertical, estimate, fine.energy_drift, fine)
+            if local <= least:
+                raise AccuracyNotReached(
+                    f"heavy top: the attitude is known to {worst:.2g} rad over {time:.6g} s, tolerance "
+                    f"{requested:.2g}; shorten the motion or loosen the tolerance (unstable motions magnify rounding)"
+                )
+            # Mostly one repetition suffices; estimates of coarse runs are too rough for larger changes.
+            local = max(local * max(0.3 * requested / worst, 1e-3), least)
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,7 +280,7 @@ def semidirect_bracket(
     """
     for pair, name in ((df, "df"), (dg, "dg")):
         check_pair(pair, name, "the gradients by momentum and by gamma")
-    (fp, fg), (gp, gg) = (tuple(finite_array(part, "gradient", (3,)) for part in pair) for pair in (df, dg))
+    (fp, fg), (gp, gg) = (tuple(finite_array(row, "gradient", (3,)) for row in pair) for pair in (df, dg))
     pi, up = _point(momentum, gamma)
     turning = np.sum(pi * np.cross(fp, gp), axis=-1)
     return -turning - np.sum(up * (np.cross(fp, gg) + np.cross(fg, gp)), axis=-1)

@@ -314,7 +314,7 @@ def sleeping_spectrum(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -
 
 
 def spectrally_stable(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> Mask:
-    """Whether no eigenvalue of an upright spin has a positive real part: (...). Arguments as `sleeping_matrix`.
+    """True where no eigenvalue of an upright spin has a positive real part: (...). Arguments of `sleeping_matrix`.
 
     The squares of the eigenvalues must be real and not positive: B, C and B^2 - 4C not negative.
 

@@ -235,7 +235,7 @@ class PendulumMotion:
 
     @property
     def _swings(self) -> bool:
-        """Whether sn is the sine of delta divided by its maximum; otherwise sn is the sine itself."""
+        """True if sn is the sine of delta divided by its maximum, else sn is the sine itself."""
         return self.regime == "libration" or self.swing == 0.0
 
     @property
@@ -305,7 +305,7 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
 
 
 def _motion(pendulum: RigidBodyPendulum, pi: Array, r: float) -> PendulumMotion:
-    """By the angle delta from a stable equilibrium: delta'^2 + W sin^2(delta) = nu^2, W = |stiffness| r^2."""
+    """Motion by the angle delta from a stable equilibrium: delta'^2 + W sin^2(delta) = nu^2, W = |stiffness| r^2."""
     # In units of the largest momentum and the least moment, so that nothing overflows.
     largest, least = float(np.max(np.abs(pi))), float(np.min(pendulum.moments))
     x, y, z = (Fraction(float(pi[i])) / Fraction(largest) for i in pendulum.axes)

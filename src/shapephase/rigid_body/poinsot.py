@@ -138,7 +138,7 @@ class Poinsot:
         return attitude @ self.top.inertia @ so3.transpose(attitude)
 
     def contact(self, t: ArrayLike, side: int = 1) -> Array:
-        """Where the plane at right angles to mu touches the ellipsoid, from its shape alone: (...) -> (..., 3) [rad/s].
+        """Contact of the plane at right angles to mu with the ellipsoid, by its shape: (...) -> (..., 3) [rad/s].
 
         The plane on the side of mu (1), the invariable plane, or its mirror image (-1). By Poinsot's theorem the points
         are the angular velocity and its negative. Inertial axes.

@@ -23,7 +23,7 @@ from ..letters import what_came
 from ._arguments import one_tensor
 from .euler_top import EulerTop
 
-_ALIGNED = 1e-12  # of the trace of I: rounding leaves I n as far from n for a computed principal axis n
+_ALIGNED = 1e-12  # |I n - I_e n|/trace(I) that rounding leaves for a computed principal axis n
 _LARGEST = 1e100  # [kg m^2/s] and its inverse: the momentum's square and inverse square must be finite
 
 
@@ -174,9 +174,9 @@ class SpinInSpace:
 
 
 def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike) -> SpinInSpace:
-    """What a steady rotation's stability means for the body that one sees: its axis stays near the momentum in space.
+    """Motion in space after a disturbance of a steady rotation, whose axis stays near the momentum if it is stable.
 
-    As Pi = R^T mu, the angle in space between a body axis n and the constant mu is that in the body between n and Pi.
+    By Pi = R^T mu the angle in space between a body axis n and the constant mu is that in the body between n and Pi.
     So where Pi stays near n in the body, n stays near mu in space, and the tilt is that of the polhode's farthest
     point. The angle about mu is not stable: motions of nearly the same momentum turn at slightly different rates.
     With two equal moments a rotation across their axis is unstable in space: the momentum wanders along the circle of

@@ -116,7 +116,7 @@ class DualSpinTurn:
 
 
 def dual_spin_turn(inertia: ArrayLike, rotor_axis: ArrayLike, magnitude: float, count: int = 101) -> DualSpinTurn:
-    """How a body turns whose rotor slowly takes up all momentum, from a spin about the axis of the largest moment.
+    """Turn of a body whose rotor slowly takes up all momentum, from a spin about the axis of the largest moment.
 
     The body stays in its steady rotation of least energy, which friction favours, and ends at rest with the rotor's
     axis along the momentum.

@@ -95,7 +95,7 @@ class AndoyerVariables:
 
     @property
     def is_regular(self) -> Mask:
-        """Whether they are regular: the parts of the momentum across both third axes are above 1e-8 of G."""
+        """True where they are regular: the momentum has more than 1e-8 of G across both third axes."""
         return (self._across > _NEAREST * self.total) & (self._level > _NEAREST * self.total)
 
     @property

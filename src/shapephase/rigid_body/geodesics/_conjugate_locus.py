@@ -62,7 +62,7 @@ class ConjugateLocus:
 
     order: int
     points: ConjugatePoints
-    """Of directions (N,), ascending."""
+    """In directions (N,), ascending."""
     time_rate: Array
     """(N,) derivative of the conjugate time by the direction."""
     cusp_directions: Array

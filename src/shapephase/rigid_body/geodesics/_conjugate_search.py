@@ -126,5 +126,5 @@ def _continued(before: Array, angles: Array) -> Array:
 
 
 def _count(sums: Array, angles: Array) -> Integers:
-    """How many eigenvalues have passed 1."""
+    """Number of times that eigenvalues have passed 1."""
     return np.rint((sums - angles.sum(axis=-1)) / _TURN).astype(np.int64)

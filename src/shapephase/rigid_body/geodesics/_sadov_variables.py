@@ -12,7 +12,7 @@ I_1, from l = pi/2. Along the axis of I_3 the angle of J is undefined, along tha
 `andoyer_from_sadov` goes the other way; the side of the axis on which the momentum is has to be given.
 
 Two equal moments need no such variables: with the axis of symmetry as third, Andoyer's own variables are
-angles and actions, l, g, k and L, G, K. Of H = G²/(2 I_e) + L² (1/I_s − 1/I_e)/2 the rates are l' = L (1/I_s − 1/I_e)
+angles and actions, l, g, k and L, G, K. By H = G²/(2 I_e) + L² (1/I_s − 1/I_e)/2 the rates are l' = L (1/I_s − 1/I_e)
 and g' = G/I_e, I_s being the moment about that axis and I_e the equal ones; with three equal moments l' = 0.
 
 Source: Sadov 1970; Bonnard, Cots and Shcherbakova 2013, introduction; theory.md R15. All from the geodesics of unit
@@ -189,7 +189,7 @@ def andoyer_from_sadov(
     sn, cn, dn, _, part = elliptic.jacobi_and_pi_excess(family.constants.characteristic, u, family.complement)
     whole = elliptic.complete_pi_excess(family.constants.characteristic, family.complement)
     i1, i2, i3 = ascending_moments(metric.moments)[0]
-    # As in `_argument`, the other way.
+    # The inverse of `_argument`.
     oscillating, far = family.is_oscillating, np.sqrt(i3 - i1)
     small, large = np.sin(tilt), np.cos(tilt)
     middle = -hemisphere * small * far * sn / np.sqrt((i3 - i2) * i1 / i2)

@@ -55,7 +55,7 @@ class GeodesicConstants:
     moments: Array
     """(3,) ascending [kg m^2]."""
     p_theta: Array
-    """As given [sqrt(kg) m]."""
+    """Clairaut's constant [sqrt(kg) m]."""
     magnitude: Array
     """p = |p_theta|, but at least 1e-9 sqrt(I_1), below which nothing changes but in proportion [sqrt(kg) m]."""
     kind: Integers
@@ -83,7 +83,7 @@ class GeodesicConstants:
 
     @property
     def oscillating(self) -> Mask:
-        """Whether they return to the equator; the equator itself counts as one of them."""
+        """True where they return to the equator; the equator itself counts as one of them."""
         return self.kind >= GeodesicClass.OSCILLATING
 
 

@@ -86,7 +86,7 @@ class AxisymmetricMetric:
         return float(max(lengths[best], -found.fun))
 
     def conjugate_time(self, momentum: ArrayLike) -> Array:
-        """When a geodesic first meets a conjugate point: (..., 3) -> (...) [s].
+        """Time of a geodesic's first conjugate point: (..., 3) -> (...) [s].
 
         tau = pi for I_3 >= I_1, where the geodesics of one p_3 meet; else the root in (pi/2, pi] of
         sin tau + kappa tau cos tau with kappa = eta (1 − p_3²)/(1 + eta p_3²), where their caustic is.
@@ -100,7 +100,7 @@ class AxisymmetricMetric:
         flat = np.ravel(kappa)
 
         def step(rest: Array) -> tuple[Array, Array]:
-            """In pi − tau, of which the equation is increasing and convex."""
+            """Newton's step in pi − tau, in which the equation is increasing and convex."""
             value = rest - np.arctan(flat * (np.pi - rest))
             return value, rest - value / (1.0 + flat / (1.0 + (flat * (np.pi - rest)) ** 2))
 
@@ -109,7 +109,7 @@ class AxisymmetricMetric:
         return (np.pi - rest) * unit_time
 
     def cut_time(self, momentum: ArrayLike) -> Array:
-        """When a geodesic stops being the shortest: (..., 3) -> (...) [s].
+        """Time up to which a geodesic is the shortest: (..., 3) -> (...) [s].
 
         tau = pi or the first zero of q_0, whichever comes first.
         """

@@ -1,6 +1,6 @@
 """Distances of left-invariant metrics on SO(3), by shooting from many starts at once.
 
-Of two equal moments the shortest geodesic is known in closed form. For three different ones the distances of the next
+For two equal moments the shortest geodesic is known in closed form. For three different ones the distances of the next
 smaller and the next larger axisymmetric metric bound it, and it is searched for: momenta of all directions and several
 sizes are led to the attitude by Levenberg-Marquardt steps with the exact differential of the exponential map. The
 shortest geodesic among those that arrive is the distance, if none was missed; the search is repeated with starts that
@@ -11,7 +11,7 @@ L/sqrt(I_3) or, as a loop of the other two turns, by L²/(4 pi sqrt(I_1 I_2)). I
 along the third axis up to 2 pi/sqrt((a_1 − a_3)(a_2 − a_3)), with which such a loop closes however short it is. Starts
 and steps are scaled by these sizes: without that, short ways along stiff or forbidden directions are missed.
 
-As the largest moment I_3 goes to infinity, the square of the distance falls short of the sub-Riemannian one by the
+When the largest moment I_3 goes to infinity, the square of the distance falls short of the sub-Riemannian one by the
 integral of Pi_3² over the shortest geodesic, in a unit of time, over I_3.
 
 Sources: theory.md section 7, Q6; Podobryaev and Sachkov 2016 for the cut times.
@@ -188,7 +188,7 @@ def _searched(metric: LeftInvariantMetric, target: Array, upper: float) -> Array
             f"distance: the shortest geodesic found has the length {best[1]:.9g}, but the distance is at most "
             f"{upper:.9g}; try an attitude nearby"
         )
-    # As close as rounding lets it: of many that arrive, the shortest is one that stops a little short.
+    # To rounding: the shortest of many arrivals is one that stops a little short.
     start = best[0] / _largest_momenta(metric, best[1])
     return _arrivals(metric, start[None], target, best[1], missed=0.0)[0][0]
 
@@ -209,7 +209,7 @@ def _starts(count: int) -> Array:
 
 
 def _reach(metric: LeftInvariantMetric, length: float) -> Array:
-    """How far ways of this length can turn about each principal axis: (3,) [rad]."""
+    """Largest turns about the principal axes by ways of this length: (3,) [rad]."""
     first, middle, _ = metric.moments
     straight = length * np.sqrt(metric.inverse_moments)
     straight[2] = max(straight[2], length * length / (4.0 * np.pi * np.sqrt(first * middle)))
@@ -227,7 +227,7 @@ def _largest_momenta(metric: LeftInvariantMetric, length: float) -> Array:
 def _arrivals(
     metric: LeftInvariantMetric, starts: Array, target: Array, length: float, missed: float = _ROUNDING
 ) -> tuple[Array, Array]:
-    """Where the steps lead from every start: momenta, and the errors of their ends in parts of `_reach`.
+    """Momenta that the steps reach from every start, and the errors of their ends relative to `_reach`.
 
     Steps end where an attitude is missed by no more than `missed` [rad].
     """
@@ -267,7 +267,7 @@ def _arrivals(
 
 
 def _bent_step(start: Array, step: Array) -> Array:
-    """Where steps lead that turn about the third axis instead of going straight across: (N, 3), (N, 3) -> (N, 3).
+    """Ends of steps that turn about the third axis instead of going straight across: (N, 3), (N, 3) -> (N, 3).
 
     Loops that begin in different directions of the first two axes end almost together, so that the errors have a valley
     round a circle, along which straight steps would have to be tiny.
@@ -291,7 +291,7 @@ def _rotation_errors(inverse_moments: Array, momenta: Array, target: Array) -> A
 
 
 def _before_cut(metric: LeftInvariantMetric, momentum: Array) -> bool:
-    """Whether an arrival at t = 1 is proven to be the shortest."""
+    """True if an arrival at t = 1 is proven to be the shortest."""
     smallest, middle, largest = metric.moments
     if middle == largest:
         symmetric = axisymmetric_metric(largest, smallest)

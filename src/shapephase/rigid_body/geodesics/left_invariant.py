@@ -54,7 +54,7 @@ class LeftInvariantMetric:
 
     @property
     def is_sub_riemannian(self) -> bool:
-        """Whether a direction is forbidden."""
+        """True if a direction is forbidden."""
         return bool(self.inverse_moments[2] == 0.0)
 
     def angular_velocity(self, momentum: ArrayLike) -> Array:
@@ -130,7 +130,7 @@ class LeftInvariantMetric:
         return (self.axes @ derivative @ self.axes.T).reshape(*batch, 3, 3)
 
     def conjugate_time(self, momentum: ArrayLike, order: int = 1) -> Array:
-        """When the geodesic meets its first conjugate point, or its `order`-th: (..., 3) -> (...) [s].
+        """Time of the geodesic's first conjugate point, or of its `order`-th: (..., 3) -> (...) [s].
 
         Points where two Jacobi fields vanish count twice. Right to about 1e-13 of the time.
 

@@ -86,7 +86,7 @@ class TabulatedStretch:
 
 
 def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None) -> Assumptions:
-    """Which assumptions on the metric F_1 dx^2 + F_2 d theta^2 hold for |x| <= reach, by 257 samples.
+    """Assumptions that the metric F_1 dx^2 + F_2 d theta^2 meets for |x| <= reach, by 257 samples.
 
     (A3), on the curvature, is `SurfaceOfRevolution.is_greatest_curvature_on_equator`.
 

@@ -70,7 +70,7 @@ class GeodesicFamily:
 
     @property
     def is_oscillating(self) -> Mask:
-        """Whether they return to the equator, or stay on it: (...)."""
+        """True where they return to the equator, or stay on it: (...)."""
         return self.constants.oscillating
 
     @property
@@ -330,7 +330,7 @@ class EquatorialConjugatePoints:
 
 
 def _half_turns(amplitude: Array, cosine: Array) -> tuple[Array, Array]:
-    """Whether the number of half turns of an amplitude is odd, and this number; the cosine decides which is nearest."""
+    """1 where the number of half turns of an amplitude is odd, else 0, and this number; the cosine decides rounding."""
     odd = np.where(cosine < 0.0, 1.0, 0.0)
     return odd, 2.0 * np.rint(0.5 * (amplitude / np.pi - odd)) + odd
 

@@ -97,7 +97,7 @@ class SurfaceOfRevolution:
 
     @property
     def has_smooth_poles(self) -> bool:
-        """Whether it closes to a smooth sphere: sqrt(m) has the slope 1 at its poles, which are no tips of cones."""
+        """True if it closes to a smooth sphere: sqrt(m) has the slope 1 at its poles, which are not tips of cones."""
         if self.end != "pole":
             return False
         stretch, _, _ = self.stretch(np.ones(1), np.zeros(1))
@@ -266,7 +266,7 @@ class SurfaceOfRevolution:
         return quadrature(self.stretch, self.depth, self.end, *flat, self.splits)[3].reshape(np.shape(chi))
 
     def tameness(self) -> str:
-        """How the first return changes with p > 0: "decreasing" (tame), "increasing", "constant" or "neither".
+        """Trend of the first return with p > 0: "decreasing" (tame), "increasing", "constant" or "neither".
 
         By its derivative at 64 values of p. Tame extremals, as the paper calls them, have no conjugate point before
         they return to the equator.
@@ -282,7 +282,7 @@ class SurfaceOfRevolution:
         return bool(curvature[0] > 0.0 and (curvature[1:] < curvature[0]).all())
 
     def curvature_trend(self) -> str:
-        """How the curvature goes from the equator to the reach: "decreasing", "increasing", "constant" or "neither"."""
+        """Trend of the curvature from the equator to the reach: "decreasing", "increasing", "constant" or "neither"."""
         curvature = self.curvature_at_height(self._sampled_heights())
         if np.ptp(curvature) <= 1e-10 * np.abs(curvature).max():
             return "constant"

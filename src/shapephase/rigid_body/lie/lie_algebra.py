@@ -115,7 +115,7 @@ class LieAlgebra:
 
     @cached_property
     def is_unimodular(self) -> bool:
-        """Whether tr ad_a = 0 for every a, so that Lie-Poisson flows keep the volume of the dual."""
+        """True if tr ad_a = 0 for every a, so that Lie-Poisson flows keep the volume of the dual."""
         return bool(np.abs(np.einsum("ijj->i", self.structure)).max() <= _ROUNDING * np.abs(self.structure).max())
 
     def matrix(self, a: ArrayLike) -> Matrices:
