@@ -12,7 +12,14 @@ from ._momentum_orbit import (
 from ._nutation import Nutation, nutation
 from .euler_angles import ZXZ, ZYZ, EulerChart, canonical_bracket, precession_rate
 from .euler_top import EulerTop
-from .gyrostat import Gyrostat
+from .gyrostat import (
+    DualSpinTurn,
+    Gyrostat,
+    GyrostatEquilibrium,
+    bifurcation_rotors,
+    dual_spin_turn,
+    gyrostat_equilibria,
+)
 from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, semidirect_bracket
 from .lagrange_top import (
     LagrangeTop,
@@ -33,13 +40,6 @@ from .poinsot import Closure, Cones, Poinsot, cones
 from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
 from .pseudo_rigid import PseudoRigidBody, PseudoRigidSpin, pseudo_rigid_spin
 from .stability import SpinInSpace, SteadyRotation, spin_in_space, steady_rotation, steady_rotations
-from .steady_gyrostats import (
-    DualSpinTurn,
-    GyrostatEquilibrium,
-    bifurcation_rotors,
-    dual_spin_turn,
-    gyrostat_equilibria,
-)
 from .twisting_somersault import RotorDive, rotor_dive, rotor_dive_lasting, tilt_of_ratio
 
 __all__ = [

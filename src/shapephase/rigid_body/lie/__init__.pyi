@@ -18,12 +18,14 @@ from .cayley_klein import (
     cayley_klein_spinor,
 )
 from .dissipation import dissipated_power, double_bracket_equations, double_bracket_motion, symmetric_bracket
-from .euler_poincare import EulerPoincareMotion, euler_poincare_motion, euler_poincare_rate
-from .generalised_poinsot import (
+from .euler_poincare import (
+    EulerPoincareMotion,
     InvariableHyperplane,
     RollingContact,
     contact_conormal,
     contact_velocity,
+    euler_poincare_motion,
+    euler_poincare_rate,
     invariable_hyperplane,
     rolling_contact,
 )
