@@ -27,37 +27,30 @@ class ArcLengthBounds:
     """Upper bounds of the length of Pi's curve over an interval [kg m^2/s], ascending in sharpness.
 
     Made by `arc_length_bounds`.
-
-    Attributes
-    ----------
-    general : l times the integral of (l + |L_o|)/I_1, I_1 the least moment; without L_o it is l^2 times that of 1/I_1
-    by_drift : l times the integral of l/I_1 + |I^-1 L_o|
-    by_energy : l times the integral of l sqrt((1/I_1 - e)(e - 1/I_3)) + |I^-1 L_o|, e = 2 E/l^2 anywhere in its bounds;
-        zero for a body with three equal moments, whose momentum does not move
     """
 
     general: float
+    """l times the integral of (l + |L_o|)/I_1, I_1 the least moment; without L_o it is l^2 times that of 1/I_1."""
     by_drift: float
+    """l times the integral of l/I_1 + |I^-1 L_o|."""
     by_energy: float
+    """l times the integral of l sqrt((1/I_1 - e)(e - 1/I_3)) + |I^-1 L_o|, e = 2 E/l^2 anywhere in its bounds; zero for
+    a body with three equal moments, whose momentum does not move."""
 
     __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
 class AzimuthBounds:
-    """Bounds of the rate at which Pi circles the certified axis, on each of K cells. Made by `azimuth_bounds`.
-
-    Attributes
-    ----------
-    sense : +1 counterclockwise seen from the tip of the axis ("about axis 3"), -1 clockwise ("about axis 1")
-    slow, fast : (K,) of sense times the azimuth's rate [rad/s]; infinite where Pi may be on the axis
-    monotone : whether the azimuth is certain to change in one sense throughout
-    """
+    """Bounds of the rate at which Pi circles the certified axis, on each of K cells. Made by `azimuth_bounds`."""
 
     sense: float
+    """+1 counterclockwise seen from the tip of the axis ("about axis 3"), -1 clockwise ("about axis 1")."""
     slow: Array
     fast: Array
+    """`slow` and `fast`: (K,) of sense times the azimuth's rate [rad/s]; infinite where Pi may be on the axis."""
     monotone: bool
+    """Whether the azimuth is certain to change in one sense throughout."""
 
     __repr__ = short_repr
 
@@ -67,21 +60,18 @@ class ReturnTimeBounds:
     """Lower bounds of the time after which Pi is first back at its start [s]; 0 where nothing is certain.
 
     Made by `return_time_bounds`.
-
-    Attributes
-    ----------
-    by_latitude : 2 pi |Pi x axis|/(l^2 max 1/I_1)
-    by_inertia : 2 pi/(l max (1/I_1 - 1/I_3)), at least `by_latitude`
-    by_azimuth : when the fastest possible azimuth has gone once round, at least `by_inertia`
-    within : whether Pi can be back in the interval at all; if not, all three are at most the interval's length
-    latest : an upper bound of the time after which Pi has gone once round the axis; infinite where nothing is certain
     """
 
     by_latitude: float
+    """2 pi |Pi x axis|/(l^2 max 1/I_1)."""
     by_inertia: float
+    """2 pi/(l max (1/I_1 - 1/I_3)), at least `by_latitude`."""
     by_azimuth: float
+    """When the fastest possible azimuth has gone once round, at least `by_inertia`."""
     within: bool
+    """Whether Pi can be back in the interval at all; if not, all three are at most the interval's length."""
     latest: float
+    """An upper bound of the time after which Pi has gone once round the axis; infinite where nothing is certain."""
 
     __repr__ = short_repr
 

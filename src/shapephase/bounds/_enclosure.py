@@ -39,32 +39,30 @@ class Enclosure:
     Everything is given in the axes of `frame`, in which I^-1 is as nearly diagonal as possible, so that the radii of
     its entries are small. With D the diagonal matrix of the row sums of the radii, middle - D and middle + D bound a
     symmetric matrix as quadratic forms.
-
-    Attributes
-    ----------
-    edges : (K + 1,) ends of the cells [s]
-    frame : (3, 3) whose columns are the axes, body axes
-    start, start_radius : (3, 3) I^-1 at the start of the interval, and its radius in the spectral norm [1/(kg m^2)]
-    inverse, inverse_radius : (K, 3, 3) middle and radius of I^-1, entry by entry [1/(kg m^2)]
-    inverse_rate, inverse_rate_radius : (K, 3, 3) of its rate [1/(kg m^2 s)]
-    drift, drift_radius : (K, 3), (K,) of w, the radius in the Euclidean norm [rad/s]
-    drift_rate, drift_rate_radius : (K, 3), (K,) of its rate [rad/s^2]
-    sampling_error : (2,) the estimated error of sampling I^-1 and w, which the radii contain
     """
 
     edges: Array
+    """(K + 1,) ends of the cells [s]."""
     frame: Array
+    """(3, 3) whose columns are the axes, body axes."""
     start: Array
     start_radius: float
+    """`start` and `start_radius`: (3, 3) I^-1 at the start of the interval, and its radius in the spectral norm [1/(kg
+    m^2)]."""
     inverse: Array
     inverse_radius: Array
+    """`inverse` and `inverse_radius`: (K, 3, 3) middle and radius of I^-1, entry by entry [1/(kg m^2)]."""
     inverse_rate: Array
     inverse_rate_radius: Array
+    """`inverse_rate` and `inverse_rate_radius`: (K, 3, 3) of its rate [1/(kg m^2 s)]."""
     drift: Array
     drift_radius: Array
+    """`drift` and `drift_radius`: (K, 3), (K,) of w, the radius in the Euclidean norm [rad/s]."""
     drift_rate: Array
     drift_rate_radius: Array
+    """`drift_rate` and `drift_rate_radius`: (K, 3), (K,) of its rate [rad/s^2]."""
     sampling_error: Array
+    """(2,) the estimated error of sampling I^-1 and w, which the radii contain."""
 
     __repr__ = short_repr
 

@@ -33,23 +33,20 @@ class EnergyBounds:
     """Bounds of E_t along every solution from one initial momentum, on each of K cells of time.
 
     Made by `energy_bounds`.
-
-    Attributes
-    ----------
-    enclosure : bounds of the deformation
-    magnitude : l, the momentum's norm [kg m^2/s]
-    initial : (2,) bounds of E at the start of the interval, apart by rounding and the error of sampling [J]
-    lower, upper : (K,) of E on each cell [J]
-    rate_lower, rate_upper : (K,) of dE/dt [W]
     """
 
     enclosure: Enclosure
+    """Bounds of the deformation."""
     magnitude: float
+    """l, the momentum's norm [kg m^2/s]."""
     initial: Array
+    """(2,) bounds of E at the start of the interval, apart by rounding and the error of sampling [J]."""
     lower: Array
     upper: Array
+    """`lower` and `upper`: (K,) of E on each cell [J]."""
     rate_lower: Array
     rate_upper: Array
+    """`rate_lower` and `rate_upper`: (K,) of dE/dt [W]."""
 
     __repr__ = short_repr
 

@@ -26,20 +26,16 @@ from .regimes import CrownRegion, RegimeCertificate, regime_certificate
 
 @dataclass(frozen=True)
 class Bound:
-    """Bound of a quantity of a motion, and the quantity itself. Made by `bounds`.
-
-    Attributes
-    ----------
-    name : quantity and the bound's name
-    is_upper : whether the value is at most the bound; else it is at least the bound
-    limit : the bound
-    value : of the motion
-    """
+    """Bound of a quantity of a motion, and the quantity itself. Made by `bounds`."""
 
     name: str
+    """Quantity and the bound's name."""
     is_upper: bool
+    """Whether the value is at most the bound; else it is at least the bound."""
     limit: float
+    """The bound."""
     value: float
+    """Value of the motion."""
 
     __repr__ = short_repr
 

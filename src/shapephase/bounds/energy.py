@@ -27,16 +27,12 @@ from ..rigid_body.euler_top import EulerTop
 
 @dataclass(frozen=True, eq=False)
 class EnergyRate:
-    """The two parts of dE_t/dt; fields are batch + t.shape [W]. Made by `energy_rate`.
-
-    Attributes
-    ----------
-    by_inertia : Pi.(I^-1)' Pi/2, the whole rate if there is no internal momentum
-    by_internal_momentum : (Pi x I^-1 Pi).I^-1 L_o
-    """
+    """The two parts of dE_t/dt; fields are batch + t.shape [W]. Made by `energy_rate`."""
 
     by_inertia: Array
+    """Pi.(I^-1)' Pi/2, the whole rate if there is no internal momentum."""
     by_internal_momentum: Array
+    """(Pi x I^-1 Pi).I^-1 L_o."""
 
     __repr__ = short_repr
 
@@ -48,23 +44,19 @@ class EnergyRate:
 
 @dataclass(frozen=True, eq=False)
 class FrozenPolhode:
-    """Polhode of Pi if the body stayed rigid from one time on. Made by `frozen_polhode`.
-
-    Attributes
-    ----------
-    points : (N, 3) of the curve from Pi once round and back to it [kg m^2/s]; on the separatrix it is not closed, but
-        the half circle through Pi between the two directions of the intermediate axis
-    energy : E_t on it [J]
-    homoclinic_energy : E_t of the separatrix [J]
-    period : of the rigid body's Pi [s]; infinite on the separatrix and at an equilibrium
-    regime : as `EulerTop.regime`
-    """
+    """Polhode of Pi if the body stayed rigid from one time on. Made by `frozen_polhode`."""
 
     points: Array
+    """(N, 3) of the curve from Pi once round and back to it [kg m^2/s]; on the separatrix it is not closed, but the
+    half circle through Pi between the two directions of the intermediate axis."""
     energy: float
+    """E_t on it [J]."""
     homoclinic_energy: float
+    """E_t of the separatrix [J]."""
     period: float
+    """Period of the rigid body's Pi [s]; infinite on the separatrix and at an equilibrium."""
     regime: str
+    """One of those of `EulerTop.regime`."""
 
     __repr__ = short_repr
 

@@ -29,15 +29,6 @@ class KeplerOrbit:
 
     A small body turns as if it were free: its base origin is at `orbit.position(t) + motion.base_position(t)`.
 
-    Attributes
-    ----------
-    gm : gravity of the other body, G M [m^3/s^2]
-    pericentre : least distance from the other body [m]
-    eccentricity : below 1 an ellipse, above 1 a hyperbola
-    axes : (3, 3) inertial axes; columns to the pericentre, across it along the motion, and the orbit's normal
-    mean_anomaly : at t = 0 [rad]; of a hyperbola e sinh(H) - H
-    centre : (3,) where the other body is [m]
-
     Examples
     --------
     >>> orbit = sp.bounds.KeplerOrbit.from_state([7.0e6, 0.0, 0.0], [0.0, 7546.05, 0.0], gm=3.986e14)
@@ -46,11 +37,17 @@ class KeplerOrbit:
     """
 
     gm: float
+    """Gravity of the other body, G M [m^3/s^2]."""
     pericentre: float
+    """Least distance from the other body [m]."""
     eccentricity: float
+    """Below 1 an ellipse, above 1 a hyperbola."""
     axes: Array
+    """(3, 3) inertial axes; columns to the pericentre, across it along the motion, and the orbit's normal."""
     mean_anomaly: float
+    """At t = 0 [rad]; of a hyperbola e sinh(H) - H."""
     centre: Array
+    """(3,) where the other body is [m]."""
 
     __repr__ = short_repr
 
@@ -180,20 +177,16 @@ class KeplerOrbit:
 
 @dataclass(frozen=True)
 class GravityTorque:
-    """Effect of the neglected gravity-gradient torque on a motion, to first order. Made by `gravity_torque_estimate`.
-
-    Attributes
-    ----------
-    largest_torque : [N m]
-    impulse : the largest change of the angular momentum [kg m^2/s]
-    attitude_error : the largest rotation away from the free motion [rad]
-    tolerance : the rotation that is allowed [rad]
-    """
+    """First-order effect of the neglected gravity-gradient torque on a motion. Made by `gravity_torque_estimate`."""
 
     largest_torque: float
+    """[N m]."""
     impulse: float
+    """The largest change of the angular momentum [kg m^2/s]."""
     attitude_error: float
+    """The largest rotation away from the free motion [rad]."""
     tolerance: float
+    """The rotation that is allowed [rad]."""
 
     __repr__ = short_repr
 

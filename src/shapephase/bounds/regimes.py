@@ -41,33 +41,29 @@ class Regime(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class RegimeCertificate:
-    """Axis that Pi circles over an interval, if certain before the motion is computed. Made by `regime_certificate`.
-
-    Attributes
-    ----------
-    regime : "about axis 1" (of the smallest moment), "about axis 3" (of the largest), or "may cross"
-    axis : (3,) unit vector, body axes: Pi . axis > 0 throughout; for "may cross" the one nearest to being certain
-    margin : the least distance of E_t above the greatest energy (below the least energy) possible on the plane across
-        the axis; negative where the regime is not certain [J]
-    energy : (2,) bounds of E_t over the interval [J]
-    threshold : (2,) bounds of the homoclinic energy l^2/(2 I_2(t)) over the interval [J]
-    interval : (start, end) [s]
-    start : (3,) Pi/l at the start of the interval, zero without momentum
-    bounds : of the energy, cell by cell
-    plane : (K,) on each cell the energy that Pi would need to cross the plane [J]
-    why : the reason, as a sentence
-    """
+    """Axis that Pi circles over an interval, if certain before the motion is computed. Made by `regime_certificate`."""
 
     regime: Regime
+    """ "about axis 1" (of the smallest moment), "about axis 3" (of the largest), or "may cross"."""
     axis: Array
+    """(3,) unit vector, body axes: Pi . axis > 0 throughout; for "may cross" the one nearest to being certain."""
     margin: float
+    """The least distance of E_t above the greatest energy (below the least energy) possible on the plane across the
+    axis; negative where the regime is not certain [J]."""
     energy: tuple[float, float]
+    """(2,) bounds of E_t over the interval [J]."""
     threshold: tuple[float, float]
+    """(2,) bounds of the homoclinic energy l^2/(2 I_2(t)) over the interval [J]."""
     interval: tuple[float, float]
+    """(start, end) [s]."""
     start: Array
+    """(3,) Pi/l at the start of the interval, zero without momentum."""
     bounds: EnergyBounds
+    """Bounds of the energy, cell by cell."""
     plane: Array
+    """(K,) on each cell the energy that Pi would need to cross the plane [J]."""
     why: str
+    """The reason, as a sentence."""
 
     __repr__ = short_repr
 
@@ -101,13 +97,10 @@ class CrownRegion:
     The union over time of the level sets of E_t between its bounds at that time; where the regime is certain, only the
     part on the side of the axis. The region R of the paper is wider: it takes the bounds over the whole interval at
     every time, and the connected component of the start (`contains_as_printed`).
-
-    Attributes
-    ----------
-    certificate : where the bounds come from
     """
 
     certificate: RegimeCertificate
+    """Where the bounds come from."""
 
     __repr__ = short_repr
 

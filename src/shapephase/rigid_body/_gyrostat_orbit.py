@@ -34,28 +34,24 @@ _METRIC = np.diag([1.0, 1.0, 1.0, -1.0])
 
 @dataclass(frozen=True, eq=False)
 class GyrostatOrbit:
-    """The closed curve of x, principal axes.
-
-    Attributes
-    ----------
-    points : (3, 4) P, T and P1
-    vertex : (4,) V
-    along : k, that is q'/k is the part along V
-    leading : c of q'^2 = c q (q - r)(q - s) [1/s^2]
-    roots : r and s, real and not positive, or conjugate
-    rate : of the argument u of the elliptic functions [1/s]
-    complement : m1 = 1 - k^2 of these
-    phase : u at t = 0
-    """
+    """The closed curve of x, principal axes."""
 
     points: Array
+    """(3, 4) P, T and P1."""
     vertex: Array
+    """(4,) V."""
     along: float
+    """k, that is q'/k is the part along V."""
     leading: float
+    """c of q'^2 = c q (q - r)(q - s) [1/s^2]."""
     roots: tuple[complex, complex]
+    """r and s, real and not positive, or conjugate."""
     rate: float
+    """Rate of the argument u of the elliptic functions [1/s]."""
     complement: float
+    """m1 = 1 - k^2 of these."""
     phase: float
+    """u at t = 0."""
 
     __post_init__ = lock_arrays
 
@@ -107,20 +103,17 @@ class Swing:
     """The angle psi about the momentum, a quotient of linear forms of X integrated along the orbit.
 
     psi = drift t + sum of weights_i times the integral of 1/(q - poles_i) + an inverse tangent.
-
-    Attributes
-    ----------
-    orbit : the curve
-    drift : [rad/s]
-    weights, poles : (2,) complex, of the integrals of the third kind
-    odd : factor of the inverse tangent [rad]
     """
 
     orbit: GyrostatOrbit
+    """The curve."""
     drift: float
+    """[rad/s]."""
     weights: Array
     poles: Array
+    """`weights` and `poles`: (2,) complex, of the integrals of the third kind."""
     odd: complex
+    """Factor of the inverse tangent [rad]."""
 
     __post_init__ = lock_arrays
 

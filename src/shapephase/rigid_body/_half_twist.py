@@ -24,25 +24,20 @@ from ._momentum_orbit import momentum_orbit
 
 @dataclass(frozen=True)
 class HalfTwist:
-    """Times at which a free rigid body turns over about its intermediate axis. Made by `half_twist`.
-
-    Attributes
-    ----------
-    time : (...) from one reversal of the intermediate component of Pi to the next, half the period 4K/rate; infinite
-        where it never reverses (steady rotations, the separatrix, a spherical body) [s]
-    asymptote : (...) log(16/complement)/growth_rate, which `time` approaches at the separatrix; infinite on it and
-        where two moments are equal [s]
-    complement : (...) m1 = 1 - k^2, 0 on the separatrix
-    rate : (...) argument of the elliptic functions per second; 0 where Pi stands still [rad/s]
-    growth_rate : (...) the positive eigenvalue at the intermediate axis,
-        |Pi| sqrt((I2 - I1)(I3 - I2)/(I1 I3))/I2 [1/s]
-    """
+    """Times at which a free rigid body turns over about its intermediate axis. Made by `half_twist`."""
 
     time: Array
+    """(...) from one reversal of the intermediate component of Pi to the next, half the period 4K/rate; infinite where
+    it never reverses (steady rotations, the separatrix, a spherical body) [s]."""
     asymptote: Array
+    """(...) log(16/complement)/growth_rate, which `time` approaches at the separatrix; infinite on it and where two
+    moments are equal [s]."""
     complement: Array
+    """(...) m1 = 1 - k^2, 0 on the separatrix."""
     rate: Array
+    """(...) argument of the elliptic functions per second; 0 where Pi stands still [rad/s]."""
     growth_rate: Array
+    """(...) the positive eigenvalue at the intermediate axis, |Pi| sqrt((I2 - I1)(I3 - I2)/(I1 I3))/I2 [1/s]."""
 
     __repr__ = short_repr
 

@@ -31,45 +31,42 @@ from ._arguments import axis_index
 
 @dataclass(frozen=True, eq=False)
 class MomentumOrbit:
-    """Motion of Pi in the principal axes of a free rigid body. Made by `momentum_orbit`.
-
-    Attributes
-    ----------
-    moments : (3,) ascending [kg m^2]
-    start : (3,) Pi at t = 0 [kg m^2/s]
-    magnitude : |Pi| [kg m^2/s]
-    regime : "rest", "spherical", "steady", "axisymmetric", "circling" or "separatrix"
-    circled, other : the indices k and a, 0 and 2 or 2 and 0; both -1 where Pi stands still and circles nothing
-    direction : (3,) ê, the unit vector along the axis circled, on Pi's side; Pi's own where it circles nothing
-    amplitudes : (3,) signed, of Pi/|Pi|
-    rate : of u [rad/s]; 0 where Pi circles nothing
-    complement : m1
-    phase : u0
-    characteristic : n <= 0 of the integral of the third kind in the azimuth and the attitude; of the moments only
-    spin : L/I_2, the steady part of the turn about Pi [rad/s]
-    excess : 2 E/L − L/I_2, by which the turn about Pi differs from it [rad/s]; 0 on the separatrix
-    precession : (L/I_a − L/I_k)/rate
-    sense : +1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still
-    condition : factor that magnifies a small change of inertia or momentum, see `EulerTop.condition`
-    """
+    """Motion of Pi in the principal axes of a free rigid body. Made by `momentum_orbit`."""
 
     moments: Array
+    """(3,) ascending [kg m^2]."""
     start: Array
+    """(3,) Pi at t = 0 [kg m^2/s]."""
     magnitude: float
+    """|Pi| [kg m^2/s]."""
     regime: str
+    """ "rest", "spherical", "steady", "axisymmetric", "circling" or "separatrix"."""
     circled: int
     other: int
+    """`circled` and `other`: the indices k and a, 0 and 2 or 2 and 0; both -1 where Pi stands still and circles
+    nothing."""
     direction: Array
+    """(3,) ê, the unit vector along the axis circled, on Pi's side; Pi's own where it circles nothing."""
     amplitudes: Array
+    """(3,) signed, of Pi/|Pi|."""
     rate: float
+    """Rate of u [rad/s]; 0 where Pi circles nothing."""
     complement: float
+    """m1."""
     phase: float
+    """u0."""
     characteristic: float
+    """n <= 0 of the integral of the third kind in the azimuth and the attitude, by the moments only."""
     spin: float
+    """L/I_2, the steady part of the turn about Pi [rad/s]."""
     excess: float
+    """2 E/L − L/I_2, by which the turn about Pi differs from it [rad/s]; 0 on the separatrix."""
     precession: float
+    """(L/I_a − L/I_k)/rate."""
     sense: float
+    """+1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still."""
     condition: float
+    """Factor that magnifies a small change of inertia or momentum, see `EulerTop.condition`."""
 
     __repr__ = short_repr
 
@@ -189,22 +186,18 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class WeierstrassForm:
-    """Squares of a free rigid body's momentum by Weierstrass's function. Made by `weierstrass_form`.
-
-    Attributes
-    ----------
-    moments : (3,) principal, by body axis [kg m^2]
-    roots : (3,) e_1, e_2, e_3 by body axis, of sum zero; the least belongs to the middle moment [1/s^2]
-    invariants : g_2 [1/s^4] and g_3 [1/s^6] of y'^2 = 4 y^3 - g_2 y - g_3
-    half_periods : omega, and the size of the imaginary one, omega' = i times it [s]; Pi_i^2 has the period 2 omega
-    shift : t_0, real part of the constant in y = P(t + t_0 + omega') [s]
-    """
+    """Squares of a free rigid body's momentum by Weierstrass's function. Made by `weierstrass_form`."""
 
     moments: Array
+    """(3,) principal, by body axis [kg m^2]."""
     roots: Array
+    """(3,) e_1, e_2, e_3 by body axis, of sum zero; the least belongs to the middle moment [1/s^2]."""
     invariants: tuple[float, float]
+    """g_2 [1/s^4] and g_3 [1/s^6] of y'^2 = 4 y^3 - g_2 y - g_3."""
     half_periods: tuple[float, float]
+    """omega, and the size of the imaginary one, omega' = i times it [s]; Pi_i^2 has the period 2 omega."""
     shift: float
+    """t_0, real part of the constant in y = P(t + t_0 + omega') [s]."""
     _orbit: MomentumOrbit
 
     __repr__ = short_repr

@@ -27,23 +27,19 @@ from .lagrange_top import LagrangeTop
 
 @dataclass(frozen=True)
 class Nutation:
-    """Rise and fall of a Lagrange top's axis. Made by `nutation`.
-
-    Attributes
-    ----------
-    lowest, highest : the range of cos(theta)
-    third_root : the root of the cubic above this range, >= 1
-    rate : argument of the elliptic functions per second [rad/s]
-    complement : m1 = 1 - k^2
-    period : 2K/rate; infinite where the axis only approaches the vertical [s]
-    """
+    """Rise and fall of a Lagrange top's axis. Made by `nutation`."""
 
     lowest: float
     highest: float
+    """`lowest` and `highest`: the range of cos(theta)."""
     third_root: float
+    """The root of the cubic above this range, >= 1."""
     rate: float
+    """Argument of the elliptic functions per second [rad/s]."""
     complement: float
+    """m1 = 1 - k^2."""
     period: float
+    """2K/rate; infinite where the axis only approaches the vertical [s]."""
     _phase: float = field(repr=False)
     _turns: tuple[float, float] = field(repr=False)
     _rooms: tuple[float, float] = field(repr=False)

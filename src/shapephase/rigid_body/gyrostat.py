@@ -216,22 +216,18 @@ _ROUNDING = 4.0 * float(
 
 @dataclass(frozen=True, eq=False)
 class GyrostatEquilibrium:
-    """Steady rotation of a gyrostat about its momentum. Made by `gyrostat_equilibria`.
-
-    Attributes
-    ----------
-    direction : (3,) of the momentum, body axes
-    rate : of the body about it, negative where it turns backward [rad/s]
-    energy : omega.I omega/2 [J]
-    stability : "least energy", "most energy" or "saddle"; only the first withstands friction
-    frequency : of small oscillations about a stable one, or the rate of growth from a saddle [rad/s]
-    """
+    """Steady rotation of a gyrostat about its momentum. Made by `gyrostat_equilibria`."""
 
     direction: Array
+    """(3,) of the momentum, body axes."""
     rate: float
+    """Rate of the body about it, negative where it turns backward [rad/s]."""
     energy: float
+    """omega.I omega/2 [J]."""
     stability: str
+    """ "least energy", "most energy" or "saddle"; only the first withstands friction."""
     frequency: float
+    """Frequency of small oscillations about a stable one, or rate of growth from a saddle [rad/s]."""
 
     __post_init__ = lock_arrays
     __repr__ = short_repr
@@ -291,18 +287,14 @@ def bifurcation_rotors(inertia: ArrayLike, rotor_axis: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class DualSpinTurn:
-    """Turn of a body whose rotor slowly takes up all momentum. Made by `dual_spin_turn`.
-
-    Attributes
-    ----------
-    rotor : (N,) momentum of the rotor, from 0 to all of it [kg m^2/s]
-    direction : (N, 3) of the momentum in the body, from the axis of the largest moment to that of the rotor
-    rate : (N,) of the body about it [rad/s]
-    """
+    """Turn of a body whose rotor slowly takes up all momentum. Made by `dual_spin_turn`."""
 
     rotor: Array
+    """(N,) momentum of the rotor, from 0 to all of it [kg m^2/s]."""
     direction: Array
+    """(N, 3) of the momentum in the body, from the axis of the largest moment to that of the rotor."""
     rate: Array
+    """(N,) of the body about it [rad/s]."""
 
     __post_init__ = lock_arrays
     __repr__ = short_repr

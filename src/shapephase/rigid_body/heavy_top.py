@@ -194,22 +194,19 @@ class HeavyTopMotion:
     """Motion of a heavy top on [0, duration].
 
     Times (...) give results of shape batch + time + item. Made by `HeavyTop.motion`.
-
-    Attributes
-    ----------
-    top : the `HeavyTop`
-    duration : [s]
-    vertical_momentum : (...) Pi.Gamma, constant [kg m^2/s]
-    error_estimate : (...) of the attitude over the whole motion, a tenth of the largest difference from a run with 32
-        times the local tolerance [rad]
-    energy_drift : (...) largest |H(t) - H(0)| at the ends of the steps [J]
     """
 
     top: HeavyTop
+    """The `HeavyTop`."""
     duration: float
+    """[s]."""
     vertical_momentum: Array
+    """(...) Pi.Gamma, constant [kg m^2/s]."""
     error_estimate: Array
+    """(...) of the attitude over the whole motion, a tenth of the largest difference from a run with 32 times the local
+    tolerance [rad]."""
     energy_drift: Array
+    """(...) largest |H(t) - H(0)| at the ends of the steps [J]."""
     _run: _Run = field(repr=False)
 
     __repr__ = short_repr

@@ -64,35 +64,32 @@ class SleepingTop:
     """Upright spin of a Lagrange top and its stability by two methods. Made by `sleeping_top`.
 
     The conserved quantity is H + Phi(Pi.Gamma, |Gamma|^2) + phi(Pi_3); dots are derivatives by Pi.Gamma.
-
-    Attributes
-    ----------
-    momentum : p = Pi_3 [kg m^2/s]
-    phi_dot, phi_prime, axial_slope : Phi_dot, Phi' and phi'(p) that make the first variation vanish
-    first_variation : (6,) gradient of the conserved quantity by (Pi, Gamma) at the equilibrium; zero
-    second_variation : (6, 6) its second derivative there, with phi'' = Phi_dot_dot = Phi_dot' = 0 and Phi'' large
-    minors : (6,) its leading principal minors: all positive if the energy-Casimir method proves stability
-    quadratic : (3,) coefficients, highest first, of the e-quadratic that decides (see `e_quadratic`)
-    eigenvalues : (4,) complex spectrum of the linearised equations on the tangent space of the coadjoint orbit [1/s]
-    energy_casimir : whether the second variation is definite (stable in the sense of Liapunov)
-    spectrally_stable : whether no eigenvalue has a positive real part
-    verdict : "stable" or "unstable". Where p^2 = 4 Mgl I1 > 0 neither method decides, but `upright_potential` does: it
-        has a strict minimum there, and the spin is stable. "marginal" where p and Mgl both vanish: a top at rest
-        without weight, which any momentum carries away
     """
 
     momentum: float
+    """p = Pi_3 [kg m^2/s]."""
     phi_dot: float
     phi_prime: float
     axial_slope: float
+    """`phi_dot`, `phi_prime` and `axial_slope`: Phi_dot, Phi' and phi'(p) that make the first variation vanish."""
     first_variation: Array
+    """(6,) gradient of the conserved quantity by (Pi, Gamma) at the equilibrium; zero."""
     second_variation: Array
+    """(6, 6) its second derivative there, with phi'' = Phi_dot_dot = Phi_dot' = 0 and Phi'' large."""
     minors: Array
+    """(6,) its leading principal minors: all positive if the energy-Casimir method proves stability."""
     quadratic: Array
+    """(3,) coefficients, highest first, of the e-quadratic that decides (see `e_quadratic`)."""
     eigenvalues: np.ndarray
+    """(4,) complex spectrum of the linearised equations on the tangent space of the coadjoint orbit [1/s]."""
     energy_casimir: bool
+    """Whether the second variation is definite (stable in the sense of Liapunov)."""
     spectrally_stable: bool
+    """Whether no eigenvalue has a positive real part."""
     verdict: str
+    """ "stable" or "unstable". Where p^2 = 4 Mgl I1 > 0 neither method decides, but `upright_potential` does: it has a
+    strict minimum there, and the spin is stable. "marginal" where p and Mgl both vanish: a top at rest without weight,
+    which any momentum carries away."""
 
     __repr__ = short_repr
 
@@ -102,21 +99,18 @@ class StabilityChart:
     """Stability of the upright spin over the ratio of moments and the spin, by three methods.
 
     Made by `stability_chart`.
-
-    Attributes
-    ----------
-    axial_ratios : (R,) I3/I1
-    momenta : (P,) Pi_3 in units of sqrt(Mgl I1); the threshold is 2
-    energy_casimir, spectrum, simulation : (R, P) True where the method finds the spin stable
-    largest_tilt : (R, P) of the simulated motions [rad]
     """
 
     axial_ratios: Array
+    """(R,) I3/I1."""
     momenta: Array
+    """(P,) Pi_3 in units of sqrt(Mgl I1); the threshold is 2."""
     energy_casimir: Mask
     spectrum: Mask
     simulation: Mask
+    """`energy_casimir`, `spectrum` and `simulation`: (R, P) True where the method finds the spin stable."""
     largest_tilt: Array
+    """(R, P) of the simulated motions [rad]."""
 
     __repr__ = short_repr
 

@@ -33,17 +33,14 @@ class Closure:
     """Turns and lobes after which a herpolhode closes.
 
     A circle has no lobes and closes in one turn, a point has neither. Made by `Poinsot.closure`.
-
-    Attributes
-    ----------
-    turns : about mu
-    lobes : waves between the two circles that the herpolhode touches
-    gap : angle between its start and its end [rad]
     """
 
     turns: int
+    """About mu."""
     lobes: int
+    """Waves between the two circles that the herpolhode touches."""
     gap: float
+    """Angle between its start and its end [rad]."""
 
     __repr__ = short_repr
 
@@ -53,21 +50,18 @@ class Cones:
     """Body cone and space cone of an axisymmetric body; the first rolls on the second, both apices in the centre.
 
     Made by `cones`.
-
-    Attributes
-    ----------
-    body_half_angle : of the body cone, about the axis of symmetry on the side of the momentum [rad]
-    space_half_angle : of the space cone, about the momentum [rad]
-    space_inside_body : the space cone lies inside the body cone (oblate), or the two touch from outside (prolate)
-    precession_rate : of the axis of symmetry about the momentum, |mu| / I1 [rad/s]
-    spin_rate : lambda, of the momentum about the axis of symmetry seen in the body [rad/s]; > 0 oblate, < 0 prolate
     """
 
     body_half_angle: float
+    """Half angle of the body cone, about the axis of symmetry on the side of the momentum [rad]."""
     space_half_angle: float
+    """Half angle of the space cone, about the momentum [rad]."""
     space_inside_body: bool
+    """The space cone lies inside the body cone (oblate), or the two touch from outside (prolate)."""
     precession_rate: float
+    """Rate of the axis of symmetry about the momentum, |mu| / I1 [rad/s]."""
     spin_rate: float
+    """lambda, of the momentum about the axis of symmetry seen in the body [rad/s]; > 0 oblate, < 0 prolate."""
 
     __repr__ = short_repr
 

@@ -20,18 +20,14 @@ from ..letters import what_came
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Steady rotation as a point on the momentum sphere, on a principal axis. Made by `equilibria`.
-
-    Attributes
-    ----------
-    direction : (3,) unit vector
-    kind : "centre" (extreme moment), "saddle" (middle moment), "degenerate" (one of a circle or sphere of equilibria)
-    rate : angular frequency about a centre, rate of growth at a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]
-    """
+    """Steady rotation as a point on the momentum sphere, on a principal axis. Made by `equilibria`."""
 
     direction: Array
+    """(3,) unit vector."""
     kind: str
+    """ "centre" (extreme moment), "saddle" (middle moment), "degenerate" (one of a circle or sphere of equilibria)."""
     rate: float
+    """Angular frequency about a centre, rate of growth at a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]."""
 
     __repr__ = short_repr
 

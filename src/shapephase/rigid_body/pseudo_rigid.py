@@ -99,31 +99,27 @@ class PseudoRigidBody:
 
 @dataclass(frozen=True, eq=False)
 class PseudoRigidSpin:
-    """Steady spin of a pseudo-rigid body. Made by `pseudo_rigid_spin`.
-
-    Attributes
-    ----------
-    body : the `PseudoRigidBody`
-    axis : 0, 1 or 2
-    momentum : along the axis [kg m^2/s]
-    rate : Omega [rad/s]
-    stretches : (3,) q
-    curvatures : (8,) second derivatives of the amended potential V + mu.I(Q)^-1 mu/2, ascending, across the turn about
-        the momentum, to which it is indifferent [J]
-    eigenvalues : (18,) complex, of the linearised motion in the turning frame [1/s]
-    verdict : "stable" where all curvatures are positive (energy-momentum method: in the sense of Liapunov, up to the
-        turn about the momentum); "unstable" where an eigenvalue has a positive real part; else "spectrally stable", as
-        about the axis of the smallest moment, where friction would decide otherwise
-    """
+    """Steady spin of a pseudo-rigid body. Made by `pseudo_rigid_spin`."""
 
     body: PseudoRigidBody
+    """The `PseudoRigidBody`."""
     axis: int
+    """0, 1 or 2."""
     momentum: float
+    """Along the axis [kg m^2/s]."""
     rate: float
+    """Omega [rad/s]."""
     stretches: Array
+    """(3,) q."""
     curvatures: Array
+    """(8,) second derivatives of the amended potential V + mu.I(Q)^-1 mu/2, ascending, across the turn about the
+    momentum, to which it is indifferent [J]."""
     eigenvalues: np.ndarray
+    """(18,) complex, of the linearised motion in the turning frame [1/s]."""
     verdict: str
+    """ "stable" where all curvatures are positive (energy-momentum method: in the sense of Liapunov, up to the turn
+    about the momentum); "unstable" where an eigenvalue has a positive real part; else "spectrally stable", as about the
+    axis of the smallest moment, where friction would decide otherwise."""
 
     __repr__ = short_repr
 

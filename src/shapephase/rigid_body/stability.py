@@ -32,37 +32,35 @@ class SteadyRotation:
     """Steady rotation of a free rigid body, and its stability by three methods. Made by `steady_rotation`.
 
     A spherical body is "stable" everywhere: every momentum stands still.
-
-    Attributes
-    ----------
-    momentum : (3,) the equilibrium Pi_e, body axes [kg m^2/s]
-    moment : I_e, the moment of inertia about it [kg m^2]
-    slope, curvature : Phi' and Phi'' at |Pi_e|^2/2 of the Casimir Phi that is added to the energy, see `casimir`
-    first_variation : (3,) gradient of H + Phi at Pi_e, Omega + Phi' Pi; zero by the choice of the slope [rad/s]
-    second_variation : (3, 3) second derivative of H + Phi at Pi_e, body axes [1/(kg m^2)]
-    definiteness : "positive definite", "negative definite", "indefinite" or "semidefinite" (equal moments)
-    linearisation : (3, 3) A in dPi' = A dPi, Euler's equations linearised at Pi_e, body axes [1/s]
-    tangent : (3, 2) columns: the principal axes at right angles to Pi_e, right-handed with it
-    eigenvalues : (2,) complex, plus and minus, of the linearisation on the tangent plane of the sphere [1/s]
-    sphere_hessian : (2, 2) second derivative of H restricted to the momentum sphere, in the basis `tangent`
-    index : number of negative directions of `sphere_hessian`
-    verdict : "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (where this moment equals
-        exactly one of the others: a neighbouring motion drifts along the circle of equilibria and stays near it)
     """
 
     momentum: Array
+    """(3,) the equilibrium Pi_e, body axes [kg m^2/s]."""
     moment: float
+    """I_e, the moment of inertia about it [kg m^2]."""
     slope: float
     curvature: float
+    """`slope` and `curvature`: Phi' and Phi'' at |Pi_e|^2/2 of the Casimir Phi that is added to the energy, see
+    `casimir`."""
     first_variation: Array
+    """(3,) gradient of H + Phi at Pi_e, Omega + Phi' Pi; zero by the choice of the slope [rad/s]."""
     second_variation: Array
+    """(3, 3) second derivative of H + Phi at Pi_e, body axes [1/(kg m^2)]."""
     definiteness: str
+    """ "positive definite", "negative definite", "indefinite" or "semidefinite" (equal moments)."""
     linearisation: Array
+    """(3, 3) A in dPi' = A dPi, Euler's equations linearised at Pi_e, body axes [1/s]."""
     tangent: Array
+    """(3, 2) columns: the principal axes at right angles to Pi_e, right-handed with it."""
     eigenvalues: np.ndarray
+    """(2,) complex, plus and minus, of the linearisation on the tangent plane of the sphere [1/s]."""
     sphere_hessian: Array
+    """(2, 2) second derivative of H restricted to the momentum sphere, in the basis `tangent`."""
     index: int
+    """Number of negative directions of `sphere_hessian`."""
     verdict: str
+    """ "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (where this moment equals exactly
+    one of the others: a neighbouring motion drifts along the circle of equilibria and stays near it)."""
 
     __repr__ = short_repr
 
@@ -150,25 +148,21 @@ def steady_rotations(
 
 @dataclass(frozen=True)
 class SpinInSpace:
-    """Motion in space of a body disturbed in a steady rotation, for all time. Made by `spin_in_space`.
-
-    Attributes
-    ----------
-    steady : the steady rotation that was disturbed
-    momentum : (3,) the disturbed Pi, body axes [kg m^2/s]
-    tilt : the greatest angle ever between the axis of the steady rotation and the angular momentum, which is constant
-        in space [rad]; on a separatrix the limit that is never quite reached
-    drift : how much faster than in the steady rotation the body turns about the momentum, on average [rad/s]; NaN where
-        Pi does not circle the axis
-    verdict : "stable up to the turn about the momentum": the tilt is as small as one likes for small disturbances,
-        while the angle about the momentum drifts; or "unstable"
-    """
+    """Motion in space of a body disturbed in a steady rotation, for all time. Made by `spin_in_space`."""
 
     steady: SteadyRotation
+    """The steady rotation that was disturbed."""
     momentum: Array
+    """(3,) the disturbed Pi, body axes [kg m^2/s]."""
     tilt: float
+    """The greatest angle ever between the axis of the steady rotation and the angular momentum, which is constant in
+    space [rad]; on a separatrix the limit that is never quite reached."""
     drift: float
+    """How much faster than in the steady rotation the body turns about the momentum, on average [rad/s]; NaN where Pi
+    does not circle the axis."""
     verdict: str
+    """ "stable up to the turn about the momentum": the tilt is as small as one likes for small disturbances, while the
+    angle about the momentum drifts; or "unstable"."""
 
     __repr__ = short_repr
 

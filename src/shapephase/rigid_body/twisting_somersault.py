@@ -44,27 +44,23 @@ _FORWARD, _ACROSS, _ = np.eye(3)  # x, about which the rotor turns; y, about whi
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RotorDive:
-    """Dive of five stages. Made by `rotor_dive`.
-
-    Attributes
-    ----------
-    moments : (3,) about x, y and z, without what the rotor turns [kg m^2]
-    momentum : l, about +y in inertial axes [kg m^2/s]
-    rotor : h, about x, in the second stage [kg m^2/s]
-    somersaults, twists : m and n
-    times : (6,) at which the stages begin and the dive ends [s]
-    turns : (5,) angles of the long axis about the momentum in each stage [rad], of sum 2 pi m
-    tilt : the angle of the momentum from the plane of x and y halfway [rad]
-    """
+    """Dive of five stages. Made by `rotor_dive`."""
 
     moments: Array
+    """(3,) about x, y and z, without what the rotor turns [kg m^2]."""
     momentum: float
+    """l, about +y in inertial axes [kg m^2/s]."""
     rotor: float
+    """h, about x, in the second stage [kg m^2/s]."""
     somersaults: float
     twists: float
+    """`somersaults` and `twists`: m and n."""
     times: Array
+    """(6,) at which the stages begin and the dive ends [s]."""
     turns: Array
+    """(5,) angles of the long axis about the momentum in each stage [rad], of sum 2 pi m."""
     tilt: float
+    """The angle of the momentum from the plane of x and y halfway [rad]."""
     _bodies: tuple[Gyrostat, EulerTop, Gyrostat] = field(repr=False)
 
     __repr__ = short_repr

@@ -43,23 +43,19 @@ _FIRST_AXIS_LAST = [1, 2, 0]  # a cyclic order of the axes, so right-handed, wit
 
 @dataclass(frozen=True, eq=False)
 class ShortestGeodesic:
-    """Shortest geodesic found from the identity to an attitude. Made by `shortest_geodesic`.
-
-    Attributes
-    ----------
-    momentum : (3,) with which it arrives at t = 1, body axes [kg m^2/s]
-    length : the distance [sqrt(kg) m]
-    certified : whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut
-    lower_bound, upper_bound : distances of axisymmetric metrics below and above this one [sqrt(kg) m]
-    residual : angle by which the end misses the attitude [rad]
-    """
+    """Shortest geodesic found from the identity to an attitude. Made by `shortest_geodesic`."""
 
     momentum: Array
+    """(3,) with which it arrives at t = 1, body axes [kg m^2/s]."""
     length: float
+    """The distance [sqrt(kg) m]."""
     certified: bool
+    """Whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut."""
     lower_bound: float
     upper_bound: float
+    """`lower_bound` and `upper_bound`: distances of axisymmetric metrics below and above this one [sqrt(kg) m]."""
     residual: float
+    """Angle by which the end misses the attitude [rad]."""
 
     __repr__ = short_repr
 

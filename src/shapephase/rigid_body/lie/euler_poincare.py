@@ -29,26 +29,22 @@ from .lie_algebra import LieAlgebra, Matrices, inertia_operator, linear_solution
 
 @dataclass(frozen=True, eq=False)
 class EulerPoincareMotion:
-    """Motion of the Euler-Poincare equations from the identity of the group. Made by `euler_poincare_motion`.
-
-    Attributes
-    ----------
-    algebra : the Lie algebra
-    inertia : (d, d) inertia operator
-    times : (N,)
-    momentum : (..., N, d) body momentum mu
-    velocity : (..., N, d) body velocity xi = I^-1 mu
-    adjoint : (..., N, d, d) Ad_g, from body to space components; needs no matrices of the group
-    attitude : (..., N, n, n) the group element g, g' = g xi; None where the algebra has no basis of matrices
-    """
+    """Motion of the Euler-Poincare equations from the identity of the group. Made by `euler_poincare_motion`."""
 
     algebra: LieAlgebra
+    """The Lie algebra."""
     inertia: Array
+    """(d, d) inertia operator."""
     times: Array
+    """(N,)."""
     momentum: Array
+    """(..., N, d) body momentum mu."""
     velocity: Array
+    """(..., N, d) body velocity xi = I^-1 mu."""
     adjoint: Array
+    """(..., N, d, d) Ad_g, from body to space components; needs no matrices of the group."""
     attitude: Matrices | None
+    """(..., N, n, n) the group element g, g' = g xi; None where the algebra has no basis of matrices."""
 
     __repr__ = short_repr
 
@@ -173,16 +169,12 @@ def _split(state: Array, blocks: list[Matrices]) -> list[Matrices]:
 
 @dataclass(frozen=True, eq=False)
 class InvariableHyperplane:
-    """Affine hyperplane {x : <normal, x> = level} of the algebra. Made by `invariable_hyperplane`.
-
-    Attributes
-    ----------
-    normal : (..., d) covector, the space momentum mu_s
-    level : (...) twice the energy
-    """
+    """Affine hyperplane {x : <normal, x> = level} of the algebra. Made by `invariable_hyperplane`."""
 
     normal: Array
+    """(..., d) covector, the space momentum mu_s."""
     level: Array
+    """(...) twice the energy."""
 
     __repr__ = short_repr
 
@@ -197,27 +189,24 @@ class RollingContact:
     """Contact of the energy quadric with the invariable hyperplane along a motion, and its rolling there.
 
     Made by `rolling_contact`.
-
-    Attributes
-    ----------
-    hyperplane : the invariable hyperplane
-    point : (..., N, d) point of contact in space, xi_s
-    hyperplane_offset : (..., N) of the point from the hyperplane; zero, part (a) of the theorem
-    quadric_offset : (..., N) l(Ad_{g^-1} xi_s) - E_0, of the point from the moved quadric; zero, part (b)
-    tangency_defect : (..., N, d) conormal of the moved quadric at the point less that of the hyperplane; zero, (b)
-    contact_velocity : (..., N, d) velocity of the point of the moved quadric that touches; zero, part (c)
-    body_rate : (..., N, d) xi', the rate of the contact along the quadric, body components
-    space_rate : (..., N, d) Ad_g xi', its rate along the hyperplane; equal rates are equal lengths of the two curves
     """
 
     hyperplane: InvariableHyperplane
+    """The invariable hyperplane."""
     point: Array
+    """(..., N, d) point of contact in space, xi_s."""
     hyperplane_offset: Array
+    """(..., N) of the point from the hyperplane; zero, part (a) of the theorem."""
     quadric_offset: Array
+    """(..., N) l(Ad_{g^-1} xi_s) - E_0, of the point from the moved quadric; zero, part (b)."""
     tangency_defect: Array
+    """(..., N, d) conormal of the moved quadric at the point less that of the hyperplane; zero, (b)."""
     contact_velocity: Array
+    """(..., N, d) velocity of the point of the moved quadric that touches; zero, part (c)."""
     body_rate: Array
+    """(..., N, d) xi', the rate of the contact along the quadric, body components."""
     space_rate: Array
+    """(..., N, d) Ad_g xi', its rate along the hyperplane; equal rates are equal lengths of the two curves."""
 
     __repr__ = short_repr
 

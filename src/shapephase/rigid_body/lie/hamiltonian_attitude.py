@@ -25,22 +25,18 @@ from .lie_poisson import gradient_at
 
 @dataclass(frozen=True, eq=False)
 class HamiltonianMotion:
-    """Motion of R' = R hat(grad H(Pi)). Made by `hamiltonian_motion`.
-
-    Attributes
-    ----------
-    times : (N,) [s]
-    attitude : (..., N, 3, 3) body axes to inertial axes
-    momentum : (..., 3) mu, inertial axes, constant [kg m^2/s]
-    body_momentum : (..., N, 3) Pi = R^T mu [kg m^2/s]
-    angular_velocity : (..., N, 3) grad H, body axes [rad/s]
-    """
+    """Motion of R' = R hat(grad H(Pi)). Made by `hamiltonian_motion`."""
 
     times: Array
+    """(N,) [s]."""
     attitude: Array
+    """(..., N, 3, 3) body axes to inertial axes."""
     momentum: Array
+    """(..., 3) mu, inertial axes, constant [kg m^2/s]."""
     body_momentum: Array
+    """(..., N, 3) Pi = R^T mu [kg m^2/s]."""
     angular_velocity: Array
+    """(..., N, 3) grad H, body axes [rad/s]."""
 
     __repr__ = short_repr
 

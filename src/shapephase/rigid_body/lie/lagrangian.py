@@ -21,20 +21,16 @@ from ...errors import ShapeError
 
 @dataclass(frozen=True, eq=False)
 class ReducedBody:
-    """A rigid body with its translations reduced out, which turns on SO(3). Made by `reduce_translations`.
-
-    Attributes
-    ----------
-    mass : total mass [kg]
-    centre : (3,) centre of mass from the material origin [m]
-    positions : (P, 3) from the centre of mass [m]
-    inertia : (3, 3) about the centre of mass [kg m^2]
-    """
+    """A rigid body with its translations reduced out, which turns on SO(3). Made by `reduce_translations`."""
 
     mass: float
+    """Total mass [kg]."""
     centre: Array
+    """(3,) centre of mass from the material origin [m]."""
     positions: Array
+    """(P, 3) from the centre of mass [m]."""
     inertia: Array
+    """(3, 3) about the centre of mass [kg m^2]."""
 
     __repr__ = short_repr
 

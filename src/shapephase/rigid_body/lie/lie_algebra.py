@@ -31,12 +31,6 @@ _NEAR_ZERO = 1e-14  # ratio of eigenvalues, or distance of structure constants f
 class LieAlgebra:
     """A real Lie algebra of dimension d, [e_i, e_j] = c_ij^k e_k.
 
-    Attributes
-    ----------
-    structure : (d, d, d) structure constants c[i, j, k]
-    basis : (d, n, n) real or complex matrices with the same brackets, or None for an abstract algebra
-    name : for messages
-
     Raises
     ------
     LieAlgebraError
@@ -53,8 +47,11 @@ class LieAlgebra:
     """
 
     structure: Array
+    """(d, d, d) structure constants c[i, j, k]."""
     basis: Matrices | None = None
+    """(d, n, n) real or complex matrices with the same brackets, or None for an abstract algebra."""
     name: str = "Lie algebra"
+    """For messages."""
 
     __repr__ = short_repr
 

@@ -23,18 +23,15 @@ class MagneticEquilibrium:
 
     It is Lyapunov stable since |M - moment| is constant along every motion, and not asymptotically: all motions nearby
     circle it with the same frequency.
-
-    Attributes
-    ----------
-    moment : (..., 3)
-    energy : (...) M . B
-    spectrum : (..., 3) eigenvalues of the linearisation delta M' = delta M x B: 0 along the line of equilibria, and
-        +-i |B| on the sphere's tangent plane
     """
 
     moment: Array
+    """(..., 3)."""
     energy: Array
+    """(...) M . B."""
     spectrum: NDArray[np.complex128]
+    """(..., 3) eigenvalues of the linearisation delta M' = delta M x B: 0 along the line of equilibria, and +-i |B| on
+    the sphere's tangent plane."""
 
     __repr__ = short_repr
 
