@@ -7,11 +7,10 @@ With G the magnitude of the body momentum Pi and the principal moments ascending
 y and p_y are canonically conjugate on the sphere of momenta. Along axis 3, at y = pi/2, is the stable equilibrium of
 the (y, p_y) plane, along axis 2, at y = 0 and pi, the unstable one; momenta along axis 1, p_y = G and -G, have no y.
 
-Bonnard et al. number the axes by descending moments: their H_1, H_2, H_3 are our Pi_3, -Pi_2, Pi_1 (the sign keeps the
-frame right-handed), their I_1, I_2, I_3 our I_3, I_2, I_1. The functions take the moments in any order and momenta in
-the caller's axes. If those descend, y and p_y are the paper's; in any other order, axes 1, 2, 3 above are the caller's
-by ascending moment, axis 2 reversed where that order is left-handed. p_y is L itself, with y' = p_y (a_1 - w) as in the
-paper's (8); the geodesics of `serret_andoyer` begin with p_y below 0, see there.
+Moments may be in any order: axes 1, 2, 3 above are the caller's by ascending moment, axis 2 reversed where that order
+is left-handed. Bonnard et al. number the axes by descending moments: their H_1, H_2, H_3 are our Pi_3, -Pi_2, Pi_1 (the
+sign keeps the frame right-handed). p_y is L itself, with y' = p_y (a_1 - w) as in the paper's (8); the geodesics of
+`serret_andoyer` begin with p_y below 0, see there.
 
 Source: Bonnard, Cots and Shcherbakova 2013, sections 3.4 and 3.5; theory.md N12.
 """
@@ -19,6 +18,7 @@ Source: Bonnard, Cots and Shcherbakova 2013, sections 3.4 and 3.5; theory.md N12
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,11 +51,12 @@ class AndoyerPendulum:
         finite numbers.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-        smallest, middle, largest = np.moveaxis(pi[..., self._order], -1, 0)
+        order, parity = self._axes
+        smallest, middle, largest = np.moveaxis(pi[..., order], -1, 0)
         along = (largest == 0.0) & (middle == 0.0)
         check_entries(along, pi, "momentum", "along the axis of the smallest moment y is undefined")
         # Adding zero takes the sign off a zero, of which arctan2 would make minus a half turn.
-        return np.linalg.norm(pi, axis=-1), np.arctan2(largest + 0.0, -self._parity * middle), smallest
+        return np.linalg.norm(pi, axis=-1), np.arctan2(largest + 0.0, -parity * middle), smallest
 
     def body_momentum(self, magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> Array:
         """Pi of G, y and p_y, the inverse of `coordinates`: (...) each -> (..., 3) [kg m^2/s].
@@ -64,8 +65,9 @@ class AndoyerPendulum:
         """
         magnitude, y, p_y = _variables(magnitude, y, p_y)
         across = np.sqrt((magnitude - p_y) * (magnitude + p_y))
+        order, parity = self._axes
         pi = np.empty((*p_y.shape, 3))
-        pi[..., self._order] = np.stack([p_y, -self._parity * across * np.cos(y), across * np.sin(y)], axis=-1)
+        pi[..., order] = np.stack([p_y, -parity * across * np.cos(y), across * np.sin(y)], axis=-1)
         return pi
 
     def hamiltonian(self, magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> Array:
@@ -116,29 +118,25 @@ class AndoyerPendulum:
         """
         theta = finite_array(theta, "theta", unit="rad")
         pendulum = self._pendulum
-        theta = -self._parity * theta
+        theta = -self._axes[1] * theta
         sine, cosine = np.sin(theta), np.cos(theta)
         shift = np.arctan2((pendulum.k2 - pendulum.k1) * sine * cosine, pendulum.k1 * cosine**2 + pendulum.k2 * sine**2)
         return 0.5 * np.pi - theta - shift
 
-    @property
+    @cached_property
     def _inverse(self) -> Array:
         """(3,) a_i = 1/I_i, descending."""
         return 1.0 / ascending_moments(self.moments)[0]
 
-    @property
-    def _order(self) -> NDArray[np.intp]:
-        """(3,) indices of the caller's axes by ascending moment."""
-        return ascending_moments(self.moments)[1]
-
-    @property
-    def _parity(self) -> float:
-        """1 if the caller's axes in that order are right-handed, else -1."""
-        return float(ascending_moments(self.moments)[2])
+    @cached_property
+    def _axes(self) -> tuple[NDArray[np.intp], float]:
+        """(3,) indices of the caller's axes by ascending moment, and 1 if right-handed in that order, else -1."""
+        _, order, parity = ascending_moments(self.moments)
+        return order, float(parity)
 
     @property
     def _pendulum(self) -> RigidBodyPendulum:
-        return rigid_body_pendulum(self.moments, self._order[::-1].tolist())
+        return rigid_body_pendulum(self.moments, self._axes[0][::-1].tolist())
 
 
 def andoyer_pendulum(moments: ArrayLike) -> AndoyerPendulum:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import inertia_argument, number_argument
 from ..arrays import Array, Mask, finite_array
-from ..errors import ShapeError, ShapePhaseError
+from ..errors import ShapeError, ShapePhaseError, SingularInertiaError
 from ..letters import what_came
 
 _UNIT_LENGTH = 1e-6  # six digits, as people write them
@@ -56,6 +56,14 @@ def one_array(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str = "
 def one_tensor(inertia: ArrayLike) -> Array:
     """One inertia tensor, made exactly symmetric: (3, 3). Raises UnphysicalInertiaError, SingularInertiaError."""
     return inertia_argument(one_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
+
+
+def positive_moments(moments: ArrayLike) -> Array:
+    """Principal moments above 0: (..., 3). Raises SingularInertiaError."""
+    values = finite_array(moments, "moments", (3,), unit="kg m^2")
+    if np.any(values <= 0.0):
+        raise SingularInertiaError(f"moments: every principal moment must be above 0, got {values.min():.6g} kg m^2")
+    return values
 
 
 def one_attitude(attitude: ArrayLike | None) -> Array:

@@ -16,9 +16,10 @@ from scipy.special import elliprf, elliprj
 from ..arrays import Array, common_shape, finite_array
 from ..display import short_repr
 from ..elliptic import complete_k
-from ..errors import ShapeError, SingularInertiaError
+from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from ..roots import bracketed_root, safe_newton
+from ._arguments import positive_moments
 from ._momentum_orbit import momentum_orbit
 
 
@@ -86,7 +87,7 @@ def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLi
     >>> print(f"{flip.time:.4f} s")
     26.3303 s
     """
-    inertia, _, _ = ascending_moments(_moments(moments))
+    inertia, _, _ = ascending_moments(positive_moments(moments))
     norm = finite_array(magnitude, "magnitude", unit="kg m^2/s")
     polar, around = finite_array(tilt, "tilt", unit="rad"), finite_array(azimuth, "azimuth", unit="rad")
     common_shape(magnitude=norm, tilt=polar, azimuth=around)
@@ -122,7 +123,7 @@ def twist_defect(moments: ArrayLike) -> Array:
     >>> print(f"{np.degrees(sp.rigid_body.twist_defect([1.0, 2.0, 2.1])):.3f} degrees")
     51.506 degrees
     """
-    a, b = _asymmetries(ascending_moments(_moments(moments))[0])
+    a, b = _asymmetries(ascending_moments(positive_moments(moments))[0])
     share, scale = b / (a + b), np.sqrt(a * b)
     lower, upper = scale * np.pi, scale * (np.pi + np.arcsin(np.sqrt(share)))
 
@@ -221,16 +222,9 @@ def _flip(moments: Array, momentum: Array) -> tuple[float, float, float, float, 
     return 2.0 * float(complete_k(m1)) / rate if turns_over else math.inf, asymptote, m1, rate, growth
 
 
-def _moments(moments: ArrayLike) -> Array:
-    inertia = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if np.any(inertia <= 0.0):
-        raise SingularInertiaError(f"moments: every principal moment must be above 0, got {inertia.min():.6g} kg m^2")
-    return inertia
-
-
 def _ordered(moments: ArrayLike, momentum: ArrayLike) -> tuple[Array, Array]:
     """Ascending moments and the momentum along their axes, whose handedness makes no difference to times."""
-    inertia, vector = _moments(moments), finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    inertia, vector = positive_moments(moments), finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     shape = common_shape(moments=inertia, momentum=vector)
     inertia, order, _ = ascending_moments(np.broadcast_to(inertia, shape))
     return inertia, np.take_along_axis(np.broadcast_to(vector, shape), order, -1)

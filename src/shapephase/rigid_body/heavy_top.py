@@ -138,7 +138,8 @@ class HeavyTop:
         The attitude is integrated as a quaternion, together with the two horizontal components of the spatial momentum
         R Pi; its vertical component, Pi.Gamma, is constant and enters as given. Gamma = R^T e_z and Pi = R^T (R Pi) are
         formed from these, so Pi.Gamma and |Gamma| cannot drift. The method is Dormand and Prince's of order 8(5,3); a
-        second run with a looser tolerance gives the error estimate.
+        second run with a looser tolerance gives the error estimate. Raises AccuracyNotReached if the tolerance cannot
+        be met: unstable or chaotic motions magnify rounding exponentially.
 
         Parameters
         ----------
@@ -149,12 +150,6 @@ class HeavyTop:
         duration : of the motion [s]
         tolerance : of the attitude over the whole motion, in [1e-12, 1e-2] [rad]
 
-        Raises
-        ------
-        ShapeError
-            If an argument is of a wrong shape or value, or both `gamma` and `attitude` are given.
-        AccuracyNotReached
-            If the tolerance cannot be met: unstable or chaotic motions magnify rounding exponentially.
         """
         body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         if gamma is not None and attitude is not None:

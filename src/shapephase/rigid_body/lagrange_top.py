@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_object, number_argument
-from ..arrays import Array, Mask, finite_array
+from ..arrays import Array, Mask, common_batch, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, SingularInertiaError
+from ._arguments import positive_moments
 from .heavy_top import HeavyTop, heavy_top_steps
 
 _GROWTH = 50.0  # of the tilt, up to which a simulated spin counts as stable: stable spins next to the threshold nutate
@@ -380,13 +381,7 @@ def _largest_tilt(top: HeavyTop, spins: Array, tilt: float, duration: float) -> 
 
 def _upright(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> tuple[Array, ...]:
     """I1, I2, I3, Mgl and Pi_3 as arrays of one shape."""
-    inertia = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if np.any(inertia <= 0.0):
-        raise SingularInertiaError(f"moments: every moment must be above 0, got {inertia.min():.6g} kg m^2")
+    inertia = positive_moments(moments)
     weight, spin = finite_array(mgl, "mgl", unit="J"), finite_array(momentum, "momentum", unit="kg m^2/s")
-    try:
-        return tuple(np.broadcast_arrays(*np.moveaxis(inertia, -1, 0), weight, spin))
-    except ValueError:
-        raise ShapeError(
-            f"moments {inertia.shape}, mgl {weight.shape}, momentum {spin.shape}: leading axes cannot be broadcast"
-        ) from None
+    common_batch(moments=inertia.shape[:-1], mgl=weight.shape, momentum=spin.shape)
+    return tuple(np.broadcast_arrays(*np.moveaxis(inertia, -1, 0), weight, spin))

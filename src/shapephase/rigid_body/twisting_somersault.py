@@ -291,7 +291,7 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
     return bracketed_root(excess, low, high)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class _Parts:
     """Durations [s] and turns [rad] of the stages, before their bodies are made."""
 
@@ -301,16 +301,8 @@ class _Parts:
     changing: float
     twisted: float
     left: float
-
-    @property
-    def alone(self) -> float:
-        """Duration of the first and of the last stage [s]."""
-        values, size = self.arguments[:2]
-        return 0.5 * self.left * float(values[1]) / size
-
-    @property
-    def duration(self) -> float:
-        return 2.0 * (self.alone + self.arguments[3]) + self.lasting
+    alone: float  # duration of the first and of the last stage [s]
+    duration: float  # of the whole dive [s]
 
 
 def _parts(moments: ArrayLike, momentum: float, rotor: float, kick: float, somersaults: float, twists: float) -> _Parts:
@@ -336,14 +328,9 @@ def _parts(moments: ArrayLike, momentum: float, rotor: float, kick: float, somer
             f"{around:g} twists and the shape changes for them are {count - 0.5 * left / np.pi:.6g} somersaults, more "
             f"than {count:g}; a quicker or stronger rotor tilts more"
         )
-    return _Parts(
-        arguments=(values, size, float(spin), on, count, around),
-        tilting=tilting,
-        lasting=lasting,
-        changing=changing,
-        twisted=twisted,
-        left=left,
-    )
+    alone = 0.5 * left * float(values[1]) / size
+    arguments = values, size, float(spin), on, count, around
+    return _Parts(arguments, tilting, lasting, changing, twisted, left, alone, 2.0 * (alone + on) + lasting)
 
 
 def _moments(moments: ArrayLike) -> Array:

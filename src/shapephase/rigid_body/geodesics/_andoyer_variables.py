@@ -126,11 +126,8 @@ class AndoyerVariables:
 
         Source: Bonnard et al., section 3.4, the complete relations, of which the last is for phi_3 (theory.md B-E4).
 
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole of the chart, where the two third axes are parallel. Its converse is
-            `andoyer_from_euler`.
+        Raises ChartPoleError within 1e-8 of a pole of the chart, where the two third axes are parallel. The inverse is
+        `andoyer_from_euler`.
         """
         angles = chart.angles(self.attitude)
         return angles, chart.conjugate_momenta(angles, self.body_momentum)
@@ -148,12 +145,8 @@ class AndoyerVariables:
 
         Source: Bonnard et al. (8), there in principal axes.
 
-        Raises
-        ------
-        ChartPoleError
-            At L = +-G, to 1e-8 of the momentum, if the body's third axis is not principal: l has no rate there.
-        ShapeError, UnphysicalInertiaError, SingularInertiaError
-            As `hamiltonian`.
+        Raises ChartPoleError at L = +-G, to 1e-8 of the momentum, if the body's third axis is not principal: l has no
+        rate there.
         """
         inverse = self._inverse(inertia)
         sine, cosine, across, along = np.sin(self.l), np.cos(self.l), self._across, self.axial
@@ -228,12 +221,7 @@ def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart 
 
     Source: as `AndoyerVariables.euler_angles`.
 
-    Raises
-    ------
-    ChartPoleError
-        Within 1e-8 of a pole of the chart.
-    ShapeError
-        If an argument is not a finite vector, or a momentum is zero.
+    Raises ChartPoleError within 1e-8 of a pole of the chart, ShapeError if a momentum is zero.
 
     Examples
     --------
@@ -263,8 +251,6 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
 
     Raises
     ------
-    ShapeError
-        If the times are not a list in order, or the momentum is zero.
     AccuracyNotReached
         If the attitude jumps, or turns so often between the times that it cannot be followed.
 

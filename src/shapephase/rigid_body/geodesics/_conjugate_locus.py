@@ -16,12 +16,11 @@ Cots and Shcherbakova 2013, end of section 2; theory.md O16, P6.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_object, number_argument
+from ...arguments import check_object, number_argument, whole_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
@@ -188,12 +187,12 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
             f"momentum: below sqrt(m(0)) = {surface.greatest_momentum:.17g}, at which the rate is infinite"
         )
     start = Start(momentum=p, q=q, room=room, phase=np.zeros(p.shape), side=np.ones(p.shape))
-    points, ends = _points(surface, np.asarray(surface.direction_of(p)), start, order)
+    points, _, end = _points(surface, np.asarray(surface.direction_of(p)), start, order)
     xi = points.phase - order * np.pi
     value, slope, _ = stretch_at(surface, q, room, xi)
     second = surface.bend_rate(q, room, xi) + 2.0 * order * _whole_bend_rate(surface, q, room)
     sine, cosine = np.sin(xi), np.cos(xi)
-    by_q = slope * sine**3 / cosine - ends.end.bend - q * second
+    by_q = slope * sine**3 / cosine - end.bend - q * second
     # At a fixed latitude q sin^2(chi) is fixed, so chi moves with q.
     moving = by_q - value / cosine**2 * np.tan(xi) / (2.0 * q)
     return (-2.0 * p / (surface.equator**2 * q) * moving)[()]
@@ -288,15 +287,8 @@ def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
     )
 
 
-class _Ends(NamedTuple):
-    """Integrals along extremals: up to the start, over a quarter of the period, up to the conjugate point."""
-
-    begin: Arcs
-    quarter: Arcs
-    end: Arcs
-
-
-def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int) -> tuple[ConjugatePoints, _Ends]:
+def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int) -> tuple[ConjugatePoints, Arcs, Arcs]:
+    """Conjugate points, and the integrals along the extremals up to the start and up to the conjugate point."""
     p, q, room, first = start.momentum, start.q, start.room, start.phase
     sine0, cosine0 = np.sin(first), folded_cosine(first)
     here = stretch_at(surface, q, room, first)[0]
@@ -330,7 +322,7 @@ def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int
         height=height,
         phase=xi + order * np.pi,
     )
-    return points, _Ends(begin, quarter, end)
+    return points, begin, end
 
 
 def _points_and_rate(
@@ -338,7 +330,7 @@ def _points_and_rate(
 ) -> tuple[ConjugatePoints, Array]:
     """Conjugate points, and d t_c/d direction from L(chi) = L(chi_0) differentiated."""
     start = start_of(surface, angle, latitude)
-    points, ends = _points(surface, angle, start, order)
+    points, begin, end = _points(surface, angle, start, order)
     q, room, first, xi = start.q, start.room, start.phase, points.phase - order * np.pi
     rest = 1.0 - float(surface.height(latitude)) ** 2
     _, slope, _ = stretch_at(surface, q, room, xi)
@@ -347,9 +339,9 @@ def _points_and_rate(
     second = surface.bend_rate(q, room, xi) + 2.0 * order * _whole_bend_rate(surface, q, room)
     sine, cosine, sine0, cosine0 = np.sin(xi), np.cos(xi), np.sin(first), np.cos(first)
     first_rate = -sine0 / cosine0 / (2.0 * np.where(q > 0.0, q, 1.0))
-    level_rate = here / cosine0**2 * first_rate + slope0 * sine0**3 / cosine0 - ends.begin.bend - q * second0
-    by_q = slope * sine**3 * cosine - cosine**2 * (ends.end.bend + q * second)
-    time_rate = 0.5 * (ends.end.bend - ends.begin.bend) + cosine**2 * level_rate - by_q - here * first_rate
+    level_rate = here / cosine0**2 * first_rate + slope0 * sine0**3 / cosine0 - begin.bend - q * second0
+    by_q = slope * sine**3 * cosine - cosine**2 * (end.bend + q * second)
+    time_rate = 0.5 * (end.bend - begin.bend) + cosine**2 * level_rate - by_q - here * first_rate
     return points, 2.0 * np.sin(angle) * np.cos(angle) * rest * time_rate
 
 
@@ -384,5 +376,5 @@ def _widest(surface: SurfaceOfRevolution, latitude: float) -> float:
 
 
 def _check_order(order: int) -> None:
-    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= _HIGHEST_ORDER:
-        raise ShapeError(f"order: expected a whole number from 1 to {_HIGHEST_ORDER}, got {what_came(order)}")
+    if whole_argument(order, "order", 1) > _HIGHEST_ORDER:
+        raise ShapeError(f"order: a whole number from 1 to {_HIGHEST_ORDER} is needed, got {order}")

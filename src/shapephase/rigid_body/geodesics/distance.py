@@ -70,12 +70,7 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
 
     Source: theory.md Q6.
 
-    Raises
-    ------
-    ShapeError
-        If the attitude is no rotation (3, 3).
-    AccuracyNotReached
-        If no geodesic arrives that is as short as the upper bound says.
+    Raises AccuracyNotReached if no geodesic arrives that is as short as the upper bound.
 
     Examples
     --------

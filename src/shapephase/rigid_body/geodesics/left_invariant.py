@@ -8,8 +8,8 @@ Pontryagin's principle, the shortest curves are the motions of a free rigid body
 and their speed is sqrt(2 H): with H = 1/2 time is length. A moment may be infinite: then its component of u is
 forbidden, a has a zero, and the metric is sub-Riemannian. `momentum_flow` has both cases in one closed form.
 
-Principal moments ascend, I_1 <= I_2 <= I_3, so that an infinite one is I_3; those of Bonnard et al. descend: their I_1,
-I_2, I_3 are our I_3, I_2, I_1. Inertias, momenta and attitudes are in the caller's body axes.
+Principal moments ascend, I_1 <= I_2 <= I_3, so that an infinite one is I_3. Inertias, momenta and attitudes are in the
+caller's body axes.
 
 Sources: Bonnard, Cots and Shcherbakova 2013, section 3; theory.md Q1-Q6.
 """
@@ -136,12 +136,8 @@ class LeftInvariantMetric:
 
         Source: theory.md Q6; `conjugate_times`.
 
-        Raises
-        ------
-        ShapeError
-            Where H is 0, or if `order` is not a whole number of 1 or more.
-        AccuracyNotReached
-            If none is found in ten thousand steps of the search, because the moments are too unequal.
+        Raises ShapeError where H is 0; AccuracyNotReached if none is found in ten thousand steps of the search, because
+        the moments are too unequal.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         self._moving(pi)

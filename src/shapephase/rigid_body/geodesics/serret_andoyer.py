@@ -15,10 +15,7 @@ The sign of p_y: phi grows here as y falls, d phi = -dy/sqrt(a_1 - w), so that p
 zero. The paper has d phi = +dy/sqrt(C - w), hence y = pi/2 + am(alpha phi, k) and p_y of the opposite sign: the
 same geodesics, mirrored in the equator (theory.md B-E5).
 
-Bonnard et al. number the moments in descending order: their I_1, I_2, I_3 are our I_3, I_2, I_1, their A < B < C our
-a_3, a_2, a_1. A metric takes the moments in any order and momenta in the caller's axes.
-
-Its geodesics are in `serret_andoyer_geodesics`.
+Moments may be in any order, momenta are in the caller's axes; Bonnard et al. have A < B < C for our a_3, a_2, a_1.
 
 Source: Bonnard, Cots and Shcherbakova 2013, sections 3.4 to 4.2 and lemma 4.2; theory.md R2 to R5, R10.
 """
@@ -36,7 +33,8 @@ from ...arrays import Array, common_shape, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
-from ._serret_andoyer_constants import constants_of, constants_of_momentum, separatrix_constants
+from .._arguments import check_entries
+from ._serret_andoyer_constants import constants_of, constants_of_momentum, moment_gaps, separatrix_constants
 from .serret_andoyer_geodesics import GeodesicFamily
 
 
@@ -71,8 +69,7 @@ class SerretAndoyerMetric:
     @property
     def alpha(self) -> float:
         """sqrt(a_1 - a_3), the rate of the elliptic argument along phi [1/(sqrt(kg) m)]."""
-        i1, _, i3 = self._ascending
-        return float(np.sqrt((i3 - i1) / (i3 * i1)))
+        return float(np.sqrt(moment_gaps(self.moments)[2]))
 
     @property
     def modulus(self) -> float:
@@ -114,10 +111,9 @@ class SerretAndoyerMetric:
 
         Source: Bonnard et al. (7); the metric of the paper's introduction is half of it (theory.md B-E1).
         """
-        i1, i2, i3 = self._ascending
+        _, upper, whole = moment_gaps(self.moments)
         angle = finite_array(y, "y", unit="rad")
-        sine, cosine = np.sin(angle) ** 2, np.cos(angle) ** 2
-        return 1.0 / self.w(angle), 1.0 / (sine * (i3 - i1) / (i3 * i1) + cosine * (i2 - i1) / (i2 * i1))
+        return 1.0 / self.w(angle), 1.0 / (whole * np.sin(angle) ** 2 + upper * np.cos(angle) ** 2)
 
     def energy(self, y: ArrayLike, p_x: ArrayLike, p_y: ArrayLike) -> Array:
         """H = (w p_x^2 + (a_1 - w) p_y^2)/2: (...) each -> (...); [J] for p in [kg m^2/s].
@@ -224,24 +220,20 @@ class SerretAndoyerMetric:
         Raises ShapeError if a momentum is zero.
         """
         momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
-        if np.any(np.all(momentum == 0.0, axis=-1)):
-            raise ShapeError("body_momentum: a zero momentum does not move; give one that is not zero")
+        zero = np.all(momentum == 0.0, axis=-1)
+        check_entries(zero, momentum, "body_momentum", "a zero momentum does not move; give one that is not zero")
         return GeodesicFamily(constants=constants_of_momentum(self.moments, momentum))
 
     @property
     def _rise(self) -> float:
-        """a_2 - a_3."""
-        _, i2, i3 = self._ascending
-        return float((i3 - i2) / (i3 * i2))
+        return moment_gaps(self.moments)[0]
 
     @property
     def _ascending(self) -> Array:
-        """I_1 < I_2 < I_3."""
         return ascending_moments(self.moments)[0]
 
     @property
     def _inverse(self) -> Array:
-        """a_1 > a_2 > a_3."""
         return 1.0 / self._ascending
 
     def _jacobi(self, phi: ArrayLike) -> tuple[Array, Array, Array, Array]:

@@ -1,8 +1,7 @@
 """Geodesics of the Serret-Andoyer metric in closed real form, their returns to the equator and conjugate points.
 
-Moments ascend, I_1 < I_2 < I_3, a_i = 1/I_i (A, B, C of Bonnard et al. are a_3, a_2, a_1, their I_1 our I_3; see
-`serret_andoyer`), and p = |p_theta|. With u = M t, the sine and cosine of am(alpha phi, k), Y = sn^2(alpha phi, k) and
-n <= 0 are, up to a common factor,
+Moments ascend, I_1 < I_2 < I_3, a_i = 1/I_i (see `serret_andoyer`), and p = |p_theta|. With u = M t, the sine and
+cosine of am(alpha phi, k), Y = sn^2(alpha phi, k) and n <= 0 are, up to a common factor,
 
     oscillating  I_2 < p^2 <= I_3   m sn(u) : k' dn(u)          n = -(1 - a_3 p^2)/(a_1 p^2 - 1)       f = cn
     rotating     I_1 <= p^2 < I_2   sn(u) : k' cn(u)            n = -(a_2 - a_3)/(a_1 - a_2)           f = dn

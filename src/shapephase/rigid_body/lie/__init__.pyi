@@ -17,7 +17,6 @@ from .cayley_klein import (
     cayley_klein_motion,
     cayley_klein_spinor,
 )
-from .dissipation import dissipated_power, double_bracket_equations, double_bracket_motion, symmetric_bracket
 from .euler_poincare import (
     EulerPoincareMotion,
     InvariableHyperplane,
@@ -72,6 +71,9 @@ from .lie_poisson import (
     bracket_gradient,
     casimir_defect,
     coadjoint_orbit_form,
+    dissipated_power,
+    double_bracket_equations,
+    double_bracket_motion,
     euler_equations,
     hamiltonian_vector_field,
     kinetic_energy,
@@ -82,6 +84,7 @@ from .lie_poisson import (
     quadratic_casimirs,
     sphere_area_form,
     sphere_symplectic_form,
+    symmetric_bracket,
 )
 from .magnetic_moment import (
     MagneticEquilibrium,

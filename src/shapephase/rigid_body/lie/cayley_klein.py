@@ -33,8 +33,6 @@ PAULI.setflags(write=False)
 def cayley_klein_momentum(z: ArrayLike) -> Array:
     """Pi_k = -z^H sigma_k z / 4, minus the momentum map of SU(2) on C^2: (..., 2) -> (..., 3) [kg m^2/s].
 
-    Raises ShapeError.
-
     Examples
     --------
     >>> print(sp.rigid_body.lie.cayley_klein_momentum([2.0, 0.0]) + 0.0)
@@ -45,8 +43,6 @@ def cayley_klein_momentum(z: ArrayLike) -> Array:
 
 def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
     """Spinor z with this momentum; its phase is the coordinate along the fibre: (..., 3), (...) -> (..., 2).
-
-    Raises ShapeError.
 
     Examples
     --------
@@ -68,8 +64,6 @@ def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
 def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
     """{F, G} on C^2 = T*R^2, from gradients with respect to q (real parts) and p (imaginary parts): (...).
 
-    Raises ShapeError.
-
     Parameters
     ----------
     first, second : (..., 2) complex, dF/dq + i dF/dp
@@ -85,8 +79,6 @@ def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
 
 def cayley_klein_gradient(omega: ArrayLike, z: ArrayLike) -> Spinor:
     """The gradient dF/dq + i dF/dp of a collective F(Pi(z)) with dF/dPi = omega: (..., 3), (..., 2) -> (..., 2).
-
-    Raises ShapeError.
 
     Examples
     --------
@@ -111,8 +103,6 @@ def cayley_klein_hamiltonian(inertia: ArrayLike, z: ArrayLike) -> Array:
 def cayley_klein_equations(inertia: ArrayLike, z: ArrayLike) -> Spinor:
     """Hamilton's equations of the kinetic energy on C^2, z' = (i/2) (Omega . sigma) z: (..., 2) -> (..., 2).
 
-    Raises as `cayley_klein_hamiltonian`.
-
     Examples
     --------
     >>> z = sp.rigid_body.lie.cayley_klein_spinor([0.0, 0.0, 2.0])
@@ -126,8 +116,6 @@ def cayley_klein_equations(inertia: ArrayLike, z: ArrayLike) -> Spinor:
 
 def cayley_klein_motion(inertia: ArrayLike, z: ArrayLike, times: ArrayLike) -> Spinor:
     """The rigid body's flow on C^2 from z at the first time: (..., 2), (N,) -> (..., N, 2).
-
-    Raises as `cayley_klein_hamiltonian`.
 
     Examples
     --------

@@ -82,7 +82,6 @@ def euler_poincare_rate(algebra: LieAlgebra, inertia: ArrayLike, momentum: Array
     >>> lie.euler_poincare_rate(lie.so3(), np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0]).tolist()
     [0.0, 0.75, 0.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     operator = inertia_operator(algebra, inertia)
     mu = finite_array(momentum, "momentum", (algebra.dimension,))
     return algebra.coad(linear_solution(operator, mu), mu)
@@ -94,19 +93,13 @@ def euler_poincare_motion(
     """The motion with a given body momentum at the first time, with its reconstruction g' = g xi.
 
     Source: Marsden and Ratiu, equation (15.2.10) for the reconstruction.
+    Raises AccuracyNotReached if the motion goes to infinity before the last time, as it can on some algebras.
 
     Parameters
     ----------
     inertia : (d, d) symmetric isomorphism of the algebra with its dual
     momentum : (..., d) body momentum at times[0], where g is the identity
     times : (N,) strictly ascending
-
-    Raises
-    ------
-    ShapeError, LieAlgebraError
-        As `euler_poincare_rate`, or if the times do not ascend.
-    AccuracyNotReached
-        If the motion goes to infinity before the last time, as it can on some algebras.
 
     Examples
     --------
@@ -115,7 +108,6 @@ def euler_poincare_motion(
     >>> print(np.linalg.norm(motion.momentum, axis=-1).round(9))
     [1.3 1.3]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     operator, d = inertia_operator(algebra, inertia), algebra.dimension
     mu, instants = finite_array(momentum, "momentum", (d,)), ascending_times(times)
     inverse, basis = np.linalg.inv(operator), algebra.basis
@@ -179,7 +171,7 @@ class InvariableHyperplane:
     __repr__ = short_repr
 
     def offset(self, point: ArrayLike) -> Array:
-        """<mu_s, x> - 2 E_0, zero on the hyperplane: (..., N, d) -> (..., N). Raises ShapeError."""
+        """<mu_s, x> - 2 E_0, zero on the hyperplane: (..., N, d) -> (..., N)."""
         points = finite_array(point, "point", (self.normal.shape[-1],))
         return np.sum(self.normal[..., None, :] * points, axis=-1) - self.level[..., None]
 
@@ -224,7 +216,6 @@ def invariable_hyperplane(algebra: LieAlgebra, inertia: ArrayLike, momentum: Arr
     >>> plane.normal.tolist(), plane.level.item()
     ([0.0, 0.0, 2.0], 1.0)
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     operator = inertia_operator(algebra, inertia)
     mu = finite_array(momentum, "momentum", (algebra.dimension,))
     if not np.all(np.abs(mu).max(axis=-1) > 0.0):
@@ -236,8 +227,6 @@ def invariable_hyperplane(algebra: LieAlgebra, inertia: ArrayLike, momentum: Arr
 
 def contact_conormal(inertia: ArrayLike, adjoint: ArrayLike, point: ArrayLike) -> Array:
     """The differential of l o Ad_{g^-1} at a point, the conormal of the moved energy quadric: (..., d) -> (..., d).
-
-    Raises ShapeError.
 
     Parameters
     ----------
@@ -259,8 +248,6 @@ def contact_conormal(inertia: ArrayLike, adjoint: ArrayLike, point: ArrayLike) -
 
 def contact_velocity(algebra: LieAlgebra, adjoint: ArrayLike, velocity: ArrayLike, body_point: ArrayLike) -> Array:
     """The velocity in space of a point fixed in the body's algebra, d/dt Ad_g eta = Ad_g [xi, eta]: -> (..., d).
-
-    Raises ShapeError.
 
     Parameters
     ----------

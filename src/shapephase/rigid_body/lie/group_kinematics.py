@@ -48,7 +48,6 @@ def adjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
      [ 0. -1.  0.]
      [ 0.  0. -1.]]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     element, inverse = _element(algebra, g)
     turned = element[..., None, :, :] @ algebra.matrix_basis @ inverse[..., None, :, :]
     return np.swapaxes(algebra.coordinates(turned), -1, -2)
@@ -66,7 +65,6 @@ def coadjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
     >>> print(sp.rigid_body.lie.coadjoint_action(sp.rigid_body.lie.so3(), half).diagonal().round(9))
     [ 1. -1. -1.]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return np.swapaxes(adjoint_action(algebra, inverse), -1, -2)
 
@@ -83,7 +81,6 @@ def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Arr
     >>> lie.body_velocity(lie.so3(), np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).round(9).tolist()
     [1.0, 2.0, 3.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return algebra.coordinates(inverse @ _like(algebra, velocity, "velocity"))
 
@@ -100,7 +97,6 @@ def space_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Ar
     >>> lie.space_velocity(lie.so3(), turn, turn @ sp.so3.hat(np.array([1.0, 0.0, 0.0]))).round(9).tolist()
     [0.0, 1.0, 0.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return algebra.coordinates(_like(algebra, velocity, "velocity") @ inverse)
 
@@ -108,7 +104,7 @@ def space_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Ar
 def body_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Array:
     """alpha^B, the pull-back of a covector at g by left translation, <alpha^B, a> = <alpha, g a>: -> (..., d).
 
-    Raises LieAlgebraError, ShapeError. Source: Marsden and Ratiu, equation (15.4.2).
+    Source: Marsden and Ratiu, equation (15.4.2).
 
     Examples
     --------
@@ -116,7 +112,6 @@ def body_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Arr
     >>> lie.body_momentum(lie.so3(), np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 1.0]))).tolist()
     [0.0, 0.0, 2.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     element, _ = _element(algebra, g)
     return _paired(_like(algebra, covector, "covector"), element[..., None, :, :] @ algebra.matrix_basis)
 
@@ -124,7 +119,7 @@ def body_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Arr
 def space_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Array:
     """alpha^S, the pull-back of a covector at g by right translation, <alpha^S, a> = <alpha, a g>: -> (..., d).
 
-    Raises LieAlgebraError, ShapeError. Source: Marsden and Ratiu, equation (15.4.1).
+    Source: Marsden and Ratiu, equation (15.4.1).
 
     Examples
     --------
@@ -132,7 +127,6 @@ def space_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Ar
     >>> lie.space_momentum(lie.so3(), np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 1.0]))).tolist()
     [0.0, 0.0, 2.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     element, _ = _element(algebra, g)
     return _paired(_like(algebra, covector, "covector"), algebra.matrix_basis @ element[..., None, :, :])
 
@@ -151,6 +145,7 @@ def _element(algebra: LieAlgebra, g: ArrayLike) -> tuple[Matrices, Matrices]:
 
 
 def _like(algebra: LieAlgebra, value: ArrayLike, name: str) -> Matrices:
+    check_object(algebra, "LieAlgebra", "algebra")
     n = algebra.matrix_basis.shape[-1]
     matrices = complex_or_real(value, name, (n, n))
     if np.iscomplexobj(matrices) and not np.iscomplexobj(algebra.matrix_basis):

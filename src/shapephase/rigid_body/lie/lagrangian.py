@@ -37,14 +37,14 @@ class ReducedBody:
     def momentum(self, se3_momentum: ArrayLike) -> Array:
         """(Pi, P) about the material origin -> Pi - c x P about the centre of mass: (..., 6) -> (..., 3).
 
-        A Poisson map of se(3)* to so(3)*, both with the minus Lie-Poisson bracket. Raises ShapeError.
+        A Poisson map of se(3)* to so(3)*, both with the minus Lie-Poisson bracket.
         """
         both = finite_array(se3_momentum, "se3_momentum", (6,))
         return both[..., :3] - np.cross(self.centre, both[..., 3:])
 
 
 def material_velocity(attitude_rate: ArrayLike, positions: ArrayLike) -> Array:
-    """V(X) = R' X: (..., 3, 3), (P, 3) -> (..., P, 3) [m/s]. Raises ShapeError; equation (15.2.1).
+    """V(X) = R' X: (..., 3, 3), (P, 3) -> (..., P, 3) [m/s]. Source: equation (15.2.1).
 
     Examples
     --------
@@ -58,7 +58,7 @@ def material_velocity(attitude_rate: ArrayLike, positions: ArrayLike) -> Array:
 def spatial_velocity(attitude: ArrayLike, attitude_rate: ArrayLike, points: ArrayLike) -> Array:
     """v(x) = R' R^-1 x at points of space: (..., 3, 3), (..., 3, 3), (..., P, 3) -> (..., P, 3) [m/s].
 
-    Raises ShapeError. Source: equation (15.2.2).
+    Source: equation (15.2.2).
 
     Examples
     --------
@@ -72,7 +72,7 @@ def spatial_velocity(attitude: ArrayLike, attitude_rate: ArrayLike, points: Arra
 def convective_velocity(attitude: ArrayLike, attitude_rate: ArrayLike, positions: ArrayLike) -> Array:
     """R^-1 R' X, the velocity in body axes: (..., 3, 3), (..., 3, 3), (P, 3) -> (..., P, 3) [m/s].
 
-    Raises ShapeError. Source: equation (15.2.3).
+    Source: equation (15.2.3).
 
     Examples
     --------
@@ -122,7 +122,7 @@ def spatial_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> A
 def material_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude_rate: ArrayLike) -> Array:
     """L = sum m |V|^2 / 2 over material velocities: (P,), (P, 3), (..., 3, 3) -> (...) [J].
 
-    Left invariant: the same for (B R, B R') with any rotation B. Raises ShapeError.
+    Left invariant: the same for (B R, B R') with any rotation B.
     Source: equations (15.2.4), (15.2.9).
 
     Examples
@@ -135,7 +135,7 @@ def material_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude_rate: 
 
 
 def spatial_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
-    """L = sum m |v(x)|^2 / 2 of the spatial velocity field at x = R X: -> (...) [J]. Raises ShapeError; (15.2.5).
+    """L = sum m |v(x)|^2 / 2 of the spatial velocity field at x = R X: -> (...) [J]. Source: (15.2.5).
 
     Examples
     --------
@@ -151,7 +151,7 @@ def spatial_lagrangian(masses: ArrayLike, positions: ArrayLike, attitude: ArrayL
 def convective_lagrangian(
     masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike
 ) -> Array:
-    """L = sum m |Omega x X|^2 / 2: -> (...) [J]. Raises ShapeError; equations (15.2.6), (15.3.1).
+    """L = sum m |Omega x X|^2 / 2: -> (...) [J]. Source: equations (15.2.6), (15.3.1).
 
     Examples
     --------
@@ -166,7 +166,7 @@ def convective_lagrangian(
 def mass_inner_product(masses: ArrayLike, positions: ArrayLike, a: ArrayLike, b: ArrayLike) -> Array:
     """<<a, b>> = sum m (a x X) . (b x X): (P,), (P, 3), (..., 3), (..., 3) -> (...) [kg m^2 times those of a and b].
 
-    L = <<Omega, Omega>> / 2. Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.2).
+    L = <<Omega, Omega>> / 2. Source: Marsden and Ratiu, equation (15.3.2).
 
     Examples
     --------
@@ -182,7 +182,7 @@ def mass_inner_product(masses: ArrayLike, positions: ArrayLike, a: ArrayLike, b:
 def mass_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
     """The inertia tensor about the material origin, I a . b = <<a, b>>: (P,), (P, 3) -> (3, 3) [kg m^2].
 
-    Raises ShapeError. Source: Marsden and Ratiu, section 15.3.
+    Source: Marsden and Ratiu, section 15.3.
 
     Examples
     --------
@@ -196,7 +196,7 @@ def mass_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
 def legendre_transform(masses: ArrayLike, positions: ArrayLike, angular_velocity: ArrayLike) -> Array:
     """Pi = sum m X x (Omega x X) = I Omega, the body momentum: (P,), (P, 3), (..., 3) -> (..., 3) [kg m^2/s].
 
-    Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.4).
+    Source: Marsden and Ratiu, equation (15.3.4).
 
     Examples
     --------
@@ -211,7 +211,7 @@ def legendre_transform(masses: ArrayLike, positions: ArrayLike, angular_velocity
 def spatial_momentum(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLike, attitude_rate: ArrayLike) -> Array:
     """pi = sum m x x v = R Pi, constant in a free motion: -> (..., 3) [kg m^2/s, inertial axes].
 
-    Raises ShapeError. Source: Marsden and Ratiu, equations (15.3.5), (15.3.7), (15.3.13).
+    Source: Marsden and Ratiu, equations (15.3.5), (15.3.7), (15.3.13).
 
     Examples
     --------
@@ -227,7 +227,7 @@ def spatial_momentum(masses: ArrayLike, positions: ArrayLike, attitude: ArrayLik
 def se3_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
     """The inertia operator on se(3), twist (Omega, V) of the material origin -> (Pi, P): (P,), (P, 3) -> (6, 6).
 
-    That of the kinetic energy with translations; for `euler_poincare_motion(se3(), ...)`. Raises ShapeError.
+    That of the kinetic energy with translations; for `euler_poincare_motion(se3(), ...)`.
 
     Examples
     --------
@@ -242,7 +242,7 @@ def se3_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
 def reduce_translations(masses: ArrayLike, positions: ArrayLike) -> ReducedBody:
     """The body about its centre of mass: SE(3) reduced by its translations to SO(3).
 
-    Raises ShapeError. Source: Marsden and Ratiu, exercise 15.1-1.
+    Source: Marsden and Ratiu, exercise 15.1-1.
 
     Examples
     --------

@@ -31,13 +31,8 @@ _NEAR_ZERO = 1e-14  # ratio of eigenvalues, or distance of structure constants f
 class LieAlgebra:
     """A real Lie algebra of dimension d, [e_i, e_j] = c_ij^k e_k.
 
-    Raises
-    ------
-    LieAlgebraError
-        If the constants are not antisymmetric in i and j, do not satisfy Jacobi's identity to rounding, or are not
-        those of the basis.
-    ShapeError
-        If an entry is not finite or the shapes do not fit.
+    Raises LieAlgebraError if the constants are not antisymmetric in i and j, do not satisfy Jacobi's identity to
+    rounding, or are not those of the basis.
 
     Examples
     --------
@@ -91,17 +86,17 @@ class LieAlgebra:
         return len(self.structure)
 
     def bracket(self, a: ArrayLike, b: ArrayLike) -> Array:
-        """The Lie bracket [a, b]: (..., d), (..., d) -> (..., d). Raises ShapeError."""
+        """The Lie bracket [a, b]: (..., d), (..., d) -> (..., d)."""
         return np.einsum("...i,...j,ijk->...k", self._vector(a, "a"), self._vector(b, "b"), self.structure)
 
     def ad(self, a: ArrayLike) -> Array:
-        """The adjoint operator ad_a, ad_a b = [a, b]: (..., d) -> (..., d, d). Raises ShapeError."""
+        """The adjoint operator ad_a, ad_a b = [a, b]: (..., d) -> (..., d, d)."""
         return np.einsum("...i,ijk->...kj", self._vector(a, "a"), self.structure)
 
     def coad(self, a: ArrayLike, mu: ArrayLike) -> Array:
         """The coadjoint operator, <ad*_a mu, b> = <mu, [a, b]>: (..., d), (..., d) -> (..., d).
 
-        For so(3) it is mu x a. Raises ShapeError.
+        For so(3) it is mu x a.
         """
         return np.einsum("...i,ijk,...k->...j", self._vector(a, "a"), self.structure, self._vector(mu, "mu"))
 
@@ -274,16 +269,10 @@ def heisenberg() -> LieAlgebra:
 
 
 def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
-    """A user's inertia operator, a symmetric isomorphism of the algebra with its dual: (d, d).
+    """Inertia operator, a symmetric isomorphism of the algebra with its dual: (d, d).
 
-    It need not be positive definite, as in Marsden and Ratiu's exercise 15.5-1.
-
-    Raises
-    ------
-    ShapeError
-        If the shape is wrong or an entry is not finite.
-    LieAlgebraError
-        If it is not symmetric to 1e-9 of its largest entry, or singular.
+    It need not be positive definite, as in Marsden and Ratiu's exercise 15.5-1. Raises LieAlgebraError if it is not
+    symmetric to 1e-9 of its largest entry, or singular.
     """
     check_object(algebra, "LieAlgebra", "algebra")
     d = algebra.dimension
@@ -299,7 +288,7 @@ def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
 
 
 def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...]) -> NDArray[Any]:
-    """A user's finite array that may hold complex numbers, its last axes as in `finite_array`. Raises ShapeError."""
+    """A user's finite array that may hold complex numbers, its last axes as in `finite_array`."""
     try:
         # asanyarray keeps the mask of a masked array, which `finite_array` refuses.
         entries = np.asanyarray(value)
@@ -339,7 +328,7 @@ def _check_basis(basis: Matrices, structure: Array) -> None:
 
 
 def _matrices(value: ArrayLike, name: str) -> Matrices:
-    """A user's square matrices, real or complex: (..., n, n), a copy. Raises ShapeError."""
+    """A user's square matrices, real or complex: (..., n, n), a copy."""
     array = complex_or_real(value, name, (None, None))
     if array.shape[-1] != array.shape[-2]:
         raise ShapeError(f"{name}: square matrices (..., n, n) are needed, got {array.shape}")

@@ -5,6 +5,13 @@ motion F' = {F, H} are mu' = ad*_{dH} mu, for the kinetic energy K = Pi . I^-1 P
 enter by their gradients, as values (..., d) or as callables of the momentum. Where no algebra is given it is so(3).
 
 Source: Marsden and Ratiu, section 15.3 and chapter 13.
+
+With double-bracket dissipation the energy of a free rigid body falls and its momentum stays on its sphere:
+Pi' = Pi x Omega + alpha Pi x (Pi x Omega) with alpha > 0, that is F' = {F, K} + {F, K}_sym with the symmetric bracket
+{F, G}_sym = -alpha (Pi x grad F) . (Pi x grad G); Marsden and Ratiu print it without the minus sign, with which the
+energy would grow.
+
+Source: Marsden and Ratiu, exercise 15.9-2; theory.md K4, M-E8.
 """
 
 from __future__ import annotations
@@ -30,7 +37,7 @@ _RANK = 1e-12  # singular values below this share of the largest are zero
 def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
     """B_ij = {mu_i, mu_j} = -c_ij^k mu_k: (..., d) -> (..., d, d). {F, G} = dF . B dG, and mu' = B dH.
 
-    For so(3) it is hat(Pi). Raises ShapeError.
+    For so(3) it is hat(Pi).
 
     Examples
     --------
@@ -39,7 +46,6 @@ def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
      [ 3.  0. -1.]
      [-2.  1.  0.]]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     return -np.einsum("ijk,...k->...ij", algebra.structure, _momentum(momentum, algebra))
 
 
@@ -55,7 +61,6 @@ def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, 
     >>> sp.rigid_body.lie.lie_poisson_bracket(x, y, [0.0, 0.0, 5.0]).item()  # {Pi_1, Pi_2} = -Pi_3
     -5.0
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     bracket = algebra.bracket(gradient_at(first, "first", mu), gradient_at(second, "second", mu))
     return -np.sum(mu * bracket, axis=-1)
@@ -69,8 +74,6 @@ def bracket_gradient(
 ) -> Array:
     """The gradient of {F, G}, with which brackets can be nested: (..., d).
 
-    Raises ShapeError.
-
     Parameters
     ----------
     first, second : gradient (..., d) and Hessian (..., d, d) of F and of G at the momenta
@@ -82,8 +85,8 @@ def bracket_gradient(
     >>> sp.rigid_body.lie.bracket_gradient(([1.0, 0.0, 0.0], flat), ([0.0, 1.0, 0.0], flat), [1.0, 2.0, 3.0]).tolist()
     [0.0, 0.0, -1.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
-    d, mu = algebra.dimension, _momentum(momentum, algebra)
+    mu = _momentum(momentum, algebra)
+    d = algebra.dimension
     for pair, name in ((first, "first"), (second, "second")):
         check_pair(pair, name, "a gradient and a Hessian")
     df, dg = finite_array(first[0], "first gradient", (d,)), finite_array(second[0], "second gradient", (d,))
@@ -96,14 +99,11 @@ def bracket_gradient(
 def hamiltonian_vector_field(hamiltonian: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
     """X_H(mu) = ad*_{dH} mu, with {F, H} = dF . X_H: (..., d) -> (..., d). For so(3) it is Pi x grad H.
 
-    Raises ShapeError.
-
     Examples
     --------
     >>> sp.rigid_body.lie.hamiltonian_vector_field([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]).tolist()  # Pi x grad H
     [0.0, -1.0, 0.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     return algebra.coad(gradient_at(hamiltonian, "hamiltonian", mu), mu)
 
@@ -127,7 +127,6 @@ def lie_poisson_motion(
     >>> print(np.linalg.norm(pi, axis=-1).round(9))
     [1.3 1.3 1.3]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     start, instants = _momentum(momentum, algebra), ascending_times(times)
     check_function(hamiltonian, "hamiltonian", "a function that gives the gradient")
     gradient_at(hamiltonian, "hamiltonian", start)
@@ -144,14 +143,13 @@ def casimir_defect(function: Gradient, momentum: ArrayLike, algebra: LieAlgebra 
 
     Zero everywhere if and only if C is a Casimir.
 
-    Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.12).
+    Source: Marsden and Ratiu, equation (15.3.12).
 
     Examples
     --------
     >>> sp.rigid_body.lie.casimir_defect([0.3, 0.4, 1.2], [0.3, 0.4, 1.2]).item()  # of |Pi|^2/2, a Casimir
     0.0
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     return np.linalg.norm(hamiltonian_vector_field(function, momentum, algebra), axis=-1)
 
 
@@ -211,7 +209,6 @@ def coadjoint_orbit_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLik
     >>> sp.rigid_body.lie.coadjoint_orbit_form([0.0, 0.0, 5.0], x, y).item()
     -0.2
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     tensor = poisson_tensor(mu, algebra)
     inverse = np.linalg.pinv(tensor, rcond=_RANK)
@@ -269,7 +266,7 @@ def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
 
 def kinetic_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
-    """K = Pi . I^-1 Pi / 2: (..., 3, 3), (..., 3) -> (...) [J]. Raises as `euler_equations`; equation (15.3.3).
+    """K = Pi . I^-1 Pi / 2: (..., 3, 3), (..., 3) -> (...) [J]. Source: equation (15.3.3).
 
     Examples
     --------
@@ -282,8 +279,6 @@ def kinetic_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
 def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     """Omega = I^-1 Pi, the gradient of the kinetic energy: (..., 3, 3), (..., 3) -> (..., 3) [rad/s, body axes].
-
-    Raises as `euler_equations`.
 
     Examples
     --------
@@ -303,6 +298,7 @@ def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
 
 
 def _momentum(value: ArrayLike, algebra: LieAlgebra) -> Array:
+    check_object(algebra, "LieAlgebra", "algebra")
     return finite_array(value, "momentum", (algebra.dimension,))
 
 
@@ -319,3 +315,79 @@ def _null_space(equations: Array) -> Array:
     _, values, vectors = np.linalg.svd(np.linalg.qr(equations, mode="r"))
     rank = int(np.sum(values > _RANK * max(float(values.max(initial=0.0)), 1.0)))
     return vectors[rank:]
+
+
+def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """{F, G}_sym = -alpha (Pi x grad F) . (Pi x grad G), from gradients at momenta (..., 3): (...).
+
+    Parameters
+    ----------
+    first, second : gradients of F and G, values (..., 3) or callables of the momentum
+    momentum : (..., 3) body momentum [kg m^2/s]
+    alpha : (...) dissipation [s/(kg m^2)], positive where energy is lost
+
+    Examples
+    --------
+    >>> x, y, z = np.eye(3)
+    >>> sp.rigid_body.lie.symmetric_bracket(x, x, [0.0, 0.0, 2.0], 0.5).item()  # -alpha |Pi x e_x|^2
+    -2.0
+    """
+    pi, strength = finite_array(momentum, "momentum", (3,), unit="kg m^2/s"), finite_array(alpha, "alpha")
+    across = np.cross(pi, gradient_at(first, "first", pi))
+    return -strength * np.sum(across * np.cross(pi, gradient_at(second, "second", pi)), axis=-1)
+
+
+def double_bracket_equations(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """Pi' = Pi x Omega + alpha Pi x (Pi x Omega): (..., 3, 3), (..., 3), (...) -> (..., 3) [kg m^2/s^2].
+
+    Examples
+    --------
+    >>> sp.rigid_body.lie.double_bracket_equations(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0], 0.1).tolist()
+    [0.0, 0.0, 0.0]
+    """
+    pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    return _rate(pi, angular_velocity(inertia, pi), finite_array(alpha, "alpha")[..., None])
+
+
+def dissipated_power(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """-dK/dt = alpha |Pi x Omega|^2, zero at equilibria only: (...) [W].
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.dissipated_power(np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0], 2.0).item()  # alpha |Pi x Omega|^2
+    1.125
+    """
+    pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    torque = np.cross(pi, angular_velocity(inertia, pi))
+    return finite_array(alpha, "alpha") * np.sum(torque * torque, axis=-1)
+
+
+def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float, times: ArrayLike) -> Array:
+    """The body momentum under double-bracket dissipation, given at the first time: (..., 3), (N,) -> (..., N, 3).
+
+    Parameters
+    ----------
+    inertia : (3, 3) or (..., 3, 3) [kg m^2]
+    alpha : (...) dissipation [s/(kg m^2)]; a negative one drives the body
+    times : (N,) strictly ascending [s]
+
+    Examples
+    --------
+    >>> pi = sp.rigid_body.lie.double_bracket_motion(np.diag([1.0, 2.0, 4.0]), [0.6, 0.1, 0.5], 1.0, [0.0, 60.0])
+    >>> print(pi[-1].round(4) + 0.0, np.linalg.norm(pi, axis=-1).round(6))
+    [0.     0.     0.7874] [0.787401 0.787401]
+    """
+    pi, instants, strength = (
+        finite_array(momentum, "momentum", (3,), unit="kg m^2/s"),
+        ascending_times(times),
+        finite_array(alpha, "alpha")[..., None],
+    )
+    inverse = inverse_inertia_argument(inertia)
+    start = np.array(np.broadcast_to(pi, np.broadcast_shapes(pi.shape, inverse.shape[:-1], (*strength.shape[:-1], 3))))
+    return flow(lambda p: _rate(p, (inverse @ p[..., None])[..., 0], strength), start, instants)
+
+
+def _rate(pi: Array, omega: Array, strength: Array) -> Array:
+    torque = np.cross(pi, omega)
+    return torque + strength * np.cross(pi, torque)

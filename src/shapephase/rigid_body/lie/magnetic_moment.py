@@ -37,7 +37,7 @@ class MagneticEquilibrium:
 
 
 def magnetic_hamiltonian(moment: ArrayLike, field: ArrayLike) -> Array:
-    """H = M . B, whose gradient is B: (..., 3), (..., 3) -> (...). Raises ShapeError.
+    """H = M . B, whose gradient is B: (..., 3), (..., 3) -> (...).
 
     Examples
     --------
@@ -48,7 +48,7 @@ def magnetic_hamiltonian(moment: ArrayLike, field: ArrayLike) -> Array:
 
 
 def magnetic_precession_rate(moment: ArrayLike, field: ArrayLike) -> Array:
-    """M' = M x B: (..., 3), (..., 3) -> (..., 3). Raises ShapeError.
+    """M' = M x B: (..., 3), (..., 3) -> (..., 3).
 
     Examples
     --------
@@ -60,8 +60,6 @@ def magnetic_precession_rate(moment: ArrayLike, field: ArrayLike) -> Array:
 
 def magnetic_precession(moment: ArrayLike, field: ArrayLike, t: ArrayLike) -> Array:
     """M(t) = exp(-t hat(B)) M(0), the turn about B at the rate -|B|: (..., 3), (..., 3), (N,) -> (..., N, 3).
-
-    Raises ShapeError.
 
     Examples
     --------

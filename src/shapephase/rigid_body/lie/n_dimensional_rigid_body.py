@@ -39,7 +39,7 @@ def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
 
 
 def n_dimensional_momentum(second_moment: ArrayLike, angular_velocity: ArrayLike) -> Array:
-    """M = Omega J + J Omega: (n, n), antisymmetric (..., n, n) -> (..., n, n). Raises as `n_dimensional_inertia`.
+    """M = Omega J + J Omega: (n, n), antisymmetric (..., n, n) -> (..., n, n).
 
     Examples
     --------
@@ -55,8 +55,6 @@ def n_dimensional_momentum(second_moment: ArrayLike, angular_velocity: ArrayLike
 def n_dimensional_angular_velocity(second_moment: ArrayLike, momentum: ArrayLike) -> Array:
     """The Omega with Omega J + J Omega = M: (n, n), antisymmetric (..., n, n) -> (..., n, n).
 
-    Raises as `n_dimensional_inertia`.
-
     Examples
     --------
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
@@ -70,7 +68,7 @@ def n_dimensional_angular_velocity(second_moment: ArrayLike, momentum: ArrayLike
 
 
 def n_dimensional_rate(second_moment: ArrayLike, momentum: ArrayLike) -> Array:
-    """M' = [M, Omega]: (n, n), antisymmetric (..., n, n) -> (..., n, n). Raises as `n_dimensional_inertia`.
+    """M' = [M, Omega]: (n, n), antisymmetric (..., n, n) -> (..., n, n).
 
     Examples
     --------
