@@ -158,9 +158,7 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
 
 
 def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
-    """The area between the two separatrices, on the side of one principal axis [sr].
-
-    Source: theory.md section 7.
+    """The area between the two separatrices, on the side of one principal axis [sr]. Source: theory.md section 7.
 
     Parameters
     ----------

@@ -100,10 +100,7 @@ class AndoyerVariables:
 
     @property
     def body_momentum(self) -> Array:
-        """Pi: (..., 3), body axes [kg m^2/s]. Singular cases included.
-
-        Source: Bonnard et al., before (5).
-        """
+        """Pi: (..., 3), body axes [kg m^2/s]. Singular cases included. Source: Bonnard et al., before (5)."""
         across = self._across
         return np.stack([across * np.sin(self.l), across * np.cos(self.l), self.axial], axis=-1)
 
