@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic
+from ..arguments import moments_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
@@ -171,9 +172,9 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     >>> print(f"{2.0 * sum(areas) / np.pi:.9f} pi")  # both sides of both axes are the sphere
     4.000000000 pi
     """
-    values = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if values.ndim != 1 or values.min() <= 0.0 or values.min() == values.max():
-        raise ShapeError(f"moments: three numbers above 0, not all equal, are needed, got {values}")
+    values = moments_argument(moments)
+    if values.min() == values.max():
+        raise ShapeError(f"moments: three that are not all equal are needed, got {values}")
     (low, middle, high), own_moment = ascending_moments(values)[0], values[axis_index(axis)]
     if own_moment not in (low, high):
         raise ShapeError(f"axis: that of the smallest or the largest of the moments {values} is needed, got {axis}")
@@ -235,9 +236,9 @@ def weierstrass_form(moments: ArrayLike, momentum: ArrayLike) -> WeierstrassForm
     >>> print(f"{top.period / form.half_periods[0]:.9f}")  # Pi itself has twice the period of its squares
     4.000000000
     """
-    values, start = finite_array(moments, "moments", (3,), unit="kg m^2"), finite_array(momentum, "momentum", (3,))
-    if values.shape != (3,) or start.shape != (3,) or values.min() <= 0.0 or len(set(values.tolist())) < 3:
-        raise ShapeError("moments, momentum: three different numbers above 0, and one momentum (3,), are needed")
+    values, start = moments_argument(moments), vector_argument(momentum, "momentum", unit="kg m^2/s")
+    if len(set(values.tolist())) < 3:
+        raise ShapeError(f"moments: three different ones are needed, got {values}")
     ascending, order, parity = ascending_moments(values)
     # All three components change sign with an odd order: a proper turn, and the squares stay.
     orbit = momentum_orbit(ascending, parity * start[order])

@@ -10,7 +10,7 @@ Source: Marsden and Ratiu, section 15.10; theory.md M1, M2, M10.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -149,7 +149,6 @@ class HeavyTop:
         attitude : (..., 3, 3) body to inertial axes at the start, instead of gamma; with neither, the identity
         duration : of the motion [s]
         tolerance : of the attitude over the whole motion, in [1e-12, 1e-2] [rad]
-
         """
         body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         if gamma is not None and attitude is not None:
@@ -174,7 +173,7 @@ class HeavyTop:
             estimate = 0.1 * _difference(coarse, fine)
             worst = float(np.max(estimate, initial=0.0))
             if worst <= requested:
-                return HeavyTopMotion(self, time, fine.vertical, estimate, fine.energy_drift, fine)
+                return replace(fine, error_estimate=estimate)
             if local <= least:
                 raise AccuracyNotReached(
                     f"heavy top: the attitude is known to {worst:.2g} rad over {time:.6g} s, tolerance "
@@ -202,7 +201,8 @@ class HeavyTopMotion:
     tolerance [rad]."""
     energy_drift: Array
     """(...) largest |H(t) - H(0)| at the ends of the steps [J]."""
-    _run: _Run = field(repr=False)
+    _scale: Array = field(repr=False)
+    _solution: OdeSolution = field(repr=False)
 
     __repr__ = short_repr
 
@@ -225,28 +225,15 @@ class HeavyTopMotion:
         return so3.apply(inverse, self.body_momentum(t))
 
     def _state(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Quaternions xyzw and spatial momentum: times (...) -> batch + time + (4,), batch + time + (3,)."""
         times = finite_array(t, "t", unit="s")
         if np.any((times < 0.0) | (times > self.duration)):
             raise ShapeError(f"t: from {times.min():.6g} to {times.max():.6g} s; the motion is on [0, {self.duration}]")
-        return self._run.state(times)
-
-
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """One integration of a motion: what belongs to its states, and the interpolant of its steps."""
-
-    vertical: Array  # (...) vertical momentum, constant [kg m^2/s]
-    scale: Array  # (...) unit of the horizontal momentum in the state [kg m^2/s]
-    energy_drift: Array  # (...) [J]
-    solution: OdeSolution
-
-    def state(self, times: Array) -> tuple[Array, Array]:
-        """Quaternions xyzw and spatial momentum: times (...) -> batch + time + (4,), batch + time + (3,)."""
-        batch = self.scale.shape
-        flat = self.solution(times.ravel()) if times.size else np.empty((6 * self.scale.size, 0))
+        batch = self._scale.shape
+        flat = self._solution(times.ravel()) if times.size else np.empty((6 * self._scale.size, 0))
         rows = np.moveaxis(flat.reshape(*batch, 6, times.size), -2, -1).reshape(*batch, *times.shape, 6)
         lift = (..., *(None,) * times.ndim)
-        return _unpacked(rows, self.scale[lift], self.vertical[lift])
+        return _unpacked(rows, self._scale[lift], self.vertical_momentum[lift])
 
 
 def semidirect_bracket(
@@ -350,7 +337,10 @@ def _unpacked(state: Array, scale: Array, vertical: Array) -> tuple[Array, Array
     return so3.normalised(state[..., :4]), np.concatenate([horizontal, upright], axis=-1)
 
 
-def _integrated(top: HeavyTop, attitude: Array, momentum: Array, duration: float, local_tolerance: float) -> _Run:
+def _integrated(
+    top: HeavyTop, attitude: Array, momentum: Array, duration: float, local_tolerance: float
+) -> HeavyTopMotion:
+    """One run with a local tolerance, without an error estimate."""
     vertical, scale, _ = _packed(top, attitude, momentum)
     before = top.energy(momentum, attitude[..., 2, :])
     times, pieces, drift = [0.0], [], np.zeros(scale.shape)
@@ -360,15 +350,14 @@ def _integrated(top: HeavyTop, attitude: Array, momentum: Array, duration: float
         drift = np.maximum(drift, np.abs(energy - before))
         times.append(t)
         pieces.append(piece)
-    return _Run(vertical=vertical, scale=scale, energy_drift=drift, solution=OdeSolution(times, pieces))
+    return HeavyTopMotion(top, duration, vertical, np.zeros(scale.shape), drift, scale, OdeSolution(times, pieces))
 
 
-def _difference(coarse: _Run, fine: _Run) -> Array:
+def _difference(coarse: HeavyTopMotion, fine: HeavyTopMotion) -> Array:
     """Largest angle between the attitudes, at the ends and middles of the finer steps [rad]."""
-    ends = fine.solution.ts
+    ends = fine._solution.ts
     times = np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])
-    rough, accurate = (so3.matrix_from_quat(run.state(times)[0]) for run in (coarse, fine))
-    return so3.angle(so3.transpose(rough) @ accurate).max(axis=-1)
+    return so3.angle(so3.transpose(coarse.attitude(times)) @ fine.attitude(times)).max(axis=-1)
 
 
 def _point(momentum: ArrayLike, gamma: ArrayLike) -> Pair:

@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic, so3, sphere
-from ..arguments import check_object
+from ..arguments import check_object, number_argument, whole_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..letters import what_came
+from ._arguments import above_zero
 from .euler_top import EulerTop
 from .portrait import inverse_difference
 
@@ -209,10 +210,7 @@ class Poinsot:
 
         Raises ShapeError if the tolerance is not positive or `most_lobes` is below 1.
         """
-        numbers = isinstance(tolerance, int | float | np.number) and isinstance(most_lobes, int | np.integer)
-        if not numbers or not (tolerance > 0.0 and most_lobes >= 1):
-            came = f"{what_came(tolerance)}, {what_came(most_lobes)}"
-            raise ShapeError(f"closure: expected tolerance > 0 and most_lobes >= 1, got {came}")
+        within, most = above_zero(tolerance, "tolerance", "rad"), whole_argument(most_lobes, "most_lobes", 1)
         inner, outer = self.annulus
         if outer == inner:
             return Closure(int(outer > 0.0), 0, 0.0)
@@ -226,9 +224,9 @@ class Poinsot:
             denominators = denominators[1], whole * denominators[1] + denominators[0]
             turns, lobes = numerators[1], denominators[1]
             gap = 2.0 * np.pi * abs(lobes * per_lobe - turns)
-            if lobes > most_lobes:
+            if lobes > most:
                 return None
-            if gap <= tolerance:
+            if gap <= within:
                 return Closure(turns, lobes, gap)
             rest = 1.0 / (rest - whole)
 
@@ -291,9 +289,7 @@ class Poinsot:
         return self.top.magnitude**2 * _across(direction, self.top.moments) / self.top.moments
 
     def _length(self, speed: Callable[[Array], Array], start: float, end: float) -> float:
-        first, last = finite_array(start, "start", unit="s"), finite_array(end, "end", unit="s")
-        if first.ndim or last.ndim:
-            raise ShapeError(f"expected one start and one end [s], got shapes {first.shape} and {last.shape}")
+        first, last = number_argument(start, "start", "s"), number_argument(end, "end", "s")
         if self._is_point:
             return 0.0
         left, right = (float(self.top.rate * t + self.top.orbit.phase) for t in (first, last))

@@ -37,7 +37,6 @@ from .group_kinematics import (
     space_momentum,
     space_velocity,
 )
-from .hamiltonian_attitude import HamiltonianMotion, hamiltonian_motion
 from .lagrangian import (
     ReducedBody,
     body_angular_velocity,
@@ -67,6 +66,7 @@ from .lie_algebra import (
     su2,
 )
 from .lie_poisson import (
+    HamiltonianMotion,
     angular_velocity,
     bracket_gradient,
     casimir_defect,
@@ -75,6 +75,7 @@ from .lie_poisson import (
     double_bracket_equations,
     double_bracket_motion,
     euler_equations,
+    hamiltonian_motion,
     hamiltonian_vector_field,
     kinetic_energy,
     lie_poisson_bracket,
