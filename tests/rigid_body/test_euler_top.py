@@ -337,7 +337,7 @@ def test_separatrix_solid_angle_is_the_area_of_the_lune():
         on_it = EulerTop.principal(i, [0.3, 0.1, 0.3 * tangent])
         assert abs(on_it.solid_angle - on_it.orbit.sense * separatrix_solid_angle(i, on_it.orbit.circled)) < 1e-6
     for bad in ([1.0, 1.0, 1.0], [0.0, 1.0, 2.0], [[1.0, 2.0, 3.0]]):
-        with pytest.raises(ShapeError, match="not all equal"):
+        with pytest.raises(ShapeError, match="moments"):
             separatrix_solid_angle(bad, 0)
     for bad in (1, 3, -1):
         with pytest.raises(ShapeError, match="axis"):
