@@ -282,7 +282,7 @@ def bifurcation_rotors(inertia: ArrayLike, rotor_axis: ArrayLike) -> Array:
     a = 1.0 / moments
     weights, poles = _poles(a, n)
     places = [_least(weights, poles, left, right) for left, right in pairwise(poles)] + _bare(a, n)
-    return np.sort([1.0 / np.sqrt(_sum(place, weights, poles)) for place in places])
+    return np.sort([1.0 / np.sqrt(np.sum(weights / (poles - place) ** 2)) for place in places])
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,17 +348,11 @@ def _unit(axis: ArrayLike) -> Array:
 
 def _poles(a: Array, b: Array) -> tuple[Array, Array]:
     """Weights and poles, ascending, of the terms (a_i b_i)^2/(a_i - c)^2; terms of equal poles are added."""
-    weights: list[float] = []
-    poles: list[float] = []
-    for k in np.argsort(a):
-        if b[k] == 0.0:
-            continue
-        if poles and abs(a[k] - poles[-1]) <= _ROUNDING * a[k]:
-            weights[-1] += float((a[k] * b[k]) ** 2)
-        else:
-            weights.append(float((a[k] * b[k]) ** 2))
-            poles.append(float(a[k]))
-    return np.array(weights), np.array(poles)
+    order = np.argsort(a)
+    order = order[b[order] != 0.0]
+    poles, squares = a[order], (a[order] * b[order]) ** 2
+    first = np.diff(poles, prepend=-np.inf) > _ROUNDING * poles
+    return np.bincount(np.cumsum(first) - 1, squares, int(first.sum())), poles[first]
 
 
 def _bare(a: Array, b: Array) -> list[float]:
@@ -367,18 +361,11 @@ def _bare(a: Array, b: Array) -> list[float]:
     return [float(a[k]) for k in range(3) if b[k] == 0.0 and np.all(np.abs(poles - a[k]) > _ROUNDING * a[k])]
 
 
-def _sum(place: float, weights: Array, poles: Array) -> float:
-    return float(np.sum(weights / (poles - place) ** 2))
-
-
 def _least(weights: Array, poles: Array, left: float, right: float) -> float:
     """Minimum of the sum between two poles, a root of its slope, which ascends."""
 
-    def slope(place: float) -> float:
-        return float(np.sum(weights / (poles - place) ** 3))
-
     inset = 1e-9 * (right - left)
-    return bracketed_root(slope, left + inset, right - inset)
+    return bracketed_root(lambda place: float(np.sum(weights / (poles - place) ** 3)), left + inset, right - inset)
 
 
 def _directions(a: Array, b: Array) -> list[Array]:
@@ -399,7 +386,7 @@ def _directions(a: Array, b: Array) -> list[Array]:
     sides = [(poles[0], -1.0, reach), (poles[-1], 1.0, reach)]
     for left, right in pairwise(poles):
         middle = _least(weights, poles, left, right)
-        if _sum(middle, weights, poles) < 1.0:
+        if np.sum(weights / (poles - middle) ** 2) < 1.0:
             sides += [(left, 1.0, middle - left), (right, -1.0, right - middle)]
     for pole, side, far in sides:
         near = float(np.sqrt(weights[poles == pole][0]))

@@ -167,12 +167,12 @@ def upright_potential(top: LagrangeTop, momentum: float, tilt: ArrayLike) -> Arr
     so V - V(0) = (p^2/(2 I1) - 2 Mgl) u + 2 Mgl u^2/(1 + u). At p^2 = 4 Mgl I1 the first term vanishes and the second
     is positive: 2 Mgl u^2 - ..., a minimum of fourth order in the tilt.
 
+    Raises ShapeError if a tilt is pi or more. Source: theory.md M6, what theorem 15.10.1 leaves out.
+
     Parameters
     ----------
     momentum : p = Pi_3 [kg m^2/s]
     tilt : of the axis from the upward vertical, in (-pi, pi) [rad]
-
-    Raises ShapeError if a tilt is pi or more. Source: theory.md M6, what theorem 15.10.1 leaves out.
 
     Examples
     --------

@@ -157,8 +157,7 @@ class RigidBodyPendulum:
     def motion(self, momentum: ArrayLike) -> PendulumMotion:
         """The motion in closed form from a body momentum (3,) at t = 0 [kg m^2/s].
 
-        The distance from the separatrix is computed in exact arithmetic from the numbers given, so a motion next to it
-        or on it is as accurate as any other.
+        The distance from the separatrix is computed in exact arithmetic, so a motion next to it is as accurate as any.
 
         Source: Marsden and Ratiu (15.11.18); the pendulum's solution in Jacobi's functions is standard.
         Raises ShapeError for a momentum along the third axis, or with a part below 1e-140 of its largest that is not
@@ -253,18 +252,14 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
 
     Equation :eq:`pendulum` of the documentation.
     Source: Marsden and Ratiu (15.11.7) to (15.11.13).
+    Raises ShapeError if the moments are all equal (then every momentum is at rest), or the third axis is the
+    intermediate one or shares its moment with another: K is then not an elliptic cylinder.
 
     Parameters
     ----------
     moments : (3,) [kg m^2], any order; momenta have their components in the same order
     axes : which of them, 0 to 2, are called 1, 2, 3. None: ascending, as in the book; where the two largest are equal
         descending, so that the third differs from the others
-
-    Raises
-    ------
-    ShapeError
-        If the moments are not positive, or all equal (then every momentum is at rest), or `axes` is not a permutation,
-        or the third axis is the intermediate one or shares its moment with another: K is then not an elliptic cylinder.
 
     Examples
     --------
@@ -283,8 +278,8 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
         if order.shape != (3,) or sorted(order.tolist()) != [0, 1, 2]:
             raise ShapeError(f"axes: got {what_came(axes)}; expected an order of 0, 1, 2")
     first, second, third = (int(i) for i in order)
-    one, two, three = (1 / Fraction(float(values[i])) for i in (first, second, third))
-    by_first, by_second = one - three, two - three
+    inverse = [1 / Fraction(float(value)) for value in values]
+    by_first, by_second = inverse[first] - inverse[third], inverse[second] - inverse[third]
     if by_first * by_second <= 0:
         raise ShapeError(
             f"axes: {(first, second, third)} puts axis {third} last, whose moment {values[third]:.17g} of {values} "
@@ -309,8 +304,8 @@ def _motion(pendulum: RigidBodyPendulum, pi: Array, r: float) -> PendulumMotion:
     # In units of the largest momentum and the least moment, so that nothing overflows.
     largest, least = float(np.max(np.abs(pi))), float(np.min(pendulum.moments))
     x, y, z = (Fraction(float(pi[i])) / Fraction(largest) for i in pendulum.axes)
-    one, two, three = (Fraction(least) / Fraction(float(pendulum.moments[i])) for i in pendulum.axes)
-    u, v = abs(one - three), abs(two - three)
+    a1, a2, a3 = (Fraction(least) / Fraction(float(pendulum.moments[i])) for i in pendulum.axes)
+    u, v = abs(a1 - a3), abs(a2 - a3)
     swapped = u < v
     if swapped:
         x, y, u, v = y, x, v, u

@@ -65,18 +65,14 @@ class SadovVariables:
 def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVariables:
     """Action and angle variables of states in Andoyer's variables: (3,), (...) -> (...).
 
+    Raises ShapeError if two moments are equal, or a state is on the separatrix or along the axis of the middle moment,
+    where the period is infinite and there are no angles. Next to it they lose digits in proportion to 1/m1, m1 the
+    complement of the elliptic modulus.
+
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
     variables : of a body with those axes
-
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, for which Andoyer's variables about the axis of symmetry are angles and actions
-        themselves (the message has their rates), or a state is on the separatrix or along the axis of the middle
-        moment, where the period is infinite and there are no angles. Next to it they lose digits in proportion to
-        1/m1, m1 the complement of the elliptic modulus.
 
     Examples
     --------

@@ -134,20 +134,14 @@ def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None 
     """The surface with the metric F_1 dx^2 + F_2 d theta^2, |x| <= reach.
 
     Source: Bonnard et al., sections 2.1 and 2.2; theory.md O1, O4, P1.
+    Raises ShapeError if the metric breaks an assumption: its equator is not a geodesic, it is not symmetric, or F_2
+    does not fall to the reach; AccuracyNotReached if it is too rough to be tabulated to rounding.
 
     Parameters
     ----------
     profile : F_2 with its derivative (m with m' where F_1 = 1), see `Profile`
     reach : the largest x: of a pole, where F_2 = 0, of the next parallel, where F_2' = 0, or of the chart's boundary
     meridian : F_1; 1 where not given
-
-    Raises
-    ------
-    ShapeError
-        If the metric breaks an assumption: its equator is no geodesic, it is not symmetric, or F_2 does not fall to the
-        reach; or if the derivative is not that of F_2.
-    AccuracyNotReached
-        If the metric is too rough to be tabulated to rounding.
 
     Examples
     --------
