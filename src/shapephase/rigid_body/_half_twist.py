@@ -100,7 +100,7 @@ def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLi
 def twist_defect(moments: ArrayLike) -> Array:
     """Tennis-racket effect on the separatrix: the angle eps by which each end of the half twist falls short.
 
-    A racket is tossed about its intermediate axis; while its handle (the axis of the smallest moment) goes round the
+    (..., 3) -> (...) in (0, pi/2) [rad]; 0 where it would be below 1e-308. A racket is tossed about its intermediate axis; while its handle (the axis of the smallest moment) goes round the
     momentum once, the racket twists about the handle by pi - 2 eps. With the handle's azimuth phi and the twist psi,
     measured from the middle of the flip, a = I2/I1 - 1 and b = 1 - I2/I3 for ascending moments, motion on the
     separatrix obeys dphi/dpsi = (1 - b cos^2 psi)/sqrt(b cos^2 psi (a + b cos^2 psi)). Half a turn gives, u = cos eps,
@@ -113,10 +113,6 @@ def twist_defect(moments: ArrayLike) -> Array:
     Parameters
     ----------
     moments : (..., 3) three different principal moments in any order [kg m^2]
-
-    Returns
-    -------
-    (...) eps in (0, pi/2) [rad]; 0 where it would be below 1e-308
 
     Examples
     --------
@@ -151,7 +147,8 @@ def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
 
         dphi/dpsi = (1 - b cos^2 psi)/sqrt((a + b cos^2 psi)(c + b cos^2 psi)),
 
-    an integral in Carlson's forms. For c > 0 the racket twists on and on; for c < 0 it swings to and fro.
+    an integral in Carlson's forms. For c > 0 the racket twists on and on; for c < 0 it swings to and fro, and the twist
+    is negative at the end of a swing back. On the separatrix it is pi - 2 `twist_defect`: (..., 3) -> (...) [rad].
 
     Source: Van Damme, Mardesic and Sugny 2017; theory.md section 7.
     Raises ShapeError if two moments are equal, or there is no momentum.
@@ -160,10 +157,6 @@ def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
     ----------
     moments : (..., 3) three different principal moments in any order [kg m^2]
     momentum : (..., 3) along these axes at any one time [kg m^2/s]
-
-    Returns
-    -------
-    (...) the twist, pi - 2 `twist_defect` on the separatrix; negative at the end of a swing back [rad]
 
     Examples
     --------

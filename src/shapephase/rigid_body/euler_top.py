@@ -33,7 +33,8 @@ _BLOCK = 16_384  # times evaluated together: their arrays (half a megabyte each)
 class EulerTop:
     """A free rigid body with a given inertia, angular momentum and initial attitude.
 
-    Every inertia and momentum is allowed, also zero momentum; times may be negative.
+    Every inertia and momentum is allowed, also zero momentum; times may be negative. Raises ShapeError, and
+    UnphysicalInertiaError or SingularInertiaError if the inertia is not symmetric or not positive definite.
 
     Equations :eq:`jacobi` and :eq:`rigid-phase` of the documentation.
 
@@ -50,13 +51,6 @@ class EulerTop:
     moments : (3,) principal moments, ascending [kg m^2]
     axes : (3, 3) whose columns are the principal axes in body axes, determinant +1
     orbit : the curve of Pi in those axes
-
-    Raises
-    ------
-    ShapeError
-        For arrays of the wrong shape or entries that are not finite numbers.
-    UnphysicalInertiaError, SingularInertiaError
-        If the inertia is not symmetric, or not positive definite.
 
     Examples
     --------

@@ -42,6 +42,9 @@ class Gyrostat:
     constant: `inertia` is without the wheel's moment J about its axle, I - J a a^T, and `rotor` is p a.
 
     Source: Volterra 1899; Wittenburg 1977.
+    Raises AccuracyNotReached within some 3e-5 rad of a steady rotation, where the oval is so small that its digits are
+    lost (below 1e-2 rad the error of the start grows as the inverse square of that angle), or for a body so nearly
+    symmetric that it is nearly a circle; `reconstruct` with `prescribed` has no such limit.
 
     Parameters
     ----------
@@ -58,13 +61,6 @@ class Gyrostat:
     axes : (3, 3) whose columns are the principal axes in body axes, determinant +1
     regime : what the momentum does in the body: "steady", "circle" (uniformly about a symmetry axis), "one oval" (the
         only part of its curve), "one of two ovals", "separatrix"
-
-    Raises
-    ------
-    AccuracyNotReached
-        Within some 3e-5 rad of a steady rotation, where the oval is so small that its digits are lost (from 1e-2 rad
-        on the error of the start grows as the inverse square of that angle), or of a body so nearly symmetric that it
-        is nearly a circle; `reconstruct` with `prescribed` has no such limit.
 
     Examples
     --------

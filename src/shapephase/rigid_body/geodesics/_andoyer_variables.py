@@ -176,7 +176,7 @@ class AndoyerVariables:
 
 
 def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerVariables:
-    """Andoyer's variables of a state: (..., 3, 3), (..., 3) -> (...) each.
+    """Andoyer's variables of a state, the angles in (-pi, pi]: (..., 3, 3), (..., 3) -> (...) each.
 
     Raises ShapeError if an argument is not a rotation or not a finite vector, or a momentum is zero.
 
@@ -184,10 +184,6 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
     ----------
     attitude : (..., 3, 3) body to inertial axes
     body_momentum : (..., 3) Pi = R^T mu, body axes [kg m^2/s]
-
-    Returns
-    -------
-    AndoyerVariables, the angles in (-pi, pi]; for singular cases see the module
 
     Examples
     --------

@@ -102,9 +102,9 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
 
 
 def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple[int, ShortestGeodesic]:
-    """The attitude of a set that is nearest to the identity, and the shortest geodesic there: the distance to the set.
+    """Index of the attitude of a set that is nearest to the identity, and the shortest geodesic there.
 
-    A set may be attitudes that look the same, such as those of a symmetric body, or many samples of a curve of goals.
+    A set may be equivalent attitudes, such as those of a symmetric body, or many samples of a curve of goals.
     Distances of axisymmetric metrics bound those to each from below, so that few of them are searched for.
 
     Raises ShapeError, AccuracyNotReached as `shortest_geodesic`; if there is no attitude.
@@ -113,10 +113,6 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
     ----------
     metric : of `left_invariant_metric`
     attitudes : (N, 3, 3), one or more
-
-    Returns
-    -------
-    its number in the set, and its `ShortestGeodesic`
 
     Examples
     --------

@@ -80,7 +80,7 @@ class NambuPair:
 
 
 def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
-    """K = a H + b L and N = c H + d L of a rigid body.
+    """K = a H + b L and N = c H + d L of a rigid body; coefficients of Pi^2 that vanish up to rounding are zero.
 
     Source: Marsden and Ratiu (15.11.5), (15.11.6); theory.md M-E11.
     Raises ShapeError if the determinant differs from 1 and -1 by more than 1e-9.
@@ -89,10 +89,6 @@ def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
     ----------
     inertia : (3, 3) [kg m^2, body axes]
     matrix : (2, 2), (a, b; c, d) with ad - bc = 1 or -1
-
-    Returns
-    -------
-    NambuPair; coefficients of Pi^2 that vanish up to rounding are zero
 
     Examples
     --------
