@@ -100,8 +100,9 @@ def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLi
 def twist_defect(moments: ArrayLike) -> Array:
     """Tennis-racket effect on the separatrix: the angle eps by which each end of the half twist falls short.
 
-    (..., 3) -> (...) in (0, pi/2) [rad]; 0 where it would be below 1e-308. A racket is tossed about its intermediate axis; while its handle (the axis of the smallest moment) goes round the
-    momentum once, the racket twists about the handle by pi - 2 eps. With the handle's azimuth phi and the twist psi,
+    (..., 3) -> (...) in (0, pi/2) [rad]; 0 where it would be below 1e-308. While the handle of a racket (the axis of
+    the smallest moment), tossed about its intermediate axis, goes round the momentum once, the racket twists about the
+    handle by pi - 2 eps. With the handle's azimuth phi and the twist psi,
     measured from the middle of the flip, a = I2/I1 - 1 and b = 1 - I2/I3 for ascending moments, motion on the
     separatrix obeys dphi/dpsi = (1 - b cos^2 psi)/sqrt(b cos^2 psi (a + b cos^2 psi)). Half a turn gives, u = cos eps,
 
