@@ -348,7 +348,8 @@ def _poles(a: Array, b: Array) -> tuple[Array, Array]:
     order = order[b[order] != 0.0]
     poles, squares = a[order], (a[order] * b[order]) ** 2
     first = np.diff(poles, prepend=-np.inf) > _ROUNDING * poles
-    return np.bincount(np.cumsum(first) - 1, squares, int(first.sum())), poles[first]
+    weights = np.bincount(np.cumsum(first) - 1, squares, int(first.sum())).astype(float)
+    return weights, poles[first]
 
 
 def _bare(a: Array, b: Array) -> list[float]:

@@ -82,9 +82,9 @@ def _brackets(inverse_moments: Array, directions: Array, order: int, step: float
 def _roots(inverse_moments: Array, directions: Array, order: int, left: _StepStart, step: float) -> Array:
     """The crossings, by Chandrupatla's bracketing method, all at once."""
 
-    def crossing(times: Array, rows: Array) -> Array:
+    def crossing(times: Array, rows: Integers) -> Array:
         """The angle that is the next to pass a whole turn, less the turn; above 0 once it has."""
-        rows = rows.astype(np.intp)
+        rows = rows.astype(np.int64)
         angles = _angles(_frame(inverse_moments, directions, left, rows, times))
         missing = order - _count(_continued(left.total[rows], angles), angles)
         index = np.arange(len(rows))

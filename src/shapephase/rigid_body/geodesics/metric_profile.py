@@ -73,7 +73,7 @@ class TabulatedStretch:
             low, high = self.edges[number], self.edges[number + 1]
             place = ((high - rest[here]) - (rest[here] - low)) / (high - low)
             table[:, here] = chebyshev.chebval(place, self.series[number].T)
-        value, slope, second = table
+        value, slope, second = table[0], table[1], table[2]
         if not self.has_root:
             return value, slope, second
         rest = np.maximum(rest, NEAREST)
