@@ -41,7 +41,7 @@ def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
         adjugate, determinant = _adjugate(inertia)
         a = inertia[..., 0, 0]
         trace = np.trace(inertia, axis1=-2, axis2=-1)
-        # The leading minors say whether such a tensor is positive definite.
+        # Such a tensor is positive definite if its leading minors are positive.
         safe = (determinant > _WELL_CONDITIONED * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
     if safe.all():
         return adjugate / determinant[..., None, None]

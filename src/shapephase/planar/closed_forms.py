@@ -146,7 +146,7 @@ def three_body_turn(masses: ArrayLike, positions: ArrayLike) -> float:
 
 
 def yo_yo_rate(hub: float, mass: float, radius: float, length: ArrayLike, rate: float = 1.0) -> Array:
-    """The rate of a hub that two cords with masses at their ends unwind from, when so much is free.
+    """Rate of a hub from which two cords with masses at their ends unwind, by the free length of each cord.
 
     From momentum and energy, which both stay. Source: Fedor 1961; theory.md section 7.
 

@@ -1,4 +1,4 @@
-"""Checks of arguments that several modules of this folder share. All raise `ShapeError`, unless said otherwise."""
+"""Checks of arguments that several modules of this folder share. They raise `ShapeError` unless noted otherwise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..arrays import Array, Mask, finite_array
 from ..errors import ShapeError, ShapePhaseError, SingularInertiaError
 from ..letters import what_came
 
-_UNIT_LENGTH = 1e-6  # six digits, as people write them
+_UNIT_LENGTH = 1e-6  # relative: six written digits
 _MOST_TURNS = 1e12  # turns of the body [1]: beyond them twelve of the sixteen digits of the phase are lost
 
 

@@ -118,7 +118,7 @@ class Swing:
     __post_init__ = lock_arrays
 
     def angle(self, times: Array) -> Array:
-        """Psi, without the constant: (N,) -> (N,) [rad]."""
+        """Angle psi, without its constant: (N,) -> (N,) [rad]."""
         orbit = self.orbit
         top, weight, _, turns, sign = orbit.ratio(times)
         total = self.drift * (times + orbit.phase / orbit.rate)

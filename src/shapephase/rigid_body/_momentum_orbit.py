@@ -218,7 +218,7 @@ def weierstrass_form(moments: ArrayLike, momentum: ArrayLike) -> WeierstrassForm
     """The polhode by Weierstrass's elliptic function P, for any order of the moments.
 
     With Pi_i' = a_i Pi_j Pi_k all three Pi_i^2 change in step: Pi_i^2 = (y - e_i)/(a_j a_k) with one y, and the product
-    of Euler's equations says y'^2 = 4 (y - e_1)(y - e_2)(y - e_3).
+    of Euler's equations is y'^2 = 4 (y - e_1)(y - e_2)(y - e_3).
 
     Source: Bonnard, Cots and Shcherbakova 2013, section 3.5; Lawden 1989; theory.md H14.
     Raises ShapeError if two moments are equal, or the momentum stands still or is on the separatrix, where P has no
@@ -291,6 +291,6 @@ def _stationary_orbit(moments: Array, start: Array, magnitude: float) -> Momentu
 
 
 def _separation(moments: list[float], x: Array) -> Fraction:
-    """L² − 2 E I2 without rounding: its sign says which axis is circled, and it vanishes on the separatrix."""
+    """L² − 2 E I2 without rounding: the sign decides which axis is circled; 0 on the separatrix."""
     i1, i2, i3 = map(Fraction, moments)
     return Fraction(float(x[2])) ** 2 * (i3 - i2) / i3 - Fraction(float(x[0])) ** 2 * (i2 - i1) / i1

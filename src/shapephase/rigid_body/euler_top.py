@@ -1,6 +1,6 @@
 """The free rigid body, the Euler top, in closed form: momentum, attitude, period and phases at any time.
 
-The momentum goes round an axis ê of the body as `momentum_orbit` says. The attitude is
+The momentum goes round an axis ê of the body, see `momentum_orbit`. The attitude is
 
     R(t) = R(0) Q(0)^T exp(psi ê) Q(t),
 

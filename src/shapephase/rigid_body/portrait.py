@@ -89,14 +89,14 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
 
     Raises ShapeError if an energy is out of range, or the three moments are equal: then no point of the sphere moves.
 
+    The two curves of an energy circle the same axis on its two sides. At both ends of the range they are points; at
+    1/(2 I_middle) each consists of two halves of separatrices.
+
     Parameters
     ----------
     moments : (3,) in any order [kg m^2]
     energies : (N,) for |Pi| = 1, from 1/(2 I_max) to 1/(2 I_min) [1/(kg m^2)]; for a top its energy over |Pi|^2
     count : points of each closed curve, of which the last is the first again
-
-    The two curves of an energy circle the same axis on its two sides. At both ends of the range they are points; at
-    1/(2 I_middle) each consists of two halves of separatrices.
 
     Examples
     --------

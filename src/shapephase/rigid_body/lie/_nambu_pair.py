@@ -7,7 +7,7 @@ with K = a H + b L and N = c H + d L for every real matrix (a, b; c, d) of deter
 
 K is then a Casimir of the bracket {F, G} = -grad K.(grad F x grad G) (of the opposite one for determinant 1), which is
 the minus Lie-Poisson bracket of the Lie algebra [a, b] = Q (a x b), Q the matrix of K; and N is the Hamiltonian. The
-signature of K says which algebra.
+signature of K decides which algebra.
 
 Marsden and Ratiu (15.11.1), (15.11.5) have the first form together with determinant 1, which runs time backwards.
 Source: Marsden and Ratiu, section 15.11, after Holm and Marsden 1991; theory.md M-E11, N1, N9.

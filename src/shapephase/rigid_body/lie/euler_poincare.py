@@ -267,7 +267,7 @@ def contact_velocity(algebra: LieAlgebra, adjoint: ArrayLike, velocity: ArrayLik
 
 
 def rolling_contact(motion: EulerPoincareMotion) -> RollingContact:
-    """The contact of energy quadric and invariable hyperplane along a motion, with what the theorem says is zero.
+    """The contact of energy quadric and invariable hyperplane along a motion, with the residuals of the theorem.
 
     Raises LieAlgebraError for a body at rest.
 

@@ -98,7 +98,7 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
     rotation, rate = so3.rotation_argument(attitude, "attitude"), finite_array(attitude_rate, "attitude_rate", (3, 3))
     spin = so3.transpose(rotation) @ rate
     symmetric = np.abs(spin + so3.transpose(spin)).max(initial=0.0)
-    if symmetric > 1e-6 * np.abs(spin).max(initial=0.0):  # six digits, as people write them
+    if symmetric > 1e-6 * np.abs(spin).max(initial=0.0):  # six written digits
         raise ShapeError(
             f"attitude_rate: not the rate of a rotation, R^T R' has a symmetric part of {symmetric:.3g}; "
             "R' = R hat(Omega) is needed"
