@@ -574,6 +574,7 @@ def test_only_rigid_deformations_have_the_closed_form():
         (lambda: EulerTop.principal([1.0, 2.0], np.ones(3)), ShapeError, "moments"),
         (lambda: EulerTop(np.eye(3), np.ones(3), 2.0 * np.eye(3)), ShapeError, "rotation"),
         (lambda: TOPS["h10_tilted"].attitude(1e30), ShapeError, "1e12 turns"),
+        (lambda: EulerTop.principal([1.0, 2.0, 3.0], [0.0, 0.0, 1.0]).attitude(4e12 * np.pi), ShapeError, "1e12 turns"),
         (lambda: TOPS["h10_tilted"].attitude(np.inf), ShapeError, "t: a finite number is needed, got inf"),
     ],
 )
