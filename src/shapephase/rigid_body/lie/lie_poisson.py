@@ -39,7 +39,8 @@ from .lie_algebra import WRITTEN_DIGITS, LieAlgebra, so
 Gradient = ArrayLike | Callable[[Array], ArrayLike]  # on the dual: values (..., d), or a callable of momenta (..., d)
 
 _SO3 = so(3)  # the algebra of a function that is not given one
-_RANK = 1e-12  # singular values below this share of the largest are zero
+_RANK = 1e-12  # singular values of the Poisson tensor below this share of the largest are zero
+_NULL = 1e-10  # of linear equations in structure constants, which may have defects of 1e-12
 
 
 def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
@@ -321,7 +322,7 @@ def _null_space(equations: Array) -> Array:
     """Orthonormal solutions of a homogeneous linear system: (m, n) -> (count, n)."""
     # The triangular factor comes first because there are many more equations than unknowns.
     _, values, vectors = np.linalg.svd(np.linalg.qr(equations, mode="r"))
-    rank = int(np.sum(values > _RANK * max(float(values.max(initial=0.0)), 1.0)))
+    rank = int(np.sum(values > _NULL * max(float(values.max(initial=0.0)), 1.0)))
     return vectors[rank:]
 
 
