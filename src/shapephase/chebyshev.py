@@ -12,8 +12,7 @@ from .display import short_repr
 
 # Numbers in the largest intermediate array of an evaluation: 16 megabytes.
 _CHUNK = 2_000_000
-MARGIN_OF_WIDTH = 1e-3
-"""Of an interval's width: times are not moved farther inside than this."""
+MARGIN_OF_WIDTH = 1e-3  # of an interval's width: times are not moved farther inside than this
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +75,7 @@ def local_coordinate(times: Array, left: Array, right: Array) -> Array:
 
 
 def exact_local_coordinate(times: Array, left: Array, right: Array) -> Array:
-    """As `local_coordinate`, to rounding for short intervals late in a long motion too."""
+    """`local_coordinate`, to rounding for short intervals late in a long motion, too."""
     # Differences of near times are exact; 2 t - left - right would lose digits.
     return np.clip(((times - left) - (right - times)) / (right - left), -1.0, 1.0)
 
@@ -96,7 +95,7 @@ def end_margin(width: Array, end: float) -> Array:
 
 
 def widest_margin(end: float) -> float:
-    """The same of wide intervals [s]."""
+    """`end_margin` of wide intervals [s]."""
     return 64.0 * float(np.spacing(end))
 
 

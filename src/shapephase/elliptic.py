@@ -21,18 +21,12 @@ from scipy.special import elliprc, elliprd, elliprf, elliprj
 from .arrays import Array, Mask, common_shape, finite_array
 from .errors import ShapeError
 
-_SMALL_ARGUMENT = 1e-9
-"""Below it sn u = am u = u and cn u = 1 to the last digit."""
-_FLOOR = 1e-60
-"""Least m1 used in integrals that converge as m1 goes to 0: a smaller one changes no digit, but overflows."""
-_CHARACTERISTIC = 1e100
-"""Largest -n: beyond it the integral of the third kind overflows."""
-_PERIODS = 1e12
-"""Longest argument [periods 2K]: reducing it costs twelve of the sixteen digits."""
-_MEANS_AGREE = 1e-8
-"""Relative difference of two means below which the next step of the arithmetic-geometric mean makes them equal."""
-_FAR = 1e-3
-"""Ratio y/p below which SciPy's R_J uses an asymptotic form that is accurate to 1e-12 only."""
+_SMALL_ARGUMENT = 1e-9  # below it sn u = am u = u and cn u = 1 to the last digit
+_FLOOR = 1e-60  # least m1 in integrals that converge as m1 goes to 0: a smaller one changes no digit, but overflows
+_CHARACTERISTIC = 1e100  # largest -n: beyond it the integral of the third kind overflows
+_PERIODS = 1e12  # longest argument [periods 2K]: reducing it costs twelve of the sixteen digits
+_MEANS_AGREE = 1e-8  # relative difference of two means that the next arithmetic-geometric step makes equal
+_FAR = 1e-3  # ratio y/p below which SciPy's R_J uses an asymptotic form that is accurate to 1e-12 only
 
 
 def complete_k(m1: ArrayLike) -> Array:
@@ -74,6 +68,9 @@ def complete_pi(n: ArrayLike, m1: ArrayLike) -> Array:
 def jacobi(u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array]:
     """Jacobi's sn, cn, dn and am of u with parameter m = k² = 1 − m1.
 
+    For |u| of a hundred sn and cn are right to 1e-13 and dn to 1e-13 of itself, however small; so is cn except next to
+    its zeros. The errors grow as 1e-15 |u|, or less; that of am also as its size.
+
     Parameters
     ----------
     u : (...) argument, any real number up to 1e12 periods
@@ -82,11 +79,6 @@ def jacobi(u: ArrayLike, m1: ArrayLike) -> tuple[Array, Array, Array, Array]:
     Returns
     -------
     sn, cn, dn, am : (...) each; dn >= 0; the amplitude [rad] is continuous in u, it grows by pi with every 2K
-
-    Notes
-    -----
-    For |u| of a hundred sn and cn are right to 1e-13 and dn to 1e-13 of itself, however small; so is cn except next to
-    its zeros. The errors grow as 1e-15 |u|, or less; that of am also as its size.
 
     Examples
     --------
@@ -203,6 +195,8 @@ def incomplete_e(phi: ArrayLike, m1: ArrayLike) -> Array:
 def incomplete_pi(n: ArrayLike, phi: ArrayLike, m1: ArrayLike) -> Array:
     """Pi(n; phi), the integral of 1/((1 − n sin²) sqrt(1 − m sin²)) from 0 to phi: (...), (...), (...) -> (...).
 
+    Source: for n < 0 Abramowitz and Stegun 17.7.15, the only form whose terms all have the same sign.
+
     Parameters
     ----------
     n : (...) characteristic from -1e100 to below 1, of the sign of Abramowitz and Stegun, SymPy and mpmath
@@ -214,10 +208,6 @@ def incomplete_pi(n: ArrayLike, phi: ArrayLike, m1: ArrayLike) -> Array:
     ShapeError
         For n >= 1, where the integrand has poles, for n < -1e100, and where the integral is infinite: m1 = 0 and
         |phi| >= pi/2 as rounded.
-
-    Notes
-    -----
-    Source: for n < 0 Abramowitz and Stegun 17.7.15, the only form whose terms all have the same sign.
 
     Examples
     --------

@@ -259,8 +259,8 @@ class ChartPoleError(ShapePhaseError, ArithmeticError):
     >>> try:
     ...     sp.rigid_body.ZXZ.rates([0.0, 0.0, 0.0], [1.0, 0.0, 0.0])
     ... except sp.errors.ChartPoleError as error:
-    ...     print(str(error)[:64])
-    angles: entry [] has theta = 0, a pole of the ZXZ chart to 1e-08
+    ...     print(str(error)[:55])
+    theta: entry [] is 0; a pole of the ZXZ chart to 1e-08,
     """
 
 

@@ -2,12 +2,11 @@
 
 The order of principal moments inside the library is ascending everywhere, I1 <= I2 <= I3: axis 1 (index 0) has the
 smallest moment, axis 2 the intermediate one, axis 3 (index 2) the largest. Public functions take moments in any order
-and answer on the caller's axes; `ascending_moments` and `principal_axes` lead from these to the inner order.
+and return results on the caller's axes; `ascending_moments` and `principal_axes` lead from these to the inner order.
 
-The literature differs, and docstrings that quote it say which symbol is which. Marsden and Ratiu have I1 >= I2 >= I3
-in section 15.8 (their I1, I2, I3 are the I3, I2, I1 of here) and I1 < I2 < I3 in section 15.11 (as here); Bonnard, Cots
-and Shcherbakova have I1 > I2 > I3, and A < B < C for the inverse moments. To read three axes backwards is an odd
-permutation, which a formula pays for by one change of sign.
+The literature differs. Marsden and Ratiu have I1 >= I2 >= I3 in section 15.8 (their I1, I2, I3 are our I3, I2, I1) and
+I1 < I2 < I3 in section 15.11; Bonnard, Cots and Shcherbakova have I1 > I2 > I3, and A < B < C for the inverse moments.
+Reversing three axes is an odd permutation, which changes one sign in a formula.
 """
 
 from __future__ import annotations
@@ -18,11 +17,10 @@ from numpy.typing import NDArray
 from .arrays import Array
 from .errors import SingularInertiaError
 
-_WELL_CONDITIONED = 1e-3
-"""Determinant, relative to the cube of the trace, above which the condition number is at most some hundred, and so is
-the factor by which the adjugate magnifies rounding."""
-_SINGULAR = 1e-12
-"""Least ratio of the smallest to the largest moment: below it the inverse has no correct digits left."""
+_WELL_CONDITIONED = (
+    1e-3  # of trace^3: with a larger determinant the adjugate magnifies rounding some hundredfold at most
+)
+_SINGULAR = 1e-12  # least ratio of the smallest to the largest moment: below it the inverse has no correct digits left
 
 
 def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
@@ -43,7 +41,7 @@ def inverse_inertia(inertia: Array, times: Array | None = None) -> Array:
         adjugate, determinant = _adjugate(inertia)
         a = inertia[..., 0, 0]
         trace = np.trace(inertia, axis1=-2, axis2=-1)
-        # The leading minors say whether such a tensor is positive definite.
+        # Such a tensor is positive definite if its leading minors are positive.
         safe = (determinant > _WELL_CONDITIONED * np.abs(trace) ** 3) & (adjugate[..., 2, 2] > 0.0) & (a > 0.0)
     if safe.all():
         return adjugate / determinant[..., None, None]
@@ -88,8 +86,6 @@ def second_moment(inertia: Array) -> Array:
     Any real distribution of mass has J positive semidefinite, which is the triangle inequality of the
     principal moments. Source: theory.md A4.
 
-    Notes
-    -----
     Equation :eq:`triangle` of the documentation.
 
     Examples
@@ -102,7 +98,7 @@ def second_moment(inertia: Array) -> Array:
 
 
 def triangle_defect(inertia: Array) -> Array:
-    """By how much the triangle inequality fails, relative to the largest moment; negative where it holds: (...).
+    """Excess over the triangle inequality, relative to the largest moment; negative where it holds: (...).
 
     Examples
     --------
@@ -116,14 +112,12 @@ def triangle_defect(inertia: Array) -> Array:
 def principal_axes(inertia: Array) -> tuple[Array, Array]:
     """Principal moments, ascending, and a proper frame of principal axes.
 
+    Source: theory.md A11 (Marsden and Ratiu, section 15.3).
+
     Returns
     -------
     moments : (..., 3) [kg m^2]
     axes : (..., 3, 3), columns are the axes, determinant +1: inertia = axes diag(moments) axes^T
-
-    Notes
-    -----
-    Source: theory.md A11 (Marsden and Ratiu, section 15.3).
 
     Examples
     --------
@@ -136,21 +130,44 @@ def principal_axes(inertia: Array) -> tuple[Array, Array]:
     return moments, axes
 
 
+def body_principal_axes(tensor: Array) -> tuple[Array, Array]:
+    """Ascending moments and axes of one body: exact for a diagonal tensor, else equal moments are made equal.
+
+    Moments of other tensors count as equal up to four roundings of the largest, the error of `eigh`.
+
+    Examples
+    --------
+    >>> sp.inertia_tensor.body_principal_axes(np.diag([3.0, 1.0, 2.0]))[0].tolist()
+    [1.0, 2.0, 3.0]
+    """
+    diagonal = np.diagonal(tensor)
+    if np.array_equal(tensor, np.diag(diagonal)):
+        moments, order, parity = ascending_moments(diagonal)
+        axes = np.eye(3)[:, order]
+        axes[:, 2] *= parity
+        return moments, axes
+    moments, axes = principal_axes(tensor)
+    close = np.diff(moments) < 4.0 * np.finfo(float).eps * moments[2]
+    if close[0]:
+        moments[0] = moments[1]
+    if close[1]:
+        moments[2] = moments[1]
+    return moments, axes
+
+
 def ascending_moments(moments: Array) -> tuple[Array, NDArray[np.intp], Array]:
     """Principal moments in ascending order, and where each of them stood.
 
     Vectors v on the given axes are v[order] on the ordered ones. Those are right-handed only for an even permutation:
     formulas that need a proper rotation multiply one of the axes by the parity.
 
+    Source: theory.md section 1 (table of conventions).
+
     Returns
     -------
     ascending : (..., 3) [kg m^2]
     order : (..., 3) indices with ascending = moments[order]; equal moments keep their order
     parity : (...) 1 for an even permutation, -1 for an odd one
-
-    Notes
-    -----
-    Source: theory.md section 1 (table of conventions).
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Roots of increasing functions, many at once: the caller's own step, kept inside a bracket that shrinks."""
+"""Bracketed roots: of one function to rounding, and of many increasing functions at once by the caller's own step."""
 
 from __future__ import annotations
 
@@ -9,10 +9,15 @@ import numpy as np
 from .arrays import Array
 from .errors import AccuracyNotReached
 
-ROUNDING = 2e-16
-"""The floor for an angle in [-pi/2, pi/2]."""
-_STEPS = 120
-_CLOSE = 6e-16
+ROUNDING = 2e-16  # the floor for an angle in [-pi/2, pi/2]
+
+
+def bracketed_root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Root to rounding of a function whose signs at low and high differ, by Brent's method."""
+    from scipy.optimize import brentq
+
+    least = 4.0 * np.finfo(float).eps  # SciPy accepts none below
+    return float(brentq(function, low, high, xtol=1e-300, rtol=least))  # type: ignore[arg-type]
 
 
 def safe_newton(
@@ -36,7 +41,7 @@ def safe_newton(
     x, low, high = np.clip(start, low, high), low.copy(), high.copy()
     last = high - low
     settled = np.zeros(x.shape, dtype=bool)
-    for _ in range(_STEPS):
+    for _ in range(120):
         value, proposed = step(x)
         low = np.where(value <= 0.0, x, low)
         high = np.where(value >= 0.0, x, high)
@@ -44,7 +49,7 @@ def safe_newton(
         inside = (proposed >= low) & (proposed <= high)
         # Steps that do not shrink by half are the mark of a rule that jumps to and fro.
         following = np.where(inside & (change <= 0.5 * last), proposed, 0.5 * (low + high))
-        settled |= (np.minimum(change, high - low) <= floor + _CLOSE * np.abs(x)) | (value == 0.0)
+        settled |= (np.minimum(change, high - low) <= floor + 3.0 * ROUNDING * np.abs(x)) | (value == 0.0)
         following = np.where(settled, x, following)
         last = np.abs(following - x)
         x = following

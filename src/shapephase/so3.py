@@ -10,16 +10,11 @@ import numpy as np
 from .arrays import Array, finite_array
 from .errors import ShapeError
 
-FAR_FROM_OPPOSITE = 0.2
-"""One and the product of two unit vectors: above it half the turn between them is far from a right angle."""
-OPPOSITE = 64.0 * float(np.finfo(float).eps)
-"""Length of the sum of two unit vectors below which they count as opposite: about a tenth of it may be rounding."""
-_SMALL_SINE = 1e-9
-"""Sine of half an angle below which sine and angle agree to the last digit (they differ by a sixth of its cube)."""
-_ORTHOGONAL = 1e-6
-"""Largest entry of R^T R - 1 in a rotation that a user gives: six digits, as people write them, are enough."""
-_UNIT_QUATERNION = 1e-3
-"""Farthest from 1 that the length of a user's quaternion may be: recordings keep as few as three digits."""
+FAR_FROM_OPPOSITE = 0.2  # 1 + a.b of unit vectors, above which half the turn between them is far from a right angle
+OPPOSITE = 64.0 * float(np.finfo(float).eps)  # length of the sum of opposite unit vectors: a tenth may be rounding
+_SMALL_SINE = 1e-9  # of half an angle: sine and angle differ by a sixth of its cube, less than the last digit
+_ORTHOGONAL = 1e-6  # largest entry of R^T R - 1 in a rotation that a user gives: six written digits
+_UNIT_QUATERNION = 1e-3  # farthest from 1 that the length of a quaternion may be: recordings keep three digits
 
 
 def hat(vector: Array) -> Array:

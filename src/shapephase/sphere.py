@@ -21,12 +21,9 @@ from .refinement import halved, settled
 Curve = Callable[[Array], tuple[Array, Array]]
 """Times (N,) -> directions (..., N, 3) and a second vector along with them (..., N, 3)."""
 
-_GAUSS = np.polynomial.legendre.leggauss(8)
-"""Nodes in [-1, 1] and weights of `gauss_nodes`; exact for polynomials of degree 15."""
-_MAGNUS_NODES = np.polynomial.legendre.leggauss(3)[0]
-"""Nodes in [-1, 1] of the sixth-order Magnus step in `transport`."""
-_HALVINGS = 12
-"""Most times that all steps are halved: a curve that needs steps 4096 times shorter has a kink between its edges."""
+_GAUSS = np.polynomial.legendre.leggauss(8)  # nodes in [-1, 1] and weights: exact for polynomials of degree 15
+_MAGNUS_NODES = np.polynomial.legendre.leggauss(3)[0]  # nodes in [-1, 1] of the sixth-order Magnus step in `transport`
+_HALVINGS = 12  # of all steps: a curve that needs steps 4096 times shorter has a kink between its edges
 
 
 def area_rate(reference: Array, direction: Array, direction_rate: Array) -> Array:
@@ -72,13 +69,13 @@ def polygon_area(corners: Array, references: Array | None = None) -> Array:
     1.570796327 = pi/2
     """
     if references is None:
-        found = [far_reference(polygon) for polygon in corners.reshape(-1, *corners.shape[-2:])]
-        references = np.reshape(found, (*corners.shape[:-2], 3))
+        far = [far_reference(polygon) for polygon in corners.reshape(-1, *corners.shape[-2:])]
+        references = np.reshape(far, (*corners.shape[:-2], 3))
     return arc_areas(corners, references).sum(axis=-1)[()]
 
 
 def arc_areas(corners: Array, references: Array) -> Array:
-    """Of a closed polygon's arcs to its reference (..., 3), in two halves the last, to the start: (..., N + 1) [sr].
+    """Areas between a closed polygon's arcs and its reference (..., 3), the last arc in two halves: (..., N + 1) [sr].
 
     (..., N, 3), (..., 3) -> (..., N + 1). Opposite ends are joined through `so3.middle`.
 
@@ -131,12 +128,12 @@ def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
     def change(last: Array, new: Array) -> float:
         return float(np.max(np.abs(wrapped(new - last))))
 
-    found = settled(map(area, halved(edges, _HALVINGS)), change, tolerance)
-    if found is None:
+    enclosed = settled(map(area, halved(edges, _HALVINGS)), change, tolerance)
+    if enclosed is None:
         raise AccuracyNotReached(
             "the solid angle of a curve does not settle; give more edges, the times of its kinks among them"
         )
-    return found
+    return enclosed
 
 
 def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
@@ -144,6 +141,8 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
 
     It takes the curve's start to its end, as the sphere rolls along without twisting; round a closed curve it is a turn
     about the start by the enclosed area.
+
+    Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
 
     Parameters
     ----------
@@ -155,10 +154,6 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     ------
     AccuracyNotReached
         If the rotation has not converged after the steps were halved twelve times.
-
-    Notes
-    -----
-    Source: theory.md D4; the steps are the sixth-order Magnus formula of Blanes, Casas and Ros 2000.
 
     Examples
     --------
@@ -187,12 +182,12 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
     def change(last: Array, new: Array) -> float:
         return float(np.max(so3.angle(new @ so3.transpose(last))))
 
-    found = settled(map(rotation, halved(edges, _HALVINGS)), change, tolerance)
-    if found is None:
+    transported = settled(map(rotation, halved(edges, _HALVINGS)), change, tolerance)
+    if transported is None:
         raise AccuracyNotReached(
             "the transport along a curve does not settle; give more edges, the times of its kinks among them"
         )
-    return found
+    return transported
 
 
 def wrapped(area: Array) -> Array:
@@ -250,5 +245,4 @@ def fibonacci_directions(count: int) -> Array:
     return np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), height], axis=-1)
 
 
-REFERENCES = fibonacci_directions(642)
-"""Those that `far_reference` chooses from: (642, 3)."""
+REFERENCES = fibonacci_directions(642)  # those that `far_reference` chooses from: (642, 3)

@@ -9,18 +9,24 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 import shapephase as sp
-from shapephase.bounds._arc_bounds import arc_length_bounds, azimuth_bounds, azimuth_rate, return_time_bounds
-from shapephase.bounds._energy_bounds import energy_bounds
-from shapephase.bounds._phase_bounds import (
+from shapephase.bounds import (
+    Bound,
     PhaseBounds,
+    arc_length_bounds,
+    azimuth_bounds,
+    azimuth_rate,
+    bounds,
+    crown_region,
     dynamic_phase_bounds,
     dynamic_phase_bounds_by_extremes,
+    energy_along,
+    energy_bounds,
+    homoclinic_energy,
     loop_phase_bounds,
+    regime_certificate,
+    return_time_bounds,
     solid_angle_bounds,
 )
-from shapephase.bounds.all_bounds import Bound, bounds
-from shapephase.bounds.energy import energy_along, homoclinic_energy
-from shapephase.bounds.regimes import crown_region, regime_certificate
 from support.independent import cross
 from support.random_deformations import KINDS, random_case
 

@@ -20,7 +20,7 @@ from shapephase.deformation._physical_validity import line_measure
 from shapephase.deformation.assemblies import assembly, boom, moving_mass, rigid_part
 from shapephase.errors import SingularInertiaError
 from shapephase.inertia_tensor import principal_axes, second_moment, triangle_defect
-from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body import EulerTop
 from support.bodies import random_loop
 from support.independent import apart, cross, hat
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import shapephase as sp
-from shapephase.bounds.energy import (
+from shapephase.bounds import (
     energy_along,
     energy_rate,
     frozen_polhode,

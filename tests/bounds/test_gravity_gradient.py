@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.bounds.gravity_gradient import (
+from shapephase.bounds import (
     GravityTorque,
     KeplerOrbit,
     eccentric_anomaly,

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from shapephase import so3
 from shapephase.errors import ChartPoleError, ShapeError, ShapePhaseError, SingularInertiaError, UnphysicalInertiaError
-from shapephase.rigid_body.euler_angles import ZXZ, ZYZ, canonical_bracket, precession_rate
+from shapephase.rigid_body import ZXZ, ZYZ, canonical_bracket, precession_rate
 from support.independent import cross
 
 CHARTS = pytest.mark.parametrize("chart", [ZXZ, ZYZ], ids=["zxz", "zyz"])
@@ -430,7 +430,7 @@ def test_poles_are_refused_j8(chart, theta):
         lambda: chart.hamiltonian(np.eye(3), angles, vector),
         lambda: chart.hamilton_equations(np.eye(3), angles, vector),
     ):
-        with pytest.raises(ChartPoleError, match=r"entry \[1\] has theta = .* pole of the Z[XY]Z chart"):
+        with pytest.raises(ChartPoleError, match=r"theta: entry \[1\] .* pole of the Z[XY]Z chart"):
             refused()
     assert abs(np.linalg.det(chart.body_rate_matrix(angles[1]))) < 1e-8
     assert np.isfinite(chart.kinetic_energy(np.eye(3), angles, vector)).all()

@@ -12,8 +12,7 @@ from scipy.special import ellipj, ellipk
 import shapephase as sp
 from shapephase import so3, sphere
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnknownNameError
-from shapephase.rigid_body._momentum_orbit import separatrix_solid_angle
-from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body import EulerTop, separatrix_solid_angle
 from support.independent import cross
 from support.long_runs import full_but
 
@@ -338,10 +337,10 @@ def test_separatrix_solid_angle_is_the_area_of_the_lune():
         on_it = EulerTop.principal(i, [0.3, 0.1, 0.3 * tangent])
         assert abs(on_it.solid_angle - on_it.orbit.sense * separatrix_solid_angle(i, on_it.orbit.circled)) < 1e-6
     for bad in ([1.0, 1.0, 1.0], [0.0, 1.0, 2.0], [[1.0, 2.0, 3.0]]):
-        with pytest.raises(ShapeError, match="not all equal"):
+        with pytest.raises(ShapeError, match="moments"):
             separatrix_solid_angle(bad, 0)
     for bad in (1, 3, -1):
-        with pytest.raises(ShapeError, match="largest"):
+        with pytest.raises(ShapeError, match="axis"):
             separatrix_solid_angle([1.0, 2.0, 3.0], bad)
 
 
@@ -575,6 +574,7 @@ def test_only_rigid_deformations_have_the_closed_form():
         (lambda: EulerTop.principal([1.0, 2.0], np.ones(3)), ShapeError, "moments"),
         (lambda: EulerTop(np.eye(3), np.ones(3), 2.0 * np.eye(3)), ShapeError, "rotation"),
         (lambda: TOPS["h10_tilted"].attitude(1e30), ShapeError, "1e12 turns"),
+        (lambda: EulerTop.principal([1.0, 2.0, 3.0], [0.0, 0.0, 1.0]).attitude(4e12 * np.pi), ShapeError, "1e12 turns"),
         (lambda: TOPS["h10_tilted"].attitude(np.inf), ShapeError, "t: a finite number is needed, got inf"),
     ],
 )

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from shapephase import so3
-from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body import EulerTop
 from support.independent import cross
 from support.long_runs import full_but
 from support.places import DATA

@@ -166,6 +166,18 @@ def test_the_number_of_steady_rotations_changes_at_the_bifurcations(axis):
     assert counts == [6, 4, 4, 2]
 
 
+@pytest.mark.parametrize(("moments", "axis"), [([1.0, 1.0, 2.0], 2), ([1.0, 2.0, 2.0], 0)])
+def test_steady_rotations_of_a_symmetric_body_turn_with_the_rotor(moments, axis):
+    """A turn about the axis of symmetry changes nothing else; with the rotor in a principal plane one term vanishes."""
+    rotor = np.where(np.arange(3) == axis, 0.15, [0.0, 0.2, 0.0])
+    turn = sp.so3.exp(0.7 * np.eye(3)[axis])
+    plain, turned = (gyrostat_equilibria(np.diag(moments), h, 1.0) for h in (rotor, turn @ rotor))
+    assert len(plain) == len(turned) == 4
+    for one, other in zip(plain, turned):
+        assert other.direction == pytest.approx(turn @ one.direction, abs=1e-14)
+        assert (other.stability, other.rate) == (one.stability, pytest.approx(one.rate, rel=1e-13))
+
+
 def test_a_dual_spin_turn_is_what_a_slow_rotor_makes():
     """The rate of the rotor's momentum is small beside those of the body, and so is what is left of nutation."""
     inertia, axis, duration = np.diag([1.0, 1.5, 2.2]), np.array([0.6, 0.3, 0.5]), 400.0

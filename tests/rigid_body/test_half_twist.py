@@ -9,9 +9,14 @@ from scipy.integrate import solve_ivp
 
 from shapephase import so3
 from shapephase.errors import ShapeError, SingularInertiaError
-from shapephase.rigid_body._half_twist import half_twist, half_twist_from_tilt, racket_twist, twist_defect
-from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.stability import steady_rotations
+from shapephase.rigid_body import (
+    EulerTop,
+    half_twist,
+    half_twist_from_tilt,
+    racket_twist,
+    steady_rotations,
+    twist_defect,
+)
 from support.independent import cross
 
 

@@ -11,10 +11,12 @@ from scipy.spatial.transform import Rotation
 
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
-from shapephase.rigid_body._nutation import nutation
-from shapephase.rigid_body.heavy_top import HeavyTop, casimirs, semidirect_bracket
-from shapephase.rigid_body.lagrange_top import (
+from shapephase.rigid_body import (
+    HeavyTop,
     LagrangeTop,
+    casimirs,
+    nutation,
+    semidirect_bracket,
     sleeping_matrix,
     sleeping_spectrum,
     sleeping_top,
@@ -262,7 +264,7 @@ def test_heavy_tops_refuse_bad_input():
         (lambda: stability_chart([1.0], [2.0], tilt=0.5), "tilt"),
         (lambda: nutation(LagrangeTop(1.0, 2.0, -1.0), UP, UP), "Mgl > 0"),
         (lambda: nutation(LagrangeTop(1.0, 2.0, 1.0), UP, 2.0 * UP), "length 1"),
-        (lambda: nutation(LagrangeTop(1.0, 2.0, 1.0), [UP], UP), "are needed"),
+        (lambda: nutation(LagrangeTop(1.0, 2.0, 1.0), [UP], UP), "is needed"),
     ):
         with pytest.raises(ShapeError, match=message):
             build()

@@ -9,8 +9,8 @@ import pytest
 
 from shapephase import so3
 from shapephase.errors import ShapeError
-from shapephase.rigid_body.heavy_top import HeavyTop
-from shapephase.rigid_body.lagrange_top import (
+from shapephase.rigid_body import (
+    HeavyTop,
     LagrangeTop,
     characteristic_polynomial,
     e_quadratic,

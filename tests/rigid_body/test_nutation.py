@@ -8,8 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from shapephase import so3
-from shapephase.rigid_body._nutation import nutation
-from shapephase.rigid_body.lagrange_top import LagrangeTop, sleeping_spectrum
+from shapephase.rigid_body import LagrangeTop, nutation, sleeping_spectrum
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -13,8 +13,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from shapephase.errors import ShapeError
-from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.poinsot import Closure, Poinsot, cones
+from shapephase.rigid_body import Closure, EulerTop, Poinsot, cones
 from support.independent import cross
 from support.long_runs import full_but
 
@@ -461,9 +460,9 @@ def test_what_cannot_be_is_refused():
     with pytest.raises(ShapeError, match="side: expected 1 or -1, got 2"):
         Poinsot(top).contact(0.0, 2)
     for wrong in ({"tolerance": 0.0}, {"tolerance": np.nan}, {"most_lobes": 0}):
-        with pytest.raises(ShapeError, match="tolerance > 0 and most_lobes >= 1"):
+        with pytest.raises(ShapeError, match=next(iter(wrong))):
             Poinsot(top).closure(**wrong)
-    with pytest.raises(ShapeError, match="one start and one end"):
+    with pytest.raises(ShapeError, match="end: one number"):
         Poinsot(top).polhode_length(0.0, [1.0, 2.0])
     with pytest.raises(ShapeError, match="t: entry"):
         Poinsot(top).herpolhode_angle([0.0, np.nan])

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from shapephase.errors import ShapeError
-from shapephase.rigid_body.portrait import equilibria, heteroclinics, inverse_difference, polhodes
+from shapephase.rigid_body import equilibria, heteroclinics, inverse_difference, polhodes
 from support.independent import cross
 
 ORDERS = [*itertools.permutations((1.0, 2.0, 3.0)), (2.4, 0.7, 2.5), (1.0, 1.1, 9.0)]

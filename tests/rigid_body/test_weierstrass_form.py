@@ -54,5 +54,5 @@ def test_without_a_real_period_there_is_no_form():
         ([1.0, 2.0, 3.0], [0.0, 0.0, 0.0]),
         ([1.0, 2.0, 3.0], [1.0, 2.0]),
     ):
-        with pytest.raises(ShapeError, match="momentum"):
+        with pytest.raises(ShapeError, match="moment"):
             weierstrass_form(moments, momentum)

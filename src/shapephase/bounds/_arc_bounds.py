@@ -19,60 +19,38 @@ from ._enclosure import ROUND_UP
 from ._energy_bounds import EnergyBounds, cross_product_bound
 from .regimes import Regime, RegimeCertificate
 
-# Counterpart of ROUND_UP for lower bounds.
-_ROUND_DOWN = 1.0 - 1e-12
-# Of the fastest azimuth rate [1]: what a difference of two rates may have lost to rounding.
-_CANCELLATION = 1e-12
+_ROUND_DOWN = 1.0 - 1e-12  # counterpart of ROUND_UP for lower bounds
 
 
 @dataclass(frozen=True, eq=False)
 class ArcLengthBounds:
-    """Upper bounds of the length of Pi's curve over an interval [kg m^2/s], each sharper than the one before.
+    """Upper bounds of the length of Pi's curve over an interval [kg m^2/s], ascending in sharpness.
 
-    Attributes
-    ----------
-    general : l times the integral of (l + |L_o|)/I_1, I_1 the least moment; without L_o it is l^2 times that of 1/I_1
-    by_drift : l times the integral of l/I_1 + |I^-1 L_o|
-    by_energy : l times the integral of l sqrt((1/I_1 - e)(e - 1/I_3)) + |I^-1 L_o|, e = 2 E/l^2 anywhere in its bounds;
-        zero for a body with three equal moments, whose momentum does not move
-
-    Examples
-    --------
-    >>> energy = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
-    >>> found = sp.bounds.arc_length_bounds(energy)
-    >>> found.by_energy <= found.general
-    True
+    Made by `arc_length_bounds`.
     """
 
     general: float
+    """l times the integral of (l + |L_o|)/I_1, I_1 the least moment; without L_o it is l^2 times that of 1/I_1."""
     by_drift: float
+    """l times the integral of l/I_1 + |I^-1 L_o|."""
     by_energy: float
+    """l times the integral of l sqrt((1/I_1 - e)(e - 1/I_3)) + |I^-1 L_o|, e = 2 E/l^2 anywhere in its bounds; zero for
+    a body with three equal moments, whose momentum does not move."""
 
     __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
 class AzimuthBounds:
-    """Bounds of the rate at which Pi circles the certified axis, on each of K cells.
-
-    Attributes
-    ----------
-    sense : +1 counterclockwise seen from the tip of the axis ("about axis 3"), -1 clockwise ("about axis 1")
-    slow, fast : (K,) of sense times the azimuth's rate [rad/s]; infinite where Pi may be on the axis
-    monotone : whether the azimuth is certain to change in one sense throughout
-
-    Examples
-    --------
-    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
-    >>> bounds = sp.bounds.azimuth_bounds(certificate)
-    >>> bounds.monotone, bounds.sense
-    (True, 1.0)
-    """
+    """Bounds of the rate at which Pi circles the certified axis, on each of K cells. Made by `azimuth_bounds`."""
 
     sense: float
+    """+1 counterclockwise seen from the tip of the axis ("about axis 3"), -1 clockwise ("about axis 1")."""
     slow: Array
     fast: Array
+    """`slow` and `fast`: (K,) of sense times the azimuth's rate [rad/s]; infinite where Pi may be on the axis."""
     monotone: bool
+    """Whether the azimuth is certain to change in one sense throughout."""
 
     __repr__ = short_repr
 
@@ -81,26 +59,19 @@ class AzimuthBounds:
 class ReturnTimeBounds:
     """Lower bounds of the time after which Pi is first back at its start [s]; 0 where nothing is certain.
 
-    Attributes
-    ----------
-    by_latitude : 2 pi |Pi x axis|/(l^2 max 1/I_1)
-    by_inertia : 2 pi/(l max (1/I_1 - 1/I_3)), at least `by_latitude`
-    by_azimuth : when the fastest possible azimuth has gone once round, at least `by_inertia`
-    within : whether Pi can be back in the interval at all; if not, all three are at most the interval's length
-    latest : an upper bound of the time after which Pi has gone once round the axis; infinite where nothing is certain
-
-    Examples
-    --------
-    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 30.0), [0.1, 0.2, 2.0])
-    >>> print(f"{sp.bounds.return_time_bounds(certificate).by_inertia:.4f} s")
-    4.1629 s
+    Made by `return_time_bounds`.
     """
 
     by_latitude: float
+    """2 pi |Pi x axis|/(l^2 max 1/I_1)."""
     by_inertia: float
+    """2 pi/(l max (1/I_1 - 1/I_3)), at least `by_latitude`."""
     by_azimuth: float
+    """When the fastest possible azimuth has gone once round, at least `by_inertia`."""
     within: bool
+    """Whether Pi can be back in the interval at all; if not, all three are at most the interval's length."""
     latest: float
+    """An upper bound of the time after which Pi has gone once round the axis; infinite where nothing is certain."""
 
     __repr__ = short_repr
 
@@ -134,27 +105,21 @@ def arc_length_bounds(bounds: EnergyBounds) -> ArcLengthBounds:
 
 
 def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Array:
-    """How fast Pi circles a principal axis without internal momentum: (...) [rad/s].
+    """Rate at which Pi circles a principal axis without internal momentum: (...) [rad/s].
 
     With axes k, i, j in cyclic order and Pi = l (cos(theta), sin(theta) cos(phi), sin(theta) sin(phi)) in them,
 
         phi' = l cos(theta) (1/I_i - 1/I_k + (1/I_j - 1/I_i) sin(phi)^2).
+
+    Equation :eq:`azimuth` of the documentation.
+    Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
+    Raises ShapeError along the axis, where there is no azimuth, and for a moment that is not above zero.
 
     Parameters
     ----------
     moments : (..., 3) about the three axes [kg m^2]
     momentum : (..., 3) Pi in those axes [kg m^2/s], not along axis k
     axis : k, 0 to 2
-
-    Raises
-    ------
-    ShapeError
-        Along the axis, where there is no azimuth, and for a moment that is not above zero.
-
-    Notes
-    -----
-    Equation :eq:`azimuth` of the documentation.
-    Source: Cabrera 2006, equation (14), with the factor l missing there (theory.md C-E4); E10.
 
     Examples
     --------
@@ -181,14 +146,8 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
     With n the part of I^-1 that couples the axis with the plane across, A' the part of I^-1 in that plane, p the
     direction of Pi in it, and w = I^-1 L_o, phi' = Pi_k (p.A'p - 1/I_k) up to (l |n| + |w|)/sin(theta).
 
-    Raises
-    ------
-    ShapeError
-        If no axis is certain.
-
-    Notes
-    -----
     Source: Cabrera 2006, equation (14) with theory.md C-E4; E10, E12.
+    Raises ShapeError if no axis is certain.
 
     Examples
     --------
@@ -209,21 +168,19 @@ def azimuth_bounds(certificate: RegimeCertificate) -> AzimuthBounds:
         stray = (magnitude * coupling + known.drift_magnitude) / sine
     near, far = along[:, 0] - across[:, 1], along[:, 1] - across[:, 0]
     fast = (magnitude * greatest * far + stray) * ROUND_UP
-    slow = (magnitude * np.where(near > 0.0, least, greatest) * near - stray) - _CANCELLATION * fast
+    slow = (magnitude * np.where(near > 0.0, least, greatest) * near - stray) - (ROUND_UP - 1.0) * fast
     return AzimuthBounds(sense=-sign, slow=slow, fast=fast, monotone=bool(np.all(slow > 0.0)))
 
 
 def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
-    """How soon Pi can be back at its start, for which it must go once round the certified axis.
+    """Lower bounds of the time until Pi is back at its start, for which it must go once round the certified axis.
 
     The formulas of the first two bounds hold for fixed principal axes without internal momentum. For other
-    deformations they are lowered where the fastest possible azimuth exceeds the rate they assume. About the axis of
-    the largest moment they are the same, with the least moment in them.
+    deformations they are lowered where the fastest possible azimuth exceeds the rate they assume. They hold about the
+    axis of the largest moment, too, with the least moment in them.
 
     Source: Cabrera 2006, remark 4.1, as corrected in theory.md C-E10; E12.
 
-    Notes
-    -----
     Equation :eq:`return-time` of the documentation.
 
     Examples
@@ -260,7 +217,7 @@ def return_time_bounds(certificate: RegimeCertificate) -> ReturnTimeBounds:
 
 
 def _time_of_full_turn(rates: Array, widths: Array) -> float:
-    """When the integral of positive rates reaches 2 pi; infinite if it does not."""
+    """Time at which the integral of positive rates reaches 2 pi; infinite if it does not."""
     turned = np.concatenate([[0.0], np.cumsum(rates * widths)])
     if turned[-1] < 2.0 * np.pi:
         return np.inf

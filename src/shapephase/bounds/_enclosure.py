@@ -20,31 +20,16 @@ from ..display import short_repr
 from ..inertia_tensor import inverse_inertia
 from ..integrator.interpolant import Interpolant
 
-# Relative rounding of one operation. The factors before it below count the operations of each formula, generously.
-_EPS = float(np.finfo(float).eps)
-# Channel of each entry of the symmetric matrix I^-1: xx, yy, zz, yz, xz, xy.
+_EPS = float(np.finfo(float).eps)  # the factors before it count the operations of each formula, generously
+# Channels xx, yy, zz, yz, xz, xy of I^-1: of each entry of the matrix, and row and column of each channel.
 _FULL = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-# Row and column of each of those six channels.
 _CHANNEL = ([0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1])
-# Entries of I^-1 that each channel stands for: two where it is off the diagonal.
-_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-# Cells; limits the loop over them in `energy_bounds`. The bounds of coarser cells are looser, but they hold.
-_MAX_CELLS = 4096
-# Of a panel: 2^-24 of it is far below any time scale that its series has.
-_MAX_HALVINGS = 24
+_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # entries that each channel stands for
+_MAX_CELLS = 4096  # limits the loop of `energy_bounds`; the bounds of coarser cells are looser, but they hold
 # Parts of a panel at which the interpolant is compared with the deformation: none is near a Chebyshev node, and they
-# are not symmetric, so that an error which is odd or even about the middle is seen.
+# are not symmetric, so that an error which is odd or even about the middle shows.
 _TEST_POINTS = np.array([0.0381, 0.2361, 0.6180, 0.8541])
-# Over the largest error seen at those points, which may all miss the peaks of an error that oscillates like T_n; it
-# is unlikely that all four see less than a quarter of it.
-_SAFETY_FACTOR = 4.0
-# Of the steepest rate of I^-1 in the interval: cells where its rate varies by less are fine enough, because their
-# contribution to the drift of the energy bounds is small beside that of the steepest cell.
-_RATE_RESOLUTION = 0.05
-# Of the magnitude of I^-1: what its rate can change it by over a cell without being worth another halving.
-_NEGLIGIBLE = 1e-9
-# For products of positive bounds, whose rounding is a few eps: thousands of times more, and still not visible.
-ROUND_UP = 1.0 + 1e-12
+ROUND_UP = 1.0 + 1e-12  # for products of positive bounds: thousands of times their rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,32 +39,30 @@ class Enclosure:
     Everything is given in the axes of `frame`, in which I^-1 is as nearly diagonal as possible, so that the radii of
     its entries are small. With D the diagonal matrix of the row sums of the radii, middle - D and middle + D bound a
     symmetric matrix as quadratic forms.
-
-    Attributes
-    ----------
-    edges : (K + 1,) ends of the cells [s]
-    frame : (3, 3) whose columns are the axes, body axes
-    start, start_radius : (3, 3) I^-1 at the start of the interval, and its radius in the spectral norm [1/(kg m^2)]
-    inverse, inverse_radius : (K, 3, 3) middle and radius of I^-1, entry by entry [1/(kg m^2)]
-    inverse_rate, inverse_rate_radius : (K, 3, 3) of its rate [1/(kg m^2 s)]
-    drift, drift_radius : (K, 3), (K,) of w, the radius in the Euclidean norm [rad/s]
-    drift_rate, drift_rate_radius : (K, 3), (K,) of its rate [rad/s^2]
-    sampling_error : (2,) the estimated error of sampling I^-1 and w, which the radii contain
     """
 
     edges: Array
+    """(K + 1,) ends of the cells [s]."""
     frame: Array
+    """(3, 3) whose columns are the axes, body axes."""
     start: Array
     start_radius: float
+    """`start` and `start_radius`: (3, 3) I^-1 at the start of the interval, and its radius in the spectral norm [1/(kg
+    m^2)]."""
     inverse: Array
     inverse_radius: Array
+    """`inverse` and `inverse_radius`: (K, 3, 3) middle and radius of I^-1, entry by entry [1/(kg m^2)]."""
     inverse_rate: Array
     inverse_rate_radius: Array
+    """`inverse_rate` and `inverse_rate_radius`: (K, 3, 3) of its rate [1/(kg m^2 s)]."""
     drift: Array
     drift_radius: Array
+    """`drift` and `drift_radius`: (K, 3), (K,) of w, the radius in the Euclidean norm [rad/s]."""
     drift_rate: Array
     drift_rate_radius: Array
+    """`drift_rate` and `drift_rate_radius`: (K, 3), (K,) of its rate [rad/s^2]."""
     sampling_error: Array
+    """(2,) the estimated error of sampling I^-1 and w, which the radii contain."""
 
     __repr__ = short_repr
 
@@ -177,6 +160,9 @@ def enclosure(
 ) -> Enclosure:
     """Bounds of the channels of a deformation and of their rates over an interval.
 
+    Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
+    Raises AccuracyNotReached if the deformation is too rough between its breaks to be sampled.
+
     Parameters
     ----------
     interval : (start, end) [s]; None: [0, duration]
@@ -184,15 +170,6 @@ def enclosure(
     tolerance : as for `reconstruct` [rad]
     resolution : cells are halved until, on each, I^-1 varies by less than this fraction of its norm, w by that
         fraction of its own norm or of the rate of rotation, and the rate of I^-1 by a twentieth of the steepest
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the deformation is too rough between its breaks to be sampled.
-
-    Notes
-    -----
-    Source: theory.md E9; Clenshaw 1955 for the bound of a Chebyshev series by its coefficients.
     """
     start, end = interval_argument(interval, deformation.duration)
     sampled = deformation.sampler().samples(magnitude or 1.0, tolerance).interpolant
@@ -200,12 +177,12 @@ def enclosure(
     edges, coefficients = _within(sampled, start, end)
     frame, coefficients = _in_best_frame(edges, coefficients)
     edges, series = _cells(edges, coefficients, resolution, magnitude)
-    middle, radius = _ball(series)
+    middle, radius = ball(series)
     at_start = ((-1.0) ** np.arange(series.shape[1])) @ series[:1]
     start_radius = _matrix_radius(_rounding(series[:1]))[0] + error[0]
-    rate_middle, rate_radius = _ball(_rates(series, np.diff(edges)))
+    rate_middle, rate_radius = ball(_rates(series, np.diff(edges)))
     # Markov's inequality: how steep a polynomial of this degree can be that is as large as the sampling error.
-    steepness = 2.0 * series.shape[1] ** 2 / _panel_width(sampled)
+    steepness = 2.0 * series.shape[1] ** 2 / float(np.diff(sampled.edges).min())
     return Enclosure(
         edges=edges,
         frame=frame,
@@ -223,22 +200,11 @@ def enclosure(
     )
 
 
-def series_bounds(coefficients: Array) -> tuple[Array, Array]:
-    """Bounds of Chebyshev series on [-1, 1]: (..., n, channels) -> lower and upper (..., channels).
+def ball(series: Array) -> tuple[Array, Array]:
+    """Middle and radius of Chebyshev series on [-1, 1]: (..., n, channels) -> twice (..., channels).
 
-    c_0 plus and minus the sum of the other |c_k|, rounded outwards.
+    The constant term, and the sum of the magnitudes of all others with a bound of rounding.
     """
-    middle, radius = _ball(coefficients)
-    return middle - radius, middle + radius
-
-
-def restricted(coefficients: Array, left: float, right: float) -> Array:
-    """The series on [left, right] of [-1, 1], stretched to [-1, 1]: (..., n, channels), as many coefficients."""
-    return restriction_matrix(coefficients.shape[-2], left, right) @ coefficients
-
-
-def _ball(series: Array) -> tuple[Array, Array]:
-    """The constant term, and the sum of the magnitudes of all others with a bound of rounding."""
     return series[..., 0, :], np.abs(series[..., 1:, :]).sum(axis=-2) + _rounding(series)
 
 
@@ -259,10 +225,8 @@ def _in_best_frame(edges: Array, coefficients: Array) -> tuple[Array, Array]:
     They are the eigenvectors of the panel, or of the mean, whose eigenvalues are farthest apart; if the principal
     axes stay fixed, these are the principal axes.
     """
-    matrices = _matrix(
-        np.concatenate([coefficients[:, 0], [np.diff(edges) @ coefficients[:, 0] / np.diff(edges).sum()]])
-    )
-    values, axes = np.linalg.eigh(matrices)
+    widths, middles = np.diff(edges), coefficients[:, 0]
+    values, axes = np.linalg.eigh(_matrix(np.concatenate([middles, [widths @ middles / widths.sum()]])))
     frame = axes[np.argmax(np.diff(values, axis=1).min(axis=1))]
     # Where the body's axes are the principal axes, the frame is exactly the identity or a permutation.
     frame = np.where(np.abs(frame) < 4.0 * _EPS, 0.0, frame)
@@ -294,11 +258,8 @@ def _sampling_error(deformation: Deformation, sampled: Interpolant) -> Array:
         np.linalg.norm(inverse - truth, axis=(1, 2)).max(),
         np.linalg.norm(drift - (truth @ internal[:, :, None])[:, :, 0], axis=1).max(),
     )
-    return _SAFETY_FACTOR * np.array(gaps)
-
-
-def _panel_width(sampled: Interpolant) -> float:
-    return float(np.diff(sampled.edges).min())
+    # All points may miss the peaks of an error that oscillates like T_n; hardly ever do all see less than a quarter.
+    return 4.0 * np.array(gaps)
 
 
 def _within(sampled: Interpolant, start: float, end: float) -> tuple[Array, Array]:
@@ -312,33 +273,28 @@ def _within(sampled: Interpolant, start: float, end: float) -> tuple[Array, Arra
     for panel in {0, len(kept) - 1}:
         left, right = edges[kept[panel]], edges[kept[panel] + 1]
         low, high = local_coordinate(ends[panel : panel + 2], left, right)
-        coefficients[panel] = restricted(coefficients[panel], low, high)
+        coefficients[panel] = restriction_matrix(coefficients.shape[1], low, high) @ coefficients[panel]
     return ends, coefficients
 
 
 def _cells(edges: Array, coefficients: Array, resolution: float, magnitude: float) -> tuple[Array, Array]:
     """Cells on which the series hardly vary: edges (K + 1,) in order of time, coefficients (K, n, 9)."""
-    parts = _divided(edges, coefficients, resolution, magnitude)
-    left = np.concatenate([left for left, _, _ in parts])
+    left, right, series = map(np.concatenate, zip(*_divided(edges, coefficients, resolution, magnitude), strict=True))
     order = np.argsort(left)
-    right = np.concatenate([right for _, right, _ in parts])[order]
-    series = np.concatenate([rows for _, _, rows in parts])[order]
-    return np.append(left[order], right[-1]), series
+    return np.append(left[order], right[order][-1]), series[order]
 
 
-def _divided(
-    edges: Array, coefficients: Array, resolution: float, magnitude: float
-) -> list[tuple[Array, Array, Array]]:
+def _divided(edges: Array, coefficients: Array, resolution: float, magnitude: float) -> list[tuple[Array, ...]]:
     """Panels halved until the series hardly vary on each: left ends, right ends, coefficients, in any order."""
     left, right, series = edges[:-1], edges[1:], coefficients
     count = series.shape[1]
     halves = restriction_matrix(count, -1.0, 0.0), restriction_matrix(count, 0.0, 1.0)
-    done: list[tuple[Array, Array, Array]] = []
+    done: list[tuple[Array, ...]] = []
     finished = 0
     inverse, drift = _norms(np.abs(series).sum(axis=1)).max(axis=0)
     scale = np.array([inverse, max(drift, magnitude * inverse)])
     steepest = _norms(np.abs(_rates(series, right - left)).sum(axis=1))[:, 0].max()
-    for _ in range(_MAX_HALVINGS):
+    for _ in range(24):  # far below any time scale of the series
         fine = _fine(series, right - left, scale, steepest, resolution)
         finished += int(fine.sum())
         if finished + 2 * int((~fine).sum()) > _MAX_CELLS:
@@ -354,10 +310,11 @@ def _divided(
 
 
 def _fine(series: Array, width: Array, scale: Array, steepest: float, resolution: float) -> Mask:
-    """Which cells are small enough: (K,)."""
-    radius = _norms(_ball(series)[1])
-    rates = _norms(_ball(_rates(series, width))[1])[:, 0]
-    rate_resolved = (rates <= _RATE_RESOLUTION * steepest) | (rates * width <= _NEGLIGIBLE * scale[0])
+    """True for cells that are small enough: (K,)."""
+    radius = _norms(ball(series)[1])
+    rates = _norms(ball(_rates(series, width))[1])[:, 0]
+    # Where the rate varies by a twentieth of the steepest, the drift of the energy bounds comes from other cells.
+    rate_resolved = (rates <= 0.05 * steepest) | (rates * width <= 1e-9 * scale[0])
     return np.all(radius <= resolution * scale, axis=1) & rate_resolved
 
 

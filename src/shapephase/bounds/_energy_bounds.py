@@ -25,14 +25,7 @@ from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ._enclosure import ROUND_UP, Enclosure, enclosure
 
-# Relative rounding of one operation. The factors before it below count the operations of each formula, generously.
-_EPS = float(np.finfo(float).eps)
-# Of the largest eigenvalue of I^-1: two closer ones than this give no slope c, which would be a quotient of two small
-# differences. Any c gives a true bound, so nothing is lost but sharpness.
-_DISTINCT = 1e-3
-# The energy bounds on a cell and the bounds of its rate depend on each other; each pass starts from a true bound and
-# sharpens it, and after three the change is of third order in the cell's length.
-_PASSES = 3
+_EPS = float(np.finfo(float).eps)  # the factors before it count the operations of each formula, generously
 
 
 @made_by("bounds.energy_bounds(deformation, momentum)")
@@ -40,28 +33,21 @@ _PASSES = 3
 class EnergyBounds:
     """Bounds of E_t along every solution from one initial momentum, on each of K cells of time.
 
-    Attributes
-    ----------
-    enclosure : bounds of the deformation
-    magnitude : l, the momentum's norm [kg m^2/s]
-    initial : (2,) bounds of E at the start of the interval, apart by rounding and the error of sampling [J]
-    lower, upper : (K,) of E on each cell [J]
-    rate_lower, rate_upper : (K,) of dE/dt [W]
-
-    Examples
-    --------
-    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
-    >>> print(f"{found.magnitude:.6f} kg m^2/s, {found.lower.min():.6f} J")
-    2.000000 kg m^2/s, 0.500000 J
+    Made by `energy_bounds`.
     """
 
     enclosure: Enclosure
+    """Bounds of the deformation."""
     magnitude: float
+    """l, the momentum's norm [kg m^2/s]."""
     initial: Array
+    """(2,) bounds of E at the start of the interval, apart by rounding and the error of sampling [J]."""
     lower: Array
     upper: Array
+    """`lower` and `upper`: (K,) of E on each cell [J]."""
     rate_lower: Array
     rate_upper: Array
+    """`rate_lower` and `rate_upper`: (K,) of dE/dt [W]."""
 
     __repr__ = short_repr
 
@@ -82,10 +68,8 @@ class EnergyBounds:
             low, high = self.enclosure.eigenvalues
             return low[:, 0], high[:, 2]
         # Divided twice, because l^2 may underflow or overflow where the quotient does not.
-        return (
-            2.0 * self.lower / self.magnitude / self.magnitude,
-            2.0 * self.upper / self.magnitude / self.magnitude,
-        )
+        low, high = (2.0 * energy / self.magnitude / self.magnitude for energy in (self.lower, self.upper))
+        return low, high
 
 
 def energy_bounds(
@@ -98,23 +82,15 @@ def energy_bounds(
 ) -> EnergyBounds:
     """Bounds of the energy E_t = Pi.I^-1 Pi/2 over an interval, before any motion is computed.
 
+    Source: Cabrera 2006, section 4.1 (the rate of E_t); theory.md E3, E9.
+    Raises ShapeError; AccuracyNotReached if the deformation is too rough between its breaks to be sampled.
+
     Parameters
     ----------
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
     attitude : (3, 3) at the start of the interval; None: the identity
     interval : (start, end) [s]; None: [0, duration]
     resolution : as for `enclosure`
-
-    Raises
-    ------
-    ShapeError
-        For arguments of the wrong shape, an attitude that is not a rotation, or times outside the deformation.
-    AccuracyNotReached
-        If the deformation is too rough between its breaks to be sampled.
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 4.1 (the rate of E_t); theory.md E3, E9.
 
     Examples
     --------
@@ -129,15 +105,7 @@ def energy_bounds(
     known = enclosure(deformation, interval, magnitude=magnitude, resolution=resolution)
     if not magnitude:
         zero = np.zeros(len(known.widths))
-        return EnergyBounds(
-            enclosure=known,
-            magnitude=0.0,
-            initial=np.zeros(2),
-            lower=zero,
-            upper=zero,
-            rate_lower=zero,
-            rate_upper=zero,
-        )
+        return EnergyBounds(known, 0.0, np.zeros(2), zero, zero, zero, zero)
     direction = body / magnitude @ known.frame
     e = float(direction @ known.start @ direction)
     room = known.start_radius * ROUND_UP + 32.0 * _EPS * abs(e)
@@ -157,7 +125,7 @@ def energy_bounds(
 
 def _propagated(known: Enclosure, low: float, high: float) -> tuple[Array, Array, Array, Array]:
     """Bounds of e and of its rate on every cell, from those at the start."""
-    least, greatest = (part[:, i].tolist() for part, i in zip(known.eigenvalues, (0, 2), strict=True))
+    least, greatest = (values[:, i].tolist() for values, i in zip(known.eigenvalues, (0, 2), strict=True))
     slowest, fastest = known.inverse_rate_range
     rising = _lines(known, fastest)
     falling = _lines(known, -slowest)
@@ -165,17 +133,15 @@ def _propagated(known: Enclosure, low: float, high: float) -> tuple[Array, Array
     rows = []
     for cell, width in enumerate(known.widths.tolist()):
         bottom, top = least[cell], greatest[cell]
-        # At first with any direction u, then with those that the bounds found so far leave.
+        # At first with any direction u, then with those that the last bounds leave; after three passes the change is
+        # of third order in the cell's length.
         inner = bottom, top
         slow, fast = 0.0, 0.0
-        for _ in range(_PASSES):
-            by_drift = _rate_by_drift(drift[cell], bottom, top, *inner)
+        for _ in range(3):
+            by_drift = 2.0 * drift[cell] * cross_product_bound(bottom, top, *inner) if drift[cell] else 0.0
             fast = _lowest(rising[cell], *inner) + by_drift
             slow = -_lowest(falling[cell], *inner) - by_drift
-            inner = (
-                max(bottom, low + min(0.0, slow * width)),
-                min(top, high + max(0.0, fast * width)),
-            )
+            inner = max(bottom, low + min(0.0, slow * width)), min(top, high + max(0.0, fast * width))
         rows.append((*inner, slow, fast))
         slip = 16.0 * _EPS * top
         low, high = max(bottom, low + slow * width - slip), min(top, high + fast * width + slip)
@@ -192,7 +158,8 @@ def _lines(known: Enclosure, rate: Array) -> list[list[tuple[float, float]]]:
     values, axes = np.linalg.eigh(known.inverse)
     along = np.einsum("kji,kjl,kli->ki", axes, rate, axes)
     rise, run = along - np.roll(along, 1, axis=1), values - np.roll(values, 1, axis=1)
-    apart = np.abs(run) > _DISTINCT * values[:, 2:]
+    # Closer eigenvalues give no slope, a quotient of two small differences; the bound is then less sharp.
+    apart = np.abs(run) > 1e-3 * values[:, 2:]
     slopes = np.concatenate([np.zeros((len(rate), 1)), np.where(apart, -rise / np.where(apart, run, 1.0), 0.0)], axis=1)
     cut = slopes[..., None, None]
     tops = np.linalg.eigvalsh(rate[:, None] + np.where(cut >= 0.0, cut * upper[:, None], cut * lower[:, None]))
@@ -203,13 +170,6 @@ def _lines(known: Enclosure, rate: Array) -> list[list[tuple[float, float]]]:
 def _lowest(lines: list[tuple[float, float]], low: float, high: float) -> float:
     """The lowest of the upper bounds of u.(I^-1)' u that the lines give for e in [low, high]."""
     return min(top - slope * (low if slope >= 0.0 else high) for slope, top in lines)
-
-
-def _rate_by_drift(drift: float, bottom: float, top: float, low: float, high: float) -> float:
-    """The largest value of 2 |u x I^-1 u| |w|."""
-    if not drift:
-        return 0.0
-    return 2.0 * drift * cross_product_bound(bottom, top, low, high)
 
 
 def cross_product_bound(bottom: float, top: float, low: float, high: float) -> float:

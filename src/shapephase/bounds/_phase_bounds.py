@@ -17,20 +17,10 @@ from ._arc_bounds import azimuth_bounds
 from ._energy_bounds import EnergyBounds
 from .regimes import RegimeCertificate
 
-# Relative: thousands of roundings, and far below what the bounds are apart.
-_ROUNDING = 1e-12
-
 
 @dataclass(frozen=True)
 class PhaseBounds:
-    """A phase lies in [lower, upper] [rad].
-
-    Examples
-    --------
-    >>> found = sp.bounds.energy_bounds(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.0, 0.0, 2.0])
-    >>> round(sp.bounds.dynamic_phase_bounds(found).upper, 6)
-    1.5
-    """
+    """Bounds of a phase, which lies in [lower, upper] [rad]. Made by `dynamic_phase_bounds`."""
 
     lower: float
     upper: float
@@ -44,7 +34,7 @@ class PhaseBounds:
 
     @property
     def is_informative(self) -> bool:
-        """Whether they restrict the phase modulo 2 pi: width < 2 pi. Source: Cabrera 2006, remark 4.2."""
+        """True if they restrict the phase modulo 2 pi: width < 2 pi. Source: Cabrera 2006, remark 4.2."""
         return self.width < 2.0 * np.pi
 
     def of_loop(self, solid_angle: float) -> PhaseBounds:
@@ -68,16 +58,12 @@ def dynamic_phase_bounds(bounds: EnergyBounds) -> PhaseBounds:
     1.500000 to 1.500000 rad
     """
     check_object(bounds, "EnergyBounds", "bounds")
-    if not bounds.magnitude:
-        return PhaseBounds(lower=0.0, upper=0.0)
-    known = bounds.enclosure
-    stray = float(known.widths @ known.drift_magnitude)
-    low, high = (2.0 / bounds.magnitude * float(known.widths @ part) for part in (bounds.lower, bounds.upper))
-    return _rounded(low - stray, high + stray)
+    widths = bounds.enclosure.widths
+    return _by_integrals(bounds, float(widths @ bounds.lower), float(widths @ bounds.upper))
 
 
 def dynamic_phase_bounds_by_extremes(bounds: EnergyBounds) -> PhaseBounds:
-    """Bounds of theta_D from the extreme energies: (2/l) E_min dt to (2/l) E_max dt, and what L_o adds to both.
+    """Bounds of theta_D from the extreme energies: (2/l) E_min dt to (2/l) E_max dt, each wider by the part of L_o.
 
     Without L_o their width is 2 (E_max - E_min) dt/l. Both are zero without momentum.
 
@@ -91,12 +77,8 @@ def dynamic_phase_bounds_by_extremes(bounds: EnergyBounds) -> PhaseBounds:
     1.500000 to 1.500000 rad
     """
     check_object(bounds, "EnergyBounds", "bounds")
-    if not bounds.magnitude:
-        return PhaseBounds(lower=0.0, upper=0.0)
-    known = bounds.enclosure
-    stray, length = float(known.widths @ known.drift_magnitude), float(known.widths.sum())
-    low, high = (2.0 / bounds.magnitude * energy * length for energy in (bounds.least, bounds.greatest))
-    return _rounded(low - stray, high + stray)
+    length = float(bounds.enclosure.widths.sum())
+    return _by_integrals(bounds, bounds.least * length, bounds.greatest * length)
 
 
 def solid_angle_bounds(certificate: RegimeCertificate) -> PhaseBounds:
@@ -105,14 +87,8 @@ def solid_angle_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     2 pi (1 - cos(theta)) for the least and the greatest angle possible between Pi and the axis, negative about the
     axis of the smallest moment.
 
-    Raises
-    ------
-    ShapeError
-        If no axis is certain, or the sense in which Pi circles it is not.
-
-    Notes
-    -----
     Source: theory.md E8, E13.
+    Raises ShapeError if no axis is certain, or the sense in which Pi circles it is not.
 
     Examples
     --------
@@ -148,6 +124,14 @@ def loop_phase_bounds(certificate: RegimeCertificate) -> PhaseBounds:
     return PhaseBounds(lower=dynamic.lower - area.upper, upper=dynamic.upper - area.lower)
 
 
+def _by_integrals(bounds: EnergyBounds, low: float, high: float) -> PhaseBounds:
+    """Bounds of theta_D by those of the integral of E_t [J s]; zero without momentum."""
+    if not bounds.magnitude:
+        return PhaseBounds(lower=0.0, upper=0.0)
+    stray = float(bounds.enclosure.widths @ bounds.enclosure.drift_magnitude)
+    return _rounded(2.0 / bounds.magnitude * low - stray, 2.0 / bounds.magnitude * high + stray)
+
+
 def _rounded(lower: float, upper: float) -> PhaseBounds:
-    room = _ROUNDING * (abs(lower) + abs(upper))
+    room = 1e-12 * (abs(lower) + abs(upper))
     return PhaseBounds(lower=lower - room, upper=upper + room)

@@ -23,34 +23,19 @@ from ._phase_bounds import dynamic_phase_bounds, dynamic_phase_bounds_by_extreme
 from .energy import energy_along, energy_rate, homoclinic_energy
 from .regimes import CrownRegion, RegimeCertificate, regime_certificate
 
-# Parts of each integrator step, each with a Gauss rule: the integrals are then good to rounding, and the extremes seen
-# at their nodes to a small part of what the bounds leave open.
-_PARTS_OF_STEP = 4
-
 
 @dataclass(frozen=True)
 class Bound:
-    """A bound of a quantity of a motion, and the quantity itself.
-
-    Attributes
-    ----------
-    name : what is bounded, and by what
-    is_upper : whether the value is at most the bound; else it is at least the bound
-    limit : the bound
-    value : of the motion
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
-    >>> bound = sp.bounds.bounds(motion)[0]
-    >>> bound.slack >= 0.0
-    True
-    """
+    """Bound of a quantity of a motion, and the quantity itself. Made by `bounds`."""
 
     name: str
+    """Quantity and the bound's name."""
     is_upper: bool
+    """Whether the value is at most the bound; else it is at least the bound."""
     limit: float
+    """The bound."""
     value: float
+    """Value of the motion."""
 
     __repr__ = short_repr
 
@@ -75,20 +60,14 @@ def bounds(
 
     Bounds that need a certain axis, or a full turn about it, are listed only where there is one.
 
+    Source: theory.md E3, E6 to E14.
+    Raises ShapeError if the motion is a batch, or has no momentum, so that there is nothing to bound.
+
     Parameters
     ----------
     motion : of one momentum, no batch
     interval : (start, end) [s]; None: [0, duration]
     resolution : as for `enclosure`
-
-    Raises
-    ------
-    ShapeError
-        If the motion is a batch, or has no momentum, so that there is nothing to bound.
-
-    Notes
-    -----
-    Source: theory.md E3, E6 to E14.
 
     Examples
     --------
@@ -127,7 +106,8 @@ class _Track:
 def _track(motion: Motion, start: float, end: float) -> _Track:
     steps = motion.solution.times
     edges = np.concatenate([[start], steps[(steps > start) & (steps < end)], [end]])
-    parts = np.arange(_PARTS_OF_STEP) / _PARTS_OF_STEP
+    # With a Gauss rule on each quarter of a step integrals are right to rounding, and extremes at the nodes nearly so.
+    parts = np.arange(4) / 4.0
     edges = np.append((edges[:-1, None] + np.diff(edges)[:, None] * parts).ravel(), end)
     nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
     times = np.concatenate([[start], nodes.ravel(), [end]])
@@ -178,12 +158,10 @@ def _phases(certificate: RegimeCertificate, motion: Motion, track: _Track) -> li
     first, last = motion.dynamic_phase(track.times[[0, -1]])
     value = float(last - first)
     rows = []
-    for name, found in (
-        ("by extremes", dynamic_phase_bounds_by_extremes(known)),
-        ("by energy", dynamic_phase_bounds(known)),
-    ):
-        rows.append(_at_most(f"dynamic phase, most, {name}", found.upper, value))
-        rows.append(_at_least(f"dynamic phase, least, {name}", found.lower, value))
+    for name, phase_bounds in (("extremes", dynamic_phase_bounds_by_extremes), ("energy", dynamic_phase_bounds)):
+        phase = phase_bounds(known)
+        rows.append(_at_most(f"dynamic phase, most, by {name}", phase.upper, value))
+        rows.append(_at_least(f"dynamic phase, least, by {name}", phase.lower, value))
     return rows
 
 
@@ -206,14 +184,8 @@ def _about_axis(certificate: RegimeCertificate, track: _Track) -> list[Bound]:
         return rows
     times = return_time_bounds(certificate)
     back = float(np.interp(2.0 * np.pi, turned, track.times) - track.times[0])
-    rows.extend(
-        _at_least(f"return time, {name}", limit, back)
-        for name, limit in (
-            ("by latitude", times.by_latitude),
-            ("by inertia", times.by_inertia),
-            ("by azimuth", times.by_azimuth),
-        )
-    )
+    limits = {"latitude": times.by_latitude, "inertia": times.by_inertia, "azimuth": times.by_azimuth}
+    rows.extend(_at_least(f"return time, by {name}", limit, back) for name, limit in limits.items())
     if np.isfinite(times.latest):
         rows.append(_at_most("return time, latest", times.latest, back))
     return rows

@@ -16,36 +16,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, number_argument, times_argument
+from ..arguments import check_object, number_argument, times_argument, whole_argument
 from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
-from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
-from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.euler_top import EulerTop
 
 
 @dataclass(frozen=True, eq=False)
 class EnergyRate:
-    """The two parts of dE_t/dt; fields are batch + t.shape [W].
-
-    Attributes
-    ----------
-    by_inertia : Pi.(I^-1)' Pi/2, the whole rate if there is no internal momentum
-    by_internal_momentum : (Pi x I^-1 Pi).I^-1 L_o
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.3, 0.4, 2.0])
-    >>> rate = sp.bounds.energy_rate(motion, 1.0)
-    >>> float(rate.by_inertia), float(rate.by_internal_momentum)
-    (0.0, 0.0)
-    """
+    """The two parts of dE_t/dt; fields are batch + t.shape [W]. Made by `energy_rate`."""
 
     by_inertia: Array
+    """Pi.(I^-1)' Pi/2, the whole rate if there is no internal momentum."""
     by_internal_momentum: Array
+    """(Pi x I^-1 Pi).I^-1 L_o."""
 
     __repr__ = short_repr
 
@@ -57,29 +44,19 @@ class EnergyRate:
 
 @dataclass(frozen=True, eq=False)
 class FrozenPolhode:
-    """The polhode of Pi if the body stayed rigid from one time on.
-
-    Attributes
-    ----------
-    points : (N, 3) of the curve from Pi once round and back to it [kg m^2/s]; on the separatrix it is not closed, but
-        the half circle through Pi between the two directions of the intermediate axis
-    energy : E_t on it [J]
-    homoclinic_energy : E_t of the separatrix [J]
-    period : of the rigid body's Pi [s]; infinite on the separatrix and at an equilibrium
-    regime : as `EulerTop.regime`
-
-    Examples
-    --------
-    >>> curve = sp.bounds.frozen_polhode(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), 0.0, [0.1, 0.2, 2.0])
-    >>> curve.regime, curve.energy < curve.homoclinic_energy
-    ('circling', True)
-    """
+    """Polhode of Pi if the body stayed rigid from one time on. Made by `frozen_polhode`."""
 
     points: Array
+    """(N, 3) of the curve from Pi once round and back to it [kg m^2/s]; on the separatrix it is not closed, but the
+    half circle through Pi between the two directions of the intermediate axis."""
     energy: float
+    """E_t on it [J]."""
     homoclinic_energy: float
+    """E_t of the separatrix [J]."""
     period: float
+    """Period of the rigid body's Pi [s]; infinite on the separatrix and at an equilibrium."""
     regime: str
+    """One of those of `EulerTop.regime`."""
 
     __repr__ = short_repr
 
@@ -118,8 +95,6 @@ def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
 
     Source: Cabrera 2006, section 4.1, with L_o where L(d_0) is printed (theory.md C-E9); E3.
 
-    Notes
-    -----
     Equation :eq:`energy-rate` of the documentation.
 
     Examples
@@ -135,10 +110,7 @@ def energy_rate(motion: Motion, t: ArrayLike) -> EnergyRate:
     shape = (*motion.batch, *times.shape)
     by_inertia = 0.5 * np.sum(pi * so3.apply(inverse_rate, pi), axis=-1)
     by_drift = np.sum(np.cross(pi, so3.apply(inverse, pi)) * drift, axis=-1)
-    return EnergyRate(
-        by_inertia=by_inertia.reshape(shape)[()],
-        by_internal_momentum=by_drift.reshape(shape)[()],
-    )
+    return EnergyRate(by_inertia.reshape(shape)[()], by_drift.reshape(shape)[()])
 
 
 def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
@@ -147,8 +119,6 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
     Raises GaugeError if the deformation is known by its inertia only.
     Source: Cabrera 2006, equation (4), with the missing half (theory.md C-E1); A6.
 
-    Notes
-    -----
     Equation :eq:`energies` of the documentation.
 
     Examples
@@ -170,14 +140,12 @@ def kinetic_energy_along(motion: Motion, t: ArrayLike) -> Array:
 def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) -> Array:
     """l^2/(2 I_2(t)), the energy on the separatrix of the body frozen at each time: times (...) -> (...) [J].
 
+    Equation :eq:`homoclinic` of the documentation.
+    Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
+
     Parameters
     ----------
     magnitude : l, the momentum's norm [kg m^2/s]
-
-    Notes
-    -----
-    Equation :eq:`homoclinic` of the documentation.
-    Source: Cabrera 2006, section 4.1.1, with the missing half (theory.md C-E5); E5.
 
     Examples
     --------
@@ -194,14 +162,12 @@ def homoclinic_energy(deformation: Deformation, t: ArrayLike, magnitude: float) 
 def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, count: int = 200) -> FrozenPolhode:
     """The level set of E_t through Pi: its polhode if the body stayed rigid with the inertia of time t.
 
+    Source: Cabrera 2006, section 4.1; theory.md E4.
+
     Parameters
     ----------
     momentum : (3,) Pi(t), base axes [kg m^2/s]
     count : number of points, 2 or more
-
-    Notes
-    -----
-    Source: Cabrera 2006, section 4.1; theory.md E4.
 
     Examples
     --------
@@ -211,8 +177,7 @@ def frozen_polhode(deformation: Deformation, t: float, momentum: ArrayLike, coun
     7.252223 s, 7.252223 s
     """
     check_object(deformation, "Deformation", "deformation")
-    if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 2:
-        raise ShapeError(f"count: a whole number of 2 or more is needed, got {what_came(count)}")
+    count = whole_argument(count, "count", 2)
     inertia = deformation.inertia(number_argument(t, "t", "s"))
     top = EulerTop(inertia, momentum)
     orbit = top.orbit

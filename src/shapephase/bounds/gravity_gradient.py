@@ -17,34 +17,10 @@ from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..refinement import halved, settled
 
-# Mean anomaly of an ellipse [rad]: beyond, its rounding alone is more than 1e-6 rad.
-_MAX_ANOMALY_ELLIPSE = 1e10
-# Mean anomaly of a hyperbola [rad]: beyond, squares overflow.
-_MAX_ANOMALY_HYPERBOLA = 1e150
-# Distance of the eccentricity from 1 that is refused as a parabola: 1 - e has then four digits left.
-_PARABOLA = 1e-12
-# Sine of the angle between position and velocity: below, the normal of the orbit is rounding noise.
-_RADIAL = 1e-12
-# Distance [m] from the attracting body: above, gm over its cube is finite for every gm below 1e128 m^3/s^2.
-_MIN_DISTANCE = 1e-60
-# Relative step of Newton's method for Kepler's equation: the error after it is about its square.
-_NEWTON_STEP = 1e-9
-# Newton's method converges in fewer steps for every anomaly and eccentricity; the limit only ends a hang.
-_MAX_NEWTON_STEPS = 60
-# Anomaly [rad] below which x - sin(x) is summed as a series, because the difference would cancel digits.
-_SERIES_LIMIT = 1.0
-# Terms of that series: the next is below a thousandth of the rounding of the first.
-_SERIES_TERMS = 9
-# Of the integrator's steps: each halving makes the fourth-order estimate sixteen times as accurate.
-_MAX_HALVINGS = 10
-# Relative change from one halving to the next at which the estimate is good enough for an order of magnitude.
-_AGREEMENT = 1e-4
-# Steps of the estimate; limits its time, at some microseconds for each step.
-_MAX_STEPS = 400_000
-# Steps whose matrices are made at once: some 30 MB.
-_CHUNK = 10_000
-# Of the duration: closer times are one edge twice, apart by rounding.
-_SAME_TIME = 1e-12
+_ROUNDING = 1e-12  # of eccentricities near 1, directions and times: closer ones have four digits left
+_MIN_DISTANCE = 1e-60  # [m]: above, gm over its cube is finite for every gm below 1e128 m^3/s^2
+_MAX_STEPS = 400_000  # of the estimate, some microseconds each
+_CHUNK = 10_000  # steps whose matrices are made at once: some 30 MB
 
 
 @made_by("bounds.KeplerOrbit.from_state(...) or from_elements(...)")
@@ -54,15 +30,6 @@ class KeplerOrbit:
 
     A small body turns as if it were free: its base origin is at `orbit.position(t) + motion.base_position(t)`.
 
-    Attributes
-    ----------
-    gm : gravity of the other body, G M [m^3/s^2]
-    pericentre : least distance from the other body [m]
-    eccentricity : below 1 an ellipse, above 1 a hyperbola
-    axes : (3, 3) inertial axes; columns to the pericentre, across it along the motion, and the orbit's normal
-    mean_anomaly : at t = 0 [rad]; of a hyperbola e sinh(H) - H
-    centre : (3,) where the other body is [m]
-
     Examples
     --------
     >>> orbit = sp.bounds.KeplerOrbit.from_state([7.0e6, 0.0, 0.0], [0.0, 7546.05, 0.0], gm=3.986e14)
@@ -71,11 +38,17 @@ class KeplerOrbit:
     """
 
     gm: float
+    """Gravity of the other body, G M [m^3/s^2]."""
     pericentre: float
+    """Least distance from the other body [m]."""
     eccentricity: float
+    """Below 1 an ellipse, above 1 a hyperbola."""
     axes: Array
+    """(3, 3) inertial axes; columns to the pericentre, across it along the motion, and the orbit's normal."""
     mean_anomaly: float
+    """At t = 0 [rad]; of a hyperbola e sinh(H) - H."""
     centre: Array
+    """(3,) where the other body is [m]."""
 
     __repr__ = short_repr
 
@@ -85,21 +58,16 @@ class KeplerOrbit:
     ) -> KeplerOrbit:
         """The orbit through a position (3,) [m] with a velocity (3,) [m/s] at t = 0.
 
-        Raises
-        ------
-        ShapeError
-            For a velocity along the position, or a parabola (eccentricity 1 to within 1e-12).
+        Raises ShapeError for a velocity along the position, or a parabola (eccentricity 1 to within 1e-12).
         """
         pull = positive_argument(gm, "gm", "a number in m^3/s^2")
         middle = vector_argument(centre, "centre", unit="m")
-        arm, rate = (
-            vector_argument(position, "position", unit="m") - middle,
-            vector_argument(velocity, "velocity", unit="m/s"),
-        )
+        arm = vector_argument(position, "position", unit="m") - middle
+        rate = vector_argument(velocity, "velocity", unit="m/s")
         distance, speed = float(np.linalg.norm(arm)), float(np.linalg.norm(rate))
         specific_momentum = np.cross(arm, rate)
         magnitude = float(np.linalg.norm(specific_momentum))
-        if magnitude <= _RADIAL * distance * speed or magnitude == 0.0:
+        if magnitude <= _ROUNDING * distance * speed or magnitude == 0.0:
             raise ShapeError(f"a velocity {rate} along the position {arm} from the centre leads straight into it")
         normal = specific_momentum / magnitude
         # e cos and e sin of the true anomaly: the eccentricity vector in the frame of the position.
@@ -130,6 +98,8 @@ class KeplerOrbit:
     ) -> KeplerOrbit:
         """The orbit with these elements at t = 0.
 
+        Raises ShapeError if axis and eccentricity contradict each other, or the orbit is a parabola.
+
         Parameters
         ----------
         semi_major_axis : [m], negative for a hyperbola
@@ -137,23 +107,16 @@ class KeplerOrbit:
         inclination, node, argument : turns about z by the node, x by the inclination, z by the argument of the
             pericentre [rad]
         mean_anomaly : [rad]
-
-        Raises
-        ------
-        ShapeError
-            If axis and eccentricity contradict each other, or the orbit is a parabola.
         """
-        numbers = finite_array(
-            [semi_major_axis, eccentricity, inclination, node, argument, mean_anomaly], "elements", (6,)
-        )
-        axis, e, tilt, turn, argument_angle, mean = (float(number) for number in numbers)
+        elements = [semi_major_axis, eccentricity, inclination, node, argument, mean_anomaly]
+        axis, e, tilt, turn, argument_angle, mean = finite_array(elements, "elements", (6,)).tolist()
         _refuse_parabola(1.0 - e)
         if e < 0.0 or axis * (1.0 - e) <= 0.0:
             raise ShapeError(
                 "an ellipse has an eccentricity from 0 to 1 and a semi-major axis above 0, a hyperbola an eccentricity "
                 f"above 1 and a semi-major axis below 0; got eccentricity {e} and semi-major axis {axis} m"
             )
-        x, z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+        x, _, z = np.eye(3)
         axes = so3.exp(turn * z) @ so3.exp(tilt * x) @ so3.exp(argument_angle * z)
         return KeplerOrbit(
             gm=positive_argument(gm, "gm", "a number in m^3/s^2"),
@@ -195,7 +158,8 @@ class KeplerOrbit:
         """Position and velocity along the pericentre and across it."""
         e, gap, axis = self.eccentricity, 1.0 - self.eccentricity, abs(self.semi_major_axis)
         mean = self.mean_anomaly + self.mean_motion * times
-        if np.abs(mean).max(initial=0.0) > (_MAX_ANOMALY_ELLIPSE if e < 1.0 else _MAX_ANOMALY_HYPERBOLA):
+        # Beyond 1e10 rad the rounding of the mean anomaly is more than 1e-6 rad; squares of 1e150 overflow.
+        if np.abs(mean).max(initial=0.0) > (1e10 if e < 1.0 else 1e150):
             raise AccuracyNotReached(
                 f"at times up to {np.abs(times).max():.3g} s the digits of the anomaly are lost; start the orbit "
                 "nearer to them"
@@ -214,53 +178,36 @@ class KeplerOrbit:
 
 @dataclass(frozen=True)
 class GravityTorque:
-    """The effect of the gravity-gradient torque, neglected for a free body, on a motion, to first order.
-
-    Attributes
-    ----------
-    largest_torque : [N m]
-    impulse : the largest change of the angular momentum [kg m^2/s]
-    attitude_error : the largest rotation away from the free motion [rad]
-    tolerance : the rotation that is allowed [rad]
-
-    Examples
-    --------
-    >>> orbit = sp.bounds.KeplerOrbit.from_state([7.0e6, 0.0, 0.0], [0.0, 7546.05, 0.0], gm=3.986e14)
-    >>> motion = sp.reconstruct(sp.rigid(np.eye(3), 10.0), [0.0, 0.5, 5.0])
-    >>> found = sp.bounds.gravity_torque_estimate(motion, orbit)
-    >>> print(f"{found.largest_torque:.9f} N m")  # a sphere feels none
-    0.000000000 N m
-    """
+    """First-order effect of the neglected gravity-gradient torque on a motion. Made by `gravity_torque_estimate`."""
 
     largest_torque: float
+    """[N m]."""
     impulse: float
+    """The largest change of the angular momentum [kg m^2/s]."""
     attitude_error: float
+    """The largest rotation away from the free motion [rad]."""
     tolerance: float
+    """The rotation that is allowed [rad]."""
 
     __repr__ = short_repr
 
     @property
     def is_free(self) -> bool:
-        """Whether the free motion agrees with the true one within the tolerance."""
+        """True if the free motion agrees with the true one within the tolerance."""
         return self.attitude_error <= self.tolerance
 
 
 def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
     """Kepler's equation E - e sin(E) = M, or e sinh(H) - H = M for e > 1, solved for E or H to rounding.
 
+    Newton's method from above the root, where the function is convex, so that it always converges.
+
+    Raises ShapeError for a negative eccentricity, or 1.
+
     Parameters
     ----------
     mean_anomaly : (...) [rad]; E is in the same revolution
     eccentricity : 0 or more, not 1
-
-    Raises
-    ------
-    ShapeError
-        For a negative eccentricity, or 1.
-
-    Notes
-    -----
-    Newton's method from above the root, where the function is convex, so that it always converges.
 
     Examples
     --------
@@ -280,12 +227,12 @@ def eccentric_anomaly(mean_anomaly: ArrayLike, eccentricity: float) -> Array:
         by_line, by_cube = rest / gap, np.cbrt((np.pi**2 if e < 1.0 else 6.0) * rest / (e or 1e-300))
     first = np.minimum(by_line, rest + e) if e < 1.0 else np.arcsinh(by_line)
     anomaly = np.minimum(first, by_cube)
-    for _ in range(_MAX_NEWTON_STEPS):
+    for _ in range(60):  # always fewer; the error is about the square of the last step
         excess = _excess(anomaly, e < 1.0)
         slope = gap + e * (2.0 * np.sin(0.5 * anomaly) ** 2 if e < 1.0 else 2.0 * np.sinh(0.5 * anomaly) ** 2)
         step = (gap * anomaly + e * excess - rest) / slope
         anomaly = anomaly - step
-        if np.all(np.abs(step) <= _NEWTON_STEP * anomaly):
+        if np.all(np.abs(step) <= 1e-9 * anomaly):
             break
     return np.where(mean < turns, -anomaly, anomaly) + turns
 
@@ -340,11 +287,13 @@ def gravity_force(mass: float, position: ArrayLike, gm: float) -> Array:
 
 
 def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float | None = None) -> GravityTorque:
-    """Is the body free enough? How far the gravity gradient along an orbit would turn it away from its free motion.
+    """Turn by which the gravity gradient along an orbit would lead a body away from its free motion.
 
     The torque 3 gm/r^3 n x I n, at the attitudes of the free motion, changes the momentum by dmu, and the attitude
     becomes exp(eps) R with eps' = R I^-1 R^T (dmu + mu x eps): to first order, with the growth of eps along the
     motion. The change of the torque with the attitude is left out: trust it while `attitude_error` is well below 1.
+
+    Source: Cabrera 2006, remark 4.7; theory.md A16; the equation of eps by linearising theory.md section 2.
 
     Parameters
     ----------
@@ -354,14 +303,8 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
 
     Raises
     ------
-    ShapeError
-        For a batch of motions.
     AccuracyNotReached
         If the estimate would take too many steps.
-
-    Notes
-    -----
-    Source: Cabrera 2006, remark 4.7; theory.md A16; the equation of eps by linearising theory.md section 2.
 
     Examples
     --------
@@ -377,13 +320,13 @@ def gravity_torque_estimate(motion: Motion, orbit: KeplerOrbit, tolerance: float
         raise ShapeError(f"one motion is needed, this is a batch of {motion.batch}; reconstruct one of them")
     allowed = motion.tolerance if tolerance is None else positive_argument(tolerance, "tolerance", "an angle in rad")
     edges = np.unique(np.concatenate([motion.solution.times, motion.deformation.breaks]))
-    edges = edges[np.concatenate([[True], np.diff(edges) > _SAME_TIME * motion.duration])]
+    edges = edges[np.concatenate([[True], np.diff(edges) > _ROUNDING * motion.duration])]
     edges[-1] = motion.duration
 
     def excess(last: Array, new: Array) -> float:
-        return float(np.max(np.abs(new - last) - _AGREEMENT * new))
+        return float(np.max(np.abs(new - last) - 1e-4 * new))  # enough for an order of magnitude
 
-    steps = takewhile(lambda ends: len(ends) <= _MAX_STEPS, halved(edges, _MAX_HALVINGS))
+    steps = takewhile(lambda ends: len(ends) <= _MAX_STEPS, halved(edges, 10))
     effects = settled((_largest_effects(motion, orbit, ends) for ends in steps), excess, 0.0)
     if effects is None:
         raise AccuracyNotReached(
@@ -422,12 +365,11 @@ def _step_matrices(motion: Motion, orbit: KeplerOrbit, edges: Array) -> tuple[Ar
     rates[:, :3, 6] = torque
     first, middle, last = rates[:-2:2], rates[1:-1:2], rates[2::2]
     h = np.diff(edges)[:, None, None]
-    one = np.eye(7)
-    k1 = first
-    k2 = middle @ (one + 0.5 * h * k1)
-    k3 = middle @ (one + 0.5 * h * k2)
-    k4 = last @ (one + h * k3)
-    steps = one + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    identity = np.eye(7)
+    k2 = middle @ (identity + 0.5 * h * first)
+    k3 = middle @ (identity + 0.5 * h * k2)
+    k4 = last @ (identity + h * k3)
+    steps = identity + h / 6.0 * (first + 2.0 * k2 + 2.0 * k3 + k4)
     return steps[:, :6], float(np.linalg.norm(torque, axis=-1).max())
 
 
@@ -435,9 +377,9 @@ def _excess(x: Array, is_ellipse: bool) -> Array:
     """x - sin(x), or sinh(x) - x, without loss of digits near zero."""
     square = x * x
     sign = -1.0 if is_ellipse else 1.0
-    near_zero = np.abs(x) < _SERIES_LIMIT
+    near_zero = np.abs(x) < 1.0
     series, term = np.zeros_like(x), np.where(near_zero, x, 0.0)
-    for k in range(1, _SERIES_TERMS + 1):
+    for k in range(1, 10):  # the next term is below a thousandth of the rounding of the first
         term = term * square / ((2 * k) * (2 * k + 1))
         series = series + sign ** (k - 1) * term
     with np.errstate(over="ignore"):
@@ -453,7 +395,7 @@ def _mean_anomaly(true_anomaly: float, e: float) -> float:
 
 
 def _refuse_parabola(gap: float) -> None:
-    if abs(gap) < _PARABOLA:
+    if abs(gap) < _ROUNDING:
         raise ShapeError("an orbit of eccentricity 1, a parabola, is not supported; change the velocity a little")
 
 

@@ -1,4 +1,4 @@
-"""Which principal axis a free body's momentum circles: a certificate given before the motion is computed.
+"""Certificate of the principal axis that a free body's momentum circles, before the motion is computed.
 
 Pi can only get from one side of a plane through the body's centre to the other by crossing it, and there its energy is
 at most l^2/2 times the greatest eigenvalue of I^-1 in that plane. So as long as E_t stays above that, Pi stays on its
@@ -8,6 +8,7 @@ l^2/(2 I_2(t)), at each time and not only their extremes; but it holds for any d
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -21,23 +22,11 @@ from ..display import short_repr
 from ._enclosure import Enclosure
 from ._energy_bounds import EnergyBounds, energy_bounds
 
-# Times, the ends among them, whose principal axes are tried. Any axis gives a true certificate; between so few times
-# the axes of a deformation in one regime hardly move, and each costs six eigenvalues a cell.
-_CANDIDATE_TIMES = 9
-# Cosine between axes of which only one is tried: they are 4.5e-5 rad apart.
-_SAME_AXIS = 1.0 - 1e-9
-# Directions times cells that are compared at once: some 100 MB of arrays.
-_CHUNK = 2_000_000
-# Relative change of the energy over the interval that the explanation calls none.
-_NO_CHANGE = 1e-6
-# Relative, of the bounds of a squared cosine: their rounding is below 100 eps.
-_COSINE_ROUND_UP = 1.0 + 1e-13
-# Absolute, of a squared cosine: rounding where it is zero.
-_COSINE_ROUNDING = 1e-15
+_CHUNK = 2_000_000  # directions times cells that are compared at once: some 100 MB of arrays
 
 
 class Regime(StrEnum):
-    """Which principal axis the momentum circles; axis 1 is that of the smallest moment, axis 3 of the largest.
+    """Principal axis that the momentum circles; axis 1 is that of the smallest moment, axis 3 of the largest.
 
     Examples
     --------
@@ -53,45 +42,35 @@ class Regime(StrEnum):
 @made_by("bounds.regime_certificate(deformation, momentum)")
 @dataclass(frozen=True, eq=False)
 class RegimeCertificate:
-    """Which axis Pi circles over an interval, if that is certain before the motion is computed.
-
-    Attributes
-    ----------
-    regime : "about axis 1" (of the smallest moment), "about axis 3" (of the largest), or "may cross"
-    axis : (3,) unit vector, body axes: Pi . axis > 0 throughout; for "may cross" the one nearest to being certain
-    margin : the least distance of E_t above the greatest energy (below the least energy) possible on the plane across
-        the axis; negative where the regime is not certain [J]
-    energy : (2,) bounds of E_t over the interval [J]
-    threshold : (2,) bounds of the homoclinic energy l^2/(2 I_2(t)) over the interval [J]
-    interval : (start, end) [s]
-    start : (3,) Pi/l at the start of the interval, zero without momentum
-    bounds : of the energy, cell by cell
-    plane : (K,) on each cell the energy that Pi would need to cross the plane [J]
-    why : the reason, as a sentence
-
-    Examples
-    --------
-    >>> certificate = sp.bounds.regime_certificate(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
-    >>> print(f"{certificate.energy[1]:.6f} < {certificate.threshold[0]:.6f} J")
-    0.515000 < 1.012500 J
-    """
+    """Axis that Pi circles over an interval, if certain before the motion is computed. Made by `regime_certificate`."""
 
     regime: Regime
+    """ "about axis 1" (of the smallest moment), "about axis 3" (of the largest), or "may cross"."""
     axis: Array
+    """(3,) unit vector, body axes: Pi . axis > 0 throughout; for "may cross" the one nearest to being certain."""
     margin: float
+    """The least distance of E_t above the greatest energy (below the least energy) possible on the plane across the
+    axis; negative where the regime is not certain [J]."""
     energy: tuple[float, float]
+    """(2,) bounds of E_t over the interval [J]."""
     threshold: tuple[float, float]
+    """(2,) bounds of the homoclinic energy l^2/(2 I_2(t)) over the interval [J]."""
     interval: tuple[float, float]
+    """(start, end) [s]."""
     start: Array
+    """(3,) Pi/l at the start of the interval, zero without momentum."""
     bounds: EnergyBounds
+    """Bounds of the energy, cell by cell."""
     plane: Array
+    """(K,) on each cell the energy that Pi would need to cross the plane [J]."""
     why: str
+    """The reason, as a sentence."""
 
     __repr__ = short_repr
 
     @property
     def certain(self) -> bool:
-        """Whether Pi stays on one side of the plane across the axis."""
+        """True if Pi stays on one side of the plane across the axis."""
         return self.regime != Regime.MAY_CROSS
 
     @property
@@ -107,55 +86,36 @@ class RegimeCertificate:
         # e = x along + (1 - x) across + 2 sqrt(x (1 - x)) coupling, x the cosine's square; 2 sqrt(...) <= 1.
         least = _share(low - coupling - across[:, 1], along[:, 1] - across[:, 1], 0.0)
         greatest = _share(high + coupling - across[:, 0], along[:, 0] - across[:, 0], 1.0)
-        return (
-            np.sqrt(np.clip(least / _COSINE_ROUND_UP, 0.0, 1.0)),
-            np.sqrt(np.clip(greatest * _COSINE_ROUND_UP + _COSINE_ROUNDING, 0.0, 1.0)),
-        )
+        # Rounding of squared cosines: below 100 eps, and absolute where they vanish.
+        wider = 1.0 + 1e-13
+        return np.sqrt(np.clip(least / wider, 0.0, 1.0)), np.sqrt(np.clip(greatest * wider + 1e-15, 0.0, 1.0))
 
 
 @made_by("bounds.crown_region(deformation, momentum)")
 @dataclass(frozen=True, eq=False)
 class CrownRegion:
-    """The part of the momentum sphere that Pi can reach over an interval.
+    """Part of the momentum sphere that Pi can reach over an interval. Made by `crown_region`.
 
     The union over time of the level sets of E_t between its bounds at that time; where the regime is certain, only the
     part on the side of the axis. The region R of the paper is wider: it takes the bounds over the whole interval at
     every time, and the connected component of the start (`contains_as_printed`).
-
-    Attributes
-    ----------
-    certificate : where the bounds come from
-
-    Examples
-    --------
-    >>> crown = sp.bounds.crown_region(sp.rigid(np.diag([1.0, 2.0, 4.0]), 3.0), [0.1, 0.2, 2.0])
-    >>> crown.certificate.axis.tolist()
-    [0.0, 0.0, 1.0]
     """
 
     certificate: RegimeCertificate
+    """Where the bounds come from."""
 
     __repr__ = short_repr
 
     def contains(self, momenta: ArrayLike) -> Mask:
-        """Whether Pi may be there at some time of the interval: (..., 3), of any norm above 0 -> (...)."""
-        vectors = finite_array(momenta, "momenta", (3,))
-        flat = vectors.reshape(-1, 3)
-        magnitude = np.linalg.norm(flat, axis=1, keepdims=True)
-        directions = np.divide(flat, magnitude, out=np.zeros_like(flat), where=magnitude > 0.0)
-        bounds = self.certificate.bounds
-        low, high = bounds.quotients
-        inside = np.empty(len(flat), dtype=np.bool_)
-        step = max(1, _CHUNK // len(low))
-        for start in range(0, len(flat), step):
-            least, greatest = bounds.enclosure.quadratic(directions[start : start + step])
-            inside[start : start + step] = np.any((greatest >= low) & (least <= high), axis=-1)
-        if self.certificate.certain:
-            inside &= directions @ self.certificate.axis > 0.0
-        return (inside & (magnitude[:, 0] > 0.0)).reshape(vectors.shape[:-1])[()]
+        """True where Pi may be at some time of the interval: (..., 3), of any norm above 0 -> (...)."""
+        low, high = self.certificate.bounds.quotients
+        axis = self.certificate.axis if self.certificate.certain else None
+        return self._between(
+            momenta, lambda least, greatest: np.any((greatest >= low) & (least <= high), axis=-1), axis
+        )
 
     def contains_as_printed(self, momenta: ArrayLike) -> Mask:
-        """Whether the paper's region R has these: (..., 3), of any norm above 0 -> (...).
+        """True in the paper's region R: (..., 3), of any norm above 0 -> (...).
 
         The union over time of the level sets of E_t between E_min and E_max, bounds over the whole interval, of which R
         is the connected component of the start. That is one side of a plane through the centre where E_min or E_max
@@ -163,20 +123,31 @@ class CrownRegion:
 
         Source: Cabrera 2006, section 4.1.1; theory.md C-E5, E8.
         """
+        bounds = self.certificate.bounds
+        lowest, highest = float(bounds.quotients[0].min()), float(bounds.quotients[1].max())
+        low, high = np.full(len(bounds.lower), lowest), np.full(len(bounds.lower), highest)
+        margin, _, axis, _ = _widest_margin(bounds.enclosure, low, high)
+        side = np.copysign(1.0, self.certificate.start @ axis) * axis
+        return self._between(
+            momenta,
+            lambda least, greatest: (greatest.max(axis=-1) >= lowest) & (least.min(axis=-1) <= highest),
+            side if margin > 0.0 and bounds.magnitude > 0.0 else None,
+        )
+
+    def _between(self, momenta: ArrayLike, condition: Callable[[Array, Array], Mask], side: Array | None) -> Mask:
+        """True for momenta other than zero whose bounds of e on the cells meet a condition, on one side of a plane."""
         vectors = finite_array(momenta, "momenta", (3,))
         flat = vectors.reshape(-1, 3)
         magnitude = np.linalg.norm(flat, axis=1, keepdims=True)
         directions = np.divide(flat, magnitude, out=np.zeros_like(flat), where=magnitude > 0.0)
-        bounds = self.certificate.bounds
-        low, high = (np.full(len(one), end) for one, end in zip(bounds.quotients, _ends(bounds.quotients), strict=True))
         inside = magnitude[:, 0] > 0.0
-        step = max(1, _CHUNK // len(low))
+        known = self.certificate.bounds.enclosure
+        step = max(1, _CHUNK // len(known.widths))
         for start in range(0, len(flat), step):
-            least, greatest = bounds.enclosure.quadratic(directions[start : start + step])
-            inside[start : start + step] &= (greatest.max(axis=-1) >= low[0]) & (least.min(axis=-1) <= high[0])
-        margin, _, axis, _ = _widest_margin(bounds.enclosure, low, high)
-        if margin > 0.0 and bounds.magnitude > 0.0:
-            inside &= directions @ (np.copysign(1.0, self.certificate.start @ axis) * axis) > 0.0
+            rows = slice(start, start + step)
+            inside[rows] &= condition(*known.quadratic(directions[rows]))
+        if side is not None:
+            inside &= directions @ side > 0.0
         return inside.reshape(vectors.shape[:-1])[()]
 
     @property
@@ -194,9 +165,13 @@ def regime_certificate(
     *,
     resolution: float = 5e-3,
 ) -> RegimeCertificate:
-    """Which principal axis the momentum of a deforming body circles over an interval, or that this is not certain.
+    """Principal axis that the momentum of a deforming body circles over an interval, if that is certain.
 
     No motion is computed: E_t, and the energy at which Pi could cross to the other side, are bounded over the interval.
+
+    Raises as `energy_bounds`.
+
+    Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.
 
     Parameters
     ----------
@@ -204,12 +179,6 @@ def regime_certificate(
     attitude : (3, 3) at the start of the interval; None: the identity
     interval : (start, end) [s]; None: [0, duration]
     resolution : as for `enclosure`; smaller is sharper and slower
-
-    Notes
-    -----
-    Raises as `energy_bounds`.
-
-    Source: Cabrera 2006, section 4.1.1, cases 1 to 3, with the threshold l^2/(2 I_2) (theory.md C-E5); E9.
 
     Examples
     --------
@@ -228,7 +197,7 @@ def regime_certificate(
         regime = Regime.MAY_CROSS
     else:
         regime = Regime.ABOUT_SMALLEST if sign > 0.0 else Regime.ABOUT_LARGEST
-    middle_low, middle_high = (part[:, 1] for part in known.eigenvalues)
+    middle_low, middle_high = (values[:, 1] for values in known.eigenvalues)
     return RegimeCertificate(
         regime=regime,
         axis=np.copysign(1.0, body @ axis) * axis,
@@ -283,26 +252,22 @@ def _widest_margin(known: Enclosure, low: Array, high: Array) -> tuple[float, fl
     return best
 
 
-def _ends(quotients: tuple[Array, Array]) -> tuple[float, float]:
-    """The least and the greatest of bounds that belong to cells."""
-    return float(quotients[0].min()), float(quotients[1].max())
-
-
 def _candidates(known: Enclosure) -> list[Array]:
     """Principal axes at times spread over the interval."""
-    picked = known.inverse[np.unique(np.linspace(0, len(known.inverse) - 1, _CANDIDATE_TIMES).astype(int))]
+    # Any axis gives a true certificate; between nine times the axes of a deformation in one regime hardly move.
+    picked = known.inverse[np.unique(np.linspace(0, len(known.inverse) - 1, 9).astype(int))]
     axes = list(known.frame.T)
     for frame in np.linalg.eigh(picked)[1]:
         for axis in (known.frame @ frame).T:
-            if not any(abs(axis @ other) > _SAME_AXIS for other in axes):
+            if not any(abs(axis @ other) > 1.0 - 1e-9 for other in axes):
                 axes.append(axis)
     return axes
 
 
-def _share(part: Array, whole: Array, otherwise: float) -> Array:
-    """part/whole where whole > 0, else `otherwise`."""
+def _share(numerator: Array, whole: Array, otherwise: float) -> Array:
+    """numerator/whole where whole > 0, else `otherwise`."""
     known = whole > 0.0
-    return np.where(known, part / np.where(known, whole, 1.0), otherwise)
+    return np.where(known, numerator / np.where(known, whole, 1.0), otherwise)
 
 
 def _reason(regime: Regime, margin: float, bounds: EnergyBounds, known: Enclosure, distance: Array) -> str:
@@ -315,7 +280,7 @@ def _reason(regime: Regime, margin: float, bounds: EnergyBounds, known: Enclosur
             f"bounds of the two overlap there by {-margin:.3g} J"
         )
     side, extreme = ("above", "greatest") if regime == Regime.ABOUT_SMALLEST else ("below", "least")
-    slack = _NO_CHANGE * bounds.greatest / float(known.widths.sum())
+    slack = 1e-6 * bounds.greatest / float(known.widths.sum())
     falls, rises = np.all(bounds.rate_upper <= slack), np.all(bounds.rate_lower >= -slack)
     change = "stays" if falls == rises else "falls but stays" if falls else "rises but stays"
     return (

@@ -14,6 +14,8 @@ from ..sphere import polygon_area
 def beanie_turn(body: float, beanie: float, angle: ArrayLike = 2.0 * np.pi) -> Array:
     """Elroy's beanie: two bodies on a pin through both centres of mass; how far the first turns back.
 
+    Source: Marsden, Montgomery and Ratiu 1990; theory.md section 7.
+
     Parameters
     ----------
     body, beanie : moments of inertia about the pin [kg m^2]
@@ -22,10 +24,6 @@ def beanie_turn(body: float, beanie: float, angle: ArrayLike = 2.0 * np.pi) -> A
     Returns
     -------
     (...) -angle I2/(I1 + I2)
-
-    Notes
-    -----
-    Source: Marsden, Montgomery and Ratiu 1990; theory.md section 7.
 
     Examples
     --------
@@ -44,6 +42,8 @@ def two_link_turn(
     With m the reduced mass, P = I1 + I2 + m (a^2 + b^2) and Q = 2 m a b, the connection is half the hinge's rate and
     D/2 over P + Q cos(angle), D = I2 + m b^2 - I1 - m a^2, which has an inverse tangent for its integral.
 
+    Source: theory.md B1 with one joint.
+
     Parameters
     ----------
     inertias : of both about their centres of mass [kg m^2]
@@ -51,10 +51,6 @@ def two_link_turn(
     levers : a from the first's centre of mass to the hinge, b from the hinge to the second's, both outward along the
         links, which are in line at the angle 0 [m]
     angle : (...) of the hinge [rad], any number of turns
-
-    Notes
-    -----
-    Source: theory.md B1 with one joint.
 
     Examples
     --------
@@ -84,14 +80,12 @@ def square_cat_turn(near: ArrayLike, far: ArrayLike, angle: ArrayLike) -> Array:
     It goes round a rectangle: the cross turns by an angle at r = `far` and back at r = `near`. The connection is
     r^2/(1 + r^2) times the angle's rate.
 
+    Source: theory.md section 7.
+
     Parameters
     ----------
     near, far : (...) arms, over those of the first cross [1]
     angle : (...) of the second cross on the first [rad]
-
-    Notes
-    -----
-    Source: theory.md section 7.
 
     Examples
     --------
@@ -112,6 +106,8 @@ def three_body_turn(masses: ArrayLike, positions: ArrayLike) -> float:
     On the sphere of shapes the loop encloses a solid angle, and the frame in which the first Jacobi vector rests turns
     by half of it.
 
+    Source: Montgomery 1996; Iwai 1987; theory.md section 7.
+
     Parameters
     ----------
     masses : (3,) [kg]
@@ -121,10 +117,6 @@ def three_body_turn(masses: ArrayLike, positions: ArrayLike) -> float:
     Returns
     -------
     [rad] about the normal; of a loop of triangles that come back up to a turn
-
-    Notes
-    -----
-    Source: Montgomery 1996; Iwai 1987; theory.md section 7.
 
     Examples
     --------
@@ -154,7 +146,9 @@ def three_body_turn(masses: ArrayLike, positions: ArrayLike) -> float:
 
 
 def yo_yo_rate(hub: float, mass: float, radius: float, length: ArrayLike, rate: float = 1.0) -> Array:
-    """The rate of a hub that two cords with masses at their ends unwind from, when so much is free.
+    """Rate of a hub from which two cords with masses at their ends unwind, by the free length of each cord.
+
+    From momentum and energy, which both stay. Source: Fedor 1961; theory.md section 7.
 
     Parameters
     ----------
@@ -167,10 +161,6 @@ def yo_yo_rate(hub: float, mass: float, radius: float, length: ArrayLike, rate: 
     Returns
     -------
     (...) rate (c R^2 - l^2)/(c R^2 + l^2), c = 1 + hub/(mass R^2) [rad/s]; 0 at `yo_yo_stop`, negative beyond
-
-    Notes
-    -----
-    From momentum and energy, which both stay. Source: Fedor 1961; theory.md section 7.
 
     Examples
     --------
@@ -186,7 +176,7 @@ def yo_yo_rate(hub: float, mass: float, radius: float, length: ArrayLike, rate: 
 
 
 def yo_yo_stop(hub: float, mass: float, radius: float) -> float:
-    """The length of each cord that stops a hub, whatever its rate: sqrt(R^2 + hub/mass) [m]. As `yo_yo_rate`.
+    """The length of each cord that stops a hub, whatever its rate: sqrt(R^2 + hub/mass) [m]. Arguments of `yo_yo_rate`.
 
     Examples
     --------

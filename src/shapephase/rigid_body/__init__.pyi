@@ -1,6 +1,6 @@
 from . import geodesics, lie
 from ._andoyer_pendulum import AndoyerPendulum, andoyer_pendulum
-from ._flow import ascending_times, flow
+from ._flow import flow
 from ._half_twist import HalfTwist, half_twist, half_twist_from_tilt, racket_twist, twist_defect
 from ._momentum_orbit import (
     MomentumOrbit,
@@ -12,8 +12,15 @@ from ._momentum_orbit import (
 from ._nutation import Nutation, nutation
 from .euler_angles import ZXZ, ZYZ, EulerChart, canonical_bracket, precession_rate
 from .euler_top import EulerTop
-from .gyrostat import Gyrostat
-from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, heavy_top_steps, semidirect_bracket
+from .gyrostat import (
+    DualSpinTurn,
+    Gyrostat,
+    GyrostatEquilibrium,
+    bifurcation_rotors,
+    dual_spin_turn,
+    gyrostat_equilibria,
+)
+from .heavy_top import HeavyTop, HeavyTopMotion, casimirs, semidirect_bracket
 from .lagrange_top import (
     LagrangeTop,
     SleepingTop,
@@ -33,13 +40,6 @@ from .poinsot import Closure, Cones, Poinsot, cones
 from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
 from .pseudo_rigid import PseudoRigidBody, PseudoRigidSpin, pseudo_rigid_spin
 from .stability import SpinInSpace, SteadyRotation, spin_in_space, steady_rotation, steady_rotations
-from .steady_gyrostats import (
-    DualSpinTurn,
-    GyrostatEquilibrium,
-    bifurcation_rotors,
-    dual_spin_turn,
-    gyrostat_equilibria,
-)
 from .twisting_somersault import RotorDive, rotor_dive, rotor_dive_lasting, tilt_of_ratio
 
 __all__ = [
@@ -73,7 +73,6 @@ __all__ = [
     "SteadyRotation",
     "WeierstrassForm",
     "andoyer_pendulum",
-    "ascending_times",
     "bifurcation_rotors",
     "canonical_bracket",
     "casimirs",
@@ -87,7 +86,6 @@ __all__ = [
     "gyrostat_equilibria",
     "half_twist",
     "half_twist_from_tilt",
-    "heavy_top_steps",
     "heteroclinics",
     "inverse_difference",
     "lie",

@@ -7,11 +7,10 @@ With G the magnitude of the body momentum Pi and the principal moments ascending
 y and p_y are canonically conjugate on the sphere of momenta. Along axis 3, at y = pi/2, is the stable equilibrium of
 the (y, p_y) plane, along axis 2, at y = 0 and pi, the unstable one; momenta along axis 1, p_y = G and -G, have no y.
 
-Bonnard et al. number the axes by descending moments: their H_1, H_2, H_3 are our Pi_3, -Pi_2, Pi_1 (the sign keeps the
-frame right-handed), their I_1, I_2, I_3 our I_3, I_2, I_1. The functions take the moments in any order and momenta in
-the caller's axes. If those descend, y and p_y are the paper's; in any other order, axes 1, 2, 3 above are the caller's
-by ascending moment, axis 2 reversed where that order is left-handed. p_y is L itself, with y' = p_y (a_1 - w) as in the
-paper's (8); the geodesics of `serret_andoyer` begin with p_y below 0, see there.
+Moments may be in any order: axes 1, 2, 3 above are the caller's by ascending moment, axis 2 reversed where that order
+is left-handed. Bonnard et al. number the axes by descending moments: their H_1, H_2, H_3 are our Pi_3, -Pi_2, Pi_1 (the
+sign keeps the frame right-handed). p_y is L itself, with y' = p_y (a_1 - w) as in the paper's (8); the geodesics of
+`serret_andoyer` begin with p_y below 0, see there.
 
 Source: Bonnard, Cots and Shcherbakova 2013, sections 3.4 and 3.5; theory.md N12.
 """
@@ -19,6 +18,7 @@ Source: Bonnard, Cots and Shcherbakova 2013, sections 3.4 and 3.5; theory.md N12
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,21 +28,15 @@ from ..arrays import Array, common_shape, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
+from ._arguments import check_entries
 from .pendulum import RigidBodyPendulum, rigid_body_pendulum
 
-_REGIME_NAMES = {"libration": "oscillating", "rotation": "rotating"}
-"""What the paper calls the pendulum's regimes; the others have the same name."""
+_REGIME_NAMES = {"libration": "oscillating", "rotation": "rotating"}  # the paper's names, where they differ
 
 
 @dataclass(frozen=True, eq=False)
 class AndoyerPendulum:
-    """The reduced Euler-Poinsot motion in the (y, p_y) plane, see `andoyer_pendulum`.
-
-    Examples
-    --------
-    >>> sp.rigid_body.andoyer_pendulum([3.0, 2.0, 1.0]).moments.tolist()
-    [3.0, 2.0, 1.0]
-    """
+    """Reduced free rigid body in the (y, p_y) plane. Made by `andoyer_pendulum`."""
 
     moments: Array
     """(3,) principal moments about the caller's axes 1, 2, 3 [kg m^2]."""
@@ -52,40 +46,28 @@ class AndoyerPendulum:
     def coordinates(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
         """G, y in (-pi, pi] and p_y of body momenta: (..., 3) -> (...), (...) [rad], (...) [kg m^2/s].
 
-        Raises
-        ------
-        ShapeError
-            If a momentum is along the axis of the smallest moment, where y is undefined, or is not three finite
-            numbers.
-
-        Notes
-        -----
         Source: Bonnard et al., before (5).
+        Raises ShapeError if a momentum is along the axis of the smallest moment, where y is undefined, or is not three
+        finite numbers.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-        smallest, middle, largest = np.moveaxis(pi[..., self._order], -1, 0)
-        bad = (largest == 0.0) & (middle == 0.0)
-        if bad.any():
-            where = tuple(int(i) for i in np.argwhere(bad)[0])
-            raise ShapeError(
-                f"momentum: entry {list(where)} is {pi[where]}, along the axis of the smallest moment, "
-                "where y is undefined"
-            )
+        order, parity = self._axes
+        smallest, middle, largest = np.moveaxis(pi[..., order], -1, 0)
+        along = (largest == 0.0) & (middle == 0.0)
+        check_entries(along, pi, "momentum", "along the axis of the smallest moment y is undefined")
         # Adding zero takes the sign off a zero, of which arctan2 would make minus a half turn.
-        return np.linalg.norm(pi, axis=-1), np.arctan2(largest + 0.0, -self._parity * middle), smallest
+        return np.linalg.norm(pi, axis=-1), np.arctan2(largest + 0.0, -parity * middle), smallest
 
     def body_momentum(self, magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> Array:
         """Pi of G, y and p_y, the inverse of `coordinates`: (...) each -> (..., 3) [kg m^2/s].
 
-        Raises
-        ------
-        ShapeError
-            If |p_y| is larger than G; so do the other methods.
+        Raises ShapeError if |p_y| is larger than G, here and in the other methods.
         """
         magnitude, y, p_y = _variables(magnitude, y, p_y)
         across = np.sqrt((magnitude - p_y) * (magnitude + p_y))
+        order, parity = self._axes
         pi = np.empty((*p_y.shape, 3))
-        pi[..., self._order] = np.stack([p_y, -self._parity * across * np.cos(y), across * np.sin(y)], axis=-1)
+        pi[..., order] = np.stack([p_y, -parity * across * np.cos(y), across * np.sin(y)], axis=-1)
         return pi
 
     def hamiltonian(self, magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> Array:
@@ -136,42 +118,35 @@ class AndoyerPendulum:
         """
         theta = finite_array(theta, "theta", unit="rad")
         pendulum = self._pendulum
-        theta = -self._parity * theta
+        theta = -self._axes[1] * theta
         sine, cosine = np.sin(theta), np.cos(theta)
         shift = np.arctan2((pendulum.k2 - pendulum.k1) * sine * cosine, pendulum.k1 * cosine**2 + pendulum.k2 * sine**2)
         return 0.5 * np.pi - theta - shift
 
-    @property
+    @cached_property
     def _inverse(self) -> Array:
-        """a_i = 1/I_i of ascending moments, so descending."""
+        """(3,) a_i = 1/I_i, descending."""
         return 1.0 / ascending_moments(self.moments)[0]
 
-    @property
-    def _order(self) -> NDArray[np.intp]:
-        """(3,) which of the caller's axes have the smallest, the middle and the largest moment."""
-        return ascending_moments(self.moments)[1]
-
-    @property
-    def _parity(self) -> float:
-        """1 if the caller's axes in that order are right-handed, else -1."""
-        return float(ascending_moments(self.moments)[2])
+    @cached_property
+    def _axes(self) -> tuple[NDArray[np.intp], float]:
+        """(3,) indices of the caller's axes by ascending moment, and 1 if right-handed in that order, else -1."""
+        _, order, parity = ascending_moments(self.moments)
+        return order, float(parity)
 
     @property
     def _pendulum(self) -> RigidBodyPendulum:
-        return rigid_body_pendulum(self.moments, self._order[::-1].tolist())
+        return rigid_body_pendulum(self.moments, self._axes[0][::-1].tolist())
 
 
 def andoyer_pendulum(moments: ArrayLike) -> AndoyerPendulum:
     """The pendulum in Serret and Andoyer's variables of three different principal moments.
 
+    Raises ShapeError if the moments are not positive, or two of them are equal.
+
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
-
-    Raises
-    ------
-    ShapeError
-        If the moments are not positive, or two of them are equal.
 
     Examples
     --------
@@ -189,9 +164,5 @@ def _variables(magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> tuple[Arra
     magnitude, y, p_y = (finite_array(v, name) for v, name in ((magnitude, "magnitude"), (y, "y"), (p_y, "p_y")))
     common_shape(magnitude=magnitude, y=y, p_y=p_y)
     magnitude, y, p_y = np.broadcast_arrays(magnitude, y, p_y)
-    if np.any(np.abs(p_y) > magnitude):
-        where = tuple(int(i) for i in np.argwhere(np.abs(p_y) > magnitude)[0])
-        raise ShapeError(
-            f"p_y: entry {list(where)} is {p_y[where]:.9g}, beyond the momentum's magnitude {magnitude[where]:.9g}"
-        )
+    check_entries(np.abs(p_y) > magnitude, p_y, "p_y", "that is beyond the momentum's magnitude")
     return magnitude, y, p_y

@@ -7,36 +7,31 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..arguments import check_function
-from ..arrays import Array, finite_array
-from ..errors import AccuracyNotReached, ShapeError
+from ..arrays import Array
+from ..errors import AccuracyNotReached
 
-_TOLERANCE = 3e-14
-"""Relative tolerance of a step; SciPy warns below 2.2e-14 (100 eps) and raises the value."""
-_STEPS = 20_000
-"""Most steps from one time to the next; a motion that needs more is too stiff for an explicit method."""
+_TOLERANCE = 3e-14  # relative tolerance of a step; SciPy warns below 2.2e-14 (100 eps) and raises the value
+_STEPS = 20_000  # most steps from one time to the next; a motion that needs more is too stiff for an explicit method
 
 
 def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Array | float | None = None) -> Array:
-    """The solution of y' = rate(y) with y(times[0]) = start, by DOP853: (N,) times -> (..., N, d).
+    """Solution of y' = rate(y) with y(times[0]) = start, by DOP853: (N,) times -> (..., N, d).
+
+    Raises AccuracyNotReached if the solution leaves every bound before the last time, the step becomes too small, or
+    the steps too many.
 
     Parameters
     ----------
     rate : (..., d) -> (..., d), smooth
     start : (..., d), all integrated together
-    times : (N,) strictly ascending, as `ascending_times` returns them
+    times : (N,) strictly ascending
     scale : magnitude of y that the tolerance 3e-14 is relative to, broadcast to start; None: the largest entry of
         each vector of start
 
     Every time is the end of a step, so no interpolation error enters. The error in phase grows with the square of the
     time: for a tumbling body it is 1e-11 after ten periods and 1e-9 after eighty.
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the solution leaves every bound before the last time, the step becomes too small, or the steps too many.
 
     Examples
     --------
@@ -76,17 +71,3 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
             )
         out.append(state.reshape(shape))
     return np.stack(out, axis=-2)
-
-
-def ascending_times(times: ArrayLike) -> Array:
-    """A user's times, checked: (N,), strictly ascending, at least one. Raises ShapeError.
-
-    Examples
-    --------
-    >>> sp.rigid_body.ascending_times([0.0, 0.5, 2.0]).tolist()
-    [0.0, 0.5, 2.0]
-    """
-    array = finite_array(times, "times", (None,))
-    if array.ndim != 1 or not array.size or np.any(np.diff(array) <= 0.0):
-        raise ShapeError("times: expected strictly ascending times (N,), the first one that of the start")
-    return array

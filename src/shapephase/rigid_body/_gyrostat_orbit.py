@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import permutations
 
 import numpy as np
 from scipy.special import elliprf, elliprj
@@ -27,49 +28,36 @@ from ..arrays import Array, lock_arrays
 from ..errors import AccuracyNotReached
 
 _EPS = float(np.finfo(float).eps)
-_REAL = 1e-9
-"""Relative imaginary part below which a root of the quartic is tried as a real one."""
+_TOLERANCE = 1e-9  # of the imaginary part of a root tried as real, and of the distance of the curve from its start
 _METRIC = np.diag([1.0, 1.0, 1.0, -1.0])
-_DOUBLE = 1e-13
-"""Relative discriminant below which two roots are one: some hundred roundings."""
-_BISECTIONS = 60
-"""Halvings of an arc of the circle, which leave rounding."""
-_GOOD = 1e-9
-"""How near the curve must pass by its start to be ours."""
-_AXES = 48
-"""Directions among which the one is chosen that the attitude is counted by."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class GyrostatOrbit:
-    """The closed curve of x, principal axes.
-
-    Attributes
-    ----------
-    points : (3, 4) P, T and P1
-    vertex : (4,) V
-    along : k, that is q'/k is the part along V
-    leading : c of q'^2 = c q (q - r)(q - s) [1/s^2]
-    roots : r and s, real and not positive, or conjugate
-    rate : of the argument u of the elliptic functions [1/s]
-    complement : m1 = 1 - k^2 of these
-    phase : u at t = 0
-    """
+    """The closed curve of x, principal axes."""
 
     points: Array
+    """(3, 4) P, T and P1."""
     vertex: Array
+    """(4,) V."""
     along: float
+    """k, that is q'/k is the part along V."""
     leading: float
+    """c of q'^2 = c q (q - r)(q - s) [1/s^2]."""
     roots: tuple[complex, complex]
+    """r and s, real and not positive, or conjugate."""
     rate: float
+    """Rate of the argument u of the elliptic functions [1/s]."""
     complement: float
+    """m1 = 1 - k^2 of these."""
     phase: float
+    """u at t = 0."""
 
     __post_init__ = lock_arrays
 
     @property
     def is_oscillating(self) -> bool:
-        """Whether there is another oval: both other roots are real and not positive."""
+        """True where there is another oval: both other roots are real and not positive."""
         return self.roots[0].imag == 0.0 and self.roots[0].real <= 0.0
 
     @cached_property
@@ -88,14 +76,15 @@ class GyrostatOrbit:
         if self.is_oscillating:
             scale = -self.roots[1].real
             turns = np.rint(am / np.pi)
-            # Of whole half turns of the amplitude sn and cn change their signs together.
+            # By half turns of the amplitude sn and cn change their signs together.
             top, weight = scale * cn * cn, sn * sn
             slope = -2.0 * scale * self.rate * cn * dn * sn
             return top, weight, slope, turns, _side(am - np.pi * turns)
         scale = float(np.abs(self.roots[0]))
-        low = cn < 0.0
-        above = np.where(low, sn * sn / np.where(low, 1.0 - cn, 1.0), 1.0 + cn)
-        below = np.where(low, 1.0 - cn, sn * sn / np.where(low, 1.0, 1.0 + cn))
+        # 1 + cn and 1 - cn, the smaller of them without loss of digits.
+        large = 1.0 + np.abs(cn)
+        small = sn * sn / large
+        above, below = np.where(cn < 0.0, small, large), np.where(cn < 0.0, large, small)
         slope = -2.0 * scale * self.rate * sn * dn
         turns = np.rint(am / (2.0 * np.pi))
         return scale * above, below, slope, turns, _side(am - 2.0 * np.pi * turns)
@@ -114,25 +103,22 @@ class Swing:
     """The angle psi about the momentum, a quotient of linear forms of X integrated along the orbit.
 
     psi = drift t + sum of weights_i times the integral of 1/(q - poles_i) + an inverse tangent.
-
-    Attributes
-    ----------
-    orbit : the curve
-    drift : [rad/s]
-    weights, poles : (2,) complex, of the integrals of the third kind
-    odd : factor of the inverse tangent [rad]
     """
 
     orbit: GyrostatOrbit
+    """The curve."""
     drift: float
+    """[rad/s]."""
     weights: Array
     poles: Array
+    """`weights` and `poles`: (2,) complex, of the integrals of the third kind."""
     odd: complex
+    """Factor of the inverse tangent [rad]."""
 
     __post_init__ = lock_arrays
 
     def angle(self, times: Array) -> Array:
-        """Psi, without the constant: (N,) -> (N,) [rad]."""
+        """Angle psi, without its constant: (N,) -> (N,) [rad]."""
         orbit = self.orbit
         top, weight, _, turns, sign = orbit.ratio(times)
         total = self.drift * (times + orbit.phase / orbit.rate)
@@ -140,18 +126,18 @@ class Swing:
         for amount, pole in zip(self.weights, self.poles, strict=True):
             if orbit.is_oscillating or not orbit.complement:
                 # On a separatrix no half period is ever over.
-                part = self._from_far(top, weight, pole)
+                partial = self._from_far(top, weight, pole)
                 half = self._from_far(0.0 * ends[0], ends[0], pole) if orbit.complement else np.zeros(1)
             else:
                 # Short of |r| the arguments of Carlson's integral would come near its cut: there from the other end.
                 half = self._from_far(ends[1], ends[0], pole) + self._to_near(ends[1], ends[0], pole)
                 far = top >= ends[1] * weight
-                part = np.where(
+                partial = np.where(
                     far,
                     self._from_far(np.where(far, top, ends[1]), np.where(far, weight, 1.0), pole),
                     half - self._to_near(np.where(far, ends[1], top), np.where(far, 1.0, weight), pole),
                 )
-            total = total + (amount * (sign * part + 2.0 * turns * half)).real
+            total = total + (amount * (sign * partial + 2.0 * turns * half)).real
         places = top - self.poles[:, None] * weight
         return total + (self.odd * (np.log(places[1]) - np.log(places[0]))).real
 
@@ -159,11 +145,11 @@ class Swing:
         """The integral of dt/(q - pole) from P, where q is infinite, to q = top/weight."""
         first, second = self.orbit.roots
         scaled = np.where(weight > 0.0, weight, 1.0)
-        found = elliprj(top + 0j, top - first * scaled, top - second * scaled, top - pole * scaled)
-        return np.where(weight > 0.0, 2.0 / (3.0 * np.sqrt(self.orbit.leading)) * scaled**1.5 * found, 0.0)
+        third = elliprj(top + 0j, top - first * scaled, top - second * scaled, top - pole * scaled)
+        return np.where(weight > 0.0, 2.0 / (3.0 * np.sqrt(self.orbit.leading)) * scaled**1.5 * third, 0.0)
 
     def _to_near(self, top: Array, weight: Array, pole: complex) -> Array:
-        """The same from q = top/weight to P1, where q is zero: with 1/q for q."""
+        """The integral of dt/(q - pole) from q = top/weight to P1, where q is zero: with 1/q for q."""
         first, second = self.orbit.roots
         scaled = np.where(top > 0.0, top, 1.0)
         args = weight + 0j, weight - scaled / first, weight - scaled / second
@@ -180,30 +166,30 @@ def _side(rest: Array) -> Array:
 def gyrostat_orbit(rates: Array, shift: Array, start: Array, speed: float) -> GyrostatOrbit:
     """The orbit through a start: A's diagonal (3,) [1/(kg m^2)], b (3,), x (3,), and |Pi| [kg m^2/s].
 
-    Raises
-    ------
-    AccuracyNotReached
-        If no cone gives the curve, as next to an equilibrium.
+    Raises AccuracyNotReached if no cone gives the curve, as next to an equilibrium.
     """
-    values, quadric = _pencil(rates, shift, start)
-    found: list[tuple[float, GyrostatOrbit]] = []
-    for place in values:
-        orbit = _by_cone(place, quadric, rates, shift, start, speed)
-        if orbit is not None:
-            distance = float(np.linalg.norm(orbit.directions(np.zeros(())) - start))
-            if distance < 16.0 * _EPS:
-                return orbit
-            found.append((distance, orbit))
-    found.sort(key=lambda one: one[0])
-    if not found or found[0][0] > _GOOD:
+    cones, quadric = _pencil(rates, shift, start)
+    nearest, best = _TOLERANCE, None
+    for cone in cones:
+        orbit = _by_cone(cone, quadric, rates, shift, start, speed)
+        distance = _distance_from(start, orbit) if orbit is not None else np.inf
+        if distance <= nearest:
+            nearest, best = distance, orbit
+        if distance < 16.0 * _EPS:
+            break
+    if best is None:
         raise AccuracyNotReached("the curve of the momentum was not found: it is too near to a point or to a circle")
-    return found[0][1]
+    return best
+
+
+def _distance_from(start: Array, orbit: GyrostatOrbit) -> float:
+    return float(np.linalg.norm(orbit.directions(np.zeros(())) - start))
 
 
 def _pencil(rates: Array, shift: Array, start: Array) -> tuple[list[tuple[float, Array]], Array]:
     """Real roots c with the vertices of their cones, the most isolated first, and Q: [(c, (4,))], (4, 4).
 
-    Of Q the last entry is such that the start is on it to rounding.
+    The last entry of Q is such that the start is on it to rounding.
     """
     quadric = np.zeros((4, 4))
     quadric[:3, :3] = np.diag(rates)
@@ -212,13 +198,12 @@ def _pencil(rates: Array, shift: Array, start: Array) -> tuple[list[tuple[float,
     roots, vectors = np.linalg.eig(_METRIC @ quadric)
     order = []
     for k in range(4):
-        if abs(roots[k].imag) <= _REAL * abs(roots[k]):
-            vertex = np.real(vectors[:, k])
-            space = float(vertex @ _METRIC @ vertex)
-            if space > 0.0:
-                order.append((-float(np.abs(np.delete(roots, k) - roots[k]).min()), float(roots[k].real), vertex))
-    order.sort(key=lambda one: one[0])
-    return [(root, vertex / np.linalg.norm(vertex)) for _, root, vertex in order], quadric
+        vertex = np.real(vectors[:, k])
+        if abs(roots[k].imag) <= _TOLERANCE * abs(roots[k]) and float(vertex @ _METRIC @ vertex) > 0.0:
+            isolation = float(np.abs(np.delete(roots, k) - roots[k]).min())
+            order.append((isolation, float(roots[k].real), vertex / np.linalg.norm(vertex)))
+    order.sort(key=lambda cone: -cone[0])
+    return [(root, vertex) for _, root, vertex in order], quadric
 
 
 def _by_cone(
@@ -234,20 +219,16 @@ def _by_cone(
     within = here - (vertex @ _METRIC @ here) / space * vertex
     projected = np.asarray(np.linalg.lstsq(basis, within, rcond=None)[0], dtype=np.float64)
     points = np.stack([np.cos(angles), np.sin(angles), np.ones(len(angles))], axis=1)
-    best: tuple[float, GyrostatOrbit] | None = None
-    for i in range(len(points)):
-        for j in range(len(points)):
-            if i == j:
-                continue
-            orbit = _through(points[i], points[j], conic, basis, vertex, projected, here, rates, shift, speed)
-            if orbit is None:
-                continue
+    lowest, best = np.inf, None
+    for far, near in permutations(points, 2):
+        orbit = _through(far, near, conic, basis, vertex, projected, here, rates, shift, speed)
+        if orbit is not None:
             # Either end may be infinite: the one where the momentum moves faster has more digits.
-            distance = float(np.linalg.norm(orbit.directions(np.zeros(())) - start))
+            distance = _distance_from(start, orbit)
             score = distance if distance > 1e3 * _EPS else -abs(orbit.along * orbit.leading)
-            if best is None or score < best[0]:
-                best = score, orbit
-    return None if best is None else best[1]
+            if score < lowest:
+                lowest, best = score, orbit
+    return best
 
 
 def _polar_basis(vertex: Array) -> Array:
@@ -278,14 +259,14 @@ def _on_circle(conic: Array) -> Array:
 
     # Its slope is the real part of a polynomial in u = exp(i t); so are its extremes roots of one of fourth degree.
     high, low = complex(sin2, cos2), 0.5 * complex(sin1, cos1)
-    found = np.roots([high, low, 0.0, np.conj(low), np.conj(high)])
+    extremes = np.roots([high, low, 0.0, np.conj(low), np.conj(high)])
     even = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
-    grid = np.sort(np.mod(np.concatenate([np.angle(found), even]), 2.0 * np.pi))
+    grid = np.sort(np.mod(np.concatenate([np.angle(extremes), even]), 2.0 * np.pi))
     left, right = grid, np.append(grid[1:], grid[0] + 2.0 * np.pi)
     change = np.sign(form(left)) * np.sign(form(right)) < 0.0
     left, right = left[change], right[change]
     sign = np.sign(form(left))
-    for _ in range(_BISECTIONS):
+    for _ in range(60):  # halvings, which leave rounding
         middle = 0.5 * (left + right)
         same = np.sign(form(middle)) == sign
         left, right = np.where(same, middle, left), np.where(same, right, middle)
@@ -306,17 +287,13 @@ def _through(
     pole = pole * np.sqrt(-2.0 * chord / bend)
     bend = -2.0 * chord
     # The start is weight (q^2 P + q T + P1).
-    at_far, at_near, at_pole = (float(projected @ one) for one in (to_far, to_near, conic @ pole))
+    at_far, at_near, at_pole = (float(projected @ polar) for polar in (to_far, to_near, conic @ pole))
     if at_pole * chord / bend * at_far < 0.0:
         pole, at_pole = -pole, -at_pole
     whole = np.stack([far, pole, near]) @ basis.T
     metric = whole @ _METRIC @ whole.T
     space = float(vertex @ _METRIC @ vertex)
-    f1, f2, f3 = (
-        -2.0 * metric[0, 1] / space,
-        -(metric[1, 1] + 2.0 * metric[0, 2]) / space,
-        -2.0 * metric[1, 2] / space,
-    )
+    f1, f2, f3 = np.array([2.0 * metric[0, 1], metric[1, 1] + 2.0 * metric[0, 2], 2.0 * metric[1, 2]]) / -space
     if not f1 > 0.0:
         return None
     f3 = max(f3, 0.0)
@@ -331,7 +308,7 @@ def _through(
     discriminant = f2 * f2 - 4.0 * f1 * f3
     # Two positive roots would end our oval: they are one, but for rounding, and it is a separatrix.
     double = discriminant >= 0.0 and f2 < 0.0
-    if double and discriminant > _DOUBLE * f2 * f2:
+    if double and discriminant > 1e-13 * f2 * f2:
         return None
     if discriminant >= 0.0 and not double:
         large = -0.5 * (f2 + np.sqrt(discriminant)) / f1
@@ -374,16 +351,7 @@ def _through(
     phase = phase if sense >= 0.0 else -phase
     if not np.isfinite(phase):
         return None
-    return GyrostatOrbit(
-        points=whole,
-        vertex=vertex,
-        along=along,
-        leading=leading,
-        roots=roots,
-        rate=float(rate),
-        complement=complement,
-        phase=phase,
-    )
+    return GyrostatOrbit(whole, vertex, along, leading, roots, float(rate), complement, phase)
 
 
 def swing_about(orbit: GyrostatOrbit, axis: Array, numerator: Array) -> Swing:
@@ -404,8 +372,8 @@ def swing_about(orbit: GyrostatOrbit, axis: Array, numerator: Array) -> Swing:
 def best_axis(orbit: GyrostatOrbit) -> Array:
     """The unit vector e, with e.V + V4 = 0, that stays farthest from the opposite of the momentum's directions."""
     basis = _polar_basis(orbit.vertex)
-    angles = 2.0 * np.pi * np.arange(_AXES) / _AXES
-    circle = np.stack([np.cos(angles), np.sin(angles), np.ones(_AXES)], axis=1) @ basis.T
+    angles = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+    circle = np.stack([np.cos(angles), np.sin(angles), np.ones(len(angles))], axis=1) @ basis.T
     against = circle[:, :3] / circle[:, 3:]
     reach = orbit.half_period if np.isfinite(orbit.half_period) else 20.0 / orbit.rate
     seen = orbit.directions(np.linspace(-reach, reach, 65) - orbit.phase / orbit.rate)

@@ -22,63 +22,52 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic
+from ..arguments import moments_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
-from ..letters import what_came
-
-_NEGLIGIBLE = 1e-140
-"""Components of Pi below this (in units of its own power of two) count as zero: squares of smaller ones underflow."""
+from ._arguments import axis_index
 
 
 @dataclass(frozen=True, eq=False)
 class MomentumOrbit:
-    """How Pi moves in the principal axes of a free rigid body.
-
-    Attributes
-    ----------
-    moments : (3,) ascending [kg m^2]
-    start : (3,) Pi at t = 0 [kg m^2/s]
-    magnitude : |Pi| [kg m^2/s]
-    regime : "rest", "spherical", "steady", "axisymmetric", "circling" or "separatrix"
-    circled, other : the indices k and a, 0 and 2 or 2 and 0; both -1 where Pi stands still and circles nothing
-    direction : (3,) ê, the unit vector along the axis circled, on Pi's side; Pi's own where it circles nothing
-    amplitudes : (3,) signed, of Pi/|Pi|
-    rate : of u [rad/s]; 0 where Pi circles nothing
-    complement : m1
-    phase : u0
-    characteristic : n <= 0 of the integral of the third kind in the azimuth and the attitude; of the moments only
-    spin : L/I_2, the steady part of the turn about Pi [rad/s]
-    excess : 2 E/L − L/I_2, by which the turn about Pi differs from it [rad/s]; 0 on the separatrix
-    precession : (L/I_a − L/I_k)/rate
-    sense : +1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still
-    condition : how much a small change of inertia or momentum is magnified, see `EulerTop.condition`
-
-    Examples
-    --------
-    >>> orbit = sp.rigid_body.momentum_orbit(np.array([1.0, 2.0, 3.0]), np.array([0.1, 0.2, 1.5]))
-    >>> orbit.circled, round(orbit.magnitude, 6)
-    (2, 1.516575)
-    """
+    """Motion of Pi in the principal axes of a free rigid body. Made by `momentum_orbit`."""
 
     moments: Array
+    """(3,) ascending [kg m^2]."""
     start: Array
+    """(3,) Pi at t = 0 [kg m^2/s]."""
     magnitude: float
+    """|Pi| [kg m^2/s]."""
     regime: str
+    """ "rest", "spherical", "steady", "axisymmetric", "circling" or "separatrix"."""
     circled: int
     other: int
+    """`circled` and `other`: the indices k and a, 0 and 2 or 2 and 0; both -1 where Pi stands still and circles
+    nothing."""
     direction: Array
+    """(3,) ê, the unit vector along the axis circled, on Pi's side; Pi's own where it circles nothing."""
     amplitudes: Array
+    """(3,) signed, of Pi/|Pi|."""
     rate: float
+    """Rate of u [rad/s]; 0 where Pi circles nothing."""
     complement: float
+    """m1."""
     phase: float
+    """u0."""
     characteristic: float
+    """n <= 0 of the integral of the third kind in the azimuth and the attitude, by the moments only."""
     spin: float
+    """L/I_2, the steady part of the turn about Pi [rad/s]."""
     excess: float
+    """2 E/L − L/I_2, by which the turn about Pi differs from it [rad/s]; 0 on the separatrix."""
     precession: float
+    """(L/I_a − L/I_k)/rate."""
     sense: float
+    """+1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still."""
     condition: float
+    """Factor that magnifies a small change of inertia or momentum, see `EulerTop.condition`."""
 
     __repr__ = short_repr
 
@@ -96,7 +85,7 @@ class MomentumOrbit:
 
     @property
     def third_kind(self) -> float:
-        """What psi + sense azimuth gains in a period in excess of spin t [rad]."""
+        """Gain of psi + sense azimuth in a period in excess of spin t [rad]."""
         return 4.0 * self.precession * float(elliptic.complete_pi_excess(self.characteristic, self.complement))
 
     def _direction(self, sn: Array, cn: Array, dn: Array) -> Array:
@@ -124,7 +113,7 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
     # Powers of two, so that squares neither overflow nor round.
     momentum_unit, inertia_unit = np.exp2(np.frexp([magnitude or 1.0, moments[2]])[1])
     x = start / momentum_unit
-    x = np.where(np.abs(x) < _NEGLIGIBLE, 0.0, x)
+    x = np.where(np.abs(x) < 1e-140, 0.0, x)  # squares of smaller components underflow
     i1, i2, i3 = i = (moments / inertia_unit).tolist()
     if not magnitude or i1 == i3 or not (x[0] or x[2]) or (i1 == i2 and not x[2]) or (i2 == i3 and not x[0]):
         return _stationary_orbit(moments, start, magnitude)
@@ -170,21 +159,12 @@ def momentum_orbit(moments: Array, start: Array) -> MomentumOrbit:
 
 
 def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
-    """The area between the two separatrices, on the side of one principal axis [sr].
+    """The area between the two separatrices, on the side of one principal axis [sr]. Source: theory.md section 7.
 
     Parameters
     ----------
     moments : (3,) in any order, above 0, not all equal [kg m^2]
     axis : 0, 1 or 2, one of these axes, with the smallest or the largest moment
-
-    Raises
-    ------
-    ShapeError
-        If the moments are not such numbers, or the axis is the intermediate one.
-
-    Notes
-    -----
-    Source: theory.md section 7.
 
     Examples
     --------
@@ -192,44 +172,31 @@ def separatrix_solid_angle(moments: ArrayLike, axis: int) -> float:
     >>> print(f"{2.0 * sum(areas) / np.pi:.9f} pi")  # both sides of both axes are the sphere
     4.000000000 pi
     """
-    values = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if values.ndim != 1 or values.min() <= 0.0 or values.min() == values.max():
-        raise ShapeError(f"moments: three numbers above 0, not all equal, are needed, got {what_came(values)}")
-    (low, middle, high), _, _ = ascending_moments(values)
-    if not isinstance(axis, int | np.integer) or axis not in (0, 1, 2) or values[axis] not in (low, high):
-        raise ShapeError(
-            f"axis: one of 0, 1, 2 with the smallest or the largest of the moments {values} is needed, got "
-            f"{what_came(axis)}"
-        )
-    circled, other = (low, high) if values[axis] == low else (high, low)
+    values = moments_argument(moments)
+    if values.min() == values.max():
+        raise ShapeError(f"moments: three that are not all equal are needed, got {values}")
+    (low, middle, high), own_moment = ascending_moments(values)[0], values[axis_index(axis)]
+    if own_moment not in (low, high):
+        raise ShapeError(f"axis: that of the smallest or the largest of the moments {values} is needed, got {axis}")
+    circled, other = (low, high) if own_moment == low else (high, low)
     own, opposite = np.sqrt(abs(middle - circled) / circled), np.sqrt(abs(other - middle) / other)
     return 4.0 * float(np.arctan2(own, opposite))
 
 
 @dataclass(frozen=True, eq=False)
 class WeierstrassForm:
-    """The squares of a free rigid body's momentum by Weierstrass's function; see `weierstrass_form`.
-
-    Attributes
-    ----------
-    moments : (3,) principal, by body axis [kg m^2]
-    roots : (3,) e_1, e_2, e_3 by body axis, of sum zero; the least belongs to the middle moment [1/s^2]
-    invariants : g_2 [1/s^4] and g_3 [1/s^6] of y'^2 = 4 y^3 - g_2 y - g_3
-    half_periods : omega, and the size of the imaginary one, omega' = i times it [s]; Pi_i^2 has the period 2 omega
-    shift : t_0, real part of the constant in y = P(t + t_0 + omega') [s]
-
-    Examples
-    --------
-    >>> form = sp.rigid_body.weierstrass_form([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
-    >>> print(np.sqrt(form.squares(0.0)).round(9))
-    [0.6 0.9 0.5]
-    """
+    """Squares of a free rigid body's momentum by Weierstrass's function. Made by `weierstrass_form`."""
 
     moments: Array
+    """(3,) principal, by body axis [kg m^2]."""
     roots: Array
+    """(3,) e_1, e_2, e_3 by body axis, of sum zero; the least belongs to the middle moment [1/s^2]."""
     invariants: tuple[float, float]
+    """g_2 [1/s^4] and g_3 [1/s^6] of y'^2 = 4 y^3 - g_2 y - g_3."""
     half_periods: tuple[float, float]
+    """omega, and the size of the imaginary one, omega' = i times it [s]; Pi_i^2 has the period 2 omega."""
     shift: float
+    """t_0, real part of the constant in y = P(t + t_0 + omega') [s]."""
     _orbit: MomentumOrbit
 
     __repr__ = short_repr
@@ -251,21 +218,16 @@ def weierstrass_form(moments: ArrayLike, momentum: ArrayLike) -> WeierstrassForm
     """The polhode by Weierstrass's elliptic function P, for any order of the moments.
 
     With Pi_i' = a_i Pi_j Pi_k all three Pi_i^2 change in step: Pi_i^2 = (y - e_i)/(a_j a_k) with one y, and the product
-    of Euler's equations says y'^2 = 4 (y - e_1)(y - e_2)(y - e_3).
+    of Euler's equations is y'^2 = 4 (y - e_1)(y - e_2)(y - e_3).
+
+    Source: Bonnard, Cots and Shcherbakova 2013, section 3.5; Lawden 1989; theory.md H14.
+    Raises ShapeError if two moments are equal, or the momentum stands still or is on the separatrix, where P has no
+    period.
 
     Parameters
     ----------
     moments : (3,) three different principal moments by body axis [kg m^2]
     momentum : (3,) Pi at t = 0, body axes, along none of them and not on the separatrix [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, or the momentum stands still or is on the separatrix, where P has no period.
-
-    Notes
-    -----
-    Source: Bonnard, Cots and Shcherbakova 2013, section 3.5; Lawden 1989; theory.md H14.
 
     Examples
     --------
@@ -274,9 +236,9 @@ def weierstrass_form(moments: ArrayLike, momentum: ArrayLike) -> WeierstrassForm
     >>> print(f"{top.period / form.half_periods[0]:.9f}")  # Pi itself has twice the period of its squares
     4.000000000
     """
-    values, start = finite_array(moments, "moments", (3,), unit="kg m^2"), finite_array(momentum, "momentum", (3,))
-    if values.shape != (3,) or start.shape != (3,) or values.min() <= 0.0 or len(set(values.tolist())) < 3:
-        raise ShapeError("moments, momentum: three different numbers above 0, and one momentum (3,), are needed")
+    values, start = moments_argument(moments), vector_argument(momentum, "momentum", unit="kg m^2/s")
+    if len(set(values.tolist())) < 3:
+        raise ShapeError(f"moments: three different ones are needed, got {values}")
     ascending, order, parity = ascending_moments(values)
     # All three components change sign with an odd order: a proper turn, and the squares stay.
     orbit = momentum_orbit(ascending, parity * start[order])
@@ -329,6 +291,6 @@ def _stationary_orbit(moments: Array, start: Array, magnitude: float) -> Momentu
 
 
 def _separation(moments: list[float], x: Array) -> Fraction:
-    """L² − 2 E I2 without rounding: its sign says which axis is circled, and it vanishes on the separatrix."""
+    """L² − 2 E I2 without rounding: the sign decides which axis is circled; 0 on the separatrix."""
     i1, i2, i3 = map(Fraction, moments)
     return Fraction(float(x[2])) ** 2 * (i3 - i2) / i3 - Fraction(float(x[0])) ** 2 * (i2 - i1) / i1

@@ -16,43 +16,30 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object
+from ..arguments import check_object, vector_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..elliptic import complete_k, complete_pi, incomplete_f, incomplete_pi, jacobi
 from ..errors import ShapeError
+from ._arguments import unit_vectors
 from .lagrange_top import LagrangeTop
-
-_UNIT = 1e-6
-"""Farthest from 1 that the length of a vertical may be: six digits, as people write them, are enough."""
 
 
 @dataclass(frozen=True)
 class Nutation:
-    """The rise and fall of a Lagrange top's axis.
-
-    Attributes
-    ----------
-    lowest, highest : the range of cos(theta)
-    third_root : the root of the cubic above this range, >= 1
-    rate : argument of the elliptic functions per second [rad/s]
-    complement : m1 = 1 - k^2
-    period : 2K/rate; infinite where the axis only approaches the vertical [s]
-
-    Examples
-    --------
-    >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
-    >>> found = sp.rigid_body.nutation(top, [0.0, 0.3, 3.0], [0.0, 0.6, 0.8])
-    >>> print(f"{found.highest:.6f}")
-    0.800000
-    """
+    """Rise and fall of a Lagrange top's axis. Made by `nutation`."""
 
     lowest: float
     highest: float
+    """`lowest` and `highest`: the range of cos(theta)."""
     third_root: float
+    """The root of the cubic above this range, >= 1."""
     rate: float
+    """Argument of the elliptic functions per second [rad/s]."""
     complement: float
+    """m1 = 1 - k^2."""
     period: float
+    """2K/rate; infinite where the axis only approaches the vertical [s]."""
     _phase: float = field(repr=False)
     _turns: tuple[float, float] = field(repr=False)
     _rooms: tuple[float, float] = field(repr=False)
@@ -84,7 +71,7 @@ class Nutation:
 
     @property
     def precession_per_period(self) -> float:
-        """By which the axis goes round the vertical in a period, as `precession` counts [rad].
+        """Turn of the axis about the vertical in a period, as `precession` counts [rad].
 
         Infinite where there is no finite period, and the axis goes round.
         """
@@ -106,11 +93,6 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     momentum : (3,) body momentum at t = 0 [kg m^2/s]
     gamma : (3,) upward vertical in body axes at t = 0
 
-    Raises
-    ------
-    ShapeError
-        If Mgl is not above 0, or an argument is of a wrong shape or value.
-
     Examples
     --------
     >>> top = sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0)
@@ -121,14 +103,8 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     check_object(top, "LagrangeTop", "top")
     if top.mgl <= 0.0:
         raise ShapeError(f"mgl: the nutation needs Mgl > 0, got {top.mgl:.6g} J; turn e3 towards the centre of mass")
-    body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-    up = finite_array(gamma, "gamma", (3,))
-    if body.shape != (3,) or up.shape != (3,):
-        raise ShapeError(f"momentum (3,) and gamma (3,) are needed, got {body.shape}, {up.shape}")
-    length = float(np.linalg.norm(up))
-    if abs(length - 1.0) > _UNIT:
-        raise ShapeError(f"gamma: the vertical must have length 1, got {length:.6g}")
-    return _nutation(top, body, up / length)
+    body = vector_argument(momentum, "momentum", unit="kg m^2/s")
+    return _nutation(top, body, unit_vectors(vector_argument(gamma, "gamma"), "gamma"))
 
 
 def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
@@ -140,14 +116,8 @@ def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
     turn = float(momentum[0] * gamma[0] + momentum[1] * gamma[1]) / i1
     across = float(gamma[0] ** 2 + gamma[1] ** 2)
     climb = float(gamma[0] * momentum[1] - gamma[1] * momentum[0]) / i1
-    cubic = np.array(
-        [
-            beta,
-            2.0 * beta * height - speed - spin**2,
-            2.0 * spin * turn - beta * across - 2.0 * height * speed,
-            climb**2,
-        ]
-    )
+    second, first = 2.0 * beta * height - speed - spin**2, 2.0 * spin * turn - beta * across - 2.0 * height * speed
+    cubic = np.array([beta, second, first, climb**2])
     low, high, third = _three_real_roots(cubic)
     low, high = min(low, 0.0), min(max(high, 0.0), 1.0 - height)
     third = max(third, 1.0 - height)
@@ -156,12 +126,14 @@ def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
     if width == 0.0 or third == low:
         return _without_nutation(height, third, rate, turns)
     complement = (third - high) / (third - low)
-    below = _room_below(height + low, turns, beta * (1.0 + height + high), height + third)
+    # 1 + u_1: by the cubic at u = -1, where that keeps digits which the root does not have.
+    lowest, slope = height + low, beta * (1.0 + height + high)
+    below = 4.0 * turns[1] ** 2 / (slope * (1.0 + height + third)) if lowest < -0.5 else 1.0 + lowest
     amplitude = np.copysign(np.arctan2(np.sqrt(-low), np.sqrt(high)), climb)
     if complement == 0.0 and abs(amplitude) >= 0.5 * np.pi:
         return _without_nutation(height, third, rate, turns)
     return Nutation(
-        lowest=height + low,
+        lowest=lowest,
         highest=height + high,
         third_root=height + third,
         rate=rate,
@@ -169,7 +141,7 @@ def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
         period=2.0 * float(complete_k(complement)) / rate,
         _phase=float(incomplete_f(amplitude, complement)),
         _turns=turns,
-        _rooms=(1.0 - (height + low), below),
+        _rooms=(1.0 - lowest, below),
     )
 
 
@@ -181,11 +153,6 @@ def _turns(top: LagrangeTop, momentum: Array, gamma: Array) -> tuple[float, floa
     above, below = (near, 2.0 - near) if height >= 0.0 else (2.0 - near, near)
     minus, plus = level - float(momentum[2]) * above, level + float(momentum[2]) * below
     return minus / (2.0 * top.transverse), plus / (2.0 * top.transverse)
-
-
-def _room_below(lowest: float, turns: tuple[float, float], slope: float, third: float) -> float:
-    """1 + u_1: by the cubic at u = -1, where that keeps digits which the root does not have."""
-    return 4.0 * turns[1] ** 2 / (slope * (1.0 + third)) if lowest < -0.5 else 1.0 + lowest
 
 
 def _integrals(nutation: Nutation) -> list[tuple[float, float]]:

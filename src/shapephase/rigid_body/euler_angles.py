@@ -6,8 +6,7 @@ Bonnard et al. (their phi_1, phi_2, phi_3). They differ in the axis of the middl
 
 A chart is regular for 0 < theta < pi. At its poles, theta = 0 and pi, phi and psi turn about one line: an attitude
 still has angles there (see `EulerChart.angles`), and rates still give an angular velocity; but some velocities have no
-rates, and (phi, theta, psi) and their momenta are not coordinates. Functions that need coordinates raise
-`ChartPoleError` within 1e-8 of a pole, where half of the digits are gone.
+rates, and (phi, theta, psi) and their momenta are not coordinates.
 
 Sources: Marsden and Ratiu, sections 15.6 and 15.7 (whose (15.6.6) gives the inverse of the attitude); Bonnard, Cots and
 Shcherbakova 2013, section 3.3 (whose H_3 has the wrong sign); theory.md J1 to J10.
@@ -26,16 +25,18 @@ from ..arrays import Array, Mask, common_batch, finite_array
 from ..display import short_repr
 from ..errors import ChartPoleError, ShapeError
 from ..inertia_tensor import inverse_inertia
+from ._arguments import check_entries
 
-_NEAREST = 1e-8
-"""Sine of theta up to which angles are not coordinates: dividing by it costs half of the sixteen digits."""
-_AT_POLE = 1e-15
-"""Sine of half the angle to a pole, up to which an attitude is at it: the rounding of an attitude is as large."""
+_NEAREST = 1e-8  # sine of theta up to which angles are not coordinates: dividing by it costs half of the sixteen digits
+_AT_POLE = 1e-15  # sine of half the angle to a pole, up to which an attitude is at it: that of rounding
 
 
 @dataclass(frozen=True)
 class EulerChart:
     """Euler angles (phi, theta, psi) with R = R_z(phi) R_node(theta) R_z(psi); use `ZXZ` or `ZYZ`.
+
+    Rates and momenta of given vectors, and what is made of momenta, need coordinates and raise `ChartPoleError` within
+    1e-8 of a pole.
 
     Examples
     --------
@@ -53,13 +54,6 @@ class EulerChart:
     def attitude(self, angles: ArrayLike) -> Array:
         """The rotation from body to inertial axes: (..., 3) [rad] -> (..., 3, 3). Any real angles, poles included.
 
-        Raises
-        ------
-        ShapeError
-            If the last axis is not three finite numbers; so do all methods.
-
-        Notes
-        -----
         Source: Marsden and Ratiu (15.6.1-5), R = P^T; Bonnard et al., section 3.3.
         """
         phi, theta, psi = np.moveaxis(finite_array(angles, "angles", (3,), unit="rad"), -1, 0)
@@ -73,11 +67,6 @@ class EulerChart:
 
         At a pole, to rounding, theta is exactly 0 or pi (as rounded), psi is 0 and phi takes the whole turn: there the
         attitude determines phi + psi, or at pi phi - psi, alone.
-
-        Raises
-        ------
-        ShapeError
-            If a matrix is further than 1e-6 from a proper rotation.
         """
         half_sum, half_difference, theta, pole = self._half_angles(attitude)
         half_sum = np.where(pole & (theta > 0.0), half_difference, half_sum)
@@ -92,10 +81,7 @@ class EulerChart:
         attitude. Samples at a pole keep the other combination from the sample before. Successive attitudes must be
         less than half a turn apart.
 
-        Raises
-        ------
-        ShapeError
-            If there is no axis of samples, or a matrix is not a rotation.
+        Raises ShapeError if there is no axis of samples, or a matrix is not a rotation.
         """
         matrices = finite_array(attitudes, "attitudes", (None, 3, 3))
         if matrices.shape[-3] == 0:
@@ -114,7 +100,7 @@ class EulerChart:
         return np.stack([half_sum + half_difference, theta, half_sum - half_difference], axis=-1)
 
     def is_regular(self, angles: ArrayLike) -> Mask:
-        """Whether the angles are coordinates there, that is further than 1e-8 from a pole: (..., 3) -> (...).
+        """True where the angles are coordinates, further than 1e-8 from a pole: (..., 3) -> (...).
 
         Source: Marsden and Ratiu, end of section 15.6; theory.md J8.
         """
@@ -153,13 +139,7 @@ class EulerChart:
         return so3.apply(self.spatial_rate_matrix(angles), rates)
 
     def rates(self, angles: ArrayLike, angular_velocity: ArrayLike) -> Array:
-        """(phi', theta', psi') of an angular velocity in body axes: (..., 3), (..., 3) -> (..., 3) [rad/s].
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-        """
+        """(phi', theta', psi') of an angular velocity in body axes: (..., 3), (..., 3) -> (..., 3) [rad/s]."""
         angles, velocity = _pair(angles, angular_velocity, "angular_velocity", "rad/s")
         self._refuse_poles(angles)
         node, across, sine, cosine = self._body_frame(angles)
@@ -167,13 +147,7 @@ class EulerChart:
         return np.stack([phi_rate, _dot(node, velocity), velocity[..., 2] - cosine[..., 0] * phi_rate], axis=-1)
 
     def rates_from_spatial(self, angles: ArrayLike, angular_velocity: ArrayLike) -> Array:
-        """(phi', theta', psi') of an angular velocity in inertial axes: (..., 3), (..., 3) -> (..., 3) [rad/s].
-
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-        """
+        """(phi', theta', psi') of an angular velocity in inertial axes: (..., 3), (..., 3) -> (..., 3) [rad/s]."""
         angles, velocity = _pair(angles, angular_velocity, "angular_velocity", "rad/s")
         self._refuse_poles(angles)
         node = self._node(angles[..., 0])
@@ -187,13 +161,6 @@ class EulerChart:
         p_phi is the component of the momentum along the inertial third axis, p_psi that along the body's, p_theta that
         along the line of nodes.
 
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-
-        Notes
-        -----
         Source: Marsden and Ratiu (15.7.3).
         """
         angles, momentum = _pair(angles, body_momentum, "body_momentum", "kg m^2/s")
@@ -203,13 +170,6 @@ class EulerChart:
     def body_momentum(self, angles: ArrayLike, momenta: ArrayLike) -> Array:
         """Pi of (p_phi, p_theta, p_psi), the inverse of `conjugate_momenta`: (..., 3), (..., 3) -> (..., 3) [kg m^2/s].
 
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-
-        Notes
-        -----
         Source: Marsden and Ratiu (15.7.4); for ZYZ the brackets in Bonnard et al., proposition 6.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
@@ -224,13 +184,6 @@ class EulerChart:
         With D = [[0, 1], [-1, 0]] and this matrix M, M D M^T = hat(Pi): Pi as a function of angles and momenta takes
         the canonical bracket to the minus Lie-Poisson bracket.
 
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-
-        Notes
-        -----
         Source: Marsden and Ratiu, exercise 15.7-1.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
@@ -239,26 +192,12 @@ class EulerChart:
         momentum = self.body_momentum(angles, momenta)
         third = np.broadcast_to([0.0, 0.0, 1.0], node.shape)
         slope = (momenta[..., 2:3] - momenta[..., 0:1] * cosine) / sine**2
-        columns = [
-            np.zeros(node.shape),
-            slope * across,
-            np.cross(momentum, third),
-            across / sine,
-            node,
-            third - cosine / sine * across,
-        ]
-        return np.stack(columns, axis=-1)
+        by_angles = [np.zeros(node.shape), slope * across, np.cross(momentum, third)]
+        return np.stack([*by_angles, across / sine, node, third - cosine / sine * across], axis=-1)
 
     def kinetic_energy(self, inertia: ArrayLike, angles: ArrayLike, rates: ArrayLike) -> Array:
         """Omega.I Omega / 2 of angles and their rates: (..., 3, 3), (..., 3), (..., 3) -> (...) [J]. Poles included.
 
-        Raises
-        ------
-        UnphysicalInertiaError, SingularInertiaError
-            If an inertia is not symmetric, or not positive definite.
-
-        Notes
-        -----
         Source: Marsden and Ratiu (15.3.3) with (15.7.2).
         """
         angles, rates = _pair(angles, rates, "rates", "rad/s")
@@ -269,15 +208,6 @@ class EulerChart:
     def hamiltonian(self, inertia: ArrayLike, angles: ArrayLike, momenta: ArrayLike) -> Array:
         """The kinetic energy of angles and conjugate momenta: (..., 3, 3), (..., 3), (..., 3) -> (...) [J].
 
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-        UnphysicalInertiaError, SingularInertiaError
-            If an inertia is not symmetric, or not positive definite.
-
-        Notes
-        -----
         Source: Marsden and Ratiu (15.7.5), (15.7.6); Bonnard et al., proposition 6.
         """
         momentum = self.body_momentum(angles, momenta)
@@ -289,15 +219,6 @@ class EulerChart:
 
         [rad/s], [kg m^2/s^2]; the inertia [kg m^2] in body axes.
 
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole.
-        UnphysicalInertiaError, SingularInertiaError
-            If an inertia is not symmetric, or not positive definite.
-
-        Notes
-        -----
         Source: Marsden and Ratiu, section 15.7, Hamilton's canonical equations.
         """
         angles, momenta = _pair(angles, momenta, "momenta", "kg m^2/s")
@@ -311,14 +232,8 @@ class EulerChart:
 
         The two angles that Pi alone determines; phi advances by `precession_rate`. At a pole psi is 0.
 
-        Raises
-        ------
-        ShapeError
-            If a momentum is zero.
-
-        Notes
-        -----
         Source: Bonnard et al., before (4), with H_3 = +|H| cos phi_2; theory.md B-E3.
+        Raises ShapeError if a momentum is zero.
         """
         momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
         if np.any(np.all(momentum == 0.0, axis=-1)):
@@ -349,36 +264,25 @@ class EulerChart:
         return node, _across(node), np.sin(angles[..., 1:2]), np.cos(angles[..., 1:2])
 
     def _refuse_poles(self, angles: Array) -> None:
-        bad = np.abs(np.sin(angles[..., 1])) <= _NEAREST
-        if bad.any():
-            where = tuple(int(i) for i in np.argwhere(bad)[0])
-            raise ChartPoleError(
-                f"angles: entry {list(where)} has theta = {angles[where][1]:.17g}, a pole of the {self.name.upper()} "
-                f"chart to {_NEAREST:g}, where the angles are not coordinates; turn the inertial or the body axes by a "
-                "constant rotation, or use attitudes and body momenta"
-            )
+        theta = angles[..., 1]
+        requirement = (
+            f"a pole of the {self.name.upper()} chart to {_NEAREST:g}, where the angles are not coordinates; turn the "
+            "inertial or the body axes by a constant rotation, or use attitudes and body momenta"
+        )
+        check_entries(np.abs(np.sin(theta)) <= _NEAREST, theta, "theta", requirement, ChartPoleError)
 
 
-ZXZ = EulerChart("zxz", (1.0, 0.0))
-"""R = R_z(phi) R_x(theta) R_z(psi): Marsden and Ratiu, section 15.6."""
-
-ZYZ = EulerChart("zyz", (0.0, 1.0))
-"""R = R_z(phi) R_y(theta) R_z(psi): Bonnard et al., section 3.3."""
+ZXZ = EulerChart("zxz", (1.0, 0.0))  # R = R_z(phi) R_x(theta) R_z(psi): Marsden and Ratiu, section 15.6
+ZYZ = EulerChart("zyz", (0.0, 1.0))  # R = R_z(phi) R_y(theta) R_z(psi): Bonnard et al., section 3.3
 
 
 def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Array:
     """phi', the rate at which the body's third axis turns about the momentum: (..., 3), (..., 3) -> (...) [rad/s].
 
-    The same in both charts, for the inertial third axis along the momentum.
+    Both charts have the same, for the inertial third axis along the momentum.
 
-    Raises
-    ------
-    ChartPoleError
-        If the body's third axis is within 1e-8 of the momentum's line.
-
-    Notes
-    -----
     Source: Bonnard et al. (4), its last form, which needs no distinction of cases.
+    Raises ChartPoleError if the body's third axis is within 1e-8 of the momentum's line.
 
     Examples
     --------
@@ -388,13 +292,10 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
     momentum, velocity = _pair(body_momentum, angular_velocity, "angular_velocity", "rad/s", first="body_momentum")
     magnitude = np.linalg.norm(momentum, axis=-1)
     across = np.hypot(momentum[..., 0], momentum[..., 1])
-    bad = across <= _NEAREST * magnitude
-    if bad.any():
-        where = tuple(int(i) for i in np.argwhere(bad)[0])
-        raise ChartPoleError(
-            f"body_momentum: entry {list(where)} is {momentum[where]}, along the body's third axis, whose azimuth is "
-            "then undefined; turn the body axes, so that another axis is the third"
-        )
+    requirement = (
+        "along it, the azimuth of the body's third axis is undefined; turn the body axes to have another third"
+    )
+    check_entries(across <= _NEAREST * magnitude, momentum, "body_momentum", requirement, ChartPoleError)
     unit = momentum[..., :2] / across[..., None]
     return magnitude * _dot(unit, velocity[..., :2]) / across
 
@@ -402,14 +303,8 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
 def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
     """{F, G} = F_q.G_p - F_p.G_q from gradients by n coordinates and their n momenta: (..., 2n), (..., 2n) -> (...).
 
-    Raises
-    ------
-    ShapeError
-        If the gradients have different or odd lengths.
-
-    Notes
-    -----
     Source: Marsden and Ratiu (15.7.7).
+    Raises ShapeError if the gradients have different or odd lengths.
 
     Examples
     --------
@@ -431,10 +326,10 @@ def canonical_bracket(gradient_f: ArrayLike, gradient_g: ArrayLike) -> Array:
 
 def _pair(angles: ArrayLike, other: ArrayLike, name: str, unit: str, first: str = "angles") -> tuple[Array, Array]:
     """Two checked arguments (..., 3), broadcast together."""
-    one = finite_array(angles, first, (3,), unit="rad" if first == "angles" else "kg m^2/s")
-    two = finite_array(other, name, (3,), unit=unit)
-    shape = common_batch(**{first: one.shape[:-1], name: two.shape[:-1]})
-    return np.broadcast_to(one, (*shape, 3)), np.broadcast_to(two, (*shape, 3))
+    left = finite_array(angles, first, (3,), unit="rad" if first == "angles" else "kg m^2/s")
+    right = finite_array(other, name, (3,), unit=unit)
+    shape = common_batch(**{first: left.shape[:-1], name: right.shape[:-1]})
+    return np.broadcast_to(left, (*shape, 3)), np.broadcast_to(right, (*shape, 3))
 
 
 def _inertia(inertia: ArrayLike, vectors: Array) -> Array:

@@ -1,6 +1,6 @@
 """The free rigid body, the Euler top, in closed form: momentum, attitude, period and phases at any time.
 
-The momentum goes round an axis ê of the body as `momentum_orbit` says. The attitude is
+The momentum goes round an axis ê of the body, see `momentum_orbit`. The attitude is
 
     R(t) = R(0) Q(0)^T exp(psi ê) Q(t),
 
@@ -20,28 +20,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic, so3
-from ..arguments import inertia_argument, made_by
-from ..arrays import Array, finite_array
-from ..display import card_html
-from ..errors import ShapeError
-from ..inertia_tensor import ascending_moments, principal_axes
-from ._card import top_card
+from ..arguments import made_by
+from ..arrays import Array
+from ..card_pictures import MOST_POINTS, curves_picture
+from ..display import Card, card_html, numbers
+from ..inertia_tensor import body_principal_axes
+from ._arguments import one_array, one_attitude, one_tensor, times_within_turns
 from ._momentum_orbit import MomentumOrbit, momentum_orbit
 
-_TURNS = 1e12
-"""Turns of the body [1] after which times are refused: twelve of the sixteen digits of the phase are gone by then."""
-_EQUAL = 4.0 * float(np.finfo(float).eps)
-"""Moments of a tensor that is not diagonal closer than this, relative to the largest, count as equal: `eigh` errs by
-as much."""
-_BLOCK = 16_384
-"""Times evaluated together: the arrays of so many (half a megabyte each) stay in a processor's cache."""
+_BLOCK = 16_384  # times evaluated together: their arrays (half a megabyte each) stay in a processor's cache
 
 
 @made_by("EulerTop(inertia, momentum)")
 class EulerTop:
     """A free rigid body with a given inertia, angular momentum and initial attitude.
 
-    Every inertia and momentum is allowed, also zero momentum; times may be negative.
+    Every inertia and momentum is allowed, also zero momentum; times may be negative. Raises ShapeError, and
+    UnphysicalInertiaError or SingularInertiaError if the inertia is not symmetric or not positive definite.
+
+    Equations :eq:`jacobi` and :eq:`rigid-phase` of the documentation.
 
     Parameters
     ----------
@@ -57,17 +54,6 @@ class EulerTop:
     axes : (3, 3) whose columns are the principal axes in body axes, determinant +1
     orbit : the curve of Pi in those axes
 
-    Raises
-    ------
-    ShapeError
-        For arrays of the wrong shape or entries that are not finite numbers.
-    UnphysicalInertiaError, SingularInertiaError
-        If the inertia is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Equations :eq:`jacobi` and :eq:`rigid-phase` of the documentation.
-
     Examples
     --------
     >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [0.6, 0.3, 1.5])
@@ -75,18 +61,9 @@ class EulerTop:
     1.207500 J, period 7.336538 s, Montgomery phase 11.386379 rad
     """
 
-    inertia: Array
-    momentum: Array
-    initial_attitude: Array
-    moments: Array
-    axes: Array
-    orbit: MomentumOrbit
-
     def __init__(self, inertia: ArrayLike, momentum: ArrayLike, attitude: ArrayLike | None = None) -> None:
-        tensor = inertia_argument(_array(inertia, "inertia", (3, 3), "kg m^2")[None])[0]
-        spatial = _array(momentum, "momentum", (3,), "kg m^2/s")
-        start = _attitude(attitude)
-        self._make(tensor, spatial, start, start.T @ spatial)
+        spatial, start = one_array(momentum, "momentum", (3,), "kg m^2/s"), one_attitude(attitude)
+        self._make(one_tensor(inertia), spatial, start, start.T @ spatial)
 
     @classmethod
     def principal(cls, moments: ArrayLike, momentum: ArrayLike, attitude: ArrayLike | None = None) -> EulerTop:
@@ -98,16 +75,15 @@ class EulerTop:
         momentum : (3,) at t = 0, body axes [kg m^2/s]
         attitude : (3, 3) at t = 0; None: the identity
         """
-        tensor = inertia_argument(np.diag(_array(moments, "moments", (3,), "kg m^2"))[None])[0]
-        body = _array(momentum, "momentum", (3,), "kg m^2/s")
-        start = _attitude(attitude)
+        tensor = one_tensor(np.diag(one_array(moments, "moments", (3,), "kg m^2")))
+        body, start = one_array(momentum, "momentum", (3,), "kg m^2/s"), one_attitude(attitude)
         top = cls.__new__(cls)
         top._make(tensor, start @ body, start, body)
         return top
 
     def _make(self, inertia: Array, momentum: Array, attitude: Array, body_momentum: Array) -> None:
         self.inertia, self.momentum, self.initial_attitude = inertia, momentum, attitude
-        self.moments, self.axes = _principal(inertia)
+        self.moments, self.axes = body_principal_axes(inertia)
         self.orbit = orbit = momentum_orbit(self.moments, self.axes.T @ body_momentum)
         # The factors left and right of exp(psi ê) Q(t) are constant: together they are one linear map of quaternions.
         ends = so3.quat_from_matrix(self.axes)
@@ -119,7 +95,21 @@ class EulerTop:
         self._around = so3.quat_product(np.broadcast_to(left, (4, 4)), columns)
 
     _repr_html_ = card_html
-    _card = top_card
+
+    def _card(self) -> Card:
+        """Moments, momentum, energy, regime and period; with the body momentum in one period."""
+        rows = [
+            ("moments", numbers(self.moments, "kg m^2")),
+            ("momentum", numbers(self.momentum, "kg m^2/s")),
+            ("energy", numbers(self.energy, "J")),
+            ("regime", self.regime),
+            ("period", numbers(self.period, "s")),
+            ("condition", f"{self.condition:.3g}, the factor by which a half turn magnifies rounding of the data"),
+        ]
+        if not np.isfinite(self.period):
+            return Card("EulerTop", rows)
+        momenta = self.body_momentum(np.linspace(0.0, self.period, MOST_POINTS))
+        return Card("EulerTop", rows, curves_picture(momenta, "body momentum in one period"))
 
     def __repr__(self) -> str:  # noqa: D105
         moments = ", ".join(f"{moment:.6g}" for moment in self.moments)
@@ -154,7 +144,7 @@ class EulerTop:
 
     @property
     def regime(self) -> str:
-        """What Pi does in the body.
+        """Kind of motion of Pi in the body.
 
         "rest" without momentum; "spherical" with three equal moments; "steady" along a principal axis; "axisymmetric":
         at a constant rate round the symmetry axis; "circling" the axis of the largest or of the smallest moment;
@@ -188,7 +178,7 @@ class EulerTop:
 
     @property
     def condition(self) -> float:
-        """How much a change of inertia or momentum, relative to its largest entry, is magnified in each half turn.
+        """Factor by which each half turn magnifies a change of inertia or momentum, relative to its largest entry.
 
         I3/I1 or more; about 1/m1 near the separatrix, infinite on it and along the intermediate axis. Rounding of the
         input is magnified by it, such as that of a tensor given in other axes than the principal ones.
@@ -254,7 +244,7 @@ class EulerTop:
 
     @property
     def long_axis_precession_per_period(self) -> float:
-        """As `precession_per_period`, for the axis of the smallest moment, whichever axis Pi circles [rad]."""
+        """`precession_per_period` of the axis of the smallest moment, whichever axis Pi circles [rad]."""
         return self.precession_per_period if self.orbit.circled == 0 else self.montgomery_phase
 
     @property
@@ -277,14 +267,8 @@ class EulerTop:
 
     def _argument(self, t: ArrayLike) -> tuple[Array, Array]:
         """Times, checked, and the argument of the elliptic functions there."""
-        times = finite_array(t, "t", unit="s")
-        longest = _TURNS * min(self.period, 2.0 * np.pi * self.moments[0] / (self.magnitude or 1.0))
-        far = float(np.abs(times).max(initial=0.0))
-        if self.magnitude and far > longest:
-            raise ShapeError(
-                f"t: {far:.6g} s is more than 1e12 turns of this body away, where rounding leaves no digits of the "
-                f"attitude; the largest time accepted is {longest:.6g} s"
-            )
+        turn = min(self.period, 2.0 * np.pi * self.moments[0] / self.magnitude) if self.magnitude else np.inf
+        times = times_within_turns(t, turn)
         return times, self.rate * times + self.orbit.phase
 
     def _quaternion(self, t: ArrayLike) -> Array:
@@ -310,32 +294,3 @@ def _precessing_frame(orbit: MomentumOrbit, times: Array, u: Array) -> Array:
     turn[..., :3] += (sine * scalar)[..., None] * orbit.direction
     turn[..., 3] = cosine * scalar
     return turn
-
-
-def _array(value: ArrayLike, name: str, shape: tuple[int, ...], unit: str) -> Array:
-    array = finite_array(value, name, shape, unit=unit).copy()
-    if array.shape != shape:
-        raise ShapeError(f"{name}: one array of shape {shape} is needed, got {array.shape}; make a top for each")
-    return array
-
-
-def _attitude(value: ArrayLike | None) -> Array:
-    start = np.eye(3) if value is None else so3.rotation_argument(value, "attitude")
-    return _array(start, "attitude", (3, 3), "")
-
-
-def _principal(tensor: Array) -> tuple[Array, Array]:
-    """Ascending moments and axes: of a diagonal tensor exactly, else with moments equal that differ by rounding."""
-    diagonal = np.diagonal(tensor)
-    if np.array_equal(tensor, np.diag(diagonal)):
-        moments, order, parity = ascending_moments(diagonal)
-        axes = np.eye(3)[:, order]
-        axes[:, 2] *= parity
-        return moments, axes
-    moments, axes = principal_axes(tensor)
-    close = np.diff(moments) < _EQUAL * moments[2]
-    if close[0]:
-        moments[0] = moments[1]
-    if close[1]:
-        moments[2] = moments[1]
-    return moments, axes

@@ -10,64 +10,41 @@ Source: Marsden and Ratiu, section 15.10; theory.md M1, M2, M10.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 
 from .. import so3
-from ..arguments import check_pair, inertia_argument
+from ..arguments import check_pair, inertia_argument, number_argument
 from ..arrays import Array, common_batch, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..letters import what_came
+from ._arguments import above_zero, unit_vectors
 
-_FLOOR = 3e-14
-"""Relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14."""
-_RATIO = 32.0
-"""Ratio of the local tolerances of the two runs of a motion, far enough apart that their difference shows the error."""
-_SHARE = 0.1
-"""Share of the runs' difference given as the error of the finer one: measured it is about 1/32, so this is cautious."""
-_FIRST = 0.01
-"""Local tolerance of the first try, relative to that of the whole motion: errors of steps add up."""
-_AIM = 0.3
-"""Error aimed at when a try is repeated, relative to the tolerance, so that one repetition mostly suffices."""
-_DROP = 1e-3
-"""Most that the local tolerance is lowered from one try to the next, as estimates of coarse runs are rough."""
-_STEPS = 200_000
-"""Most steps of one run, some minutes of computing."""
-_UNIT = 1e-6
-"""Farthest from 1 that the length of a unit vector may be: six digits, as people write them, are enough."""
-_UP = np.array([0.0, 0.0, 1.0])
-"""The upward vertical e_z, inertial axes."""
+_FLOOR = 3e-14  # relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14
+_RATIO = 32.0  # of the local tolerances of the two runs of a motion, whose difference shows the error
+_STEPS = 200_000  # most steps of one run, some minutes of computing
 
-Pair = tuple[Array, Array]
-"""A point of se(3)*, or a gradient there: its Pi part and its Gamma part, each (..., 3)."""
+Pair = tuple[Array, Array]  # a point of se(3)*, or a gradient there: its Pi part and its Gamma part, each (..., 3)
 
 
 @dataclass(frozen=True, eq=False)
 class HeavyTop:
     """A heavy top, or a batch of them.
 
+    Equation :eq:`heavy-top` of the documentation.
+    Source: Marsden and Ratiu (15.10.1-3).
+    Raises ShapeError if shapes or entries are wrong, or chi is no unit vector (to 1e-6).
+
     Parameters
     ----------
     inertia : (..., 3, 3) symmetric positive definite tensor about the fixed point, body axes [kg m^2]
     mgl : (...) mass times gravity times the distance of the centre of mass from the fixed point [J]
     chi : (..., 3) unit vector from the fixed point to the centre of mass, body axes
-
-    Raises
-    ------
-    ShapeError
-        If shapes or entries are wrong, or chi is no unit vector (to 1e-6).
-    UnphysicalInertiaError, SingularInertiaError
-        If a tensor is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Equation :eq:`heavy-top` of the documentation.
-    Source: Marsden and Ratiu (15.10.1-3).
 
     Examples
     --------
@@ -86,18 +63,10 @@ class HeavyTop:
     def __init__(self, inertia: ArrayLike, mgl: ArrayLike, chi: ArrayLike = (0.0, 0.0, 1.0)) -> None:
         tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
         tensor = inertia_argument(tensor.reshape(-1, 3, 3)).reshape(tensor.shape)
-        direction = finite_array(chi, "chi", (3,))
-        length = np.linalg.norm(direction, axis=-1)
-        if np.any(np.abs(length - 1.0) > _UNIT):
-            raise ShapeError(f"chi: must have length 1 (the distance belongs to mgl), got {np.ravel(length)[0]:.6g}")
-        strength = finite_array(mgl, "mgl", unit="J")
+        direction, strength = unit_vectors(chi, "chi"), finite_array(mgl, "mgl", unit="J")
         common_batch(inertia=tensor.shape[:-2], mgl=strength.shape, chi=direction.shape[:-1])
-        for name, value in (
-            ("inertia", tensor),
-            ("mgl", strength),
-            ("chi", so3.normalised(direction)),
-            ("inverse", inverse_inertia(tensor)),
-        ):
+        values = {"inertia": tensor, "mgl": strength, "chi": direction, "inverse": inverse_inertia(tensor)}
+        for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def angular_velocity(self, momentum: ArrayLike) -> Array:
@@ -169,7 +138,8 @@ class HeavyTop:
         The attitude is integrated as a quaternion, together with the two horizontal components of the spatial momentum
         R Pi; its vertical component, Pi.Gamma, is constant and enters as given. Gamma = R^T e_z and Pi = R^T (R Pi) are
         formed from these, so Pi.Gamma and |Gamma| cannot drift. The method is Dormand and Prince's of order 8(5,3); a
-        second run with a looser tolerance gives the error estimate.
+        second run with a looser tolerance gives the error estimate. Raises AccuracyNotReached if the tolerance cannot
+        be met: unstable or chaotic motions magnify rounding exponentially.
 
         Parameters
         ----------
@@ -179,105 +149,60 @@ class HeavyTop:
         attitude : (..., 3, 3) body to inertial axes at the start, instead of gamma; with neither, the identity
         duration : of the motion [s]
         tolerance : of the attitude over the whole motion, in [1e-12, 1e-2] [rad]
-
-        Raises
-        ------
-        ShapeError
-            If an argument is of a wrong shape or value, or both `gamma` and `attitude` are given.
-        AccuracyNotReached
-            If the tolerance cannot be met: unstable or chaotic motions magnify rounding exponentially.
         """
-        start, body, time, requested = self._arguments(momentum, gamma, attitude, duration, tolerance)
+        body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+        if gamma is not None and attitude is not None:
+            raise ShapeError("gamma, attitude: give one of them; each determines where the vertical is")
+        if gamma is not None:
+            vertical = unit_vectors(gamma, "gamma")
+            start = so3.between(vertical, np.broadcast_to(np.eye(3)[2], vertical.shape))
+        else:
+            start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
+        time, requested = above_zero(duration, "duration", "s"), number_argument(tolerance, "tolerance", "rad")
+        if not 1e-12 <= requested <= 1e-2:
+            raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {what_came(tolerance)}")
+        own = np.broadcast_shapes(self.inertia.shape[:-2], self.mgl.shape, self.chi.shape[:-1])
+        shape = common_batch(top=own, momentum=body.shape[:-1], attitude=start.shape[:-2])
+        start, body = np.broadcast_to(start, (*shape, 3, 3)), np.broadcast_to(body, (*shape, 3))
         least = _RATIO * _FLOOR
-        local = max(_FIRST * requested, least)
+        local = max(0.01 * requested, least)  # errors of steps add up
         while True:
             coarse = _integrated(self, start, body, time, local)
             fine = _integrated(self, start, body, time, local / _RATIO)
-            estimate = _SHARE * _difference(coarse, fine)
+            # Measured, the error of the finer run is about 1/32 of the difference.
+            estimate = 0.1 * _difference(coarse, fine)
             worst = float(np.max(estimate, initial=0.0))
             if worst <= requested:
-                return HeavyTopMotion(
-                    top=self,
-                    duration=time,
-                    vertical_momentum=fine.vertical,
-                    error_estimate=estimate,
-                    energy_drift=fine.energy_drift,
-                    _run=fine,
-                )
+                return replace(fine, error_estimate=estimate)
             if local <= least:
                 raise AccuracyNotReached(
                     f"heavy top: the attitude is known to {worst:.2g} rad over {time:.6g} s, tolerance "
                     f"{requested:.2g}; shorten the motion or loosen the tolerance (unstable motions magnify rounding)"
                 )
-            local = max(local * max(_AIM * requested / worst, _DROP), least)
-
-    def _arguments(
-        self,
-        momentum: ArrayLike,
-        gamma: ArrayLike | None,
-        attitude: ArrayLike | None,
-        duration: float,
-        tolerance: float,
-    ) -> tuple[Array, Array, float, float]:
-        body = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-        if gamma is not None and attitude is not None:
-            raise ShapeError("gamma, attitude: give one of them; each determines where the vertical is")
-        if gamma is not None:
-            vertical = finite_array(gamma, "gamma", (3,))
-            length = np.linalg.norm(vertical, axis=-1)
-            if np.any(np.abs(length - 1.0) > _UNIT):
-                raise ShapeError(f"gamma: the vertical must have length 1, got {np.ravel(length)[0]:.6g}")
-            start = so3.between(so3.normalised(vertical), np.broadcast_to(_UP, vertical.shape))
-        else:
-            start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
-        time = finite_array(duration, "duration", unit="s")
-        requested = finite_array(tolerance, "tolerance", unit="rad")
-        if time.shape != () or time <= 0.0:
-            raise ShapeError(f"duration: one number above 0 s is needed, got {what_came(duration)}")
-        if requested.shape != () or not 1e-12 <= requested <= 1e-2:
-            raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {what_came(tolerance)}")
-        shape = common_batch(
-            inertia=self.inertia.shape[:-2],
-            mgl=self.mgl.shape,
-            chi=self.chi.shape[:-1],
-            momentum=body.shape[:-1],
-            attitude=start.shape[:-2],
-        )
-        return (
-            np.broadcast_to(start, (*shape, 3, 3)),
-            np.broadcast_to(body, (*shape, 3)),
-            float(time),
-            float(requested),
-        )
+            # Mostly one repetition suffices; estimates of coarse runs are too rough for larger changes.
+            local = max(local * max(0.3 * requested / worst, 1e-3), least)
 
 
 @dataclass(frozen=True, eq=False)
 class HeavyTopMotion:
-    """A motion of a heavy top on [0, duration]. Times (...) give results of shape batch + time + item.
+    """Motion of a heavy top on [0, duration].
 
-    Attributes
-    ----------
-    top : the `HeavyTop`
-    duration : [s]
-    vertical_momentum : (...) Pi.Gamma, constant [kg m^2/s]
-    error_estimate : (...) of the attitude over the whole motion, a tenth of the largest difference from a run with 32
-        times the local tolerance [rad]
-    energy_drift : (...) largest |H(t) - H(0)| at the ends of the steps [J]
-
-    Examples
-    --------
-    >>> top = sp.rigid_body.HeavyTop(np.diag([1.0, 1.0, 0.5]), 2.0)
-    >>> motion = top.motion([0.0, 0.0, 3.0], duration=1.0)
-    >>> print(f"{float(motion.energy_drift) < 1e-9} {float(motion.vertical_momentum):.6f}")
-    True 3.000000
+    Times (...) give results of shape batch + time + item. Made by `HeavyTop.motion`.
     """
 
     top: HeavyTop
+    """The `HeavyTop`."""
     duration: float
+    """[s]."""
     vertical_momentum: Array
+    """(...) Pi.Gamma, constant [kg m^2/s]."""
     error_estimate: Array
+    """(...) of the attitude over the whole motion, a tenth of the largest difference from a run with 32 times the local
+    tolerance [rad]."""
     energy_drift: Array
-    _run: _Run = field(repr=False)
+    """(...) largest |H(t) - H(0)| at the ends of the steps [J]."""
+    _scale: Array = field(repr=False)
+    _solution: OdeSolution = field(repr=False)
 
     __repr__ = short_repr
 
@@ -296,36 +221,19 @@ class HeavyTopMotion:
 
     def angular_velocity(self, t: ArrayLike) -> Array:
         """Omega(t), body axes: (...) -> (..., 3) [rad/s]."""
-        momentum = self.body_momentum(t)
-        inverse = self.top.inverse
-        return so3.apply(inverse[(..., *(None,) * np.ndim(t), slice(None), slice(None))], momentum)
+        inverse = self.top.inverse[(..., *(None,) * np.ndim(t), slice(None), slice(None))]
+        return so3.apply(inverse, self.body_momentum(t))
 
     def _state(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Quaternions xyzw and spatial momentum: times (...) -> batch + time + (4,), batch + time + (3,)."""
         times = finite_array(t, "t", unit="s")
         if np.any((times < 0.0) | (times > self.duration)):
             raise ShapeError(f"t: from {times.min():.6g} to {times.max():.6g} s; the motion is on [0, {self.duration}]")
-        return self._run.state(times)
-
-
-@dataclass(frozen=True, eq=False)
-class _Run:
-    """One integration of a motion: what belongs to its states, and the interpolant of its steps."""
-
-    vertical: Array
-    """(...) vertical momentum, constant [kg m^2/s]."""
-    scale: Array
-    """(...) unit of the horizontal momentum in the state [kg m^2/s]."""
-    energy_drift: Array
-    """(...) largest |H(t) - H(0)| at the ends of the steps [J]."""
-    solution: OdeSolution
-
-    def state(self, times: Array) -> tuple[Array, Array]:
-        """Quaternions xyzw and spatial momentum: times (...) -> batch + time + (4,), batch + time + (3,)."""
-        batch = self.scale.shape
-        flat = self.solution(times.ravel()) if times.size else np.empty((6 * self.scale.size, 0))
+        batch = self._scale.shape
+        flat = self._solution(times.ravel()) if times.size else np.empty((6 * self._scale.size, 0))
         rows = np.moveaxis(flat.reshape(*batch, 6, times.size), -2, -1).reshape(*batch, *times.shape, 6)
         lift = (..., *(None,) * times.ndim)
-        return _unpacked(rows, self.scale[lift], self.vertical[lift])
+        return _unpacked(rows, self._scale[lift], self.vertical_momentum[lift])
 
 
 def semidirect_bracket(
@@ -335,14 +243,12 @@ def semidirect_bracket(
 
     {F, G} = -Pi.(F_Pi x G_Pi) - Gamma.(F_Pi x G_Gamma + F_Gamma x G_Pi); F' = {F, H} along a heavy top's motion.
 
+    Source: Marsden and Ratiu, introduction (heavy top) and section 15.10; theory.md M2.
+
     Parameters
     ----------
     df, dg : gradients (F_Pi, F_Gamma), (G_Pi, G_Gamma), each of two (..., 3)
     momentum, gamma : (..., 3) the point
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, introduction (heavy top) and section 15.10; theory.md M2.
 
     Examples
     --------
@@ -353,7 +259,7 @@ def semidirect_bracket(
     """
     for pair, name in ((df, "df"), (dg, "dg")):
         check_pair(pair, name, "the gradients by momentum and by gamma")
-    (fp, fg), (gp, gg) = (tuple(finite_array(part, "gradient", (3,)) for part in pair) for pair in (df, dg))
+    (fp, fg), (gp, gg) = (tuple(finite_array(row, "gradient", (3,)) for row in pair) for pair in (df, dg))
     pi, up = _point(momentum, gamma)
     turning = np.sum(pi * np.cross(fp, gp), axis=-1)
     return -turning - np.sum(up * (np.cross(fp, gg) + np.cross(fg, gp)), axis=-1)
@@ -379,25 +285,7 @@ def heavy_top_steps(
     """Steps of the integration: time, attitude (quaternions xyzw) and spatial momentum after each, and its interpolant.
 
     All tops of the batch take the same steps. The tolerance of one step applies to the attitude [rad] and to the
-    momentum relative to max(|Pi|, sqrt(Mgl I)).
-
-    Parameters
-    ----------
-    attitude : (..., 3, 3) at the start, body to inertial axes
-    momentum : (..., 3) body momentum at the start [kg m^2/s]
-    duration : [s]
-
-    Raises
-    ------
-    AccuracyNotReached
-        After 200 000 steps, or where the step shrinks to nothing.
-
-    Examples
-    --------
-    >>> top = sp.rigid_body.HeavyTop(np.diag([1.0, 1.0, 0.5]), 2.0)
-    >>> steps = list(sp.rigid_body.heavy_top_steps(top, np.eye(3), np.array([0.0, 0.0, 3.0]), 1.0, 1e-9))
-    >>> print(f"{steps[-1][0]:.6f} s")
-    1.000000 s
+    momentum relative to max(|Pi|, sqrt(Mgl I)). Raises AccuracyNotReached after 200 000 steps.
     """
     vertical, scale, start = _packed(top, attitude, momentum)
     strength = top.mgl / scale
@@ -449,7 +337,10 @@ def _unpacked(state: Array, scale: Array, vertical: Array) -> tuple[Array, Array
     return so3.normalised(state[..., :4]), np.concatenate([horizontal, upright], axis=-1)
 
 
-def _integrated(top: HeavyTop, attitude: Array, momentum: Array, duration: float, local_tolerance: float) -> _Run:
+def _integrated(
+    top: HeavyTop, attitude: Array, momentum: Array, duration: float, local_tolerance: float
+) -> HeavyTopMotion:
+    """One run with a local tolerance, without an error estimate."""
     vertical, scale, _ = _packed(top, attitude, momentum)
     before = top.energy(momentum, attitude[..., 2, :])
     times, pieces, drift = [0.0], [], np.zeros(scale.shape)
@@ -459,16 +350,14 @@ def _integrated(top: HeavyTop, attitude: Array, momentum: Array, duration: float
         drift = np.maximum(drift, np.abs(energy - before))
         times.append(t)
         pieces.append(piece)
-    return _Run(vertical=vertical, scale=scale, energy_drift=drift, solution=OdeSolution(times, pieces))
+    return HeavyTopMotion(top, duration, vertical, np.zeros(scale.shape), drift, scale, OdeSolution(times, pieces))
 
 
-def _difference(coarse: _Run, fine: _Run) -> Array:
+def _difference(coarse: HeavyTopMotion, fine: HeavyTopMotion) -> Array:
     """Largest angle between the attitudes, at the ends and middles of the finer steps [rad]."""
-    ends = fine.solution.ts
+    ends = fine._solution.ts
     times = np.concatenate([ends, 0.5 * (ends[1:] + ends[:-1])])
-    before, after = (so3.matrix_from_quat(run.state(times)[0]) for run in (coarse, fine))
-    turn = so3.transpose(before) @ after
-    return so3.angle(turn).max(axis=-1)
+    return so3.angle(so3.transpose(coarse.attitude(times)) @ fine.attitude(times)).max(axis=-1)
 
 
 def _point(momentum: ArrayLike, gamma: ArrayLike) -> Pair:

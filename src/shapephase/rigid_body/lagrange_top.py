@@ -14,33 +14,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object
-from ..arrays import Array, Mask, finite_array
+from ..arguments import check_object, number_argument
+from ..arrays import Array, Mask, common_batch, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, SingularInertiaError
+from ._arguments import positive_moments
 from .heavy_top import HeavyTop, heavy_top_steps
 
-_GROWTH = 50.0
-"""Tilt, relative to the first one, up to which a simulated spin counts as stable: room for the wide
-nutation of stable spins next to the threshold."""
-_LARGEST_TILT = 0.01
-"""Largest first tilt of a simulation [rad]: its growth by the factor above is still less than a right angle."""
-_LOCAL_TOLERANCE = 1e-9
-"""Local tolerance of a simulation [rad], far below the least sensible tilt."""
-_THRESHOLD = 8.0 * float(np.finfo(float).eps)
-"""Of p^2 - 4 Mgl I1, relative to p^2: closer to the threshold, the momentum is `critical_momentum` but for rounding."""
+_GROWTH = 50.0  # of the tilt, up to which a simulated spin counts as stable: stable spins next to the threshold nutate
+_LARGEST_TILT = 0.5 / _GROWTH  # [rad] at the start of a simulation: its growth stays far below a right angle
 
 
 @dataclass(frozen=True)
 class LagrangeTop:
     """A heavy top with I1 = I2 = `transverse`, I3 = `axial` [kg m^2], chi = e3 and this Mgl [J].
-
-    Raises
-    ------
-    ShapeError
-        If an entry is not a finite number.
-    SingularInertiaError
-        If a moment is not positive.
 
     Examples
     --------
@@ -58,7 +45,7 @@ class LagrangeTop:
     def __post_init__(self) -> None:
         """Check the numbers."""
         for name in ("transverse", "axial", "mgl"):
-            object.__setattr__(self, name, _number(getattr(self, name), name))
+            object.__setattr__(self, name, number_argument(getattr(self, name), name))
         if min(self.transverse, self.axial) <= 0.0:
             raise SingularInertiaError(f"moments must be above 0, got {self.transverse:.6g}, {self.axial:.6g} kg m^2")
 
@@ -75,44 +62,35 @@ class LagrangeTop:
 
 @dataclass(frozen=True)
 class SleepingTop:
-    """The upright spin of a Lagrange top and what two methods say about its stability.
+    """Upright spin of a Lagrange top and its stability by two methods. Made by `sleeping_top`.
 
     The conserved quantity is H + Phi(Pi.Gamma, |Gamma|^2) + phi(Pi_3); dots are derivatives by Pi.Gamma.
-
-    Attributes
-    ----------
-    momentum : p = Pi_3 [kg m^2/s]
-    phi_dot, phi_prime, axial_slope : Phi_dot, Phi' and phi'(p) that make the first variation vanish
-    first_variation : (6,) gradient of the conserved quantity by (Pi, Gamma) at the equilibrium; zero
-    second_variation : (6, 6) its second derivative there, with phi'' = Phi_dot_dot = Phi_dot' = 0 and Phi'' large
-    minors : (6,) its leading principal minors: all positive if the energy-Casimir method proves stability
-    quadratic : (3,) coefficients, highest first, of the e-quadratic that decides (see `e_quadratic`)
-    eigenvalues : (4,) complex spectrum of the linearised equations on the tangent space of the coadjoint orbit [1/s]
-    energy_casimir : whether the second variation is definite (stable in the sense of Liapunov)
-    spectrally_stable : whether no eigenvalue has a positive real part
-    verdict : "stable" or "unstable". Where p^2 = 4 Mgl I1 > 0 neither method decides, but `upright_potential` does: it
-        has a strict minimum there, and the spin is stable. "marginal" where p and Mgl both vanish: a top at rest
-        without weight, which any momentum carries away
-
-    Examples
-    --------
-    >>> top = sp.rigid_body.sleeping_top(sp.rigid_body.LagrangeTop(1.0, 0.5, 2.0), 3.0)
-    >>> top.momentum, top.energy_casimir, top.verdict
-    (3.0, True, 'stable')
     """
 
     momentum: float
+    """p = Pi_3 [kg m^2/s]."""
     phi_dot: float
     phi_prime: float
     axial_slope: float
+    """`phi_dot`, `phi_prime` and `axial_slope`: Phi_dot, Phi' and phi'(p) that make the first variation vanish."""
     first_variation: Array
+    """(6,) gradient of the conserved quantity by (Pi, Gamma) at the equilibrium; zero."""
     second_variation: Array
+    """(6, 6) its second derivative there, with phi'' = Phi_dot_dot = Phi_dot' = 0 and Phi'' large."""
     minors: Array
+    """(6,) its leading principal minors: all positive if the energy-Casimir method proves stability."""
     quadratic: Array
+    """(3,) coefficients, highest first, of the e-quadratic that decides (see `e_quadratic`)."""
     eigenvalues: np.ndarray
+    """(4,) complex spectrum of the linearised equations on the tangent space of the coadjoint orbit [1/s]."""
     energy_casimir: bool
+    """Whether the second variation is definite (stable in the sense of Liapunov)."""
     spectrally_stable: bool
+    """Whether no eigenvalue has a positive real part."""
     verdict: str
+    """ "stable" or "unstable". Where p^2 = 4 Mgl I1 > 0 neither method decides, but `upright_potential` does: it has a
+    strict minimum there, and the spin is stable. "marginal" where p and Mgl both vanish: a top at rest without weight,
+    which any momentum carries away."""
 
     __repr__ = short_repr
 
@@ -121,26 +99,19 @@ class SleepingTop:
 class StabilityChart:
     """Stability of the upright spin over the ratio of moments and the spin, by three methods.
 
-    Attributes
-    ----------
-    axial_ratios : (R,) I3/I1
-    momenta : (P,) Pi_3 in units of sqrt(Mgl I1); the threshold is 2
-    energy_casimir, spectrum, simulation : (R, P) True where the method finds the spin stable
-    largest_tilt : (R, P) of the simulated motions [rad]
-
-    Examples
-    --------
-    >>> chart = sp.rigid_body.stability_chart([0.5], [1.0, 3.0], duration=8.0)
-    >>> chart.energy_casimir.tolist()
-    [[False, True]]
+    Made by `stability_chart`.
     """
 
     axial_ratios: Array
+    """(R,) I3/I1."""
     momenta: Array
+    """(P,) Pi_3 in units of sqrt(Mgl I1); the threshold is 2."""
     energy_casimir: Mask
     spectrum: Mask
     simulation: Mask
+    """`energy_casimir`, `spectrum` and `simulation`: (R, P) True where the method finds the spin stable."""
     largest_tilt: Array
+    """(R, P) of the simulated motions [rad]."""
 
     __repr__ = short_repr
 
@@ -148,17 +119,10 @@ class StabilityChart:
 def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     """The upright spin with Pi_3 = `momentum` [kg m^2/s], and its stability: stable if Pi_3^2 >= 4 Mgl I1, else not.
 
-    At equality, of which the theorem says nothing, the energy has a strict minimum among the motions of the same Pi_3
+    At equality, which the theorem leaves open, the energy has a strict minimum among the motions of the same Pi_3
     and Pi.Gamma (see `upright_potential`), and an isolated level of conserved quantities is stable.
     The free number e = -Phi_dot/p is taken where the e-quadratic is largest, at 1/(2 I1).
 
-    Raises
-    ------
-    ShapeError
-        If the momentum is not a finite number.
-
-    Notes
-    -----
     Source: Marsden and Ratiu, theorem 15.10.1; D. Aeyels, Syst. Control Lett. 19 (1992) 461, for equality.
 
     Examples
@@ -168,7 +132,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     [False, True]
     """
     check_object(top, "LagrangeTop", "top")
-    p = _number(momentum, "momentum")
+    p = number_argument(momentum, "momentum")
     i1, i3, mgl = top.transverse, top.axial, top.mgl
     phi_dot = -0.5 * p / i1
     phi_prime = -0.5 * (mgl + phi_dot * p)
@@ -176,7 +140,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     b = -2.0 * phi_prime + 2.0 * i3 * phi_dot**2 + abs(mgl) + p * p / i1
     second = second_variation(top, p, phi_dot, b=b)
     excess = p * p - 4.0 * mgl * i1
-    at_threshold = abs(excess) <= _THRESHOLD * p * p
+    at_threshold = abs(excess) <= 8.0 * np.finfo(float).eps * p * p  # `critical_momentum`, but for rounding
     stable = bool(np.all(spectrally_stable([i1, i1, i3], mgl, p)))
     return SleepingTop(
         momentum=p,
@@ -203,12 +167,12 @@ def upright_potential(top: LagrangeTop, momentum: float, tilt: ArrayLike) -> Arr
     so V - V(0) = (p^2/(2 I1) - 2 Mgl) u + 2 Mgl u^2/(1 + u). At p^2 = 4 Mgl I1 the first term vanishes and the second
     is positive: 2 Mgl u^2 - ..., a minimum of fourth order in the tilt.
 
+    Raises ShapeError if a tilt is pi or more. Source: theory.md M6, what theorem 15.10.1 leaves out.
+
     Parameters
     ----------
     momentum : p = Pi_3 [kg m^2/s]
     tilt : of the axis from the upward vertical, in (-pi, pi) [rad]
-
-    Raises ShapeError if a tilt is pi or more. Source: theory.md M6, what theorem 15.10.1 leaves out.
 
     Examples
     --------
@@ -218,7 +182,7 @@ def upright_potential(top: LagrangeTop, momentum: float, tilt: ArrayLike) -> Arr
     16.0, nearly 2^4
     """
     check_object(top, "LagrangeTop", "top")
-    p, angle = _number(momentum, "momentum"), finite_array(tilt, "tilt", unit="rad")
+    p, angle = number_argument(momentum, "momentum"), finite_array(tilt, "tilt", unit="rad")
     if np.any(np.abs(angle) >= np.pi):
         raise ShapeError(
             f"tilt: {np.abs(angle).max():.6g} rad; between -pi and pi the axis points away from straight down"
@@ -251,7 +215,7 @@ def second_variation(
     0.500000 -0.427051
     """
     check_object(top, "LagrangeTop", "top")
-    p, phi_dot, a, b, c, d = (_number(v, "second variation") for v in (momentum, phi_dot, a, b, c, d))
+    p, phi_dot, a, b, c, d = (number_argument(v, "second variation") for v in (momentum, phi_dot, a, b, c, d))
     vertical = -(top.mgl + phi_dot * p)
     matrix = np.diag([1.0 / top.transverse, 1.0 / top.transverse, 1.0 / top.axial + a + c, vertical, vertical, 0.0])
     matrix[0, 3] = matrix[3, 0] = matrix[1, 4] = matrix[4, 1] = phi_dot
@@ -272,12 +236,14 @@ def e_quadratic(top: LagrangeTop, momentum: float) -> Array:
     [-9.0, 9.0, -2.0]
     """
     check_object(top, "LagrangeTop", "top")
-    p, i1 = _number(momentum, "momentum"), top.transverse
+    p, i1 = number_argument(momentum, "momentum"), top.transverse
     return np.array([-p * p, p * p / i1, -top.mgl / i1])
 
 
 def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> Array:
     """The linearised equations of (Pi_1, Pi_2, Gamma_1, Gamma_2) at an upright spin: (..., 4, 4).
+
+    Source: Marsden and Ratiu (15.10.15) with theory.md M-E10, extended to I2 other than I1.
 
     Parameters
     ----------
@@ -285,15 +251,6 @@ def sleeping_matrix(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> 
         mass lies on axis 3 [kg m^2]
     mgl : (...) [J]
     momentum : (...) p = Pi_3 [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If an argument is of a wrong shape or value, or a moment is not positive.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.10.15) with theory.md M-E10, extended to I2 other than I1.
 
     Examples
     --------
@@ -315,7 +272,7 @@ def characteristic_polynomial(moments: ArrayLike, mgl: ArrayLike, momentum: Arra
     For I1 = I2 the discriminant is (2 I1 - I3)^2 (p/I3)^2 (p^2 - 4 Mgl I1)/I1^4. For I3 = 2 I1 it vanishes for every
     p: the two pairs of roots coincide, and the sign of B decides.
 
-    Source: Marsden and Ratiu (15.10.16) with theory.md M-E10. Arguments and errors as `sleeping_matrix`.
+    Source: Marsden and Ratiu (15.10.16) with theory.md M-E10. Arguments as `sleeping_matrix`.
 
     Examples
     --------
@@ -333,7 +290,7 @@ def characteristic_polynomial(moments: ArrayLike, mgl: ArrayLike, momentum: Arra
 
 
 def sleeping_spectrum(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> np.ndarray:
-    """The four eigenvalues of `sleeping_matrix`: (..., 4) complex [1/s]. Arguments and errors as there.
+    """The four eigenvalues of `sleeping_matrix`: (..., 4) complex [1/s]. Arguments as there.
 
     Found through their squares (-B +- sqrt(B^2 - 4C))/2, so they come in pairs of opposite sign.
 
@@ -352,7 +309,7 @@ def sleeping_spectrum(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -
 
 
 def spectrally_stable(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> Mask:
-    """Whether no eigenvalue of an upright spin has a positive real part: (...). Arguments as `sleeping_matrix`.
+    """True where no eigenvalue of an upright spin has a positive real part: (...). Arguments of `sleeping_matrix`.
 
     The squares of the eigenvalues must be real and not positive: B, C and B^2 - 4C not negative.
 
@@ -374,23 +331,15 @@ def stability_chart(
     tilt stays within 50 times the first one. Next to the threshold the tilt grows slowly, at the rate
     sqrt(1 - Pi_3^2/4), and long durations are needed.
 
+    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M8.
+    Raises AccuracyNotReached if the simulation needs more than 200 000 steps.
+
     Parameters
     ----------
     axial_ratios : (R,) I3/I1 > 0
     momenta : (P,) Pi_3/sqrt(Mgl I1)
     tilt : at the start, in (0, 0.01] [rad]
     duration : of the simulation [sqrt(I1/Mgl)]
-
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If an argument is wrong.
-    AccuracyNotReached
-        If the simulation needs more than 200 000 steps.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, theorem 15.10.1; theory.md M8.
 
     Examples
     --------
@@ -399,7 +348,7 @@ def stability_chart(
     ([[False, True]], [[False, True]])
     """
     ratios, spins = finite_array(axial_ratios, "axial_ratios"), finite_array(momenta, "momenta")
-    lean, time = _number(tilt, "tilt"), _number(duration, "duration")
+    lean, time = number_argument(tilt, "tilt"), number_argument(duration, "duration")
     if ratios.ndim != 1 or spins.ndim != 1 or not ratios.size or not spins.size:
         raise ShapeError(f"axial_ratios, momenta: two lists are needed, got shapes {ratios.shape}, {spins.shape}")
     if not 0.0 < lean <= _LARGEST_TILT or time <= 0.0:
@@ -421,9 +370,9 @@ def stability_chart(
 def _largest_tilt(top: HeavyTop, spins: Array, tilt: float, duration: float) -> Array:
     shape = np.broadcast_shapes(top.inertia.shape[:-2], spins.shape)
     attitude = np.broadcast_to(so3.exp(np.array([tilt, 0.0, 0.0])), (*shape, 3, 3))
-    momentum = np.broadcast_to(spins[:, None] * np.array([0.0, 0.0, 1.0]), (*shape, 3))
+    momentum = np.broadcast_to(spins[:, None] * np.eye(3)[2], (*shape, 3))
     largest = np.full(shape, tilt)
-    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, duration, _LOCAL_TOLERANCE):
+    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, duration, 1e-9):
         # The parts of the quaternion are sine and cosine of half the angle between body axis 3 and the vertical.
         across, along = np.hypot(quat[..., 0], quat[..., 1]), np.hypot(quat[..., 2], quat[..., 3])
         largest = np.maximum(largest, 2.0 * np.arctan2(across, along))
@@ -432,20 +381,7 @@ def _largest_tilt(top: HeavyTop, spins: Array, tilt: float, duration: float) -> 
 
 def _upright(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> tuple[Array, ...]:
     """I1, I2, I3, Mgl and Pi_3 as arrays of one shape."""
-    inertia = finite_array(moments, "moments", (3,), unit="kg m^2")
-    if np.any(inertia <= 0.0):
-        raise SingularInertiaError(f"moments: every moment must be above 0, got {inertia.min():.6g} kg m^2")
+    inertia = positive_moments(moments)
     weight, spin = finite_array(mgl, "mgl", unit="J"), finite_array(momentum, "momentum", unit="kg m^2/s")
-    try:
-        return tuple(np.broadcast_arrays(*np.moveaxis(inertia, -1, 0), weight, spin))
-    except ValueError:
-        raise ShapeError(
-            f"moments {inertia.shape}, mgl {weight.shape}, momentum {spin.shape}: leading axes cannot be broadcast"
-        ) from None
-
-
-def _number(value: ArrayLike, name: str) -> float:
-    array = finite_array(value, name)
-    if array.shape != ():
-        raise ShapeError(f"{name}: one number is needed, got shape {array.shape}")
-    return float(array)
+    common_batch(moments=inertia.shape[:-1], mgl=weight.shape, momentum=spin.shape)
+    return tuple(np.broadcast_arrays(*np.moveaxis(inertia, -1, 0), weight, spin))

@@ -28,27 +28,20 @@ from numpy.typing import ArrayLike
 from scipy.special import elliprf
 
 from .. import elliptic
-from ..arguments import moments_argument
+from ..arguments import moments_argument, vector_argument
 from ..arrays import Array, common_shape, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from ..letters import what_came
+from ._arguments import check_entries
 
-_FAINT = 1e-140
-"""Least part of a momentum, relative to the largest, that is not zero: squares of smaller parts underflow."""
+_FAINT = 1e-140  # of the largest component of a momentum: squares of smaller ones underflow
 
 
 @dataclass(frozen=True)
 class PendulumEquilibrium:
-    """A steady rotation as an equilibrium of the pendulum, p = 0.
-
-    Examples
-    --------
-    >>> pendulum = sp.rigid_body.rigid_body_pendulum([1.0, 2.0, 3.0])
-    >>> [(round(point.angle, 6), point.stability) for point in pendulum.equilibria]
-    [(0.0, 'stable'), (1.570796, 'unstable'), (3.141593, 'stable'), (4.712389, 'unstable')]
-    """
+    """Steady rotation as an equilibrium of the pendulum, p = 0. Made by `RigidBodyPendulum.equilibria`."""
 
     angle: float
     """theta [rad]: 0, pi/2, pi or 3 pi/2."""
@@ -64,15 +57,7 @@ class PendulumEquilibrium:
 
 @dataclass(frozen=True, eq=False)
 class RigidBodyPendulum:
-    """The coordinates (r, theta, p) of body momenta on elliptic cylinders, see `rigid_body_pendulum`.
-
-    Examples
-    --------
-    >>> pendulum = sp.rigid_body.rigid_body_pendulum([1.0, 2.0, 3.0])
-    >>> radius, angle, p = pendulum.coordinates([0.6, 0.9, 0.5])
-    >>> print(f"{radius:.6f} {angle:.6f} {p:.6f}")
-    0.612372 0.643501 0.500000
-    """
+    """Coordinates (r, theta, p) of body momenta on elliptic cylinders. Made by `rigid_body_pendulum`."""
 
     moments: Array
     """(3,) principal moments as given [kg m^2]."""
@@ -92,24 +77,14 @@ class RigidBodyPendulum:
     def coordinates(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
         """r, theta in (-pi, pi] and p of body momenta: (..., 3) -> (...), (...) [rad], (...) [kg m^2/s].
 
-        Raises
-        ------
-        ShapeError
-            If a momentum is along the third axis, where the angle is undefined, or is not three finite numbers.
-
-        Notes
-        -----
         Source: Marsden and Ratiu (15.11.12).
+        Raises ShapeError if a momentum is along the third axis, where the angle is undefined, or is not three finite
+        numbers.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         first, second, third = np.moveaxis(pi[..., list(self.axes)], -1, 0)
-        bad = (first == 0.0) & (second == 0.0)
-        if bad.any():
-            where = tuple(int(i) for i in np.argwhere(bad)[0])
-            raise ShapeError(
-                f"momentum: entry {list(where)} is {pi[where]}, along the cylinders' axis {self.axes[2]}, where theta "
-                "is undefined; choose an order of the axes with another one last"
-            )
+        requirement = f"along the cylinders' axis {self.axes[2]} theta is undefined; put another axis last"
+        check_entries((first == 0.0) & (second == 0.0), pi, "momentum", requirement)
         cosine, sine = first / self.k1, second / self.k2
         # Adding zero takes the sign off a zero, of which arctan2 would make minus a half turn.
         return np.hypot(cosine, sine), np.arctan2(sine + 0.0, cosine), third
@@ -170,34 +145,25 @@ class RigidBodyPendulum:
 
         Source: Marsden and Ratiu, after corollary 15.11.2.
         """
-        at_zero = "neutral" if self.stiffness == 0.0 else "stable" if self.stiffness > 0.0 else "unstable"
-        across = {"neutral": "neutral", "stable": "unstable", "unstable": "stable"}[at_zero]
-        first, second, _ = self.axes
-        return (
-            PendulumEquilibrium(angle=0.0, axis=first, sign=1, stability=at_zero),
-            PendulumEquilibrium(angle=0.5 * np.pi, axis=second, sign=1, stability=across),
-            PendulumEquilibrium(angle=np.pi, axis=first, sign=-1, stability=at_zero),
-            PendulumEquilibrium(angle=1.5 * np.pi, axis=second, sign=-1, stability=across),
+        kinds = {1.0: ("stable", "unstable"), 0.0: ("neutral", "neutral"), -1.0: ("unstable", "stable")}
+        pair = kinds[float(np.sign(self.stiffness))]
+        return tuple(
+            PendulumEquilibrium(
+                angle=0.5 * np.pi * k, axis=self.axes[k % 2], sign=1 if k < 2 else -1, stability=pair[k % 2]
+            )
+            for k in range(4)
         )
 
     def motion(self, momentum: ArrayLike) -> PendulumMotion:
         """The motion in closed form from a body momentum (3,) at t = 0 [kg m^2/s].
 
-        The distance from the separatrix is computed in exact arithmetic from the numbers given, so a motion next to it
-        or on it is as accurate as any other.
+        The distance from the separatrix is computed in exact arithmetic, so a motion next to it is as accurate as any.
 
-        Raises
-        ------
-        ShapeError
-            For a momentum along the third axis, or with a part below 1e-140 of its largest that is not zero.
-
-        Notes
-        -----
         Source: Marsden and Ratiu (15.11.18); the pendulum's solution in Jacobi's functions is standard.
+        Raises ShapeError for a momentum along the third axis, or with a part below 1e-140 of its largest that is not
+        zero.
         """
-        pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-        if pi.shape != (3,):
-            raise ShapeError(f"momentum: expected one momentum (3,), got {pi.shape}")
+        pi = vector_argument(momentum, "momentum", unit="kg m^2/s")
         r, _, _ = self.coordinates(pi)
         faint = (pi != 0.0) & (np.abs(pi) < _FAINT * np.max(np.abs(pi)))
         if faint.any():
@@ -207,15 +173,7 @@ class RigidBodyPendulum:
 
 @dataclass(frozen=True, eq=False)
 class PendulumMotion:
-    """A motion of the pendulum, and of the rigid body, in closed form; made by `RigidBodyPendulum.motion`.
-
-    Examples
-    --------
-    >>> motion = sp.rigid_body.rigid_body_pendulum([1.0, 2.0, 3.0]).motion([0.6, 0.9, 0.5])
-    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
-    >>> print(np.abs(motion.body_momentum(1.0) - top.body_momentum(1.0)).max().round(9))
-    0.0
-    """
+    """Motion of the pendulum, and of the rigid body, in closed form. Made by `RigidBodyPendulum.motion`."""
 
     pendulum: RigidBodyPendulum
     radius: float
@@ -242,7 +200,7 @@ class PendulumMotion:
 
     @property
     def period(self) -> float:
-        """Of Pi, 4 K(k)/|rate| [s]: one libration, or one turn of theta. Infinite on the separatrix and at rest."""
+        """Period of Pi, 4 K(k)/|rate| [s]: a libration, or a turn of theta; infinite on the separatrix and at rest."""
         if self.regime == "separatrix" or self.rate == 0.0:
             return float("inf")
         return float(4.0 * elliptic.complete_k(self.complement) / abs(self.rate))
@@ -250,10 +208,7 @@ class PendulumMotion:
     def angle(self, time: ArrayLike) -> Array:
         """theta, continuous in time: (...) [s] -> (...) [rad]; in [-pi, pi] at t = 0.
 
-        Raises
-        ------
-        ShapeError
-            For times that are not finite, or longer than 1e12 periods; so do all methods.
+        Raises ShapeError for times that are not finite, or longer than 1e12 periods; so do all methods.
         """
         sn, _, dn, am = self._jacobi(time)
         return self.centre + (np.arctan2(self.swing * sn, dn) if self._swings else am)
@@ -279,7 +234,7 @@ class PendulumMotion:
 
     @property
     def _swings(self) -> bool:
-        """Whether sn is the sine of delta divided by its maximum; otherwise sn is the sine itself."""
+        """True if sn is the sine of delta divided by its maximum, else sn is the sine itself."""
         return self.regime == "libration" or self.swing == 0.0
 
     @property
@@ -295,22 +250,16 @@ class PendulumMotion:
 def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -> RigidBodyPendulum:
     """The pendulum of a rigid body with given principal moments.
 
+    Equation :eq:`pendulum` of the documentation.
+    Source: Marsden and Ratiu (15.11.7) to (15.11.13).
+    Raises ShapeError if the moments are all equal (then every momentum is at rest), or the third axis is the
+    intermediate one or shares its moment with another: K is then not an elliptic cylinder.
+
     Parameters
     ----------
     moments : (3,) [kg m^2], any order; momenta have their components in the same order
     axes : which of them, 0 to 2, are called 1, 2, 3. None: ascending, as in the book; where the two largest are equal
         descending, so that the third differs from the others
-
-    Raises
-    ------
-    ShapeError
-        If the moments are not positive, or all equal (then every momentum is at rest), or `axes` is not a permutation,
-        or the third axis is the intermediate one or shares its moment with another: K is then not an elliptic cylinder.
-
-    Notes
-    -----
-    Equation :eq:`pendulum` of the documentation.
-    Source: Marsden and Ratiu (15.11.7) to (15.11.13).
 
     Examples
     --------
@@ -329,8 +278,8 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
         if order.shape != (3,) or sorted(order.tolist()) != [0, 1, 2]:
             raise ShapeError(f"axes: got {what_came(axes)}; expected an order of 0, 1, 2")
     first, second, third = (int(i) for i in order)
-    one, two, three = (1 / Fraction(float(values[i])) for i in (first, second, third))
-    by_first, by_second = one - three, two - three
+    inverse = [1 / Fraction(float(value)) for value in values]
+    by_first, by_second = inverse[first] - inverse[third], inverse[second] - inverse[third]
     if by_first * by_second <= 0:
         raise ShapeError(
             f"axes: {(first, second, third)} puts axis {third} last, whose moment {values[third]:.17g} of {values} "
@@ -351,12 +300,12 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
 
 
 def _motion(pendulum: RigidBodyPendulum, pi: Array, r: float) -> PendulumMotion:
-    """By the angle delta from a stable equilibrium: delta'^2 + W sin^2(delta) = nu^2, W = |stiffness| r^2."""
+    """Motion by the angle delta from a stable equilibrium: delta'^2 + W sin^2(delta) = nu^2, W = |stiffness| r^2."""
     # In units of the largest momentum and the least moment, so that nothing overflows.
     largest, least = float(np.max(np.abs(pi))), float(np.min(pendulum.moments))
     x, y, z = (Fraction(float(pi[i])) / Fraction(largest) for i in pendulum.axes)
-    one, two, three = (Fraction(least) / Fraction(float(pendulum.moments[i])) for i in pendulum.axes)
-    u, v = abs(one - three), abs(two - three)
+    a1, a2, a3 = (Fraction(least) / Fraction(float(pendulum.moments[i])) for i in pendulum.axes)
+    u, v = abs(a1 - a3), abs(a2 - a3)
     swapped = u < v
     if swapped:
         x, y, u, v = y, x, v, u

@@ -16,71 +16,53 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import elliptic, so3, sphere
-from ..arguments import check_object
+from ..arguments import check_object, number_argument, whole_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..letters import what_came
+from ._arguments import above_zero
 from .euler_top import EulerTop
 from .portrait import inverse_difference
 
-_TAIL = 60.0
-"""Argument u beyond which the separatrix is not integrated: the arc that is left is shorter than 1e-25 of it."""
-_QUADRATURE = 1e-14
-"""Error of a panel, relative to the arc length, below which it is not halved again; near rounding."""
-_EQUAL = 1e-12
-"""Moments closer than this, relative to the larger, count as equal: inertias are seldom known to more digits."""
+_TAIL = 60.0  # argument u of the separatrix: the arc beyond it is shorter than exp(-60) = 1e-26 of the whole
+_EQUAL = 1e-12  # relative difference of moments that count as equal: inertias are seldom known to more digits
 
 
 @dataclass(frozen=True)
 class Closure:
-    """How a herpolhode closes; a circle has no lobes and closes in one turn, a point has neither.
+    """Turns and lobes after which a herpolhode closes.
 
-    Attributes
-    ----------
-    turns : about mu
-    lobes : waves between the two circles that the herpolhode touches
-    gap : angle between its start and its end [rad]
-
-    Examples
-    --------
-    >>> top = sp.EulerTop.principal([1.0, 1.0, 2.0], [0.6, 0.0, 0.8])
-    >>> closure = sp.rigid_body.Poinsot(top).closure()
-    >>> closure.turns, closure.lobes
-    (5, 4)
+    A circle has no lobes and closes in one turn, a point has neither. Made by `Poinsot.closure`.
     """
 
     turns: int
+    """About mu."""
     lobes: int
+    """Waves between the two circles that the herpolhode touches."""
     gap: float
+    """Angle between its start and its end [rad]."""
 
     __repr__ = short_repr
 
 
 @dataclass(frozen=True)
 class Cones:
-    """The cones of an axisymmetric body: the body cone rolls on the space cone, both with their apex in the centre.
+    """Body cone and space cone of an axisymmetric body; the first rolls on the second, both apices in the centre.
 
-    Attributes
-    ----------
-    body_half_angle : of the body cone, about the axis of symmetry on the side of the momentum [rad]
-    space_half_angle : of the space cone, about the momentum [rad]
-    space_inside_body : the space cone lies inside the body cone (oblate), or the two touch from outside (prolate)
-    precession_rate : of the axis of symmetry about the momentum, |mu| / I1 [rad/s]
-    spin_rate : lambda, of the momentum about the axis of symmetry seen in the body [rad/s]; > 0 oblate, < 0 prolate
-
-    Examples
-    --------
-    >>> cones = sp.rigid_body.cones(sp.EulerTop.principal([1.0, 1.0, 2.0], [3.0, 0.0, 4.0]))
-    >>> print(f"{np.degrees(cones.body_half_angle):.3f} degrees, {cones.precession_rate:.3f} rad/s")
-    56.310 degrees, 5.000 rad/s
+    Made by `cones`.
     """
 
     body_half_angle: float
+    """Half angle of the body cone, about the axis of symmetry on the side of the momentum [rad]."""
     space_half_angle: float
+    """Half angle of the space cone, about the momentum [rad]."""
     space_inside_body: bool
+    """The space cone lies inside the body cone (oblate), or the two touch from outside (prolate)."""
     precession_rate: float
+    """Rate of the axis of symmetry about the momentum, |mu| / I1 [rad/s]."""
     spin_rate: float
+    """lambda, of the momentum about the axis of symmetry seen in the body [rad/s]; > 0 oblate, < 0 prolate."""
 
     __repr__ = short_repr
 
@@ -93,10 +75,7 @@ class Poinsot:
     point of contact: radius, angle and arc length are zero. On the separatrix the herpolhode comes from the foot of
     the normal, touches the outer circle once, and spirals back: the inner radius is 0, the angle per period infinite.
 
-    Raises
-    ------
-    ShapeError
-        For a top without momentum, which has no invariable plane.
+    Raises ShapeError for a top without momentum, which has no invariable plane.
 
     Examples
     --------
@@ -154,15 +133,12 @@ class Poinsot:
         return attitude @ self.top.inertia @ so3.transpose(attitude)
 
     def contact(self, t: ArrayLike, side: int = 1) -> Array:
-        """Where the plane at right angles to mu touches the ellipsoid, from its shape alone: (...) -> (..., 3) [rad/s].
+        """Contact of the plane at right angles to mu with the ellipsoid, by its shape: (...) -> (..., 3) [rad/s].
 
         The plane on the side of mu (1), the invariable plane, or its mirror image (-1). By Poinsot's theorem the points
         are the angular velocity and its negative. Inertial axes.
 
-        Raises
-        ------
-        ShapeError
-            If side is not 1 or -1.
+        Raises ShapeError if side is not 1 or -1.
         """
         if not isinstance(side, int | np.integer) or side not in (1, -1):
             raise ShapeError(f"side: expected 1 or -1, got {what_came(side)}")
@@ -188,7 +164,7 @@ class Poinsot:
         times = finite_array(t, "t", unit="s")
         if self._is_point:
             return np.zeros(times.shape)[()]
-        return self._radius(self._direction(self.top.rate * times + self.top.orbit.phase))
+        return self._radius(self.top.orbit.directions(self.top.rate * times + self.top.orbit.phase))
 
     def herpolhode_angle(self, t: ArrayLike) -> Array:
         """Angle of the herpolhode about mu from where it is at t = 0, unwrapped: (...) -> (...) [rad].
@@ -219,7 +195,7 @@ class Poinsot:
 
     @property
     def frequencies(self) -> tuple[float, float]:
-        """Of Pi in the body, and of the mean precession about mu [rad/s]; the first is 0 without a finite period.
+        """Frequencies of Pi in the body, 0 without a finite period, and of the mean precession about mu [rad/s].
 
         Every coordinate of the attitude is a Fourier series in the two. Their ratio, the second by the first, is
         `angle_per_period` / 2 pi. Source: Bonnard et al., section 3.5.
@@ -232,15 +208,9 @@ class Poinsot:
         The numbers of lobes tried, half periods of Pi, are the denominators of the continued fraction of the turns per
         lobe: no smaller number comes nearer. On the separatrix the curve never closes.
 
-        Raises
-        ------
-        ShapeError
-            If the tolerance is not positive or `most_lobes` is below 1.
+        Raises ShapeError if the tolerance is not positive or `most_lobes` is below 1.
         """
-        numbers = isinstance(tolerance, int | float | np.number) and isinstance(most_lobes, int | np.integer)
-        if not numbers or not (tolerance > 0.0 and most_lobes >= 1):
-            came = f"{what_came(tolerance)}, {what_came(most_lobes)}"
-            raise ShapeError(f"closure: expected tolerance > 0 and most_lobes >= 1, got {came}")
+        within, most = above_zero(tolerance, "tolerance", "rad"), whole_argument(most_lobes, "most_lobes", 1)
         inner, outer = self.annulus
         if outer == inner:
             return Closure(int(outer > 0.0), 0, 0.0)
@@ -254,9 +224,9 @@ class Poinsot:
             denominators = denominators[1], whole * denominators[1] + denominators[0]
             turns, lobes = numerators[1], denominators[1]
             gap = 2.0 * np.pi * abs(lobes * per_lobe - turns)
-            if lobes > most_lobes:
+            if lobes > most:
                 return None
-            if gap <= tolerance:
+            if gap <= within:
                 return Closure(turns, lobes, gap)
             rest = 1.0 / (rest - whole)
 
@@ -275,28 +245,15 @@ class Poinsot:
             return 0.0
         quarter = min(float(elliptic.complete_k(self.top.complement)), _TAIL)
         half = self._integral(self._polhode_speed, -quarter, quarter)
-        return half if self._is_separatrix else 2.0 * half
+        return half if self.top.regime == "separatrix" else 2.0 * half
 
     @property
     def _is_point(self) -> bool:
         return self.top.regime in ("spherical", "steady")
 
     @property
-    def _is_separatrix(self) -> bool:
-        return self.top.regime == "separatrix"
-
-    @property
     def _start(self) -> Array:
         return self.top.orbit.start / self.top.magnitude
-
-    def _direction(self, u: Array) -> Array:
-        """Pi/|Pi| along the principal axes at u = rate t + phase, where Pi circles an axis: (...) -> (..., 3)."""
-        orbit = self.top.orbit
-        sn, cn, dn, _ = elliptic.jacobi(u, orbit.complement)
-        direction = np.empty((*np.shape(u), 3))
-        for index, function in ((orbit.circled, dn), (orbit.other, cn), (1, sn)):
-            direction[..., index] = orbit.amplitudes[index] * function
-        return direction
 
     def _angle(self, times: Array) -> Array:
         """Azimuth about mu of the circled axis, and of Omega from there, each up to a constant: (...) [rad]."""
@@ -332,13 +289,11 @@ class Poinsot:
         return self.top.magnitude**2 * _across(direction, self.top.moments) / self.top.moments
 
     def _length(self, speed: Callable[[Array], Array], start: float, end: float) -> float:
-        first, last = finite_array(start, "start", unit="s"), finite_array(end, "end", unit="s")
-        if first.ndim or last.ndim:
-            raise ShapeError(f"expected one start and one end [s], got shapes {first.shape} and {last.shape}")
+        first, last = number_argument(start, "start", "s"), number_argument(end, "end", "s")
         if self._is_point:
             return 0.0
         left, right = (float(self.top.rate * t + self.top.orbit.phase) for t in (first, last))
-        if self._is_separatrix:
+        if self.top.regime == "separatrix":
             return self._integral(speed, *np.clip([left, right], -_TAIL, _TAIL))
         half = 2.0 * float(elliptic.complete_k(self.top.complement))
         whole = float(np.trunc((right - left) / half))
@@ -350,12 +305,12 @@ class Poinsot:
 
         def panels(starts: Array, ends: Array) -> Array:
             nodes, weights = sphere.gauss_nodes(starts, ends)
-            return np.sum(weights * speed(self._direction(nodes)), axis=-1)
+            return np.sum(weights * speed(self.top.orbit.directions(nodes)), axis=-1)
 
         edges = np.linspace(left, right, max(4, int(np.ceil(2.0 * abs(right - left)))) + 1)
         starts, ends = edges[:-1], edges[1:]
         whole, total = panels(starts, ends), 0.0
-        allowed = _QUADRATURE * abs(whole.sum())
+        allowed = 1e-14 * abs(whole.sum())
         while len(starts):
             middle = 0.5 * (starts + ends)
             first, second = panels(starts, middle), panels(middle, ends)
@@ -372,15 +327,9 @@ def cones(top: EulerTop) -> Cones:
     Two moments that agree to 1e-12 count as equal. For a body that spins about its axis of symmetry both cones have no
     width; for one that spins about an axis across, the body cone is a plane.
 
-    Raises
-    ------
-    ShapeError
-        If no two moments are equal, or all three, or the momentum is zero.
-
-    Notes
-    -----
     Source: Marsden and Ratiu, 15.8 case 2, whose I1 = I2 are the equal moments and I3 the one about the axis of
     symmetry, with the signs of theory.md M-E6: Omega = Pi/I1 - lambda e.
+    Raises ShapeError if no two moments are equal, or all three, or the momentum is zero.
 
     Examples
     --------
@@ -411,7 +360,5 @@ def cones(top: EulerTop) -> Cones:
 
 def _across(direction: Array, moments: Array) -> Array:
     """n x I^-1 n along the principal axes, by differences of moments: (..., 3) -> (..., 3)."""
-    gaps = np.array(
-        [inverse_difference(moments, 2, 1), inverse_difference(moments, 0, 2), inverse_difference(moments, 1, 0)]
-    )
+    gaps = np.array([inverse_difference(moments, *pair) for pair in ((2, 1), (0, 2), (1, 0))])
     return gaps * direction[..., [1, 2, 0]] * direction[..., [2, 0, 1]]

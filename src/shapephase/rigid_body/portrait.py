@@ -17,30 +17,17 @@ from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from ..letters import what_came
 
-_ROUNDED = 1e-12
-"""An energy outside its range by no more than this, relative to the bound, is taken for the bound, rounded."""
-
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A steady rotation as a point on the momentum sphere, on a principal axis.
-
-    Attributes
-    ----------
-    direction : (3,) unit vector
-    kind : "centre" (extreme moment), "saddle" (middle moment), "degenerate" (one of a circle or sphere of equilibria)
-    rate : angular frequency about a centre, rate of growth at a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]
-
-    Examples
-    --------
-    >>> points = sp.rigid_body.equilibria([1.0, 2.0, 3.0])
-    >>> len(points), [point.kind for point in points]
-    (6, ['centre', 'centre', 'saddle', 'saddle', 'centre', 'centre'])
-    """
+    """Steady rotation as a point on the momentum sphere, on a principal axis. Made by `equilibria`."""
 
     direction: Array
+    """(3,) unit vector."""
     kind: str
+    """ "centre" (extreme moment), "saddle" (middle moment), "degenerate" (one of a circle or sphere of equilibria)."""
     rate: float
+    """Angular frequency about a centre, rate of growth at a saddle, 0 where degenerate; for |Pi| = 1 [1/(kg m^2)]."""
 
     __repr__ = short_repr
 
@@ -57,29 +44,23 @@ def equilibria(moments: ArrayLike) -> tuple[Equilibrium, ...]:
     ('saddle', [0.0, 1.0, 0.0])
     """
     inertia = moments_argument(moments)
-    found = []
+    points = []
     for axis in range(3):
         product = inverse_difference(inertia, (axis + 1) % 3, axis) * inverse_difference(inertia, (axis + 2) % 3, axis)
         kind = "degenerate" if product == 0.0 else "centre" if product > 0.0 else "saddle"
         rate = float(np.sqrt(abs(product)))
-        found += [Equilibrium(direction=side * np.eye(3)[axis], kind=kind, rate=rate) for side in (1.0, -1.0)]
-    return tuple(found)
+        points += [Equilibrium(direction=side * np.eye(3)[axis], kind=kind, rate=rate) for side in (1.0, -1.0)]
+    return tuple(points)
 
 
 def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
     """The four great half-circles from saddle to saddle, each along its motion: (4, count, 3) unit vectors.
 
-    For moments in any order, on the axes as they were given. In axes of ascending moments each lies in a
-    plane, |Pi_1/Pi_3| = sqrt((1/I2 - 1/I3)/(1/I1 - 1/I2)).
+    In axes of ascending moments each lies in a plane, |Pi_1/Pi_3| = sqrt((1/I2 - 1/I3)/(1/I1 - 1/I2)).
 
-    Raises
-    ------
-    ShapeError
-        If two moments are equal: the middle axis is then on a circle of equilibria and there is no separatrix.
-
-    Notes
-    -----
     Source: Marsden and Ratiu (15.8.10), whose I1, I2, I3 are our I3, I2, I1, with the signs of theory.md M-E4.
+    Raises ShapeError if two moments are equal: the middle axis is then on a circle of equilibria and there is no
+    separatrix.
 
     Examples
     --------
@@ -106,19 +87,16 @@ def heteroclinics(moments: ArrayLike, count: int = 181) -> Array:
 def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array:
     """Curves of constant energy on the sphere of unit momentum, along their motion: (N,) -> (N, 2, count, 3).
 
+    Raises ShapeError if an energy is out of range, or the three moments are equal: then no point of the sphere moves.
+
+    The two curves of an energy circle the same axis on its two sides. At both ends of the range they are points; at
+    1/(2 I_middle) each consists of two halves of separatrices.
+
     Parameters
     ----------
     moments : (3,) in any order [kg m^2]
     energies : (N,) for |Pi| = 1, from 1/(2 I_max) to 1/(2 I_min) [1/(kg m^2)]; for a top its energy over |Pi|^2
     count : points of each closed curve, of which the last is the first again
-
-    The two curves of an energy circle the same axis on its two sides. At both ends of the range they are points; at
-    1/(2 I_middle) each consists of two halves of separatrices.
-
-    Raises
-    ------
-    ShapeError
-        If an energy is out of range, or the three moments are equal: then no point of the sphere moves.
 
     Examples
     --------
@@ -133,7 +111,8 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     lowest, highest = 0.5 / ascending[2], 0.5 / ascending[0]
     if lowest == highest:
         raise ShapeError(f"moments: all are {lowest} kg m^2, and every point of the sphere is at rest; no curves")
-    if levels.ndim != 1 or np.any((levels < lowest * (1.0 - _ROUNDED)) | (levels > highest * (1.0 + _ROUNDED))):
+    rounding = 1e-12
+    if levels.ndim != 1 or np.any((levels < lowest * (1.0 - rounding)) | (levels > highest * (1.0 + rounding))):
         raise ShapeError(
             f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {what_came(levels)}"
         )

@@ -20,38 +20,26 @@ from numpy.typing import ArrayLike
 from scipy.optimize import root
 
 from .. import so3
-from ..arguments import check_object
+from ..arguments import check_object, number_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, UnphysicalInertiaError
-from ..letters import what_came
+from ._arguments import axis_index
 
-_GROWTH = 30.0 * float(np.sqrt(np.finfo(float).eps))
-"""Of the fastest mode: real parts of eigenvalues below it come from double eigenvalues and rounding."""
-_FLAT = 1e3 * float(np.finfo(float).eps)
-"""Of the largest second derivative: smaller ones are zero but for rounding."""
-_RESIDUAL = 1e-10
-"""Of the forces that balance in a steady spin, relative to their size."""
+_EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True, eq=False)
 class PseudoRigidBody:
     """A homogeneously deforming body of neo-Hookean material.
 
+    A rigid body with principal moments I_i has E_i = (I_j + I_k - I_i)/2 (`inertia_tensor.second_moment`).
+
     Parameters
     ----------
     second_moments : (3,) E_i > 0, the integrals of X_i^2 by mass in the reference, along its principal axes [kg m^2]
     shear : mu > 0, shear modulus times volume [J]
     bulk : lambda >= 0, Lame's first constant times volume [J]
-
-    Raises
-    ------
-    ShapeError, UnphysicalInertiaError
-        If they are not such numbers.
-
-    Notes
-    -----
-    Of a rigid body with principal moments I_i, E_i = (I_j + I_k - I_i)/2 (`inertia_tensor.second_moment`).
 
     Examples
     --------
@@ -111,37 +99,27 @@ class PseudoRigidBody:
 
 @dataclass(frozen=True, eq=False)
 class PseudoRigidSpin:
-    """A steady spin of a pseudo-rigid body; see `pseudo_rigid_spin`.
-
-    Attributes
-    ----------
-    body : the `PseudoRigidBody`
-    axis : 0, 1 or 2
-    momentum : along the axis [kg m^2/s]
-    rate : Omega [rad/s]
-    stretches : (3,) q
-    curvatures : (8,) second derivatives of the amended potential V + mu.I(Q)^-1 mu/2, ascending, across the turn about
-        the momentum, to which it is indifferent [J]
-    eigenvalues : (18,) complex, of the linearised motion in the turning frame [1/s]
-    verdict : "stable" where all curvatures are positive (energy-momentum method: in the sense of Liapunov, up to the
-        turn about the momentum); "unstable" where an eigenvalue has a positive real part; else "spectrally stable", as
-        about the axis of the smallest moment, where friction would decide otherwise
-
-    Examples
-    --------
-    >>> body = sp.rigid_body.PseudoRigidBody([3.0, 2.0, 1.0], shear=10.0, bulk=20.0)
-    >>> [sp.rigid_body.pseudo_rigid_spin(body, axis, 2.0).verdict for axis in range(3)]
-    ['spectrally stable', 'unstable', 'stable']
-    """
+    """Steady spin of a pseudo-rigid body. Made by `pseudo_rigid_spin`."""
 
     body: PseudoRigidBody
+    """The `PseudoRigidBody`."""
     axis: int
+    """0, 1 or 2."""
     momentum: float
+    """Along the axis [kg m^2/s]."""
     rate: float
+    """Omega [rad/s]."""
     stretches: Array
+    """(3,) q."""
     curvatures: Array
+    """(8,) second derivatives of the amended potential V + mu.I(Q)^-1 mu/2, ascending, across the turn about the
+    momentum, to which it is indifferent [J]."""
     eigenvalues: np.ndarray
+    """(18,) complex, of the linearised motion in the turning frame [1/s]."""
     verdict: str
+    """ "stable" where all curvatures are positive (energy-momentum method: in the sense of Liapunov, up to the turn
+    about the momentum); "unstable" where an eigenvalue has a positive real part; else "spectrally stable", as about the
+    axis of the smallest moment, where friction would decide otherwise."""
 
     __repr__ = short_repr
 
@@ -156,21 +134,13 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
 
     The stretches are a critical point of V + momentum^2/(2 I(q)), reached from the body at rest.
 
+    Source: Lewis and Simo 1990; Marsden and Ratiu, section 15.9, remark 5 (theory.md L8).
+    Raises AccuracyNotReached if no equilibrium is found.
+
     Parameters
     ----------
     axis : 0, 1 or 2, of the reference's principal axes
     momentum : [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError
-        If the axis is none of these, or the momentum not a finite number.
-    AccuracyNotReached
-        If no equilibrium is found.
-
-    Notes
-    -----
-    Source: Lewis and Simo 1990; Marsden and Ratiu, section 15.9, remark 5 (theory.md L8).
 
     Examples
     --------
@@ -180,25 +150,21 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
     1.017854 rad/s, as rigid 1.200000 rad/s
     """
     check_object(body, "PseudoRigidBody", "body")
-    if not isinstance(axis, int | np.integer) or axis not in (0, 1, 2):
-        raise ShapeError(f"axis: one of 0, 1, 2 is needed, got {what_came(axis)}")
-    value = finite_array(momentum, "momentum", unit="kg m^2/s")
-    if value.shape:
-        raise ShapeError(f"momentum: one number is needed, got {what_came(momentum)}")
-    size = float(value)
-    stretches = _stretched(body, int(axis), size)
-    rate = size / float(body.moments(stretches)[axis])
-    curvatures = _curvatures(body, int(axis), size, stretches)
-    eigenvalues = _spectrum(body, int(axis), rate, stretches)
-    if curvatures[0] > _FLAT * curvatures[-1]:
+    index, size = axis_index(axis), number_argument(momentum, "momentum", "kg m^2/s")
+    stretches = _stretched(body, index, size)
+    rate = size / float(body.moments(stretches)[index])
+    curvatures = _curvatures(body, index, size, stretches)
+    eigenvalues = _spectrum(body, index, rate, stretches)
+    # Double eigenvalues are split by the root of the rounding; curvatures have its thousandfold.
+    if curvatures[0] > 1e3 * _EPS * curvatures[-1]:
         verdict = "stable"
-    elif np.real(eigenvalues).max() > _GROWTH * np.abs(eigenvalues).max():
+    elif np.real(eigenvalues).max() > 30.0 * np.sqrt(_EPS) * np.abs(eigenvalues).max():
         verdict = "unstable"
     else:
         verdict = "spectrally stable"
     return PseudoRigidSpin(
         body=body,
-        axis=int(axis),
+        axis=index,
         momentum=size,
         rate=rate,
         stretches=stretches,
@@ -216,7 +182,7 @@ def _stretches(value: ArrayLike) -> Array:
 
 
 def _stretched(body: PseudoRigidBody, axis: int, momentum: float) -> Array:
-    """The stretches of a steady spin: by their logarithms, so that they stay positive."""
+    """Stretches of a steady spin, solved for by their logarithms, so that they stay positive."""
     across = np.where(np.arange(3) == axis, 0.0, body.second_moments)
 
     def balance(logs: Array) -> Array:
@@ -224,10 +190,10 @@ def _stretched(body: PseudoRigidBody, axis: int, momentum: float) -> Array:
         pulled = momentum**2 * across * q * q / float(across @ (q * q)) ** 2
         return (body.shear * (q * q - 1.0) + body.bulk * logs.sum() - pulled) / body.shear
 
-    found = root(balance, np.zeros(3), tol=1e-15)
-    stretches = np.exp(found.x)
-    if np.abs(balance(found.x)).max() > _RESIDUAL * (1.0 + float((stretches**2).max())):
-        raise AccuracyNotReached(f"no steady spin with momentum {momentum:.6g} kg m^2/s was found: {found.message}")
+    solution = root(balance, np.zeros(3), tol=1e-15)
+    stretches = np.exp(solution.x)
+    if np.abs(balance(solution.x)).max() > 1e-10 * (1.0 + float((stretches**2).max())):
+        raise AccuracyNotReached(f"no steady spin with momentum {momentum:.6g} kg m^2/s was found: {solution.message}")
     return stretches
 
 

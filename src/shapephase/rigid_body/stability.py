@@ -14,69 +14,53 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import inertia_argument
+from ..arguments import magnitude_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
 from ..letters import what_came
+from ._arguments import one_tensor
 from .euler_top import EulerTop
 
-_ROUNDING = 16.0 * np.finfo(float).eps
-"""Moments of a tensor that is not diagonal closer than this, relative to its trace, may be equal but for rounding."""
-_ALIGNED = 1e-12
-"""Distance of I n from the line of n, relative to the trace of I, up to which n is a principal axis: what rounding
-leaves of axes that were computed."""
-_LEAST = 1e-100
-"""Smallest momentum taken [kg m^2/s]: its square and the curvature, its inverse square, must be finite."""
-_MOST = 1e100
-"""Largest momentum taken [kg m^2/s], for the same reason."""
+_ALIGNED = 1e-12  # |I n - I_e n|/trace(I) that rounding leaves for a computed principal axis n
+_LARGEST = 1e100  # [kg m^2/s] and its inverse: the momentum's square and inverse square must be finite
 
 
 @dataclass(frozen=True)
 class SteadyRotation:
-    """A steady rotation of a free rigid body and what three methods say of its stability.
+    """Steady rotation of a free rigid body, and its stability by three methods. Made by `steady_rotation`.
 
-    Attributes
-    ----------
-    momentum : (3,) the equilibrium Pi_e, body axes [kg m^2/s]
-    moment : I_e, the moment of inertia about it [kg m^2]
-    slope, curvature : Phi' and Phi'' at |Pi_e|^2/2 of the Casimir Phi that is added to the energy, see `casimir`
-    first_variation : (3,) gradient of H + Phi at Pi_e, Omega + Phi' Pi; zero by the choice of the slope [rad/s]
-    second_variation : (3, 3) second derivative of H + Phi at Pi_e, body axes [1/(kg m^2)]
-    definiteness : "positive definite", "negative definite", "indefinite" or "semidefinite" (equal moments)
-    linearisation : (3, 3) A in dPi' = A dPi, Euler's equations linearised at Pi_e, body axes [1/s]
-    tangent : (3, 2) columns: the principal axes at right angles to Pi_e, right-handed with it
-    eigenvalues : (2,) complex, plus and minus, of the linearisation on the tangent plane of the sphere [1/s]
-    sphere_hessian : (2, 2) second derivative of H restricted to the momentum sphere, in the basis `tangent`
-    index : number of negative directions of `sphere_hessian`
-    verdict : "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (where this moment equals
-        exactly one of the others: a neighbouring motion drifts along the circle of equilibria and stays near it)
-
-    Notes
-    -----
     A spherical body is "stable" everywhere: every momentum stands still.
-
-    Examples
-    --------
-    >>> spin = sp.rigid_body.steady_rotation(np.diag([1.0, 2.0, 3.0]), [0.0, 0.0, 1.0])
-    >>> spin.moment, spin.verdict
-    (3.0, 'stable')
     """
 
     momentum: Array
+    """(3,) the equilibrium Pi_e, body axes [kg m^2/s]."""
     moment: float
+    """I_e, the moment of inertia about it [kg m^2]."""
     slope: float
     curvature: float
+    """`slope` and `curvature`: Phi' and Phi'' at |Pi_e|^2/2 of the Casimir Phi that is added to the energy, see
+    `casimir`."""
     first_variation: Array
+    """(3,) gradient of H + Phi at Pi_e, Omega + Phi' Pi; zero by the choice of the slope [rad/s]."""
     second_variation: Array
+    """(3, 3) second derivative of H + Phi at Pi_e, body axes [1/(kg m^2)]."""
     definiteness: str
+    """ "positive definite", "negative definite", "indefinite" or "semidefinite" (equal moments)."""
     linearisation: Array
+    """(3, 3) A in dPi' = A dPi, Euler's equations linearised at Pi_e, body axes [1/s]."""
     tangent: Array
+    """(3, 2) columns: the principal axes at right angles to Pi_e, right-handed with it."""
     eigenvalues: np.ndarray
+    """(2,) complex, plus and minus, of the linearisation on the tangent plane of the sphere [1/s]."""
     sphere_hessian: Array
+    """(2, 2) second derivative of H restricted to the momentum sphere, in the basis `tangent`."""
     index: int
+    """Number of negative directions of `sphere_hessian`."""
     verdict: str
+    """ "stable" (Liapunov), "unstable", or "stable modulo the circle of equilibria" (where this moment equals exactly
+    one of the others: a neighbouring motion drifts along the circle of equilibria and stays near it)."""
 
     __repr__ = short_repr
 
@@ -97,22 +81,14 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     +-|Pi| sqrt((I_e - I_i)(I_j - I_e)/(I_i I_j)) / I_e. The energy-Casimir method proves stability where that matrix
     is definite (the largest and the smallest moment); the spectrum proves instability where it is indefinite.
 
+    Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2 (I_e is their I1 in turn for each axis; where they
+    order the moments, their I1 > I2 > I3 are our I3, I2, I1); theory.md L1-L3, L5, M-E13.
+    Raises ShapeError if a shape is wrong, or the momentum is zero or not along a principal axis (to 1e-12).
+
     Parameters
     ----------
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
     momentum : (3,) along a principal axis, not zero, body axes [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError
-        If a shape is wrong, or the momentum is zero or not along a principal axis (to 1e-12).
-    UnphysicalInertiaError, SingularInertiaError
-        If the tensor is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.9.4-12), theorem 15.9.1, remark 2 (I_e is their I1 in turn for each axis; where they
-    order the moments, their I1 > I2 > I3 are our I3, I2, I1); theory.md L1-L3, L5, M-E13.
 
     Examples
     --------
@@ -120,14 +96,11 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     >>> print(f"{spin.eigenvalues.real.max():.6f} = sqrt((1 - 1/2)(1/2 - 1/3))")
     0.288675 = sqrt((1 - 1/2)(1/2 - 1/3))
     """
-    tensor = _tensor(inertia)
-    vector = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-    if vector.shape != (3,):
-        raise ShapeError(f"momentum: one steady rotation has one momentum (3,), got {vector.shape}")
+    tensor, vector = one_tensor(inertia), vector_argument(momentum, "momentum", unit="kg m^2/s")
     largest = np.abs(vector).max()
     if largest == 0.0:
         raise ShapeError("momentum: the body is at rest; a steady rotation needs a momentum other than zero")
-    if not _LEAST < largest < _MOST:
+    if not 1.0 / _LARGEST < largest < _LARGEST:
         raise ShapeError(f"momentum: {largest:.3g} kg m^2/s is out of range, 1e-100 to 1e100; take other units")
     magnitude = float(largest * np.linalg.norm(vector / largest))
     axis = vector / magnitude
@@ -154,30 +127,20 @@ def steady_rotations(
     15.9.1 is the axis of the largest moment (its I1, our I3), which is the shortest axis of the inertia ellipsoid and
     of a homogeneous box: here axes go by their moments (theory.md M-E12).
 
+    Equation :eq:`unstable-rate` of the documentation.
+    Source: Marsden and Ratiu, theorem 15.9.1.
+
     Parameters
     ----------
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
     magnitude : |Pi| > 0 [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError, UnphysicalInertiaError, SingularInertiaError
-        As `steady_rotation`.
-
-    Notes
-    -----
-    Equation :eq:`unstable-rate` of the documentation.
-    Source: Marsden and Ratiu, theorem 15.9.1.
 
     Examples
     --------
     >>> [spin.verdict for spin in sp.rigid_body.steady_rotations(np.diag([1.0, 2.0, 3.0]))]
     ['stable', 'unstable', 'stable']
     """
-    tensor = _tensor(inertia)
-    norm = finite_array(magnitude, "magnitude", unit="kg m^2/s")
-    if norm.shape != () or norm <= 0.0:
-        raise ShapeError(f"magnitude: one number above 0 kg m^2/s is needed, got {what_came(magnitude)}")
+    tensor, norm = one_tensor(inertia), magnitude_argument(magnitude)
     _, axes = principal_axes(tensor)
     smallest, intermediate, largest = (steady_rotation(tensor, norm * axes[:, k]) for k in range(3))
     return smallest, intermediate, largest
@@ -185,58 +148,42 @@ def steady_rotations(
 
 @dataclass(frozen=True)
 class SpinInSpace:
-    """How a body moves in space that was disturbed in a steady rotation, for all time; see `spin_in_space`.
-
-    Attributes
-    ----------
-    steady : the steady rotation that was disturbed
-    momentum : (3,) the disturbed Pi, body axes [kg m^2/s]
-    tilt : the greatest angle ever between the axis of the steady rotation and the angular momentum, which is constant
-        in space [rad]; on a separatrix the limit that is never quite reached
-    drift : how much faster than in the steady rotation the body turns about the momentum, on average [rad/s]; NaN where
-        Pi does not circle the axis
-    verdict : "stable up to the turn about the momentum": the tilt is as small as one likes for small disturbances,
-        while the angle about the momentum drifts; or "unstable"
-
-    Examples
-    --------
-    >>> spin = sp.rigid_body.spin_in_space(np.diag([1.0, 2.0, 3.0]), [0.0, 0.0, 1.0], [0.0, 0.01, 1.0])
-    >>> spin.verdict
-    'stable up to the turn about the momentum'
-    """
+    """Motion in space of a body disturbed in a steady rotation, for all time. Made by `spin_in_space`."""
 
     steady: SteadyRotation
+    """The steady rotation that was disturbed."""
     momentum: Array
+    """(3,) the disturbed Pi, body axes [kg m^2/s]."""
     tilt: float
+    """The greatest angle ever between the axis of the steady rotation and the angular momentum, which is constant in
+    space [rad]; on a separatrix the limit that is never quite reached."""
     drift: float
+    """How much faster than in the steady rotation the body turns about the momentum, on average [rad/s]; NaN where Pi
+    does not circle the axis."""
     verdict: str
+    """ "stable up to the turn about the momentum": the tilt is as small as one likes for small disturbances, while the
+    angle about the momentum drifts; or "unstable"."""
 
     __repr__ = short_repr
 
 
 def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike) -> SpinInSpace:
-    """What a steady rotation's stability means for the body that one sees: its axis stays near the momentum in space.
+    """Motion in space after a disturbance of a steady rotation, whose axis stays near the momentum if it is stable.
 
-    As Pi = R^T mu, the angle in space between a body axis n and the constant mu is that in the body between n and Pi.
+    By Pi = R^T mu the angle in space between a body axis n and the constant mu is that in the body between n and Pi.
     So where Pi stays near n in the body, n stays near mu in space, and the tilt is that of the polhode's farthest
     point. The angle about mu is not stable: motions of nearly the same momentum turn at slightly different rates.
     With two equal moments a rotation across their axis is unstable in space: the momentum wanders along the circle of
     equilibria, and the axis away from the momentum.
+
+    Source: Marsden and Ratiu, section 15.9, remark 3 (theory.md L7); M-E1 and M-E7 for the farthest point.
+    Raises ShapeError, UnphysicalInertiaError, SingularInertiaError as `steady_rotation`; also if `disturbed` is zero.
 
     Parameters
     ----------
     inertia : (3, 3) symmetric positive definite tensor, body axes [kg m^2]
     momentum : (3,) of the steady rotation, along a principal axis [kg m^2/s]
     disturbed : (3,) Pi after the disturbance, not zero [kg m^2/s]
-
-    Raises
-    ------
-    ShapeError, UnphysicalInertiaError, SingularInertiaError
-        As `steady_rotation`; also if `disturbed` is zero.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, section 15.9, remark 3 (theory.md L7); M-E1 and M-E7 for the farthest point.
 
     Examples
     --------
@@ -245,15 +192,14 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
     tilt 0.5729 degrees, drift 2.50e-05 rad/s
     """
     steady = steady_rotation(inertia, momentum)
-    vector = finite_array(disturbed, "disturbed", unit="kg m^2/s")
-    if vector.shape != (3,) or not vector.any():
+    vector = vector_argument(disturbed, "disturbed", unit="kg m^2/s")
+    if not vector.any():
         raise ShapeError(f"disturbed: one momentum (3,) other than zero is needed, got {what_came(disturbed)}")
     axis = steady.momentum / np.linalg.norm(steady.momentum)
-    top = EulerTop(inertia, np.asarray(vector), None)
-    stable = steady.verdict == "stable"
+    top, stable = EulerTop(inertia, vector), steady.verdict == "stable"
     return SpinInSpace(
         steady=steady,
-        momentum=np.asarray(vector),
+        momentum=vector,
         tilt=_farthest(top, axis),
         drift=_mean_turn(top, axis) - float(np.linalg.norm(steady.momentum)) / steady.moment,
         verdict="stable up to the turn about the momentum" if stable else "unstable",
@@ -261,7 +207,7 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
 
 
 def _farthest(top: EulerTop, axis: Array) -> float:
-    """The greatest angle between Pi and a principal axis [rad]."""
+    """Greatest angle between Pi and a principal axis [rad]."""
     orbit, own = top.orbit, top.axes.T @ axis
     if orbit.circled < 0:
         return float(so3.angle_between(orbit.direction, own))
@@ -285,13 +231,6 @@ def _mean_turn(top: EulerTop, axis: Array) -> float:
     return top.montgomery_phase / top.period
 
 
-def _tensor(inertia: ArrayLike) -> Array:
-    tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
-    if tensor.shape != (3, 3):
-        raise ShapeError(f"inertia: one tensor (3, 3) is needed, got {tensor.shape}")
-    return inertia_argument(tensor[None])[0]
-
-
 def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
     """Moments and principal axes in the plane at right angles to a principal axis, right-handed with it."""
     first = so3.perpendicular(axis)
@@ -303,9 +242,9 @@ def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
 
 
 def _tie(tensor: Array, axis: Array) -> float:
-    """Largest difference of equal moments [kg m^2]: none for a diagonal tensor, whose moments are exact."""
+    """Largest difference of equal moments [kg m^2]: 0 for a diagonal tensor, else 16 roundings of the trace."""
     exact = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0 and np.count_nonzero(axis) == 1
-    return 0.0 if exact else _ROUNDING * float(np.trace(tensor))
+    return 0.0 if exact else 16.0 * float(np.finfo(float).eps * np.trace(tensor))
 
 
 def _classified(

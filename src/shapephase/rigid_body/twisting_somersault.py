@@ -25,7 +25,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import root_scalar
 
 from .. import elliptic, so3
 from ..arguments import moments_argument
@@ -33,71 +32,47 @@ from ..arrays import Array, Integers, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 from ..letters import what_came
+from ..roots import bracketed_root
 from ..sphere import gauss_nodes
+from ._arguments import above_zero
 from .euler_top import EulerTop
 from .gyrostat import Gyrostat
 
-_CELLS = 16
-"""In a period or less, whose quadrature counts whole turns: its error is far below half of one."""
-_SLOWEST = 0.3
-"""Least momentum that a dive is looked for with, of that which does all somersaults without a twist."""
-_FASTEST = 4.0
-"""Largest momentum that a dive is looked for with, likewise."""
-_TRIALS = 24
-"""Momenta among which a dive of given duration is looked for."""
-_EDGE = 1e-9
-"""[rad] From the long axis and from the separatrix, between which the tilt of a twist is looked for."""
-_ROUNDED = 1.0 + 1e-12
-"""Of the duration: times up to which are the end, but for rounding."""
-_FORWARD = np.array([1.0, 0.0, 0.0])
-"""x, about which the rotor turns."""
-_ACROSS = np.array([0.0, 1.0, 0.0])
-"""y, about which the body somersaults."""
-_TWIST = 2
-"""The stage in which the body twists."""
+_MOMENTA = np.geomspace(0.3, 4.0, 24)  # tried for a duration, relative to the momentum of the somersaults alone
+_FORWARD, _ACROSS, _ = np.eye(3)  # x, about which the rotor turns; y, about which the body somersaults
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RotorDive:
-    """A dive of five stages; see `rotor_dive`.
-
-    Attributes
-    ----------
-    moments : (3,) about x, y and z, without what the rotor turns [kg m^2]
-    momentum : l, about +y in inertial axes [kg m^2/s]
-    rotor : h, about x, in the second stage [kg m^2/s]
-    somersaults, twists : m and n
-    times : (6,) at which the stages begin and the dive ends [s]
-    turns : (5,) what the long axis turns through about the momentum in each stage [rad], of sum 2 pi m
-    tilt : the angle of the momentum from the plane of x and y halfway [rad]
-
-    Examples
-    --------
-    >>> dive = sp.rigid_body.rotor_dive([12.0, 11.0, 1.0], 70.0, 50.0, 0.12, somersaults=1.5, twists=2)
-    >>> print(f"{dive.duration:.4f} s, of which it twists {np.diff(dive.times)[2]:.4f} s")
-    1.5857 s, of which it twists 0.4005 s
-    """
+    """Dive of five stages. Made by `rotor_dive`."""
 
     moments: Array
+    """(3,) about x, y and z, without what the rotor turns [kg m^2]."""
     momentum: float
+    """l, about +y in inertial axes [kg m^2/s]."""
     rotor: float
+    """h, about x, in the second stage [kg m^2/s]."""
     somersaults: float
     twists: float
+    """`somersaults` and `twists`: m and n."""
     times: Array
+    """(6,) at which the stages begin and the dive ends [s]."""
     turns: Array
+    """(5,) angles of the long axis about the momentum in each stage [rad], of sum 2 pi m."""
     tilt: float
+    """The angle of the momentum from the plane of x and y halfway [rad]."""
     _bodies: tuple[Gyrostat, EulerTop, Gyrostat] = field(repr=False)
 
     __repr__ = short_repr
 
     @property
     def duration(self) -> float:
-        """Of the whole dive [s]."""
+        """Duration of the whole dive [s]."""
         return float(self.times[-1])
 
     @property
     def landing(self) -> Array:
-        """Where a dive of m somersaults and n twists has to end, exactly: (3, 3), body axes to inertial axes."""
+        """Exact last attitude of a dive of m somersaults and n twists: (3, 3), body axes to inertial axes."""
         turn, twist = 2.0 * np.pi * self.somersaults, 2.0 * np.pi * self.twists
         return so3.exp(turn * _ACROSS) @ so3.exp(np.array([0.0, 0.0, twist]))
 
@@ -121,9 +96,9 @@ class RotorDive:
         return self._by_stage(t, (3,), lambda body, since: body.body_momentum(since), alone)
 
     def rotor_momentum(self, t: ArrayLike) -> Array:
-        """What the rotor has, L_o of the body as a deforming one: times (...) -> (..., 3), body axes [kg m^2/s].
+        """Momentum of the rotor, L_o of the body as a deforming one: times (...) -> (..., 3), body axes [kg m^2/s].
 
-        At a time when it is switched, what it has then on.
+        Switching times belong to the stage that begins.
         """
         times = self._checked(t)
         spins = np.array([0.0, self.rotor, 0.0, float(self._bodies[2].rotor[0]), 0.0])
@@ -153,7 +128,7 @@ class RotorDive:
         """
         times, sense = self._checked(t), np.sign(self.rotor)
         pi, period = self.body_momentum(times), self._bodies[1].period
-        start, end = self.times[_TWIST : _TWIST + 2]
+        start, end = self.times[2:4]
         gone = times - start + 0.5 * (self.twists * period - (end - start))
         # Before and after, the momentum has left or reached the y axis by less than half a turn.
         turns = np.where(times < start, 0.0, np.where(times > end, self.twists, gone / period))
@@ -162,7 +137,7 @@ class RotorDive:
 
     def _checked(self, t: ArrayLike) -> Array:
         times = finite_array(t, "t", unit="s")
-        if np.any((times < 0.0) | (times > self.duration * _ROUNDED)):
+        if np.any((times < 0.0) | (times > self.duration * (1.0 + 1e-12))):
             raise ShapeError(f"t: {times.min():.6g} to {times.max():.6g} s; the dive is on [0, {self.duration:.6g}] s")
         return np.minimum(times, self.duration)
 
@@ -176,14 +151,14 @@ class RotorDive:
         of_body: Callable[[Gyrostat | EulerTop, Array], Array],
         alone: Callable[[int, Array], Array],
     ) -> Array:
-        """What a stage has at its times; `alone` is for the somersault without twist, first and last."""
+        """Values of each stage at its times; `alone` is for the somersaults without twist, first and last."""
         times = self._checked(t)
-        found, stages = np.empty((*times.shape, *shape)), self._stage(times)
+        values, stages = np.empty((*times.shape, *shape)), self._stage(times)
         for stage in range(5):
             here = stages == stage
             since = times[here] - self.times[stage]
-            found[here] = alone(stage, since) if stage in (0, 4) else of_body(self._bodies[stage - 1], since)
-        return found
+            values[here] = alone(stage, since) if stage in (0, 4) else of_body(self._bodies[stage - 1], since)
+        return values
 
 
 def rotor_dive(
@@ -194,6 +169,10 @@ def rotor_dive(
     What is left for somersaults without twist, half of it at the start and half at the end, follows, and with it the
     duration. `rotor_dive_lasting` finds the momentum for a duration.
 
+    Source: Bharadwaj et al. 2016; Cabrera 2006 (13); theory.md F10.
+    Raises TrajectoryError if there is no such dive: after the first shape change the momentum does not circle the long
+    axis, or has circled it too far already, or shape changes and twist alone are more somersaults.
+
     Parameters
     ----------
     moments : (3,) about the rotor's axis x, the somersault's y and the long axis z, that about z the smallest [kg m^2]
@@ -202,18 +181,6 @@ def rotor_dive(
     kick : time for which the rotor is on, twice [s]
     somersaults : m > 0
     twists : n, a positive multiple of a half
-
-    Raises
-    ------
-    ShapeError
-        If an argument is of a wrong shape or value.
-    TrajectoryError
-        If there is no such dive: after the first shape change the momentum does not circle the long axis, or has
-        circled it too far already, or shape changes and twist alone are more somersaults.
-
-    Notes
-    -----
-    Source: Bharadwaj et al. 2016; Cabrera 2006 (13); theory.md F10.
 
     Examples
     --------
@@ -249,14 +216,12 @@ def rotor_dive_lasting(
 ) -> RotorDive:
     """The dive with m somersaults and n twists in a given time: the momentum is solved for.
 
+    Other parameters and errors as `rotor_dive`; TrajectoryError also where no momentum between 0.3 and 4 times that of
+    the somersaults alone gives the duration.
+
     Parameters
     ----------
     duration : of the whole dive, 1.5 s from a platform of ten metres [s]
-
-    Notes
-    -----
-    Other parameters and errors as `rotor_dive`; TrajectoryError also where no momentum between 0.3 and 4 times that of
-    the somersaults alone gives the duration.
 
     Examples
     --------
@@ -264,26 +229,25 @@ def rotor_dive_lasting(
     >>> print(f"{dive.duration:.9f} s, {dive.momentum:.4f} kg m^2/s, tilt {np.degrees(dive.tilt):.3f} degrees")
     1.500000000 s, 74.1313 kg m^2/s, tilt 19.398 degrees
     """
-    span, values = _positive(duration, "duration", "s"), _moments(moments)
-    alone = 2.0 * np.pi * _positive(somersaults, "somersaults", "") * float(values[1]) / span
+    span, values = above_zero(duration, "duration", "s"), _moments(moments)
+    momenta = 2.0 * np.pi * above_zero(somersaults, "somersaults") * float(values[1]) / span * _MOMENTA
 
     def excess(momentum: float) -> float:
         return _parts(values, momentum, rotor, kick, somersaults, twists).duration - span
 
     last, reason = None, "none of them is a dive"
-    for momentum in alone * np.geomspace(_SLOWEST, _FASTEST, _TRIALS):
+    for momentum in momenta:
         try:
             now = (float(momentum), excess(float(momentum)))
         except TrajectoryError as error:
             last, reason = None, str(error)
             continue
         if last is not None and (last[1] > 0.0) != (now[1] > 0.0):
-            return rotor_dive(
-                values, _root(excess, last[0], now[0]), rotor, kick, somersaults=somersaults, twists=twists
-            )
+            found = bracketed_root(excess, last[0], now[0])
+            return rotor_dive(values, found, rotor, kick, somersaults=somersaults, twists=twists)
         last = now
     raise TrajectoryError(
-        f"duration: no momentum from {_SLOWEST * alone:.6g} to {_FASTEST * alone:.6g} kg m^2/s makes the dive last "
+        f"duration: no momentum from {momenta[0]:.6g} to {momenta[-1]:.6g} kg m^2/s makes the dive last "
         f"{span:.6g} s ({reason})"
     )
 
@@ -294,21 +258,13 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
     In the kick model shape changes take no time. The momentum, tilted from y towards z by this angle, then circles z n
     times while the long axis goes round the momentum m times.
 
+    Source: Dullin and Tong 2016, the kick model; theory.md F10.
+    Raises TrajectoryError if a twist takes more somersaults at any tilt.
+
     Parameters
     ----------
     moments : (3,) as for `rotor_dive` [kg m^2]
     somersaults_per_twist : m/n
-
-    Raises
-    ------
-    ShapeError
-        If the arguments are of a wrong shape or value.
-    TrajectoryError
-        If a twist takes more somersaults at any tilt.
-
-    Notes
-    -----
-    Source: Dullin and Tong 2016, the kick model; theory.md F10.
 
     Examples
     --------
@@ -317,7 +273,7 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
     >>> print(f"{np.degrees(tilt):.4f} degrees, {10.0 * top.long_axis_precession_per_period / np.pi:.9f} pi")
     39.3758 degrees, 3.000000000 pi
     """
-    values, ratio = _moments(moments), _positive(somersaults_per_twist, "somersaults_per_twist", "")
+    values, ratio = _moments(moments), above_zero(somersaults_per_twist, "somersaults_per_twist")
     rates = 1.0 / values
     least = np.arcsin(np.sqrt(max(0.0, (rates[0] - rates[1]) / (rates[2] - rates[1]))))
 
@@ -325,24 +281,19 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
         top = EulerTop.principal(values, [0.0, np.cos(tilt), np.sin(tilt)])
         return top.long_axis_precession_per_period / (2.0 * np.pi) - ratio
 
-    low, high = float(least) + _EDGE, 0.5 * np.pi - _EDGE
+    # Off the separatrix and the long axis, where the rotation number is not defined.
+    low, high = float(least) + 1e-9, 0.5 * np.pi - 1e-9
     if excess(low) < 0.0 or excess(high) > 0.0:
         raise TrajectoryError(
             f"somersaults_per_twist: from {excess(high) + ratio:.6g} to {excess(low) + ratio:.6g} are possible for "
             f"this body, got {ratio:.6g}"
         )
-    return _root(excess, low, high)
+    return bracketed_root(excess, low, high)
 
 
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function changes its sign, to rounding."""
-    found = root_scalar(function, bracket=(low, high), method="brentq", xtol=1e-15 * high)
-    return float(found.root)
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class _Parts:
-    """What stages take and turn, before the bodies of the stages are made."""
+    """Durations [s] and turns [rad] of the stages, before their bodies are made."""
 
     arguments: tuple[Array, float, float, float, float, float]
     tilting: Gyrostat
@@ -350,23 +301,15 @@ class _Parts:
     changing: float
     twisted: float
     left: float
-
-    @property
-    def alone(self) -> float:
-        """Of the first and of the last stage [s]."""
-        values, size = self.arguments[:2]
-        return 0.5 * self.left * float(values[1]) / size
-
-    @property
-    def duration(self) -> float:
-        return 2.0 * (self.alone + self.arguments[3]) + self.lasting
+    alone: float  # duration of the first and of the last stage [s]
+    duration: float  # of the whole dive [s]
 
 
 def _parts(moments: ArrayLike, momentum: float, rotor: float, kick: float, somersaults: float, twists: float) -> _Parts:
     """The stages of a dive; see `rotor_dive`."""
     values = _moments(moments)
-    size, on = _positive(momentum, "momentum", "kg m^2/s"), _positive(kick, "kick", "s")
-    count, around = _positive(somersaults, "somersaults", ""), _positive(twists, "twists", "")
+    size, on = above_zero(momentum, "momentum", "kg m^2/s"), above_zero(kick, "kick", "s")
+    count, around = above_zero(somersaults, "somersaults"), above_zero(twists, "twists")
     spin = finite_array(rotor, "rotor", unit="kg m^2/s")
     if (2.0 * around) % 1.0 or spin.shape or not spin:
         raise ShapeError("twists: a multiple of a half is needed; rotor: one momentum other than 0")
@@ -385,14 +328,9 @@ def _parts(moments: ArrayLike, momentum: float, rotor: float, kick: float, somer
             f"{around:g} twists and the shape changes for them are {count - 0.5 * left / np.pi:.6g} somersaults, more "
             f"than {count:g}; a quicker or stronger rotor tilts more"
         )
-    return _Parts(
-        arguments=(values, size, float(spin), on, count, around),
-        tilting=tilting,
-        lasting=lasting,
-        changing=changing,
-        twisted=twisted,
-        left=left,
-    )
+    alone = 0.5 * left * float(values[1]) / size
+    arguments = values, size, float(spin), on, count, around
+    return _Parts(arguments, tilting, lasting, changing, twisted, left, alone, 2.0 * (alone + on) + lasting)
 
 
 def _moments(moments: ArrayLike) -> Array:
@@ -402,23 +340,17 @@ def _moments(moments: ArrayLike) -> Array:
     return values
 
 
-def _positive(value: ArrayLike, name: str, unit: str) -> float:
-    number = finite_array(value, name, unit=unit)
-    if number.shape or number <= 0.0:
-        raise ShapeError(f"{name}: one number above 0 is needed, got {what_came(value)}")
-    return float(number)
-
-
 def _azimuth(attitude: Array) -> Array:
-    """Of the long axis about y, from z: (..., 3, 3) -> (...) [rad]."""
+    """Azimuth of the long axis about y, from z: (..., 3, 3) -> (...) [rad]."""
     return np.arctan2(attitude[..., 0, 2], attitude[..., 2, 2])
 
 
 def _turned(body: Gyrostat | EulerTop, since: ArrayLike) -> Array:
-    """What the long axis has turned through about the momentum: times (...) from 0 on -> (...) [rad]."""
+    """Angle that the long axis has turned through about the momentum: times (...) from 0 on -> (...) [rad]."""
     times = np.asarray(since, dtype=float)
     span = float(times.max(initial=0.0))
-    cells = _CELLS * (1 + int(min(span / body.period, 1e4)))
+    # 16 cells a period: the error of the quadrature, which counts whole turns, is far below half of one.
+    cells = 16 * (1 + int(min(span / body.period, 1e4)))
     edges = np.linspace(0.0, span, cells + 1)
     nodes, weights = gauss_nodes(edges[:-1], edges[1:])
     pi, omega = body.body_momentum(nodes), body.angular_velocity(nodes)
@@ -429,7 +361,7 @@ def _turned(body: Gyrostat | EulerTop, since: ArrayLike) -> Array:
 
 
 def _since_the_plane(top: EulerTop) -> float:
-    """How long before t = 0 the momentum crossed Pi_x = 0 with Pi_y > 0 [s]."""
+    """Time since the momentum crossed Pi_x = 0 with Pi_y > 0, at t = 0 [s]."""
     quarter = float(elliptic.complete_k(top.complement))
     forward = int(np.argmax(np.abs(top.axes[0])))
     crossing = 0.0 if forward == 1 else quarter

@@ -8,15 +8,8 @@ import pytest
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ChartPoleError, ShapeError, UnphysicalInertiaError
-from shapephase.rigid_body._andoyer_pendulum import andoyer_pendulum
-from shapephase.rigid_body.euler_angles import ZXZ, ZYZ
-from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.geodesics._andoyer_variables import (
-    AndoyerVariables,
-    andoyer_from_euler,
-    andoyer_motion,
-    andoyer_variables,
-)
+from shapephase.rigid_body import ZXZ, ZYZ, EulerTop, andoyer_pendulum
+from shapephase.rigid_body.geodesics import AndoyerVariables, andoyer_from_euler, andoyer_motion, andoyer_variables
 
 MOMENTS = np.array([3.0, 2.0, 1.0])
 TENSOR = np.array([[2.1, 0.3, -0.2], [0.3, 1.7, 0.15], [-0.2, 0.15, 1.2]])

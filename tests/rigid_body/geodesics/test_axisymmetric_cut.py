@@ -9,8 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from shapephase import so3
 from shapephase.errors import ShapeError
-from shapephase.rigid_body.geodesics.axisymmetric_cut import axisymmetric_metric
-from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
+from shapephase.rigid_body.geodesics import axisymmetric_metric, left_invariant_metric
 
 # (I_1, I_3): flat with I_3 below and beyond 2 I_1, round, rods, sub-Riemannian.
 PAIRS = [(1.0, 1.5), (1.0, 3.0), (1.0, 30.0), (2.0, 2.0), (2.0, 0.7), (1.0, 0.2), (1.0, np.inf), (2.5, np.inf)]

@@ -10,10 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError
-from shapephase.rigid_body.geodesics import distance
-from shapephase.rigid_body.geodesics.axisymmetric_cut import axisymmetric_metric
-from shapephase.rigid_body.geodesics.distance import nearest_attitude, shortest_geodesic
-from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
+from shapephase.rigid_body.geodesics import (
+    axisymmetric_metric,
+    distance,
+    left_invariant_metric,
+    nearest_attitude,
+    shortest_geodesic,
+)
 from support.long_runs import full_but
 
 AXISYMMETRIC = [[1.0, 1.0, 3.0], [1.0, 1.0, 0.3], [0.7, 2.0, 2.0], [1.0, np.inf, 1.0], [1.5, 1.5, 1.5]]

@@ -9,24 +9,23 @@ from geographiclib.geodesic import Geodesic
 from scipy.optimize import brentq
 
 from shapephase.errors import ShapeError
-from shapephase.rigid_body.geodesics._conjugate_locus import (
+from shapephase.rigid_body.geodesics import (
+    astroid,
     conjugate_height_rate,
     conjugate_locus,
     conjugate_points,
     conjugate_points_of_momentum,
-)
-from shapephase.rigid_body.geodesics._cut_locus import cut_locus, cut_time
-from shapephase.rigid_body.geodesics._ellipsoid import (
-    astroid,
+    cut_locus,
+    cut_time,
     ellipsoid,
     ellipsoid_period,
+    extremal,
     geodetic_latitude,
     latitude_of_geodetic,
     meridian_length,
     metric_coefficients,
+    surface_of_metric,
 )
-from shapephase.rigid_body.geodesics._extremal import extremal
-from shapephase.rigid_body.geodesics.metric_profile import surface_of_metric
 from support.long_runs import full_but
 
 ASPECTS = [0.02, 0.5, 0.6, 0.99, 1.0, 1.5, 20.0]

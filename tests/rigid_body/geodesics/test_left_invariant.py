@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
-from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body import EulerTop
 from shapephase.rigid_body.geodesics import _conjugate_search as conjugate_search
-from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
+from shapephase.rigid_body.geodesics import left_invariant_metric
 from support.independent import cross
 from support.long_runs import full_but
 

@@ -15,10 +15,15 @@ from scipy.integrate import quad, solve_ivp
 
 from shapephase import so3
 from shapephase.errors import ShapeError
-from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.geodesics._andoyer_variables import AndoyerVariables, andoyer_motion, andoyer_variables
-from shapephase.rigid_body.geodesics._sadov_variables import sadov_frequencies, sadov_variables
-from shapephase.rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
+from shapephase.rigid_body import EulerTop
+from shapephase.rigid_body.geodesics import (
+    AndoyerVariables,
+    andoyer_motion,
+    andoyer_variables,
+    sadov_frequencies,
+    sadov_variables,
+    serret_andoyer_metric,
+)
 from support.long_runs import full_but
 
 MOMENTS = np.array([3.0, 2.0, 1.0])

@@ -13,17 +13,20 @@ from scipy.special import ellipj
 
 from shapephase import elliptic
 from shapephase.errors import AccuracyNotReached, ShapeError
-from shapephase.rigid_body.geodesics._conjugate_locus import (
+from shapephase.rigid_body.geodesics import (
+    assumptions,
     conjugate_height_rate,
     conjugate_locus,
     conjugate_points,
     conjugate_points_of_momentum,
+    cut_locus,
+    cut_time,
+    ellipsoid,
+    extremal,
+    surface_of_metric,
+    surface_of_stretch,
+    variational_jacobi_field,
 )
-from shapephase.rigid_body.geodesics._cut_locus import cut_locus, cut_time
-from shapephase.rigid_body.geodesics._ellipsoid import ellipsoid
-from shapephase.rigid_body.geodesics._extremal import extremal, variational_jacobi_field
-from shapephase.rigid_body.geodesics.metric_profile import assumptions, surface_of_metric
-from shapephase.rigid_body.geodesics.surface_of_revolution import surface_of_stretch
 from support.long_runs import full_but
 
 ANDOYER = (1.0 / 3.0, 1.0 / 2.0, 1.0)

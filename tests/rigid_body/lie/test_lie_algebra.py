@@ -11,39 +11,24 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm, logm
 
 from shapephase import so3 as rotations
-from shapephase.errors import AccuracyNotReached, ShapeError, ShapePhaseError, SingularInertiaError
+from shapephase.errors import AccuracyNotReached, LieAlgebraError, ShapeError, ShapePhaseError, SingularInertiaError
 from shapephase.inertia_tensor import second_moment
-from shapephase.rigid_body.lie.euler_poincare import euler_poincare_motion, euler_poincare_rate
-from shapephase.rigid_body.lie.generalised_poinsot import (
-    contact_conormal,
-    contact_velocity,
-    invariable_hyperplane,
-    rolling_contact,
-)
-from shapephase.rigid_body.lie.group_kinematics import (
+from shapephase.rigid_body.lie import (
+    LieAlgebra,
     adjoint_action,
     body_momentum,
     body_velocity,
     coadjoint_action,
+    contact_conormal,
+    contact_velocity,
+    euler_poincare_motion,
+    euler_poincare_rate,
     group_exponential,
-    space_momentum,
-    space_velocity,
-)
-from shapephase.rigid_body.lie.lagrangian import reduce_translations, se3_inertia
-from shapephase.rigid_body.lie.lie_algebra import (
-    LieAlgebra,
-    LieAlgebraError,
+    hamiltonian_vector_field,
     heisenberg,
+    invariable_hyperplane,
     lie_algebra_from_matrices,
-    se2,
-    se3,
-    sl2r,
-    so,
-    so3,
-    su2,
-)
-from shapephase.rigid_body.lie.lie_poisson import hamiltonian_vector_field, lie_poisson_bracket
-from shapephase.rigid_body.lie.n_dimensional_rigid_body import (
+    lie_poisson_bracket,
     manakov_integrals,
     momentum_traces,
     n_dimensional_angular_velocity,
@@ -51,6 +36,17 @@ from shapephase.rigid_body.lie.n_dimensional_rigid_body import (
     n_dimensional_momentum,
     n_dimensional_rate,
     pfaffian,
+    reduce_translations,
+    rolling_contact,
+    se2,
+    se3,
+    se3_inertia,
+    sl2r,
+    so,
+    so3,
+    space_momentum,
+    space_velocity,
+    su2,
 )
 from support.independent import cross
 

@@ -12,7 +12,11 @@ from scipy.integrate import solve_ivp
 
 from shapephase import so3 as rotations
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError
-from shapephase.rigid_body.lie.cayley_klein import (
+from shapephase.rigid_body.lie import (
+    angular_velocity,
+    body_angular_velocity,
+    bracket_gradient,
+    casimir_defect,
     cayley_klein_attitude,
     cayley_klein_bracket,
     cayley_klein_equations,
@@ -21,51 +25,45 @@ from shapephase.rigid_body.lie.cayley_klein import (
     cayley_klein_momentum,
     cayley_klein_motion,
     cayley_klein_spinor,
-)
-from shapephase.rigid_body.lie.dissipation import (
+    coadjoint_orbit_form,
+    convective_lagrangian,
+    convective_velocity,
     dissipated_power,
     double_bracket_equations,
     double_bracket_motion,
-    symmetric_bracket,
-)
-from shapephase.rigid_body.lie.lagrangian import (
-    body_angular_velocity,
-    convective_lagrangian,
-    convective_velocity,
-    legendre_transform,
-    mass_inertia,
-    mass_inner_product,
-    material_lagrangian,
-    material_velocity,
-    reduce_translations,
-    se3_inertia,
-    spatial_angular_velocity,
-    spatial_lagrangian,
-    spatial_momentum,
-    spatial_velocity,
-)
-from shapephase.rigid_body.lie.lie_algebra import heisenberg, se2, se3, sl2r, so, so3, su2
-from shapephase.rigid_body.lie.lie_poisson import (
-    angular_velocity,
-    bracket_gradient,
-    casimir_defect,
-    coadjoint_orbit_form,
     euler_equations,
     hamiltonian_vector_field,
+    heisenberg,
     kinetic_energy,
+    legendre_transform,
     lie_poisson_bracket,
     lie_poisson_motion,
     linear_casimirs,
-    poisson_tensor,
-    quadratic_casimirs,
-    sphere_area_form,
-    sphere_symplectic_form,
-)
-from shapephase.rigid_body.lie.magnetic_moment import (
     magnetic_equilibria,
     magnetic_hamiltonian,
     magnetic_precession,
     magnetic_precession_rate,
+    mass_inertia,
+    mass_inner_product,
+    material_lagrangian,
+    material_velocity,
+    poisson_tensor,
+    quadratic_casimirs,
+    reduce_translations,
+    se2,
+    se3,
+    se3_inertia,
+    sl2r,
+    so,
+    so3,
+    spatial_angular_velocity,
+    spatial_lagrangian,
+    spatial_momentum,
+    spatial_velocity,
+    sphere_area_form,
+    sphere_symplectic_form,
+    su2,
+    symmetric_bracket,
 )
 from support.independent import cross
 

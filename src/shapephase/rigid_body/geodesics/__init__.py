@@ -2,7 +2,7 @@
 
 Conjugate and cut points, distances, and the variables of Andoyer and Sadov. Mostly after Bonnard, Cots and
 Shcherbakova 2013, who number principal moments in descending order: their I_1 > I_2 > I_3 and A < B < C are our
-I_3, I_2, I_1 and 1/I_3, 1/I_2, 1/I_1. Moments are taken in any order, and answers are on the caller's axes.
+I_3, I_2, I_1 and 1/I_3, 1/I_2, 1/I_1. Moments are taken in any order, and results are on the caller's axes.
 """
 
 from lazy_loader import attach_stub

@@ -3,12 +3,14 @@ from ._arc_quadrature import Arcs
 from ._conjugate_locus import (
     ConjugateLocus,
     ConjugatePoints,
+    CutLocus,
     conjugate_height_rate,
     conjugate_locus,
     conjugate_points,
     conjugate_points_of_momentum,
+    cut_locus,
+    cut_time,
 )
-from ._cut_locus import CutLocus, cut_locus, cut_time
 from ._ellipsoid import (
     EllipsoidStretch,
     astroid,
@@ -19,14 +21,11 @@ from ._ellipsoid import (
     meridian_length,
     metric_coefficients,
 )
-from ._extremal import Extremal, Start, extremal, start_of, stretch_at, variational_jacobi_field
+from ._extremal import Extremal, extremal, variational_jacobi_field
 from ._sadov_variables import SadovVariables, andoyer_from_sadov, sadov_frequencies, sadov_variables
 from ._serret_andoyer_constants import (
     GeodesicClass,
     GeodesicConstants,
-    constants_of,
-    constants_of_momentum,
-    separatrix_constants,
 )
 from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
 from .distance import ShortestGeodesic, nearest_attitude, shortest_geodesic
@@ -54,7 +53,6 @@ __all__ = [
     "SadovVariables",
     "SerretAndoyerMetric",
     "ShortestGeodesic",
-    "Start",
     "SurfaceOfRevolution",
     "TabulatedStretch",
     "TurningBody",
@@ -69,8 +67,6 @@ __all__ = [
     "conjugate_locus",
     "conjugate_points",
     "conjugate_points_of_momentum",
-    "constants_of",
-    "constants_of_momentum",
     "cut_locus",
     "cut_time",
     "ellipsoid",
@@ -84,11 +80,8 @@ __all__ = [
     "nearest_attitude",
     "sadov_frequencies",
     "sadov_variables",
-    "separatrix_constants",
     "serret_andoyer_metric",
     "shortest_geodesic",
-    "start_of",
-    "stretch_at",
     "surface_of_metric",
     "surface_of_stretch",
     "variational_jacobi_field",

@@ -27,23 +27,16 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_object, inertia_argument
-from ...arrays import Array, Mask, finite_array
+from ...arrays import Array, Mask, common_batch, common_shape, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ChartPoleError, ShapeError, WrongObjectError
 from ...inertia_tensor import inverse_inertia
 from ...letters import what_came
+from .._arguments import check_entries
 from ..euler_angles import ZXZ, ZYZ, EulerChart
 
-_NEAREST = 1e-8
-"""sqrt(G^2 - L^2)/G; nearer, L rounds to G, and the part of the momentum across the axis is lost."""
-_LARGEST_TURN = 1.0
-"""[rad] From one sample to the next: far from half a turn, where a turn's sense is lost."""
-_NO_TURN = 1e-9
-"""[rad] Turns of a body at rest, which do not become less with the step."""
-_MOST_SAMPLES = 200_000
-"""14 MB of attitudes; or eight times the number of times given, if that is more."""
-_REFINEMENT_RATIO = 0.7
-"""Half the step turns by half; more than this share is a turn that was missed by whole turns."""
+_NEAREST = 1e-8  # sqrt(G^2 - L^2)/G; nearer, L rounds to G, and the momentum's component across the axis is lost
+_MOST_SAMPLES = 200_000  # 14 MB of attitudes; or eight times the number of times given, if that is more
 
 
 class TurningBody(Protocol):
@@ -51,7 +44,6 @@ class TurningBody(Protocol):
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
     >>> top.attitude(0.0).shape, top.body_momentum(0.0).round(9).tolist()  # what is needed of it
     ((3, 3), [1.5, 0.3, 0.4])
@@ -68,17 +60,14 @@ class TurningBody(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class AndoyerVariables:
-    """g, k, l [rad] and the momenta conjugate to them [kg m^2/s]; see `andoyer_variables`. They broadcast together.
+    """Andoyer's g, k, l [rad] and the momenta conjugate to them [kg m^2/s], which broadcast together.
 
-    Raises
-    ------
-    ShapeError
-        If their shapes do not go together, an entry is not finite, G is not above 0, or |L| or |K| is above G.
+    Raises ShapeError if their shapes do not go together, an entry is not finite, G is not above 0, or |L| or |K| is
+    above G.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
+    >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
     >>> print(f"{state.hamiltonian(np.diag([1.0, 2.0, 4.0])):.9f}, {0.3**2 / 2 + 0.4**2 / 4 + 1.2**2 / 8:.9f}")
     0.265000000, 0.265000000
     """
@@ -96,35 +85,22 @@ class AndoyerVariables:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        names = ("g", "k", "l", "total", "vertical", "axial")
-        values = [finite_array(getattr(self, name), name) for name in names]
-        try:
-            values = np.broadcast_arrays(*values)
-        except ValueError:
-            shapes = ", ".join(f"{name} {value.shape}" for name, value in zip(names, values, strict=True))
-            raise ShapeError(f"{shapes}: the shapes cannot be broadcast together") from None
-        for name, value in zip(names, values, strict=True):
-            object.__setattr__(self, name, value)
-        for name, value in (("total", 0.0), ("vertical", self.vertical), ("axial", self.axial)):
-            bad = (self.total <= 0.0) | (np.abs(value) > self.total)
-            if bad.any():
-                where = tuple(int(i) for i in np.argwhere(bad)[0])
-                raise ShapeError(
-                    f"{name}: entry {list(where)} is {getattr(self, name)[where]:.17g} where G is "
-                    f"{self.total[where]:.17g}; G must be above 0, K and L between -G and G"
-                )
+        values = {name: finite_array(value, name) for name, value in vars(self).items()}
+        shape = common_shape(**values)
+        for name, value in values.items():
+            object.__setattr__(self, name, np.broadcast_to(value, shape))
+        check_entries(self.total <= 0.0, self.total, "total", "G must be above 0")
+        for name, value in (("vertical", self.vertical), ("axial", self.axial)):
+            check_entries(np.abs(value) > self.total, value, name, "K and L must be between -G and G")
 
     @property
     def is_regular(self) -> Mask:
-        """Whether they are regular: the parts of the momentum across both third axes are above 1e-8 of G."""
+        """True where they are regular: the momentum has more than 1e-8 of G across both third axes."""
         return (self._across > _NEAREST * self.total) & (self._level > _NEAREST * self.total)
 
     @property
     def body_momentum(self) -> Array:
-        """Pi: (..., 3), body axes [kg m^2/s]. Singular cases included.
-
-        Source: Bonnard et al., before (5).
-        """
+        """Pi: (..., 3), body axes [kg m^2/s]. Singular cases included. Source: Bonnard et al., before (5)."""
         across = self._across
         return np.stack([across * np.sin(self.l), across * np.cos(self.l), self.axial], axis=-1)
 
@@ -138,22 +114,17 @@ class AndoyerVariables:
     def attitude(self) -> Array:
         """R, body to inertial axes: (..., 3, 3). Singular cases included."""
         outward = _vertical_frame(self.k, np.arctan2(self._level, self.vertical))
-        return outward @ _about_third(self.g) @ _body_frame(np.arctan2(self._across, self.axial), self.l)
+        return outward @ _turn(self.g, 0, 1) @ _body_frame(np.arctan2(self._across, self.axial), self.l)
 
     def euler_angles(self, chart: EulerChart = ZYZ) -> tuple[Array, Array]:
         """Euler angles (phi, theta, psi) in [rad] and their momenta: two (..., 3).
 
         p_phi = K and p_psi = L in both charts, `ZYZ` of Bonnard et al. and `ZXZ` of Marsden and Ratiu.
 
-        Raises
-        ------
-        ChartPoleError
-            Within 1e-8 of a pole of the chart, where the two third axes are parallel. Its converse is
-            `andoyer_from_euler`.
-
-        Notes
-        -----
         Source: Bonnard et al., section 3.4, the complete relations, of which the last is for phi_3 (theory.md B-E4).
+
+        Raises ChartPoleError within 1e-8 of a pole of the chart, where the two third axes are parallel. The inverse is
+        `andoyer_from_euler`.
         """
         angles = chart.angles(self.attitude)
         return angles, chart.conjugate_momenta(angles, self.body_momentum)
@@ -161,13 +132,6 @@ class AndoyerVariables:
     def hamiltonian(self, inertia: ArrayLike) -> Array:
         """The energy Pi.I^-1 Pi/2 of a body of this inertia: (..., 3, 3) [kg m^2, body axes] -> (...) [J].
 
-        Raises
-        ------
-        ShapeError, UnphysicalInertiaError, SingularInertiaError
-            If the inertia does not go with the variables, is not symmetric, or not positive definite.
-
-        Notes
-        -----
         Source: Bonnard et al. (5), there in principal axes.
         """
         momentum = self.body_momentum
@@ -176,33 +140,23 @@ class AndoyerVariables:
     def rates(self, inertia: ArrayLike) -> tuple[Array, Array, Array]:
         """g', l' [rad/s] and L' [kg m^2/s^2] of free motion; k, G and K are constant: (..., 3, 3) -> three (...).
 
-        Raises
-        ------
-        ChartPoleError
-            At L = +-G, to 1e-8 of the momentum, if the body's third axis is not principal: l has no rate there.
-        ShapeError, UnphysicalInertiaError, SingularInertiaError
-            As `hamiltonian`.
-
-        Notes
-        -----
         Source: Bonnard et al. (8), there in principal axes.
+
+        Raises ChartPoleError at L = +-G, to 1e-8 of the momentum, if the body's third axis is not principal: l has no
+        rate there.
         """
         inverse = self._inverse(inertia)
         sine, cosine, across, along = np.sin(self.l), np.cos(self.l), self._across, self.axial
         zero = np.zeros(across.shape)
-        ahead, aside = (
-            np.stack([sine, cosine, zero], -1),
-            np.stack([cosine, -sine, zero], -1),
-        )
+        ahead, aside = np.stack([sine, cosine, zero], -1), np.stack([cosine, -sine, zero], -1)
         column, third = so3.apply(inverse, ahead), inverse[..., 2, 2]
         own, mixed = np.sum(column * ahead, axis=-1), column[..., 2]
-        bad = (across <= _NEAREST * self.total) & np.any(inverse[..., 2, :2] != 0.0, axis=-1)
-        if bad.any():
-            where = tuple(int(i) for i in np.argwhere(bad)[0])
-            raise ChartPoleError(
-                f"entry {list(where)}: the momentum is along the body's third axis to {_NEAREST:g}, where l has no "
-                "rate unless that axis is principal; turn the body axes, so that another axis is the third"
-            )
+        requirement = (
+            f"the momentum is along the body's third axis to {_NEAREST:g}, where l has no rate unless that axis is "
+            "principal; turn the body axes, so that another axis is the third"
+        )
+        undefined = (across <= _NEAREST * self.total) & np.any(inverse[..., 2, :2] != 0.0, axis=-1)
+        check_entries(undefined, np.broadcast_to(along, undefined.shape), "axial", requirement, ChartPoleError)
         part = np.where(mixed == 0.0, 0.0, along * mixed / np.where(across > 0.0, across, 1.0))
         twist = across**2 * np.sum(column * aside, axis=-1) + across * along * np.sum(aside * inverse[..., 2], axis=-1)
         return self.total * (own + part), along * (third - own - part) + across * mixed, -twist
@@ -217,47 +171,29 @@ class AndoyerVariables:
 
     def _inverse(self, inertia: ArrayLike) -> Array:
         tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
-        try:
-            np.broadcast_shapes(tensor.shape[:-2], self.l.shape)
-        except ValueError:
-            raise ShapeError(
-                f"inertia {tensor.shape}: its leading axes do not go with those of the variables, {self.l.shape}"
-            ) from None
+        common_batch(inertia=tensor.shape[:-2], variables=self.l.shape)
         return inverse_inertia(tensor)
 
 
 def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerVariables:
-    """Andoyer's variables of a state: (..., 3, 3), (..., 3) -> (...) each.
+    """Andoyer's variables of a state, the angles in (-pi, pi]: (..., 3, 3), (..., 3) -> (...) each.
+
+    Raises ShapeError if an argument is not a rotation or not a finite vector, or a momentum is zero.
 
     Parameters
     ----------
     attitude : (..., 3, 3) body to inertial axes
     body_momentum : (..., 3) Pi = R^T mu, body axes [kg m^2/s]
 
-    Returns
-    -------
-    AndoyerVariables, the angles in (-pi, pi]; singular cases as the module says
-
-    Raises
-    ------
-    ShapeError
-        If an argument is not a rotation or not a finite vector, or a momentum is zero.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
+    >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [0.3, 0.4, 1.2])
     >>> print(f"{state.total:.9f} {state.axial:.9f}")
     1.300000000 1.200000000
     """
     rotation = so3.rotation_argument(attitude, "attitude")
     momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
-    try:
-        shape = np.broadcast_shapes(rotation.shape[:-2], momentum.shape[:-1])
-    except ValueError:
-        raise ShapeError(
-            f"attitude {rotation.shape}, body_momentum {momentum.shape}: the leading axes cannot be broadcast together"
-        ) from None
+    shape = common_batch(attitude=rotation.shape[:-2], body_momentum=momentum.shape[:-1])
     momentum = np.broadcast_to(momentum, (*shape, 3))
     total, vertical, azimuth, tilt = _outer(so3.apply(rotation, momentum), "body_momentum")
     across = np.hypot(momentum[..., 0], momentum[..., 1])
@@ -270,34 +206,19 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
     magnitude = np.abs(momentum[..., 2])
     axial = np.where(magnitude > across, total - across**2 / (total + magnitude), magnitude)
     axial = np.copysign(axial, momentum[..., 2])
-    return AndoyerVariables(
-        g=so3.wrap(turn),
-        k=so3.wrap(azimuth),
-        l=so3.wrap(inner),
-        total=total,
-        vertical=vertical,
-        axial=axial,
-    )
+    return AndoyerVariables(so3.wrap(turn), so3.wrap(azimuth), so3.wrap(inner), total, vertical, axial)
 
 
 def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart = ZYZ) -> AndoyerVariables:
     """Andoyer's variables of Euler angles (phi, theta, psi) and their momenta: (..., 3), (..., 3) -> (...) each.
 
-    Raises
-    ------
-    ChartPoleError
-        Within 1e-8 of a pole of the chart.
-    ShapeError
-        If an argument is not a finite vector, or a momentum is zero.
-
-    Notes
-    -----
     Source: as `AndoyerVariables.euler_angles`.
+
+    Raises ChartPoleError within 1e-8 of a pole of the chart, ShapeError if a momentum is zero.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_from_euler([0.1, 1.0, 0.2], [1.2, 0.1, 0.3])
+    >>> state = sp.rigid_body.geodesics.andoyer_from_euler([0.1, 1.0, 0.2], [1.2, 0.1, 0.3])
     >>> print(f"{state.vertical:.9f} {state.axial:.9f}")
     1.200000000 0.300000000
     """
@@ -313,6 +234,9 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     is followed reliably, and g and l may gain half turns there that leave the attitude unchanged. Between the times
     given the motion is sampled more densely, until it turns by less than a radian from one sample to the next.
 
+    Equation :eq:`andoyer-energy` of the documentation.
+    Source: Cabrera 2006 (13) for the phase; theory.md R1.
+
     Parameters
     ----------
     motion : with `attitude(t)` and `body_momentum(t)`: an `EulerTop`, or a `Motion`, also of a deforming body
@@ -320,31 +244,21 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
 
     Raises
     ------
-    ShapeError
-        If the times are not a list in order, or the momentum is zero.
     AccuracyNotReached
         If the attitude jumps, or turns so often between the times that it cannot be followed.
 
-    Notes
-    -----
-    Equation :eq:`andoyer-energy` of the documentation.
-    Source: Cabrera 2006 (13) for the phase; theory.md R1.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
-    >>> state = geodesics.andoyer_motion(top, [0.0, top.period])
+    >>> state = sp.rigid_body.geodesics.andoyer_motion(top, [0.0, top.period])
     >>> print(state.total.round(9), f"{state.g[1] - state.g[0]:.6f}")
     [1.58113883 1.58113883] 7.508599
     """
     if not (hasattr(motion, "attitude") and hasattr(motion, "body_momentum")):
         raise WrongObjectError(f"motion: a Motion or an EulerTop is needed, got {what_came(motion)}")
     times = finite_array(t, "t", (None,), unit="s")
-    if times.ndim != 1 or not (np.all(np.diff(times) > 0.0) or np.all(np.diff(times) < 0.0)):
-        raise ShapeError(f"t: a list (N,) of times in strict order is needed, got shape {times.shape}")
-    if not times.size:
-        raise ShapeError("t: at least one time is needed, got none")
+    if times.ndim != 1 or not times.size or not (np.all(np.diff(times) > 0.0) or np.all(np.diff(times) < 0.0)):
+        raise ShapeError(f"t: a list (N,) of times in strict order, at least one, is needed, got shape {times.shape}")
     if times.size == 1:
         return andoyer_variables(motion.attitude(times), motion.body_momentum(times))
     dense, attitudes = _close_samples(motion, times)
@@ -357,18 +271,11 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     start = angles[..., :1, :]
     angles = angles + (so3.wrap(start) - start)
     axial = np.clip(momentum[..., 2], -total, total)
-    return AndoyerVariables(
-        g=angles[..., 0],
-        k=so3.wrap(azimuth),
-        l=angles[..., 2],
-        total=total,
-        vertical=vertical,
-        axial=axial,
-    )
+    return AndoyerVariables(angles[..., 0], so3.wrap(azimuth), angles[..., 2], total, vertical, axial)
 
 
 def _close_samples(motion: TurningBody, times: Array) -> tuple[Array, Array]:
-    """Times, evenly spaced between those given, and attitudes there, close together on this grid and the one before."""
+    """Times, evenly spaced between those given, dense enough to follow the attitudes, and these attitudes."""
     steps, before, parts = np.diff(times), np.inf, 1
     while True:
         inner = times[:-1, None] + steps[:, None] * (np.arange(parts) / parts)
@@ -376,8 +283,8 @@ def _close_samples(motion: TurningBody, times: Array) -> tuple[Array, Array]:
         attitudes = motion.attitude(dense)
         turned = so3.angle(so3.transpose(attitudes[..., :-1, :, :]) @ attitudes[..., 1:, :, :])
         largest = float(np.max(turned, initial=0.0))
-        # One grid is not enough: whole turns from one sample to the next would look like none.
-        if before < _LARGEST_TURN and largest < _REFINEMENT_RATIO * before + _NO_TURN:
+        # On one grid whole turns from one sample to the next would show as none: half the step must turn by half.
+        if before < 1.0 and largest < 0.7 * before + 1e-9:
             return dense, attitudes
         before = largest
         if dense.size > max(_MOST_SAMPLES, 8 * times.size):
@@ -390,33 +297,22 @@ def _close_samples(motion: TurningBody, times: Array) -> tuple[Array, Array]:
 
 def _outer(spatial: Array, name: str) -> tuple[Array, Array, Array, Array]:
     """G, K, k and I of the momentum in inertial axes."""
-    bad = np.all(spatial == 0.0, axis=-1)
-    if bad.any():
-        where = tuple(int(i) for i in np.argwhere(bad)[0])
-        raise ShapeError(f"{name}: entry {list(where)} is zero, and a momentum without direction has no such variables")
-    level = np.hypot(spatial[..., 0], spatial[..., 1])
-    total = np.maximum(np.hypot(level, spatial[..., 2]), np.abs(spatial[..., 2]))
-    return (
-        total,
-        spatial[..., 2],
-        np.arctan2(0.0 - spatial[..., 0], spatial[..., 1] + 0.0),
-        np.arctan2(level, spatial[..., 2]),
-    )
-
-
-def _about_third(angle: Array) -> Array:
-    """R_z(angle)."""
-    return _turn(angle, 0, 1)
+    zero = np.all(spatial == 0.0, axis=-1)
+    check_entries(zero, spatial, name, "a momentum of zero has no direction, and no such variables")
+    x, y, vertical = np.moveaxis(spatial, -1, 0)
+    level = np.hypot(x, y)
+    total = np.maximum(np.hypot(level, vertical), np.abs(vertical))
+    return total, vertical, np.arctan2(0.0 - x, y + 0.0), np.arctan2(level, vertical)
 
 
 def _vertical_frame(azimuth: Array, tilt: Array) -> Array:
     """R_z(azimuth + pi) R_x(tilt), whose third axis is that of the momentum."""
-    return _about_third(azimuth) @ _turn(-tilt, 1, 2) * np.array([-1.0, -1.0, 1.0])
+    return _turn(azimuth, 0, 1) @ _turn(-tilt, 1, 2) * np.array([-1.0, -1.0, 1.0])
 
 
 def _body_frame(tilt: Array, angle: Array) -> Array:
     """R_x(tilt) R_z(angle)."""
-    return _turn(tilt, 1, 2) @ _about_third(angle)
+    return _turn(tilt, 1, 2) @ _turn(angle, 0, 1)
 
 
 def _turn(angle: Array, i: int, j: int) -> Array:

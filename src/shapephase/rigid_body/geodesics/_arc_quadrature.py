@@ -17,35 +17,15 @@ import numpy as np
 from ...arrays import Array, Mask
 
 Triple = tuple[Array, Array, Array]
-Stretch = Callable[[Array, Array], Triple]
-"""Y and depth - Y, (N,) each -> D(Y), D'(Y), D''(Y), (N,) each."""
+Stretch = Callable[[Array, Array], Triple]  # Y and depth - Y, (N,) each -> D(Y), D'(Y), D''(Y), (N,) each
 
-_RULE = np.polynomial.legendre.leggauss(16)
-_NODES = _RULE[0]
-"""(16,) in [-1, 1]: right to rounding on panels that are as long as their distance to a singularity."""
-_WEIGHTS = _RULE[1]
-_NEAR_POLE = 1e-4
-"""1 - Y; nearer, the difference D(Y) - D(1) loses four digits, and the series by D' and D'' is right to rounding."""
-_BEND_WIDTH = 0.02
-"""Weight of |D''/D'| at the pole: where D bends sharply the series holds less far, to 1 - Y = 0.005 |D'/D''|."""
-_NOT_ZERO = 1e-30
-"""Least q and depth - q of the grading: beyond that many halvings nothing changes."""
-_MOST_SPLITS = 7
-"""Parts of each panel; a metric that needs more is too rough."""
-_SETTLED = np.array([2e-13, 2e-13, 2e-12, 1e-8])
-"""Relative changes that are rounding: of integrals of D, and of its derivatives, which may come from a table of D."""
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(
+    16
+)  # right to rounding on panels as long as their distance to a pole
 
 
 class Arcs(NamedTuple):
-    """Integrals from the equator to a phase, any shape.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> arcs = geodesics.Arcs(np.array(1.0), np.array(0.5), np.array(0.0))
-    >>> float(arcs.time), float(arcs.longitude)
-    (1.0, 0.5)
-    """
+    """Integrals from the equator to a phase, any shape. Made by `SurfaceOfRevolution.arcs`."""
 
     time: Array
     """Arc length."""
@@ -85,7 +65,7 @@ def quadrature(
             add(active, start, np.minimum(angles[active], high), from_turning=False)
     levels = np.full(angles.shape, equator_levels)
     if end != "pole":
-        width = np.sqrt(np.maximum(room, _NOT_ZERO) / np.maximum(q, _NOT_ZERO))
+        width = np.sqrt(np.maximum(room, 1e-30) / np.maximum(q, 1e-30))
         levels = np.maximum(levels, np.ceil(np.log2(quarter / np.minimum(width, quarter))).astype(int) + 1)
     remaining = np.maximum(0.5 * np.pi - angles, 0.0)
     for level in range(int(levels.max()) + 1):
@@ -117,14 +97,15 @@ def folded_cosine(angle: Array) -> Array:
 def settled_splits(stretch: Stretch, depth: float, end: str) -> int | None:
     """The least number of parts of each panel at which the integrals have converged; None if there is none."""
     q = depth * np.array([0.02, 0.2, 0.5, 0.8, 0.95, 0.999])
-    before = None
-    for splits in range(1, _MOST_SPLITS + 1):
-        found = np.stack(quadrature(stretch, depth, end, q, depth - q, np.full(q.shape, 0.5 * np.pi), splits))
-        if before is not None:
-            change = np.abs(found - before) / (np.abs(found) + np.abs(found[0]))
-            if np.all(change.max(axis=1) <= _SETTLED):
-                return splits - 1
-        before = found
+    # Rounding of integrals of D, and of its derivatives, which may come from a table of D.
+    rounding = np.array([2e-13, 2e-13, 2e-12, 1e-8])
+    before = np.full((4, q.size), np.inf)
+    for splits in range(1, 8):
+        integrals = np.stack(quadrature(stretch, depth, end, q, depth - q, np.full(q.shape, 0.5 * np.pi), splits))
+        change = np.abs(integrals - before) / (np.abs(integrals) + np.abs(integrals[0]))
+        if np.all(change.max(axis=1) <= rounding):
+            return splits - 1
+        before = integrals
     return None
 
 
@@ -136,9 +117,10 @@ def _integrands(
     if pole is None:
         angle = value / ((1.0 - depth) + rest)
     else:
-        # Where D bends sharply at the pole the series holds less far.
-        bending = _BEND_WIDTH * abs(float(pole[2][0])) / max(abs(float(pole[1][0])), 1e-300)
-        near = rest * max(1.0, bending) < _NEAR_POLE
+        # Nearer than 1e-4 the difference D(Y) - D(1) loses four digits, and the series by D' and D'' is right to
+        # rounding; where D bends sharply at the pole it holds less far, to 1 - Y = 0.005 |D'/D''|.
+        bending = 0.02 * abs(float(pole[2][0])) / max(abs(float(pole[1][0])), 1e-300)
+        near = rest * max(1.0, bending) < 1e-4
         # Less the mean of D' from here to the pole, by the trapezoidal rule corrected at both ends.
         mean = 0.5 * (slope + pole[1]) + rest / 12.0 * (second - pole[2])
         angle = np.where(near, -mean, (value - pole[0]) / np.where(near, 1.0, rest))

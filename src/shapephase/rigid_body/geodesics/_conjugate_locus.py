@@ -1,17 +1,26 @@
-"""Conjugate points on a surface of revolution: exactly one of every order between consecutive turning points.
+"""Conjugate points and cut loci on a surface of revolution.
 
-The functions take any latitude of the start, all orders, and directions (angles from east to north at the start).
+Between consecutive turning points there is exactly one conjugate point of every order. The functions take any latitude
+of the start, all orders, and directions (angles from east to north at the start).
+
+On a smooth sphere of revolution, symmetric in its equator, whose curvature falls all the way from the equator to the
+poles (an oblate ellipsoid), the cut locus of a point is an arc of the opposite parallel; where it rises (a prolate
+one), an arc of the opposite meridian; on the round sphere the opposite point. The arc's ends are conjugate points.
+It is an arc of the opposite parallel also where only the first return falls with p, whatever the curvature does:
+extremals of opposite directions meet there, after half a period, and those of smaller p farther on.
+
+Sources: Sinclair and Tanaka 2007, main theorem; Bonnard, Caillau, Sinclair and Tanaka 2009, for first returns; Bonnard,
+Cots and Shcherbakova 2013, end of section 2; theory.md O16, P6.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arguments import check_object, number_argument
+from ...arguments import check_object, number_argument, whole_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
@@ -21,27 +30,12 @@ from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
 from .surface_of_revolution import SurfaceOfRevolution
 
-_HIGHEST_ORDER = 1000
-"""Up to here the phase, order times pi, keeps twelve digits of the way between two turning points."""
-_CONSTANT_TIME = 1e-11
-"""Rates of the conjugate time by the direction [1/rad], in parts of the time, that are rounding."""
-_LEAST_DIRECTIONS = 8
-"""Two in each quadrant, the least that show the four cusps of a generic locus."""
-_BAND_MARGIN = 1e-6
-"""In parts of the widest angle of oscillating extremals, at which conjugate points are infinitely far."""
+_HIGHEST_ORDER = 1000  # up to here the phase, order times pi, keeps twelve digits between two turning points
 
 
 @dataclass(frozen=True, eq=False)
 class ConjugatePoints:
-    """Conjugate points along extremals in directions (...), see `conjugate_points`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> points = geodesics.conjugate_points(geodesics.ellipsoid(0.8), 0.5)
-    >>> print(f"{points.time:.6f} {points.latitude:.6f} {points.longitude:.6f}")
-    2.745913 -0.073137 2.732659
-    """
+    """Conjugate points along extremals in directions (...). Made by `conjugate_points`."""
 
     direction: Array
     """Angle at the start from east to north [rad]."""
@@ -63,19 +57,11 @@ class ConjugatePoints:
 
 @dataclass(frozen=True, eq=False)
 class ConjugateLocus:
-    """The conjugate locus of one order, sampled, see `conjugate_locus`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> locus = geodesics.conjugate_locus(geodesics.ellipsoid(0.8), 60)
-    >>> locus.order, len(locus.cusp_directions)
-    (1, 4)
-    """
+    """Conjugate locus of one order, sampled. Made by `conjugate_locus`."""
 
     order: int
     points: ConjugatePoints
-    """Of directions (N,), ascending."""
+    """In directions (N,), ascending."""
     time_rate: Array
     """(N,) derivative of the conjugate time by the direction."""
     cusp_directions: Array
@@ -94,19 +80,12 @@ def conjugate_points(
 ) -> ConjugatePoints:
     """The conjugate points of an order along extremals from a latitude, longitude 0: directions (...) [rad] -> (...).
 
-    Raises
-    ------
-    ShapeError
-        If the order is not in 1..1000 or a direction leads out of the band of oscillating extremals.
-
-    Notes
-    -----
     Source: Bonnard et al., lemma 2.7 and remark 2, in the form of the module `surface_of_revolution`.
+    Raises ShapeError if the order is not in 1..1000 or a direction leads out of the band of oscillating extremals.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> points = geodesics.conjugate_points(geodesics.ellipsoid(1.0), [0.3, 0.9])
+    >>> points = sp.rigid_body.geodesics.conjugate_points(sp.rigid_body.geodesics.ellipsoid(1.0), [0.3, 0.9])
     >>> print(points.time.round(9))  # pi on a sphere
     [3.14159265 3.14159265]
     """
@@ -140,6 +119,8 @@ def conjugate_locus(
 ) -> ConjugateLocus:
     """The conjugate locus of a point: all conjugate points of an order, and its cusps.
 
+    Raises ShapeError as `conjugate_points`; or for fewer than 8 directions.
+
     Parameters
     ----------
     directions : how many (the next multiple of 4), spread evenly over those that lead to oscillating extremals, none
@@ -150,15 +131,9 @@ def conjugate_locus(
     A cusp is where the conjugate time is extremal as the direction varies; two of them between neighbouring directions
     are missed.
 
-    Raises
-    ------
-    ShapeError
-        As `conjugate_points`; or for fewer than 8 directions.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> geodesics.conjugate_locus(geodesics.ellipsoid(0.8), 60).cusps
+    >>> sp.rigid_body.geodesics.conjugate_locus(sp.rigid_body.geodesics.ellipsoid(0.8), 60).cusps
     4
     """
     latitude = number_argument(latitude, "latitude", "rad")
@@ -180,7 +155,7 @@ def conjugate_locus(
             raise ShapeError("directions: expected how many, or ascending angles (N,)")
         points, rate = _points_and_rate(surface, chosen, order, latitude)
         band, closed = np.zeros(len(rate), dtype=int), False
-    signs = np.sign(np.where(np.abs(rate) < _CONSTANT_TIME * points.time, 0.0, rate))
+    signs = np.sign(np.where(np.abs(rate) < 1e-11 * points.time, 0.0, rate))
     moving = np.flatnonzero(signs)
     ahead = np.roll(moving, -1)
     change = (signs[moving] != signs[ahead]) & (band[moving] == band[ahead]) & (closed | (ahead > moving))
@@ -190,19 +165,13 @@ def conjugate_locus(
 
 
 def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, order: int = 1) -> Array:
-    """n R'' + integral of d^2 f/dp^2 from the equator on: what decides whether a branch of the locus has cusps.
+    """n R'' + integral of d^2 f/dp^2 from the equator on, which is 0 at cusps of a branch of the locus.
 
     The second derivative by p of the longitude on the latitude of the conjugate point of order n, of extremals from the
     equator with 0 < p < sqrt(m(0)): (...) -> (...). Where it is not 0 the branch has no cusp, also where R'' < 0.
 
-    Raises
-    ------
-    ShapeError
-        If p is that of the equator, where it is infinite, or of no oscillating extremal.
-
-    Notes
-    -----
     Source: Bonnard et al., before proposition 3, which assumes R'' > 0; theory.md B-E9, O13.
+    Raises ShapeError if p is that of the equator, where it is infinite, or of no oscillating extremal.
 
     Examples
     --------
@@ -218,26 +187,108 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
             f"momentum: below sqrt(m(0)) = {surface.greatest_momentum:.17g}, at which the rate is infinite"
         )
     start = Start(momentum=p, q=q, room=room, phase=np.zeros(p.shape), side=np.ones(p.shape))
-    points, ends = _points(surface, np.asarray(surface.direction_of(p)), start, order)
+    points, _, end = _points(surface, np.asarray(surface.direction_of(p)), start, order)
     xi = points.phase - order * np.pi
     value, slope, _ = stretch_at(surface, q, room, xi)
     second = surface.bend_rate(q, room, xi) + 2.0 * order * _whole_bend_rate(surface, q, room)
     sine, cosine = np.sin(xi), np.cos(xi)
-    by_q = slope * sine**3 / cosine - ends.end.bend - q * second
+    by_q = slope * sine**3 / cosine - end.bend - q * second
     # At a fixed latitude q sin^2(chi) is fixed, so chi moves with q.
     moving = by_q - value / cosine**2 * np.tan(xi) / (2.0 * q)
     return (-2.0 * p / (surface.equator**2 * q) * moving)[()]
 
 
-class _Ends(NamedTuple):
-    """Integrals along extremals: up to the start, over a quarter of the period, up to the conjugate point."""
+@dataclass(frozen=True)
+class CutLocus:
+    """Cut locus of the point at a latitude and longitude 0: an arc between two ends. Made by `cut_locus`."""
 
-    begin: Arcs
-    quarter: Arcs
-    end: Arcs
+    kind: str
+    """ "parallel", "meridian" or "point"."""
+    latitudes: tuple[float, float]
+    """phi of the ends, ascending."""
+    longitudes: tuple[float, float]
+    """theta of the ends, ascending, about pi [rad]."""
+
+    __repr__ = short_repr
 
 
-def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int) -> tuple[ConjugatePoints, _Ends]:
+def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
+    """The cut locus of the point at a latitude, longitude 0.
+
+    Raises ShapeError if the surface is no smooth sphere whose curvature changes one way from the equator to the poles,
+    or whose first return falls with p, or the point is a pole.
+
+    Examples
+    --------
+    >>> cut = sp.rigid_body.geodesics.cut_locus(sp.rigid_body.geodesics.ellipsoid(0.8))
+    >>> print(cut.kind, np.round(np.array(cut.longitudes) / np.pi, 9))
+    parallel [0.8 1.2]
+    """
+    check_object(surface, "SurfaceOfRevolution", "surface")
+    kind = _kind(surface, latitude)
+    phi = float(latitude)
+    if kind == "point":
+        return CutLocus(kind=kind, latitudes=(0.0 - phi, 0.0 - phi), longitudes=(np.pi, np.pi))
+    if kind == "parallel":
+        end = float(conjugate_points(surface, 0.0, 1, latitude).longitude)
+        return CutLocus(kind=kind, latitudes=(0.0 - phi, 0.0 - phi), longitudes=(end, 2.0 * np.pi - end))
+    ends = np.sort(conjugate_points(surface, np.array([0.5, -0.5]) * np.pi, 1, latitude).latitude)
+    return CutLocus(kind=kind, latitudes=(float(ends[0]), float(ends[1])), longitudes=(np.pi, np.pi))
+
+
+def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Array:
+    """The length up to which extremals from a latitude in directions (...) [rad] are shortest: (...) -> (...).
+
+    Until they meet their mirror image: at the opposite parallel, after half a period, or at the opposite meridian.
+
+    Examples
+    --------
+    >>> print(f"{sp.rigid_body.geodesics.cut_time(sp.rigid_body.geodesics.ellipsoid(1.0), 0.5):.9f} = pi")
+    3.141592654 = pi
+    """
+    check_object(surface, "SurfaceOfRevolution", "surface")
+    kind = _kind(surface, latitude)
+    angle = finite_array(direction, "direction", unit="rad")
+    start = start_of(surface, angle, latitude)
+    if kind != "meridian":
+        return np.asarray(0.5 * surface.period(start.momentum))[()]
+    p, q, room, first = (np.ravel(a) for a in (start.momentum, start.q, start.room, start.phase))
+    magnitude = np.abs(p)
+    begin = surface.trusted_arcs(magnitude, q, room, first)
+    # Next to a meridian the longitude jumps at the pole, and the conjugate point is the limit of the meeting points.
+    straight = magnitude <= 1e-9 * surface.greatest_momentum
+
+    def step(chi: Array) -> tuple[Array, Array]:
+        gained = surface.trusted_arcs(magnitude, q, room, chi).longitude - begin.longitude - np.pi
+        square = q * np.sin(chi) ** 2
+        value, _, _ = surface.stretch(square, surface.depth - square)
+        rate = magnitude / surface.equator * value / np.maximum(1.0 - square, np.finfo(float).tiny)
+        return gained, chi - gained / np.maximum(rate, np.finfo(float).tiny)
+
+    chi = safe_newton(step, first + 0.9 * np.pi, first, first + np.pi)
+    time = surface.trusted_arcs(magnitude, q, room, chi).time - begin.time
+    conjugate = np.ravel(conjugate_points(surface, angle, 1, latitude).time)
+    return np.where(straight, conjugate, time).reshape(angle.shape)[()]
+
+
+def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
+    if not surface.has_smooth_poles:
+        raise ShapeError(f"a cut locus is known on smooth spheres of revolution; this one ends at a {surface.end}")
+    if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - 1e-12:
+        raise ShapeError(f"latitude: one number between the poles is needed, got {what_came(latitude)}")
+    trend = surface.curvature_trend()
+    if trend != "neither":
+        return {"decreasing": "parallel", "increasing": "meridian", "constant": "point"}[trend]
+    if surface.tameness() == "decreasing":
+        return "parallel"
+    raise ShapeError(
+        "the curvature must fall, or rise, all the way from the equator to the poles, or the first return fall with p; "
+        "they do not"
+    )
+
+
+def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int) -> tuple[ConjugatePoints, Arcs, Arcs]:
+    """Conjugate points, and the integrals along the extremals up to the start and up to the conjugate point."""
     p, q, room, first = start.momentum, start.q, start.room, start.phase
     sine0, cosine0 = np.sin(first), folded_cosine(first)
     here = stretch_at(surface, q, room, first)[0]
@@ -258,7 +309,7 @@ def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int
     guess = np.arctan2(here * sine0 + cosine0 * q * (whole - begin.bend), cosine0 * here)
     xi = safe_newton(step, np.ravel(guess), -limit, limit, ROUNDING).reshape(p.shape)
     rest = surface.trusted_arcs(p, q, room, xi)
-    end = Arcs(*(part + 2.0 * order * one for part, one in zip(rest, quarter)))
+    end = Arcs(*(partial + 2.0 * order * whole for partial, whole in zip(rest, quarter)))
     # The phase is xi and whole half turns, each of which changes the sign of y.
     height = (-1.0) ** order * start.side * np.sqrt(q) * np.sin(xi)
     top = np.sqrt(surface.depth)
@@ -271,7 +322,7 @@ def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int
         height=height,
         phase=xi + order * np.pi,
     )
-    return points, _Ends(begin, quarter, end)
+    return points, begin, end
 
 
 def _points_and_rate(
@@ -279,7 +330,7 @@ def _points_and_rate(
 ) -> tuple[ConjugatePoints, Array]:
     """Conjugate points, and d t_c/d direction from L(chi) = L(chi_0) differentiated."""
     start = start_of(surface, angle, latitude)
-    points, ends = _points(surface, angle, start, order)
+    points, begin, end = _points(surface, angle, start, order)
     q, room, first, xi = start.q, start.room, start.phase, points.phase - order * np.pi
     rest = 1.0 - float(surface.height(latitude)) ** 2
     _, slope, _ = stretch_at(surface, q, room, xi)
@@ -288,9 +339,9 @@ def _points_and_rate(
     second = surface.bend_rate(q, room, xi) + 2.0 * order * _whole_bend_rate(surface, q, room)
     sine, cosine, sine0, cosine0 = np.sin(xi), np.cos(xi), np.sin(first), np.cos(first)
     first_rate = -sine0 / cosine0 / (2.0 * np.where(q > 0.0, q, 1.0))
-    level_rate = here / cosine0**2 * first_rate + slope0 * sine0**3 / cosine0 - ends.begin.bend - q * second0
-    by_q = slope * sine**3 * cosine - cosine**2 * (ends.end.bend + q * second)
-    time_rate = 0.5 * (ends.end.bend - ends.begin.bend) + cosine**2 * level_rate - by_q - here * first_rate
+    level_rate = here / cosine0**2 * first_rate + slope0 * sine0**3 / cosine0 - begin.bend - q * second0
+    by_q = slope * sine**3 * cosine - cosine**2 * (end.bend + q * second)
+    time_rate = 0.5 * (end.bend - begin.bend) + cosine**2 * level_rate - by_q - here * first_rate
     return points, 2.0 * np.sin(angle) * np.cos(angle) * rest * time_rate
 
 
@@ -300,11 +351,9 @@ def _whole_bend_rate(surface: SurfaceOfRevolution, q: Array, room: Array) -> Arr
 
 def _eastward(surface: SurfaceOfRevolution, count: int, latitude: float) -> Array:
     """The eastward half of `count` directions of oscillating extremals, none of them along an axis of symmetry."""
-    if count < _LEAST_DIRECTIONS:
-        raise ShapeError(f"directions: at least {_LEAST_DIRECTIONS} are needed to see the locus, got {count}")
-    half = (count + 1) // 2
-    if half % 2:
-        half += 1
+    if count < 8:
+        raise ShapeError(f"directions: at least 8 are needed, two in each quadrant, to see the four cusps, got {count}")
+    half = 2 * ((count + 3) // 4)
     return _widest(surface, latitude) * (2.0 * (np.arange(half) + 0.5) / half - 1.0)
 
 
@@ -317,15 +366,15 @@ def _mirrored(points: ConjugatePoints, turn: float, changing: tuple[str, ...]) -
 
 
 def _widest(surface: SurfaceOfRevolution, latitude: float) -> float:
-    """The largest angle to the parallels of extremals that oscillate, less a margin where steeper ones do not."""
+    """Largest angle to the parallels of extremals that oscillate, less a margin: there points are infinitely far."""
     if surface.has_smooth_poles:
         return 0.5 * np.pi
     here = float(np.sqrt(surface.metric(latitude)))
     if here <= surface.least_momentum:
         raise ShapeError(f"latitude: {latitude!r} is at the surface's end, from where no extremal oscillates")
-    return float(np.arccos(surface.least_momentum / here)) * (1.0 - _BAND_MARGIN)
+    return float(np.arccos(surface.least_momentum / here)) * (1.0 - 1e-6)
 
 
 def _check_order(order: int) -> None:
-    if isinstance(order, bool) or not isinstance(order, int | np.integer) or not 1 <= order <= _HIGHEST_ORDER:
-        raise ShapeError(f"order: expected a whole number from 1 to {_HIGHEST_ORDER}, got {what_came(order)}")
+    if whole_argument(order, "order", 1) > _HIGHEST_ORDER:
+        raise ShapeError(f"order: a whole number from 1 to {_HIGHEST_ORDER} is needed, got {order}")

@@ -14,21 +14,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 from ... import so3
 from ...arrays import Array, Integers
 from ...errors import AccuracyNotReached
 from ._momentum_flow import attitude_flow, exponential_fields, momentum_flow
 
-_TURN = 2.0 * np.pi
-"""[rad]"""
-_STEP_SAFETY = 0.9
-"""A step is so much of the shortest time in which the angles' sum could grow by a whole turn, and a turn be missed."""
-_STEPS_EACH = 10_000
-"""Steps for each order: moments (3, 2, 1) need about ten, only moments five thousandfold apart need more."""
-_SLACK = 1e-6
-"""[rad] By so much rounding may set the angles' sum back; far below the growth in a step."""
-_EPS = float(np.finfo(float).eps)
+_TURN = 2.0 * np.pi  # [rad]
+_STEPS_EACH = 10_000  # steps for each order: moments (3, 2, 1) need ten, only moments five thousandfold apart need more
+_SLACK = 1e-6  # [rad] that rounding may set the sum of the angles back: far below the growth in a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +43,13 @@ class _StepStart:
 def conjugate_times(inverse_moments: Array, momenta: Array, order: int) -> Array:
     """The `order`-th conjugate time of each geodesic, counted with multiplicity: (3,) descending, (N, 3) -> (N,).
 
-    Raises
-    ------
-    AccuracyNotReached
-        If there is none in ten thousand steps times `order`, each of some tenths of a turn about the axis of the
-        smallest moment: the moments are too unequal.
+    Raises AccuracyNotReached if there is none in ten thousand steps times `order`, each of some tenths of a turn about
+    the axis of the smallest moment: the moments are too unequal.
     """
     magnitude = np.linalg.norm(momenta, axis=-1)
     directions = momenta / magnitude[:, None]
-    step = _STEP_SAFETY * _TURN / (2.5 * float(inverse_moments.sum()))
+    # Below the shortest time in which the sum of the angles could grow by a whole turn, which would be missed.
+    step = 0.9 * _TURN / (2.5 * float(inverse_moments.sum()))
     left = _brackets(inverse_moments, directions, order, step)
     return _roots(inverse_moments, directions, order, left, step) / magnitude
 
@@ -89,44 +82,21 @@ def _brackets(inverse_moments: Array, directions: Array, order: int, step: float
 def _roots(inverse_moments: Array, directions: Array, order: int, left: _StepStart, step: float) -> Array:
     """The crossings, by Chandrupatla's bracketing method, all at once."""
 
-    def crossing(rows: Integers, times: Array) -> Array:
+    def crossing(times: Array, rows: Integers) -> Array:
         """The angle that is the next to pass a whole turn, less the turn; above 0 once it has."""
+        rows = rows.astype(np.int64)
         angles = _angles(_frame(inverse_moments, directions, left, rows, times))
         missing = order - _count(_continued(left.total[rows], angles), angles)
         index = np.arange(len(rows))
         ahead = angles[index, 3 - np.clip(missing, 1, 3)] - _TURN
-        return np.where(missing > 0, ahead, angles[index, np.clip(-missing, 0, 2)])
+        value = np.where(missing > 0, ahead, angles[index, np.clip(-missing, 0, 2)])
+        # At t = 0 all angles are whole turns.
+        return np.where(times > 0.0, value, -_TURN)
 
-    every = np.arange(len(directions))
-    a, b = left.time + step, left.time.copy()
-    fa, fb = crossing(every, a), np.full(len(every), -_TURN)
-    moved = every[b > 0.0]
-    fb[moved] = crossing(moved, b[moved])
-    share = np.full(len(every), 0.5)
-    # A conjugate time may be at the end of a step, to rounding.
-    best = np.where(fb > 0.0, b, a)
-    rows = every[(fa > 0.0) & (fb <= 0.0)]
-    while rows.size:
-        x = a[rows] + share[rows] * (b[rows] - a[rows])
-        fx = crossing(rows, x)
-        same = np.sign(fx) == np.sign(fa[rows])
-        c, fc = np.where(same, a[rows], b[rows]), np.where(same, fa[rows], fb[rows])
-        b[rows], fb[rows] = np.where(same, b[rows], a[rows]), np.where(same, fb[rows], fa[rows])
-        a[rows], fa[rows] = x, fx
-        nearer = np.abs(fx) < np.abs(fb[rows])
-        best[rows] = np.where(nearer, x, b[rows])
-        least = 2.0 * _EPS * np.abs(best[rows]) / np.abs(b[rows] - x)
-        rest = (least < 0.5) & (fx != 0.0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            xi = (x - b[rows]) / (c - b[rows])
-            phi = (fx - fb[rows]) / (fc - fb[rows])
-            quadratic = (phi**2 < xi) & ((1.0 - phi) ** 2 < 1.0 - xi)
-            inverse = fx / (fb[rows] - fx) * fc / (fb[rows] - fc) + (c - x) / (b[rows] - x) * fx / (fc - fx) * fb[
-                rows
-            ] / (fc - fb[rows])
-        share[rows] = np.clip(np.where(quadratic, inverse, 0.5), least, 1.0 - least)
-        rows = rows[rest]
-    return best
+    every, low, high = np.arange(len(directions)), left.time, left.time + step
+    solution = find_root(crossing, (low, high), args=(every,), tolerances={"xatol": 0.0, "xrtol": np.finfo(float).eps})
+    # A conjugate time may be at an end of a step, to rounding.
+    return np.where(crossing(low, every) > 0.0, low, np.where(solution.success, solution.x, high))
 
 
 def _frame(inverse_moments: Array, directions: Array, left: _StepStart, rows: Integers, times: Array) -> Array:
@@ -156,5 +126,5 @@ def _continued(before: Array, angles: Array) -> Array:
 
 
 def _count(sums: Array, angles: Array) -> Integers:
-    """How many eigenvalues have passed 1."""
+    """Number of times that eigenvalues have passed 1."""
     return np.rint((sums - angles.sum(axis=-1)) / _TURN).astype(np.int64)

@@ -17,31 +17,21 @@ from numpy.typing import ArrayLike
 from scipy.special import elliprd, elliprf, elliprj
 
 from ... import elliptic
+from ...arguments import number_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
-from ...letters import what_came
 from ...roots import ROUNDING, safe_newton
+from .._arguments import above_zero
 from ._arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
 
-_LEAST_ASPECT = 1e-3
-"""Far beyond any body of use, and its square, of which the closed forms are made, keeps ten digits beside 1."""
-_LARGEST_ASPECT = 1e3
-_BEYOND_A_POLE = 1e-12
-"""Relative: latitudes so little further are taken for the pole's."""
+_BEYOND_A_POLE = 1e-12  # relative: latitudes so little further are taken for the pole's
 
 
 @dataclass(frozen=True)
 class EllipsoidStretch:
-    """D(Y) = a sqrt(epsilon^2 + (1 - epsilon^2) Y) and its derivatives.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> geodesics.ellipsoid(0.5).stretch
-    EllipsoidStretch(aspect=0.5, radius=1)
-    """
+    """D(Y) = a sqrt(epsilon^2 + (1 - epsilon^2) Y) and its derivatives. Made by `ellipsoid`."""
 
     aspect: float
     radius: float
@@ -73,27 +63,19 @@ class EllipsoidStretch:
 def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolution:
     """The ellipsoid of revolution with polar over equatorial axis `aspect`: below 1 oblate, above 1 prolate.
 
-    Raises
-    ------
-    ShapeError
-        If the aspect is not between 0.001 and 1000, or the radius not positive.
-
-    Notes
-    -----
     Source: Bonnard et al., section 2 (F_1, F_2); theory.md P1.
+    Raises ShapeError if the aspect is not between 0.001 and 1000, or the radius not positive.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> oblate = geodesics.ellipsoid(0.5)
+    >>> oblate = sp.rigid_body.geodesics.ellipsoid(0.5)
     >>> oblate.equator, oblate.end
     (1.0, 'pole')
     """
-    epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
-    if not _LEAST_ASPECT <= epsilon <= _LARGEST_ASPECT:
-        raise ShapeError(f"aspect: polar over equatorial axis must be between 0.001 and 1000, got {what_came(epsilon)}")
-    if not radius > 0.0:
-        raise ShapeError(f"equatorial_radius: must be positive, got {what_came(radius)}")
+    epsilon, radius = number_argument(aspect, "aspect"), above_zero(equatorial_radius, "equatorial_radius")
+    # The closed forms are made of the square, which keeps ten digits beside 1.
+    if not 1e-3 <= epsilon <= 1e3:
+        raise ShapeError(f"aspect: polar over equatorial axis must be between 0.001 and 1000, got {epsilon:.6g}")
     stretch = EllipsoidStretch(aspect=epsilon, radius=radius)
     return surface_of_stretch(stretch, radius**2, 1.0, "pole", stretch.arcs)
 
@@ -105,13 +87,12 @@ def metric_coefficients(aspect: float, colatitude: ArrayLike) -> tuple[Array, Ar
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> tuple(float(value) for value in geodesics.metric_coefficients(0.5, np.pi / 2.0))
+    >>> tuple(float(value) for value in sp.rigid_body.geodesics.metric_coefficients(0.5, np.pi / 2.0))
     (0.25, 1.0)
     """
     phi = finite_array(colatitude, "colatitude", unit="rad")
     sine2 = np.sin(phi) ** 2
-    return np.cos(phi) ** 2 + _number(aspect, "aspect") ** 2 * sine2, sine2
+    return np.cos(phi) ** 2 + number_argument(aspect, "aspect") ** 2 * sine2, sine2
 
 
 def meridian_length(aspect: float, colatitude: ArrayLike) -> Array:
@@ -122,11 +103,10 @@ def meridian_length(aspect: float, colatitude: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.meridian_length(1.0, np.pi / 2.0):.9f} = pi/2")  # of a sphere
+    >>> print(f"{sp.rigid_body.geodesics.meridian_length(1.0, np.pi / 2.0):.9f} = pi/2")  # of a sphere
     1.570796327 = pi/2
     """
-    epsilon = _number(aspect, "aspect")
+    epsilon = number_argument(aspect, "aspect")
     phi = finite_array(colatitude, "colatitude", unit="rad")
     if epsilon <= 1.0:
         return elliptic.incomplete_e(phi, epsilon**2)
@@ -144,11 +124,10 @@ def ellipsoid_period(aspect: float, momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.ellipsoid_period(1.0, 0.5):.9f} = 2 pi")  # of a sphere
+    >>> print(f"{sp.rigid_body.geodesics.ellipsoid_period(1.0, 0.5):.9f} = 2 pi")  # of a sphere
     6.283185307 = 2 pi
     """
-    epsilon = _number(aspect, "aspect")
+    epsilon = number_argument(aspect, "aspect")
     p = finite_array(momentum, "momentum")
     if np.any(np.abs(p) > 1.0):
         raise ShapeError("momentum: on a unit equator the absolute value of Clairaut's constant is at most 1")
@@ -168,13 +147,12 @@ def astroid(aspect: float, direction: ArrayLike) -> tuple[Array, Array]:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> latitude, longitude = geodesics.astroid(0.999, 0.0)
+    >>> latitude, longitude = sp.rigid_body.geodesics.astroid(0.999, 0.0)
     >>> print(f"{abs(latitude):.6f} {np.pi - longitude:.6f}")
     0.000000 0.003142
     """
     angle = finite_array(direction, "direction", unit="rad")
-    radius = np.pi * (1.0 - _number(aspect, "aspect"))
+    radius = np.pi * (1.0 - number_argument(aspect, "aspect"))
     return -radius * np.sin(angle) ** 3, np.pi - radius * np.cos(angle) ** 3
 
 
@@ -189,19 +167,13 @@ def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: 
     aspect, equatorial_radius : as for `ellipsoid`
     geodetic : (...) from -pi/2 to pi/2 [rad]
 
-    Raises
-    ------
-    ShapeError
-        If a latitude is beyond a pole, or another argument is not such a number.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> north = geodesics.latitude_of_geodetic(1.0 - 1.0 / 298.257223563, np.radians(45.0), 6378137.0)
+    >>> north = sp.rigid_body.geodesics.latitude_of_geodetic(1.0 - 1.0 / 298.257223563, np.radians(45.0), 6378137.0)
     >>> print(f"{north:.3f} m from the equator of the Earth")
     4984944.378 m from the equator of the Earth
     """
-    epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
+    epsilon, radius = number_argument(aspect, "aspect"), number_argument(equatorial_radius, "equatorial_radius")
     angle = finite_array(geodetic, "geodetic", unit="rad")
     if np.any(np.abs(angle) > 0.5 * np.pi * (1.0 + _BEYOND_A_POLE)):
         raise ShapeError("geodetic: latitudes are between -pi/2 and pi/2 rad")
@@ -213,18 +185,13 @@ def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: 
 def geodetic_latitude(aspect: float, latitude: ArrayLike, equatorial_radius: float = 1.0) -> Array:
     """The geodetic latitude of phi, the inverse of `latitude_of_geodetic`: (...) -> (...) [rad].
 
-    Raises
-    ------
-    ShapeError
-        If a latitude is beyond a pole, or another argument is not such a number.
-
     Examples
     --------
     >>> from shapephase.rigid_body import geodesics
     >>> print(f"{np.degrees(geodesics.geodetic_latitude(0.5, geodesics.latitude_of_geodetic(0.5, 0.7))):.6f}")
     40.107046
     """
-    epsilon, radius = _number(aspect, "aspect"), _number(equatorial_radius, "equatorial_radius")
+    epsilon, radius = number_argument(aspect, "aspect"), number_argument(equatorial_radius, "equatorial_radius")
     phi = finite_array(latitude, "latitude") / radius
     quarter = float(_from_equator(epsilon, np.asarray(0.5 * np.pi)))
     if np.any(np.abs(phi) > quarter * (1.0 + _BEYOND_A_POLE)):
@@ -237,8 +204,8 @@ def geodetic_latitude(aspect: float, latitude: ArrayLike, equatorial_radius: flo
 
     low, high = np.zeros_like(distance), np.full_like(distance, 0.5 * np.pi)
     parametric = safe_newton(step, 0.5 * np.pi * distance / quarter, low, high, ROUNDING)
-    found = np.arctan2(np.sin(parametric), epsilon * np.cos(parametric)).reshape(phi.shape)
-    return np.copysign(found, phi)[()]
+    geodetic = np.arctan2(np.sin(parametric), epsilon * np.cos(parametric)).reshape(phi.shape)
+    return np.copysign(geodetic, phi)[()]
 
 
 def _from_equator(aspect: float, parametric: Array) -> Array:
@@ -250,10 +217,3 @@ def _from_equator(aspect: float, parametric: Array) -> Array:
     second = square + (sine / aspect) ** 2
     bent = (1.0 - aspect) * (1.0 + aspect) / (3.0 * aspect**2) * sine**3 * elliprd(square, second, 1.0)
     return aspect * (sine * elliprf(square, second, 1.0) + bent)
-
-
-def _number(value: float, name: str) -> float:
-    found = finite_array(value, name)
-    if found.shape != ():
-        raise ShapeError(f"{name}: expected one number, got shape {found.shape}")
-    return float(found)

@@ -16,23 +16,12 @@ from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs
 from .surface_of_revolution import SurfaceOfRevolution
 
-_RELATIVE_TOLERANCE = 3e-14
-"""Just above the least that SciPy accepts: the integration is there to check the closed form."""
-_ABSOLUTE_TOLERANCE = 1e-15
-"""[rad, or length of a field that starts with slope 1]"""
-
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where extremals start, in the form the integrals need: all (...) of one shape.
+    """Start of extremals, in the form that the integrals need: all (...) of one shape.
 
     Extremals that start southward are mirrored in the equator, so that the start phase is in [-pi/2, pi/2].
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> geodesics.start_of(geodesics.ellipsoid(1.0), [0.0, np.pi / 2.0]).momentum.round(9).tolist()
-    [1.0, 0.0]
     """
 
     momentum: Array
@@ -51,16 +40,9 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Extremal:
-    """Extremals of unit speed from one latitude, longitude 0, in directions (...); made by `extremal`.
+    """Extremals of unit speed from one latitude, longitude 0, in directions (...). Made by `extremal`.
 
     Arguments t (...) [length] are any numbers; results have the directions' axes first, then those of t.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> geodesic = geodesics.extremal(geodesics.ellipsoid(1.0), 0.5)
-    >>> print(f"{geodesic.jacobi_field(np.pi / 2.0):.9f}")  # sin t on a sphere
-    1.000000000
     """
 
     surface: SurfaceOfRevolution
@@ -71,10 +53,7 @@ class Extremal:
     def phase(self, times: ArrayLike) -> Array:
         """chi at times t, increasing, of the mirrored extremal where it starts southward [rad]."""
         t = finite_array(times, "times")
-        p, q, room, phase = (
-            np.broadcast_to(_spread(a, t), np.shape(a) + t.shape)
-            for a in (self.start.momentum, self.start.q, self.start.room, self.start.phase)
-        )
+        p, q, room, phase = np.broadcast_arrays(*self._spread_start(t)[:4], t)[:4]
         quarter = self.surface.trusted_arcs(p, q, room, np.full(p.shape, 0.5 * np.pi)).time
         total = self.surface.trusted_arcs(p, q, room, phase).time + t
         turns = np.rint(total / (2.0 * quarter))
@@ -95,7 +74,7 @@ class Extremal:
         Source: Bonnard et al., section 2.1.
         """
         t = finite_array(times, "times")
-        p, q, _, first, side = (_spread(a, t) for a in _fields(self.start))
+        p, q, _, first, side = self._spread_start(t)
         chi = self.phase(t)
         longitude = self._arcs(chi, t).longitude - self.surface.arcs(p, first).longitude
         return (
@@ -115,7 +94,7 @@ class Extremal:
 
     def jacobi_field_at(self, phase: Array, times: Array) -> Array:
         """`jacobi_field` at known phases of the times."""
-        p, q, room, first, _ = (_spread(a, times) for a in _fields(self.start))
+        p, q, room, first, _ = self._spread_start(times)
         bend = self._arcs(phase, times).bend - self.surface.trusted_arcs(p, q, room, first).bend
         there, here = self._stretch(q, room, phase), self._stretch(q, room, first)
         return (
@@ -137,7 +116,7 @@ class Extremal:
         return field * p / distance, -field * slope / distance
 
     def poincare_field(self, times: ArrayLike) -> tuple[Array, Array]:
-        """J_2 = t dq/dt, of phi and theta: how the end moves with the magnitude of the initial momentum, at times t.
+        """J_2 = t dq/dt, of phi and theta: the end's derivative by the magnitude of the initial momentum, at times t.
 
         Source: Bonnard et al., section 2.2.
         """
@@ -146,25 +125,25 @@ class Extremal:
         return t * slope, t * _spread(self.start.momentum, t) / self.surface.metric(latitude)
 
     def _arcs(self, phase: Array, times: Array) -> Arcs:
-        p, q, room = (_spread(a, times) for a in (self.start.momentum, self.start.q, self.start.room))
-        return self.surface.trusted_arcs(*np.broadcast_arrays(p, q, room, phase))
+        return self.surface.trusted_arcs(*np.broadcast_arrays(*self._spread_start(times)[:3], phase))
 
     def _stretch(self, q: Array, room: Array, phase: Array) -> Array:
         return stretch_at(self.surface, q, room, phase)[0]
+
+    def _spread_start(self, times: Array) -> tuple[Array, ...]:
+        """p, q, depth - q, phase and side of the start, with an axis of length 1 for each axis of the times."""
+        return tuple(_spread(values, times) for values in vars(self.start).values())
 
 
 def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Extremal:
     """Extremals from a latitude in directions (...), angles from east to north [rad].
 
-    Raises
-    ------
-    ShapeError
-        If a direction leads out of the band of extremals that oscillate about the equator within the chart.
+    Raises ShapeError if a direction leads out of the band of extremals that oscillate about the equator within the
+    chart.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> meridian = geodesics.extremal(geodesics.ellipsoid(1.0), np.pi / 2.0)
+    >>> meridian = sp.rigid_body.geodesics.extremal(sp.rigid_body.geodesics.ellipsoid(1.0), np.pi / 2.0)
     >>> latitude, longitude, direction = meridian.state(0.3)
     >>> print(f"{latitude:.9f}")  # on a sphere as far north as it went
     0.300000000
@@ -174,20 +153,10 @@ def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
 
 def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float = 0.0) -> Start:
-    """`Start` of directions (...) [rad] at a latitude. Raises ShapeError, see `extremal`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> start = geodesics.start_of(geodesics.ellipsoid(1.0), 0.5)
-    >>> print(f"{start.momentum:.9f} = cos 0.5")
-    0.877582562 = cos 0.5
-    """
+    """`Start` of directions (...) [rad] at a latitude. Raises ShapeError, see `extremal`."""
     check_object(surface, "SurfaceOfRevolution", "surface")
     angle = finite_array(direction, "direction", unit="rad")
-    if np.ndim(latitude) != 0:
-        raise ShapeError(f"latitude: expected one number, got shape {np.shape(latitude)}")
-    y = float(surface.height(latitude))
+    y = float(surface.height(number_argument(latitude, "latitude", "rad")))
     rest = (1.0 - y) * (1.0 + y)
     sine, cosine = np.sin(angle), np.cos(angle)
     p = surface.greatest_momentum * np.sqrt(rest) * cosine
@@ -200,21 +169,10 @@ def start_of(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
 
 def stretch_at(surface: SurfaceOfRevolution, q: Array, room: Array, phase: Array) -> tuple[Array, Array, Array]:
-    """D, D' and D'' at phases of extremals: (...) x 3 -> (...) x 3.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> surface = geodesics.ellipsoid(1.0)
-    >>> start = geodesics.start_of(surface, 0.5)
-    >>> float(geodesics.stretch_at(surface, start.q, start.room, start.phase)[0])
-    1.0
-    """
-    check_object(surface, "SurfaceOfRevolution", "surface")
+    """D, D' and D'' at phases of extremals: (...) x 3 -> (...) x 3."""
     q, room, phase = np.broadcast_arrays(q, room, phase)
-    sine2, cosine2 = np.sin(phase) ** 2, np.cos(phase) ** 2
-    found = surface.stretch((q * sine2).ravel(), (room + q * cosine2).ravel())
-    value, slope, second = (a.reshape(q.shape) for a in found)
+    square, rest = q * np.sin(phase) ** 2, room + q * np.cos(phase) ** 2
+    value, slope, second = (a.reshape(q.shape) for a in surface.stretch(square.ravel(), rest.ravel()))
     return value, slope, second
 
 
@@ -225,14 +183,8 @@ def variational_jacobi_field(
 
     The phase is integrated with it, by d chi/dt = 1/D, so that turning points are regular. Times ascend, from 0 on.
 
-    Raises
-    ------
-    AccuracyNotReached
-        If the integration fails.
-
-    Notes
-    -----
     Source: Bonnard et al., definition 2.2.
+    Raises AccuracyNotReached if the integration fails.
 
     Examples
     --------
@@ -254,16 +206,11 @@ def variational_jacobi_field(
 
     state = [float(start.phase), 0.0, 1.0]
     span = (0.0, max(float(t[-1]), np.finfo(float).tiny))
-    solution = solve_ivp(
-        rate, span, state, method="DOP853", t_eval=t, rtol=_RELATIVE_TOLERANCE, atol=_ABSOLUTE_TOLERANCE
-    )
+    # Just above the least tolerance that SciPy accepts: the integration is there to check the closed form.
+    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=3e-14, atol=1e-15)
     if not solution.success:
         raise AccuracyNotReached(f"Jacobi's equation could not be integrated: {solution.message}")
     return solution.y[1]
-
-
-def _fields(start: Start) -> tuple[Array, Array, Array, Array, Array]:
-    return start.momentum, start.q, start.room, start.phase, start.side
 
 
 def _spread(values: Array, times: Array) -> Array:

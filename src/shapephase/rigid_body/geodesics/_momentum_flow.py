@@ -27,12 +27,7 @@ from ... import elliptic, so3
 from ...arrays import Array
 from ...errors import ShapeError
 
-_LONGEST_STEP = 1.0
-"""In units of 1/sqrt(max(P, Q)), of which a quarter period is at least pi/2: no step nears a zero of c or d."""
-_MOST_STEPS = 20_000
-"""Limit of the time of one call; rounding grows with the steps, too."""
-_SMALL_TURN = 0.02
-"""[rad] Below, R dPi(t)/dPi − 1 would lose two digits, and Gauss's rule of six nodes is right to rounding."""
+_MOST_STEPS = 20_000  # limit of the time of one call; rounding grows with the steps, too
 
 
 def momentum_flow(inverse_moments: Array, start: Array, times: Array) -> tuple[Array, Array]:
@@ -40,19 +35,17 @@ def momentum_flow(inverse_moments: Array, start: Array, times: Array) -> tuple[A
 
     In equal steps short enough that none is near a zero of c or d; errors grow as the flow itself does.
 
-    Raises
-    ------
-    ShapeError
-        For times so long that there would be more than 20,000 steps, each of a sixth of a period or more.
+    Raises ShapeError for times so long that there would be more than 20,000 steps, each of a sixth of a period or more.
     """
     p, q = _conserved(inverse_moments, start)
+    # A quarter period is at least pi/2 in units of 1/sqrt(max(P, Q)): no step of one unit nears a zero of c or d.
     longest = float((np.sqrt(np.maximum(p, q)) * np.abs(times)).max(initial=0.0))
-    if longest > _MOST_STEPS * _LONGEST_STEP:
+    if longest > _MOST_STEPS:
         raise ShapeError(
             f"t: in {np.abs(times).max():.6g} s the momentum goes round its curve about {longest / 6.0:.3g} times, "
             "too far for a derivative; make the time shorter"
         )
-    count = max(1, int(np.ceil(longest / _LONGEST_STEP)))
+    count = max(1, int(np.ceil(longest)))
     functions = _step_functions(inverse_moments, start, p, q, times / count)
     momentum, jacobian = start, np.broadcast_to(np.eye(3), (*start.shape, 3))
     for _ in range(count):
@@ -82,10 +75,11 @@ def exponential_fields(inverse_moments: Array, start: Array, times: Array, attit
 
         Y = (t Pi u^T − hat(Pi)(R dPi(t)/dPi − 1))/|Pi|².
 
-    For turns so small that the difference would lose digits, Y is the integral of R a dPi(t)/dPi, by Gauss's rule.
+    For turns below 0.02 rad the difference would lose two digits, and Y is the integral of R a dPi(t)/dPi, for which
+    Gauss's rule of six nodes is right to rounding.
     """
     magnitude = np.linalg.norm(start, axis=-1)
-    small = magnitude * np.abs(times) * inverse_moments[0] < _SMALL_TURN
+    small = magnitude * np.abs(times) * inverse_moments[0] < 0.02
     fields = np.empty((*start.shape, 3))
     if small.any():
         fields[small] = _small_fields(inverse_moments, start[small], times[small])
@@ -108,10 +102,9 @@ def exponential_derivative(inverse_moments: Array, start: Array, times: Array) -
 def _small_fields(inverse_moments: Array, start: Array, times: Array) -> Array:
     fields = np.zeros((*start.shape, 3))
     for node, weight in zip(*np.polynomial.legendre.leggauss(6)):
-        part = 0.5 * (1.0 + node) * times
-        rates = inverse_moments[:, None] * momentum_flow(inverse_moments, start, part)[1]
-        turned = attitude_flow(inverse_moments, start, part) @ rates
-        fields += (0.5 * weight * times)[:, None, None] * turned
+        instants = 0.5 * (1.0 + node) * times
+        rates = inverse_moments[:, None] * momentum_flow(inverse_moments, start, instants)[1]
+        fields += (0.5 * weight * times)[:, None, None] * (attitude_flow(inverse_moments, start, instants) @ rates)
     return fields
 
 

@@ -11,8 +11,8 @@ momentum circles the axis of I_3 or its opposite, angles count from l = pi/2 or 
 I_1, from l = pi/2. Along the axis of I_3 the angle of J is undefined, along that of I_1 it follows from l.
 `andoyer_from_sadov` goes the other way; the side of the axis on which the momentum is has to be given.
 
-With two equal moments there is nothing to be found: with the axis of symmetry as third, Andoyer's own variables are
-angles and actions, l, g, k and L, G, K. Of H = G²/(2 I_e) + L² (1/I_s − 1/I_e)/2 the rates are l' = L (1/I_s − 1/I_e)
+Two equal moments need no such variables: with the axis of symmetry as third, Andoyer's own variables are
+angles and actions, l, g, k and L, G, K. By H = G²/(2 I_e) + L² (1/I_s − 1/I_e)/2 the rates are l' = L (1/I_s − 1/I_e)
 and g' = G/I_e, I_s being the moment about that axis and I_e the equal ones; with three equal moments l' = 0.
 
 Source: Sadov 1970; Bonnard, Cots and Shcherbakova 2013, introduction; theory.md R15. All from the geodesics of unit
@@ -33,24 +33,14 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
 from ...letters import what_came
+from .._arguments import check_entries
 from ._andoyer_variables import AndoyerVariables, andoyer_variables
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
-
-_HALVINGS = 60
-"""Of a right angle, which leave rounding."""
 
 
 @dataclass(frozen=True, eq=False)
 class SadovVariables:
-    """Actions, angles and frequencies, (...) each; see `sadov_variables`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
-    >>> print(f"{geodesics.sadov_variables([3.0, 2.0, 1.0], state).precession_rate:.6f} rad/s")
-    0.567543 rad/s
-    """
+    """Actions, angles and frequencies, (...) each. Made by `sadov_variables`."""
 
     own: Array
     """Conjugate to `action` [rad]."""
@@ -75,24 +65,19 @@ class SadovVariables:
 def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVariables:
     """Action and angle variables of states in Andoyer's variables: (3,), (...) -> (...).
 
+    Raises ShapeError if two moments are equal, or a state is on the separatrix or along the axis of the middle moment,
+    where the period is infinite and there are no angles. Next to it they lose digits in proportion to 1/m1, m1 the
+    complement of the elliptic modulus.
+
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
     variables : of a body with those axes
 
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, for which Andoyer's variables about the axis of symmetry are angles and actions
-        themselves (the message has their rates), or a state is on the separatrix or along the axis of the middle
-        moment, where the period is infinite and there are no angles. Next to it they lose digits in proportion to
-        1/m1, m1 the complement of the elliptic modulus.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
-    >>> found = geodesics.sadov_variables([3.0, 2.0, 1.0], state)
+    >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
+    >>> found = sp.rigid_body.geodesics.sadov_variables([3.0, 2.0, 1.0], state)
     >>> print(f"{found.total:.9f} {found.own_rate:.6f}")
     1.581138830 0.474919
     """
@@ -104,14 +89,11 @@ def sadov_variables(moments: ArrayLike, variables: AndoyerVariables) -> SadovVar
         metric = _descending(metric)
     momentum = variables.body_momentum
     family = metric.geodesics_of(momentum)
-    lost = family.complement == 0.0
-    if lost.any():
-        where = tuple(int(i) for i in np.argwhere(lost)[0])
-        raise ShapeError(
-            f"variables: entry {list(where)} is on the separatrix or along the axis of the middle moment, where the "
-            "period is infinite and there are no angle variables; the action alone is "
-            "`SerretAndoyerMetric.separatrix().action`"
-        )
+    requirement = (
+        "on the separatrix and along the axis of the middle moment the period is infinite and there are no angle "
+        "variables; the action alone is `SerretAndoyerMetric.separatrix().action`"
+    )
+    check_entries(family.complement == 0.0, momentum, "variables", requirement)
     speed = np.sqrt(2.0 * variables.hamiltonian(np.diag(metric.moments)))
     u = _argument(metric.moments, momentum, variables.l, family.is_oscillating, family.complement)
     quarter = elliptic.complete_k(family.complement)
@@ -135,20 +117,13 @@ def sadov_frequencies(moments: ArrayLike, body_momentum: ArrayLike) -> tuple[Arr
     The rate at which the momentum goes round in the body, and the mean rate about the momentum; on the separatrix their
     limits, of which the first is 0. The moments, in any order, are those about the momenta's axes.
 
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, or a momentum is zero.
-
-    Notes
-    -----
     Source: theory.md R15.
+    Raises ShapeError if two moments are equal, or a momentum is zero.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> top = sp.EulerTop.principal([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
-    >>> own, precession = geodesics.sadov_frequencies([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
+    >>> own, precession = sp.rigid_body.geodesics.sadov_frequencies([3.0, 2.0, 1.0], [1.5, 0.3, 0.4])
     >>> print(f"{own * top.period:.9f} = 2 pi")
     6.283185307 = 2 pi
     """
@@ -164,6 +139,13 @@ def andoyer_from_sadov(
 ) -> AndoyerVariables:
     """The states with these angle and action variables, in Andoyer's: (3,), (..., 3), (..., 3), (...) -> (...).
 
+    The energy is found from J by bisection, as J grows with the angle of the momentum from the axis of the largest
+    moment. Next to the separatrix angles lose digits as in `sadov_variables`.
+
+    Source: Sadov 1970; theory.md R15.
+    Raises ShapeError if two moments are equal, an action is out of range, a side is another number, or J is that of the
+    separatrix.
+
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
@@ -172,26 +154,12 @@ def andoyer_from_sadov(
     side : (...) 1 or -1: whether the momentum is on the positive side of the axis that it circles, which is that of
         the largest moment where J is below its value on the separatrix, and that of the smallest moment above
 
-    Raises
-    ------
-    ShapeError
-        If two moments are equal, an action is out of range, a side is another number, or J is that of the separatrix.
-
-    Notes
-    -----
-    The energy is found from J by bisection, as J grows with the angle of the momentum from the axis of the largest
-    moment. Next to the separatrix angles lose digits as in `sadov_variables`.
-
-    Source: Sadov 1970; theory.md R15.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> state = geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
-    >>> sadov = geodesics.sadov_variables([3.0, 2.0, 1.0], state)
-    >>> angles = [sadov.own, sadov.precession, sadov.node]
-    >>> actions = [sadov.action, sadov.total, sadov.vertical]
-    >>> again = geodesics.andoyer_from_sadov([3.0, 2.0, 1.0], angles, actions)
+    >>> state = sp.rigid_body.geodesics.andoyer_variables(np.eye(3), [1.5, 0.3, 0.4])
+    >>> sadov = sp.rigid_body.geodesics.sadov_variables([3.0, 2.0, 1.0], state)
+    >>> angles, actions = [sadov.own, sadov.precession, sadov.node], [sadov.action, sadov.total, sadov.vertical]
+    >>> again = sp.rigid_body.geodesics.andoyer_from_sadov([3.0, 2.0, 1.0], angles, actions)
     >>> print(again.body_momentum.round(9))
     [1.5 0.3 0.4]
     """
@@ -206,9 +174,7 @@ def andoyer_from_sadov(
     enclosed, total, vertical = np.moveaxis(action, -1, 0)
     if np.any((total <= 0.0) | (enclosed < 0.0) | (enclosed > total)):
         raise ShapeError("actions: J must be between 0 and G, which must be above 0")
-    own, precession, node, enclosed, total, vertical, hemisphere = np.broadcast_arrays(
-        own, precession, node, enclosed, total, vertical, hemisphere
-    )
+    enclosed, hemisphere, _ = np.broadcast_arrays(enclosed, hemisphere, own)
     tilt = _tilt_of_action(metric, enclosed / total)
     across = _between_ends(tilt)
     family = metric.geodesics_of(across)
@@ -219,7 +185,7 @@ def andoyer_from_sadov(
     sn, cn, dn, _, part = elliptic.jacobi_and_pi_excess(family.constants.characteristic, u, family.complement)
     whole = elliptic.complete_pi_excess(family.constants.characteristic, family.complement)
     i1, i2, i3 = ascending_moments(metric.moments)[0]
-    # As in `_argument`, the other way.
+    # The inverse of `_argument`.
     oscillating, far = family.is_oscillating, np.sqrt(i3 - i1)
     small, large = np.sin(tilt), np.cos(tilt)
     middle = -hemisphere * small * far * sn / np.sqrt((i3 - i2) * i1 / i2)
@@ -239,7 +205,7 @@ def andoyer_from_sadov(
 
 
 def _metric(moments: ArrayLike) -> SerretAndoyerMetric:
-    """As `serret_andoyer_metric`; of two equal moments the error says which variables to take."""
+    """`serret_andoyer_metric`, with an error for two equal moments that names the variables to use instead."""
     values = moments_argument(moments)
     if len(np.unique(values)) < 3:
         raise ShapeError(
@@ -263,7 +229,7 @@ def _between_ends(tilt: Array) -> Array:
 def _tilt_of_action(metric: SerretAndoyerMetric, share: Array) -> Array:
     """The angle from the axis of the largest moment at which the action is this share of G: (...) -> (...) [rad]."""
     low, high = np.zeros(share.shape), np.full(share.shape, 0.5 * np.pi)
-    for _ in range(_HALVINGS):
+    for _ in range(60):  # halvings of a right angle, which leave rounding
         middle = 0.5 * (low + high)
         momentum = _between_ends(middle)
         speed = np.sqrt(np.sum(momentum**2 / metric.moments, axis=-1))

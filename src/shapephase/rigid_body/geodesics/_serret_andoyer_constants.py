@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from ...arrays import Array, Integers, Mask, finite_array
 from ...display import short_repr
 from ...inertia_tensor import ascending_moments
-from ._checks import check_entries
+from .._arguments import check_entries
 
 
 class GeodesicClass(IntEnum):
@@ -26,8 +26,7 @@ class GeodesicClass(IntEnum):
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> [kind.name for kind in geodesics.GeodesicClass]
+    >>> [kind.name for kind in sp.rigid_body.geodesics.GeodesicClass]
     ['EXTENDED', 'ROTATING', 'SEPARATRIX', 'OSCILLATING', 'EQUATOR']
     """
 
@@ -43,29 +42,20 @@ class GeodesicClass(IntEnum):
     """p^2 = I_3, the limit of oscillating geodesics."""
 
 
-_LEAST_MOMENTUM = 1e-9
-"""In parts of sqrt(I_1): theta is proportional to p to the last digit below, as what is left out is p^2/I_1 of it."""
-_EPS = float(np.finfo(float).eps)
-_DEKKER_FACTOR = 2.0**27 + 1.0
-"""Splits a float64 of 53 bits into two halves whose products are exact (Dekker 1971)."""
+_LEAST_MOMENTUM = 1e-9  # of sqrt(I_1): below, theta is proportional to p up to p^2/I_1, less than rounding
 
 
 @dataclass(frozen=True, eq=False)
 class GeodesicConstants:
     """Constants of geodesics from the equator with given p_theta, (...) each but the moments.
 
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> constants = geodesics.constants_of(np.array([3.0, 2.0, 1.0]), [1.7, 1.5])
-    >>> constants.p_theta.tolist()
-    [1.7, 1.5]
+    Made by `SerretAndoyerMetric.geodesics`.
     """
 
     moments: Array
     """(3,) ascending [kg m^2]."""
     p_theta: Array
-    """As given [sqrt(kg) m]."""
+    """Clairaut's constant [sqrt(kg) m]."""
     magnitude: Array
     """p = |p_theta|, but at least 1e-9 sqrt(I_1), below which nothing changes but in proportion [sqrt(kg) m]."""
     kind: Integers
@@ -93,26 +83,18 @@ class GeodesicConstants:
 
     @property
     def oscillating(self) -> Mask:
-        """Whether they return to the equator; the equator itself counts as one of them."""
+        """True where they return to the equator; the equator itself counts as one of them."""
         return self.kind >= GeodesicClass.OSCILLATING
 
 
 def constants_of(moments: Array, p_theta: ArrayLike) -> GeodesicConstants:
-    """The geodesics from the equator of three different moments (3,), see `SerretAndoyerMetric.geodesics`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> constants = geodesics.constants_of(np.array([3.0, 2.0, 1.0]), 1.7)
-    >>> float(constants.p_theta)
-    1.7
-    """
+    """The geodesics from the equator of three different moments (3,), see `SerretAndoyerMetric.geodesics`."""
     ascending, _, _ = ascending_moments(moments)
     p = finite_array(p_theta, "p_theta", unit="sqrt(kg) m")
     magnitude = np.maximum(np.abs(p), _LEAST_MOMENTUM * np.sqrt(ascending[0]))
     at_edge, at_crest, at_equator = (_one_minus_square(magnitude, moment) for moment in ascending)
     # sqrt(I_3), rounded to the nearest float, may be too large by its last digit.
-    at_equator = np.where(np.abs(at_equator) <= 2.0 * _EPS, np.maximum(at_equator, 0.0), at_equator)
+    at_equator = np.where(np.abs(at_equator) <= 2.0 * np.finfo(float).eps, np.maximum(at_equator, 0.0), at_equator)
     limit = f"the largest is the equator's, the root of the largest moment, {np.sqrt(ascending[2]):.17g}"
     check_entries(at_equator < 0.0, p, "p_theta", limit)
     return _constants(ascending, p, magnitude, at_equator, at_crest, at_edge)
@@ -122,13 +104,6 @@ def constants_of_momentum(moments: Array, body_momentum: Array) -> GeodesicConst
     """The geodesics, from the equator, of which free motions with these momenta are a part: (3,), (..., 3).
 
     The moments are those about the body axes 1, 2, 3, the momenta not zero; p_theta = |Pi|/sqrt(2 E).
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> constants = geodesics.constants_of_momentum(np.array([3.0, 2.0, 1.0]), np.array([3.0, 0.0, 0.0]))
-    >>> print(f"{constants.p_theta**2:.9f}")  # l^2/(2 E) is the moment of a steady rotation
-    3.000000000
     """
     ascending, order, _ = ascending_moments(moments)
     lower, upper, whole = moment_gaps(moments)
@@ -143,14 +118,7 @@ def constants_of_momentum(moments: Array, body_momentum: Array) -> GeodesicConst
 
 
 def separatrix_constants(moments: Array) -> GeodesicConstants:
-    """The separatrix, p_theta = sqrt(I_2) without rounding.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.separatrix_constants(np.array([3.0, 2.0, 1.0])).p_theta**2:.9f}")  # I_2
-    2.000000000
-    """
+    """The separatrix, p_theta = sqrt(I_2) without rounding."""
     ascending, _, _ = ascending_moments(moments)
     i1, i2, i3 = ascending
     magnitude = np.sqrt(np.asarray(i2))
@@ -170,7 +138,7 @@ def moment_gaps(moments: Array) -> tuple[float, float, float]:
 def _constants(
     moments: Array, p: Array, magnitude: Array, at_equator: Array, at_crest: Array, at_edge: Array
 ) -> GeodesicConstants:
-    """Of ascending moments, |p| and 1 - a_3 p^2, 1 - a_2 p^2, 1 - a_1 p^2."""
+    """Constants by ascending moments, |p|, 1 - a_3 p^2, 1 - a_2 p^2 and 1 - a_1 p^2."""
     lower, upper, whole = moment_gaps(moments)
     a1, a2, a3 = 1.0 / moments
     inner = np.where(at_edge > 0.0, GeodesicClass.EXTENDED, GeodesicClass.ROTATING)
@@ -181,9 +149,7 @@ def _constants(
     # The values 1.0 stand where a class does not use the number, so that nothing is divided by zero.
     above = np.where(oscillating, -at_edge, 1.0)
     positive_crest = np.where(at_crest > 0.0, at_crest, 1.0)
-    rate = np.sqrt(
-        np.where(oscillating, lower * above, np.where(extended, whole * at_crest, at_equator * upper)),
-    )
+    rate = np.sqrt(np.where(oscillating, lower * above, np.where(extended, whole * at_crest, at_equator * upper)))
     complement = np.where(
         oscillating,
         -whole * at_crest / (lower * above),
@@ -217,7 +183,7 @@ def _one_minus_square(magnitude: Array, moment: float) -> Array:
     """1 - magnitude^2/moment to all digits, the square in two exact parts (Dekker 1971)."""
     unit = 2.0 ** -(np.frexp(moment)[1] // 2)
     x, limit = magnitude * unit, moment * unit * unit
-    high = x * _DEKKER_FACTOR
+    high = x * (2.0**27 + 1.0)
     high = high - (high - x)
     low = x - high
     square = x * x

@@ -19,31 +19,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from ... import so3
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...letters import what_came
-from ...roots import safe_newton
-
-_SAMPLES = 129
-"""Axial parts of momenta, among which the longest geodesic up to its cut is looked for."""
+from ...roots import bracketed_root, safe_newton
 
 
 @dataclass(frozen=True)
 class AxisymmetricMetric:
-    """The metric of moments (I_1, I_1, I_3) in these axes, see `axisymmetric_metric`.
+    """Metric of moments (I_1, I_1, I_3) in these axes. Made by `axisymmetric_metric`.
 
     Momenta are in body axes, axis 3 the axis of symmetry; they need not have unit speed, and times are theirs.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.axisymmetric_metric(1.0, 1.0)
-    >>> print(f"{metric.cut_time([0.6, 0.0, 0.8]):.9f} = pi")  # of a round body
-    3.141592654 = pi
     """
 
     equatorial: float
@@ -88,23 +78,20 @@ class AxisymmetricMetric:
             stretch = np.sqrt(1.0 + self.eta * axial**2)
             return 2.0 * np.sqrt(self.equatorial) * self._first_root(axial, on_su2=True) * stretch
 
-        samples = np.linspace(0.0, 1.0, _SAMPLES)
+        samples = np.linspace(0.0, 1.0, 129)
         lengths = length(samples)
         best = int(np.argmax(lengths))
-        low, high = samples[max(best - 1, 0)], samples[min(best + 1, _SAMPLES - 1)]
+        low, high = samples[max(best - 1, 0)], samples[min(best + 1, len(samples) - 1)]
         found = minimize_scalar(lambda p: -float(length(np.asarray(p))), bounds=(low, high), method="bounded")
         return float(max(lengths[best], -found.fun))
 
     def conjugate_time(self, momentum: ArrayLike) -> Array:
-        """When a geodesic first meets a conjugate point: (..., 3) -> (...) [s].
+        """Time of a geodesic's first conjugate point: (..., 3) -> (...) [s].
 
         tau = pi for I_3 >= I_1, where the geodesics of one p_3 meet; else the root in (pi/2, pi] of
         sin tau + kappa tau cos tau with kappa = eta (1 − p_3²)/(1 + eta p_3²), where their caustic is.
 
-        Raises
-        ------
-        ShapeError
-            If a momentum is not three finite numbers, or nothing moves with it; so do all methods.
+        Raises ShapeError if a momentum is not three finite numbers, or nothing moves with it; so do all methods.
         """
         axial, unit_time = self._direction(momentum)
         if self.eta <= 0.0:
@@ -113,7 +100,7 @@ class AxisymmetricMetric:
         flat = np.ravel(kappa)
 
         def step(rest: Array) -> tuple[Array, Array]:
-            """In pi − tau, of which the equation is increasing and convex."""
+            """Newton's step in pi − tau, in which the equation is increasing and convex."""
             value = rest - np.arctan(flat * (np.pi - rest))
             return value, rest - value / (1.0 + flat / (1.0 + (flat * (np.pi - rest)) ** 2))
 
@@ -122,7 +109,7 @@ class AxisymmetricMetric:
         return (np.pi - rest) * unit_time
 
     def cut_time(self, momentum: ArrayLike) -> Array:
-        """When a geodesic stops being the shortest: (..., 3) -> (...) [s].
+        """Time up to which a geodesic is the shortest: (..., 3) -> (...) [s].
 
         tau = pi or the first zero of q_0, whichever comes first.
         """
@@ -130,7 +117,7 @@ class AxisymmetricMetric:
         return self._first_root(axial, on_su2=False) * unit_time
 
     def cut_time_on_su2(self, momentum: ArrayLike) -> Array:
-        """The same on the unit quaternions, where q and −q are two points: (..., 3) -> (...) [s].
+        """Cut time on the unit quaternions, where q and −q are two points: (..., 3) -> (...) [s].
 
         tau = pi for I_3 >= I_1, else the first zero of q_3 if that is earlier.
         """
@@ -160,13 +147,7 @@ class AxisymmetricMetric:
         return np.sqrt(self.axial) * alpha
 
     def distance(self, attitude: ArrayLike) -> Array:
-        """The distance from the identity: (..., 3, 3) -> (...), the length of `shortest_momentum`'s geodesic.
-
-        Raises
-        ------
-        ShapeError
-            If a matrix is further than 1e-6 from a proper rotation.
-        """
+        """The distance from the identity: (..., 3, 3) -> (...), the length of `shortest_momentum`'s geodesic."""
         return self._length(self.shortest_momentum(attitude))
 
     def shortest_momentum(self, attitude: ArrayLike) -> Array:
@@ -174,32 +155,15 @@ class AxisymmetricMetric:
 
         The attitude leaves one unknown, the angle nu of cos tau + i p_3 sin tau, and before the cut the angle nu + beta
         of q_0 + i q_3 takes each value once. On the cut one of several shortest ways is chosen.
-
-        Raises
-        ------
-        ShapeError
-            If a matrix is further than 1e-6 from a proper rotation.
         """
         return self._shortest_of_each(so3.quat_from_matrix(so3.rotation_argument(attitude, "attitude")))
 
     def distance_on_su2(self, quat_xyzw: ArrayLike) -> Array:
-        """The distance of unit quaternions from 1, where −1 is another point: (..., 4) -> (...).
-
-        Raises
-        ------
-        ShapeError
-            If a quaternion's length is further than 1e-3 from 1.
-        """
+        """The distance of unit quaternions from 1, where −1 is another point: (..., 4) -> (...)."""
         return self._length(self.shortest_momentum_on_su2(quat_xyzw))
 
     def shortest_momentum_on_su2(self, quat_xyzw: ArrayLike) -> Array:
-        """As `shortest_momentum`, to a unit quaternion and not to its negative: (..., 4) -> (..., 3).
-
-        Raises
-        ------
-        ShapeError
-            If a quaternion's length is further than 1e-3 from 1.
-        """
+        """The momentum of a shortest geodesic to a unit quaternion, not to its negative: (..., 4) -> (..., 3)."""
         so3.quat_argument(quat_xyzw, "quat_xyzw")
         return self._shortest_of_each(so3.normalised(np.asarray(quat_xyzw, dtype=float)))
 
@@ -208,7 +172,7 @@ class AxisymmetricMetric:
         return np.array(flat).reshape(*quats.shape[:-1], 3)
 
     def _length(self, momentum: Array) -> Array:
-        """Of the geodesic in a unit of time."""
+        """Length of the geodesic in a unit of time."""
         equator, axis = np.sum(momentum[..., :2] ** 2, axis=-1), momentum[..., 2] ** 2
         return np.sqrt(equator / self.equatorial + axis / self.axial)
 
@@ -229,7 +193,7 @@ class AxisymmetricMetric:
         side = 1.0 if way(quarter, 1.0)[2] >= target else -1.0
         angle = 0.0
         if target > 0.0:
-            angle = float(brentq(lambda nu: way(nu, side)[2] - target, 0.0, quarter, xtol=1e-300, rtol=1e-15))  # type: ignore[arg-type]
+            angle = bracketed_root(lambda nu: way(nu, side)[2] - target, 0.0, quarter)
         sine, turn, _ = way(angle, side)
         tau = float(np.arctan2(sine, side * along * np.cos(angle)))
         # tau near pi has fewer digits than its sine.
@@ -289,24 +253,17 @@ class AxisymmetricMetric:
 def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
     """The metric of moments (I_1, I_1, I_3), I_3 about the axis of symmetry, which is the third.
 
+    Equation :eq:`conjugate-time` of the documentation.
+    Raises ShapeError if a moment is not a number above 0, or I_1 is not finite.
+
     Parameters
     ----------
     equatorial : I_1 > 0 [kg m^2]
     axial : I_3 > 0 [kg m^2]; `inf` for the sub-Riemannian metric
 
-    Raises
-    ------
-    ShapeError
-        If a moment is not a number above 0, or I_1 is not finite.
-
-    Notes
-    -----
-    Equation :eq:`conjugate-time` of the documentation.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> print(f"{geodesics.axisymmetric_metric(2.0, 1.0).diameter:.9f} = pi sqrt(2)")
+    >>> print(f"{sp.rigid_body.geodesics.axisymmetric_metric(2.0, 1.0).diameter:.9f} = pi sqrt(2)")
     4.442882938 = pi sqrt(2)
     """
     try:

@@ -1,6 +1,6 @@
 """Distances of left-invariant metrics on SO(3), by shooting from many starts at once.
 
-Of two equal moments the shortest geodesic is known in closed form. For three different ones the distances of the next
+For two equal moments the shortest geodesic is known in closed form. For three different ones the distances of the next
 smaller and the next larger axisymmetric metric bound it, and it is searched for: momenta of all directions and several
 sizes are led to the attitude by Levenberg-Marquardt steps with the exact differential of the exponential map. The
 shortest geodesic among those that arrive is the distance, if none was missed; the search is repeated with starts that
@@ -11,7 +11,7 @@ L/sqrt(I_3) or, as a loop of the other two turns, by L²/(4 pi sqrt(I_1 I_2)). I
 along the third axis up to 2 pi/sqrt((a_1 − a_3)(a_2 − a_3)), with which such a loop closes however short it is. Starts
 and steps are scaled by these sizes: without that, short ways along stiff or forbidden directions are missed.
 
-As the largest moment I_3 goes to infinity, the square of the distance falls short of the sub-Riemannian one by the
+When the largest moment I_3 goes to infinity, the square of the distance falls short of the sub-Riemannian one by the
 integral of Pi_3² over the shortest geodesic, in a unit of time, over I_3.
 
 Sources: theory.md section 7, Q6; Podobryaev and Sachkov 2016 for the cut times.
@@ -33,61 +33,29 @@ from ._momentum_flow import attitude_flow, exponential_derivative
 from .axisymmetric_cut import axisymmetric_metric
 from .left_invariant import LeftInvariantMetric
 
-_FRACTIONS = (0.35, 0.7, 1.05, 1.4)
-"""Sizes of the starts, in parts of the largest momenta along the axes; a loop that closes is at about sqrt(2)."""
-_FEW = 48
-"""Directions of a search."""
-_MANY = 384
-"""Directions of the last, where the others find nothing as short as the upper bound."""
-_MOST_SEARCHES = 4
-"""Searches with starts scaled to the last one's length; the second rarely finds anything shorter."""
-_STEPS = 60
-"""Levenberg-Marquardt steps; Newton's last few square the error, the others only have to reach their basin."""
-_CLOSE = 1e-9
-"""In parts of how far such a way can turn: arrived, what the next step would leave is rounding."""
-_ROUNDING = 1e-15
-"""[rad] An attitude is no better known."""
-_MARGIN = 1e-7
-"""By so much, in parts, a length may be above its upper bound, or an end past the cut, for rounding."""
-_IMPROVED = 1e-9
-"""In parts: a length that is shorter by more is another way."""
-_FIRST_DAMPING = 1e-2
-"""Of the mean square of the differential: near Newton's step, but bounded where the differential is singular."""
-_LEAST_DAMPING = 1e-16
-_LARGEST_DAMPING = 1e6
-_HOPELESS_DAMPING = 1e5
-"""Above it a start is given up: ten steps in a row, each a tenth of the last, did not come closer."""
-_FIRST_AXIS_LAST = [1, 2, 0]
-"""A cyclic order of the axes, so right-handed, with that of the smallest moment as third."""
+_FEW, _MANY = 48, 384  # directions of a search, and of the last where it finds nothing as short as the upper bound
+_STEPS = 60  # of Levenberg and Marquardt; the last few square the error, the others have to reach their basin
+_CLOSE = 1e-9  # relative: of residuals of an arrival, where the next step squares them, and of different lengths
+_ROUNDING = 1e-15  # [rad] of an attitude
+_MARGIN = 1e-7  # relative, by which rounding may put a length above its upper bound, or an end past the cut
+_FIRST_AXIS_LAST = [1, 2, 0]  # a cyclic order of the axes, so right-handed, with that of the smallest moment as third
 
 
 @dataclass(frozen=True, eq=False)
 class ShortestGeodesic:
-    """The shortest geodesic found from the identity to an attitude, see `shortest_geodesic`.
-
-    Attributes
-    ----------
-    momentum : (3,) with which it arrives at t = 1, body axes [kg m^2/s]
-    length : the distance [sqrt(kg) m]
-    certified : whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut
-    lower_bound, upper_bound : distances of axisymmetric metrics below and above this one [sqrt(kg) m]
-    residual : angle by which the end misses the attitude [rad]
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 1.0, 1.0])
-    >>> found = geodesics.shortest_geodesic(metric, sp.so3.exp(np.array([0.3, 0.0, 0.4])))
-    >>> print(found.momentum.round(6))
-    [0.3 0.  0.4]
-    """
+    """Shortest geodesic found from the identity to an attitude. Made by `shortest_geodesic`."""
 
     momentum: Array
+    """(3,) with which it arrives at t = 1, body axes [kg m^2/s]."""
     length: float
+    """The distance [sqrt(kg) m]."""
     certified: bool
+    """Whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut."""
     lower_bound: float
     upper_bound: float
+    """`lower_bound` and `upper_bound`: distances of axisymmetric metrics below and above this one [sqrt(kg) m]."""
     residual: float
+    """Angle by which the end misses the attitude [rad]."""
 
     __repr__ = short_repr
 
@@ -100,22 +68,14 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
     more than once about the axis of the smallest moment, longer than 2 pi sqrt(I_1), many geodesics have nearly equal
     length: there a shorter one may have been.
 
-    Raises
-    ------
-    ShapeError
-        If the attitude is no rotation (3, 3).
-    AccuracyNotReached
-        If no geodesic arrives that is as short as the upper bound says.
-
-    Notes
-    -----
     Source: theory.md Q6.
+
+    Raises AccuracyNotReached if no geodesic arrives that is as short as the upper bound.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 1.0, 1.0])
-    >>> found = geodesics.shortest_geodesic(metric, sp.so3.exp(np.array([0.3, 0.0, 0.4])))
+    >>> metric = sp.rigid_body.geodesics.left_invariant_metric([1.0, 1.0, 1.0])
+    >>> found = sp.rigid_body.geodesics.shortest_geodesic(metric, sp.so3.exp(np.array([0.3, 0.0, 0.4])))
     >>> print(f"{found.length:.9f}")
     0.500000000
     """
@@ -142,31 +102,23 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
 
 
 def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple[int, ShortestGeodesic]:
-    """The attitude of a set that is nearest to the identity, and the shortest geodesic there: the distance to the set.
+    """Index of the attitude of a set that is nearest to the identity, and the shortest geodesic there.
 
-    A set may be attitudes that look the same, such as those of a symmetric body, or many samples of a curve of goals.
+    A set may be equivalent attitudes, such as those of a symmetric body, or many samples of a curve of goals.
     Distances of axisymmetric metrics bound those to each from below, so that few of them are searched for.
+
+    Raises ShapeError, AccuracyNotReached as `shortest_geodesic`; if there is no attitude.
 
     Parameters
     ----------
     metric : of `left_invariant_metric`
     attitudes : (N, 3, 3), one or more
 
-    Returns
-    -------
-    its number in the set, and its `ShortestGeodesic`
-
-    Raises
-    ------
-    ShapeError, AccuracyNotReached
-        As `shortest_geodesic`; if there is no attitude.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 2.0, 3.0])
+    >>> metric = sp.rigid_body.geodesics.left_invariant_metric([1.0, 2.0, 3.0])
     >>> same = sp.so3.exp(np.array([[0.0, 0.0, 2.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0 - np.pi]]))
-    >>> number, found = geodesics.nearest_attitude(metric, same)
+    >>> number, found = sp.rigid_body.geodesics.nearest_attitude(metric, same)
     >>> print(number, f"{found.length:.6f}")
     1 1.414214
     """
@@ -208,21 +160,22 @@ def _searched(metric: LeftInvariantMetric, target: Array, upper: float) -> Array
     near = float(np.linalg.norm(scaled)) < 0.5 * np.pi
     expected = float(axisymmetric_metric(mean, largest).distance(so3.exp(scaled))) if near else upper
     best = _shortest_arrival(metric, target, _FEW, min(expected, upper))
-    for _ in range(_MOST_SEARCHES):
+    # Starts are scaled to the last length; the second search rarely finds anything shorter.
+    for _ in range(4):
         other = _shortest_arrival(metric, target, _FEW, min(best[1], upper))
-        improved = other[1] < best[1] * (1.0 - _IMPROVED)
+        improved = other[1] < best[1] * (1.0 - _CLOSE)
         best = other if other[1] < best[1] else best
         if not improved:
             break
     most = upper * (1.0 + _MARGIN + _ROUNDING / _reach(metric, upper).min())
     if best[1] > most:
-        best = min(best, _shortest_arrival(metric, target, _MANY, upper), key=lambda found: found[1])
+        best = min(best, _shortest_arrival(metric, target, _MANY, upper), key=lambda arrival: arrival[1])
     if best[1] > most:
         raise AccuracyNotReached(
             f"distance: the shortest geodesic found has the length {best[1]:.9g}, but the distance is at most "
             f"{upper:.9g}; try an attitude nearby"
         )
-    # As close as rounding lets it: of many that arrive, the shortest is one that stops a little short.
+    # To rounding: the shortest of many arrivals is one that stops a little short.
     start = best[0] / _largest_momenta(metric, best[1])
     return _arrivals(metric, start[None], target, best[1], missed=0.0)[0][0]
 
@@ -237,13 +190,13 @@ def _shortest_arrival(metric: LeftInvariantMetric, target: Array, count: int, le
 
 
 def _starts(count: int) -> Array:
-    """Momenta in units of the largest along each axis: all directions, several sizes."""
+    """Momenta in units of the largest along each axis: all directions, up to sqrt(2), where a loop closes."""
     directions = sphere.fibonacci_directions(count)
-    return np.concatenate([fraction * directions for fraction in _FRACTIONS])
+    return np.concatenate([fraction * directions for fraction in (0.35, 0.7, 1.05, 1.4)])
 
 
 def _reach(metric: LeftInvariantMetric, length: float) -> Array:
-    """How far ways of this length can turn about each principal axis: (3,) [rad]."""
+    """Largest turns about the principal axes by ways of this length: (3,) [rad]."""
     first, middle, _ = metric.moments
     straight = length * np.sqrt(metric.inverse_moments)
     straight[2] = max(straight[2], length * length / (4.0 * np.pi * np.sqrt(first * middle)))
@@ -261,7 +214,7 @@ def _largest_momenta(metric: LeftInvariantMetric, length: float) -> Array:
 def _arrivals(
     metric: LeftInvariantMetric, starts: Array, target: Array, length: float, missed: float = _ROUNDING
 ) -> tuple[Array, Array]:
-    """Where the steps lead from every start: momenta, and the errors of their ends in parts of `_reach`.
+    """Momenta that the steps reach from every start, and the errors of their ends relative to `_reach`.
 
     Steps end where an attitude is missed by no more than `missed` [rad].
     """
@@ -272,7 +225,9 @@ def _arrivals(
     largest = 1.5 * float(np.linalg.norm(starts, axis=-1).max())
     errors = _rotation_errors(inverse_moments, momenta, target) * weights
     sizes = np.linalg.norm(errors, axis=-1)
-    damping = np.full(len(momenta), _FIRST_DAMPING)
+    # Relative to the mean square of the differential: near Newton's step, but bounded where that is singular. Above 1e5
+    # a start is given up: several steps in a row, each a tenth of the last, did not come closer.
+    damping = np.full(len(momenta), 1e-2)
     rows = np.arange(len(momenta))
     derivative = exponential_derivative(inverse_moments, momenta, times)
     for _ in range(_STEPS):
@@ -291,15 +246,15 @@ def _arrivals(
         momenta[taken], errors[taken], sizes[taken] = trial[better], error[better], apart[better]
         derivative[taken] = exponential_derivative(inverse_moments, momenta[taken], times[taken])
         changed = np.where(better, 0.1 * damping[rows], 10.0 * damping[rows])
-        damping[rows] = np.clip(changed, _LEAST_DAMPING, _LARGEST_DAMPING)
-        rows = rows[(sizes[rows] > missed * weights.max()) & (damping[rows] < _HOPELESS_DAMPING)]
+        damping[rows] = np.clip(changed, 1e-16, 1e6)
+        rows = rows[(sizes[rows] > missed * weights.max()) & (damping[rows] < 1e5)]
         if not rows.size:
             break
     return momenta, sizes
 
 
 def _bent_step(start: Array, step: Array) -> Array:
-    """Where steps lead that turn about the third axis instead of going straight across: (N, 3), (N, 3) -> (N, 3).
+    """Ends of steps that turn about the third axis instead of going straight across: (N, 3), (N, 3) -> (N, 3).
 
     Loops that begin in different directions of the first two axes end almost together, so that the errors have a valley
     round a circle, along which straight steps would have to be tiny.
@@ -323,7 +278,7 @@ def _rotation_errors(inverse_moments: Array, momenta: Array, target: Array) -> A
 
 
 def _before_cut(metric: LeftInvariantMetric, momentum: Array) -> bool:
-    """Whether an arrival at t = 1 is proven to be the shortest."""
+    """True if an arrival at t = 1 is proven to be the shortest."""
     smallest, middle, largest = metric.moments
     if middle == largest:
         symmetric = axisymmetric_metric(largest, smallest)

@@ -8,8 +8,8 @@ Pontryagin's principle, the shortest curves are the motions of a free rigid body
 and their speed is sqrt(2 H): with H = 1/2 time is length. A moment may be infinite: then its component of u is
 forbidden, a has a zero, and the metric is sub-Riemannian. `momentum_flow` has both cases in one closed form.
 
-Principal moments ascend, I_1 <= I_2 <= I_3, so that an infinite one is I_3; those of Bonnard et al. descend: their I_1,
-I_2, I_3 are our I_3, I_2, I_1. Inertias are given, and momenta and attitudes answered, in the caller's body axes.
+Principal moments ascend, I_1 <= I_2 <= I_3, so that an infinite one is I_3. Inertias, momenta and attitudes are in the
+caller's body axes.
 
 Sources: Bonnard, Cots and Shcherbakova 2013, section 3; theory.md Q1-Q6.
 """
@@ -22,34 +22,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import inertia_argument, moments_argument
+from ...arguments import inertia_argument, moments_argument, whole_argument
 from ...arrays import Array, common_batch, finite_array, real_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments, principal_axes
-from ...letters import what_came
+from .._arguments import check_entries
 from ._conjugate_search import conjugate_times
 from ._momentum_flow import attitude_flow, exponential_derivative
 
-_LEAST_SPEED = 1e-12
-"""In parts of the largest speed of such a momentum: below, rounding decides whether it is along the forbidden axis."""
+_LEAST_SPEED = 1e-12  # of the largest speed of such a momentum: below, rounding decides whether it moves
 
 
 @dataclass(frozen=True, eq=False)
 class LeftInvariantMetric:
-    """A left-invariant metric on SO(3), see `left_invariant_metric`.
+    """Left-invariant metric on SO(3). Made by `left_invariant_metric`.
 
     Momenta are those at the start, in body axes, and the geodesics start at the identity: by left invariance the one
     that starts at R_0 is R_0 times it. Leading axes of momenta and times broadcast. Everything raises `ShapeError` for
     momenta or times of the wrong shape or not finite.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 2.0, 4.0])
-    >>> turn = metric.attitude(np.array([0.0, 0.0, 2.0]), 1.0)
-    >>> print(f"{sp.so3.angle(turn):.9f}")  # momentum over moment
-    0.500000000
     """
 
     moments: Array
@@ -63,7 +54,7 @@ class LeftInvariantMetric:
 
     @property
     def is_sub_riemannian(self) -> bool:
-        """Whether a direction is forbidden."""
+        """True if a direction is forbidden."""
         return bool(self.inverse_moments[2] == 0.0)
 
     def angular_velocity(self, momentum: ArrayLike) -> Array:
@@ -76,10 +67,7 @@ class LeftInvariantMetric:
     def pseudo_hamiltonian(self, momentum: ArrayLike, angular_velocity: ArrayLike) -> Array:
         """u.Pi − u.I u/2, of which the maximum over u is `hamiltonian`: (..., 3), (..., 3) -> (...) [J].
 
-        Raises
-        ------
-        ShapeError
-            If u has a component that the metric forbids.
+        Raises ShapeError if u has a component that the metric forbids.
         """
         pi, u = self._principal(momentum), self._principal(angular_velocity, "angular_velocity", "rad/s")
         if self.is_sub_riemannian and np.any(u[..., 2] != 0.0):
@@ -103,10 +91,8 @@ class LeftInvariantMetric:
     def unit_speed(self, momentum: ArrayLike) -> Array:
         """The momentum of the same direction with H = 1/2: (..., 3) -> (..., 3).
 
-        Raises
-        ------
-        ShapeError
-            Where H is 0: at zero momentum, and along the forbidden direction, to which no geodesic belongs.
+        Raises ShapeError where H is 0: at zero momentum, and along the forbidden direction, to which no geodesic
+        belongs.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         return pi / self._moving(pi)[..., None]
@@ -144,26 +130,19 @@ class LeftInvariantMetric:
         return (self.axes @ derivative @ self.axes.T).reshape(*batch, 3, 3)
 
     def conjugate_time(self, momentum: ArrayLike, order: int = 1) -> Array:
-        """When the geodesic meets its first conjugate point, or its `order`-th: (..., 3) -> (...) [s].
+        """Time of the geodesic's first conjugate point, or of its `order`-th: (..., 3) -> (...) [s].
 
         Points where two Jacobi fields vanish count twice. Right to about 1e-13 of the time.
 
-        Raises
-        ------
-        ShapeError
-            Where H is 0, or if `order` is not a whole number of 1 or more.
-        AccuracyNotReached
-            If none is found in ten thousand steps of the search, because the moments are too unequal.
-
-        Notes
-        -----
         Source: theory.md Q6; `conjugate_times`.
+
+        Raises ShapeError where H is 0; AccuracyNotReached if none is found in ten thousand steps of the search, because
+        the moments are too unequal.
         """
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         self._moving(pi)
-        if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
-            raise ShapeError(f"order: a whole number of 1 or more is needed, got {what_came(order)}")
-        times = conjugate_times(self.inverse_moments, pi.reshape(-1, 3) @ self.axes, int(order))
+        count = whole_argument(order, "order", 1)
+        times = conjugate_times(self.inverse_moments, pi.reshape(-1, 3) @ self.axes, count)
         return times.reshape(pi.shape[:-1])[()]
 
     def conjugate_locus(self, momentum: ArrayLike, order: int = 1) -> Array:
@@ -177,12 +156,8 @@ class LeftInvariantMetric:
         """The speeds; raises unless all are above 0."""
         speed = self.speed(momentum)
         still = ~(speed > _LEAST_SPEED * np.sqrt(self.inverse_moments[0]) * np.linalg.norm(momentum, axis=-1))
-        if still.any():
-            where = tuple(int(i) for i in np.argwhere(still)[0])
-            raise ShapeError(
-                f"momentum: entry {list(where)} is {momentum[where]}, with which nothing moves; it must not be zero"
-                + (f", nor along the forbidden direction {self.axes[:, 2]}" if self.is_sub_riemannian else "")
-            )
+        forbidden = f", nor along the forbidden direction {self.axes[:, 2]}" if self.is_sub_riemannian else ""
+        check_entries(still, momentum, "momentum", "nothing moves with it; it must not be zero" + forbidden)
         return speed
 
     def _flat(self, momentum: ArrayLike, t: ArrayLike) -> tuple[Array, Array, tuple[int, ...]]:
@@ -194,26 +169,17 @@ class LeftInvariantMetric:
 def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
     """The metric u.I u of an inertia, or of principal moments one of which may be infinite.
 
+    Source: Bonnard et al., sections 3.1 and 3.2.
+    Raises ShapeError for another shape, moments not positive, or more than one infinite.
+
     Parameters
     ----------
     inertia : (3,) principal moments about the three body axes, in any order, one of them `inf` for the sub-Riemannian
         metric that forbids turns about this axis; or a tensor (3, 3), symmetric positive definite [kg m^2]
 
-    Raises
-    ------
-    ShapeError
-        For another shape, moments not positive, or more than one infinite.
-    UnphysicalInertiaError, SingularInertiaError
-        If a tensor is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Source: Bonnard et al., sections 3.1 and 3.2.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.left_invariant_metric([1.0, 1.0, 1.0])
+    >>> metric = sp.rigid_body.geodesics.left_invariant_metric([1.0, 1.0, 1.0])
     >>> print(f"{metric.conjugate_time(np.array([0.6, 0.0, 0.8])):.9f} = 2 pi")  # of a round body
     6.283185307 = 2 pi
     """

@@ -15,63 +15,29 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from scipy.fft import dct
 
-from ...arguments import check_function, number_argument
+from ...arguments import check_function
 from ...arrays import Array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
-from ...letters import what_came
 from ...roots import safe_newton
-from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
+from .._arguments import above_zero
+from .surface_of_revolution import NEAREST, SurfaceOfRevolution, surface_of_stretch
 
+# x (N,) -> F_2 and dF_2/dx, (N,) each; the derivative with all its digits next to the equator, where it vanishes.
 Profile = Callable[[Array], tuple[Array, Array]]
-"""x (N,) -> F_2 and dF_2/dx, (N,) each; the derivative with all its digits next to the equator, where it vanishes."""
-Meridian = Callable[[Array], Array]
-"""x (N,) -> F_1 > 0 (N,)."""
+Meridian = Callable[[Array], Array]  # x (N,) -> F_1 > 0 (N,)
 
-_DEGREE = 24
-"""Of the polynomial on a panel: high enough for few panels, low enough for derivatives that keep their digits."""
-_HALVINGS = 14
-"""Of the panels: a metric that needs more is too rough, or given with noise."""
-_SETTLED = 1.5e-15
-"""Last coefficients, in parts of the largest value, that are rounding; about seven eps."""
-_MOST_FORGIVEN = 20.0 * _SETTLED
-"""The same on the finest panels, where the noise of the functions given is all that is left."""
-_TRIMMED = 4e-16
-"""Coefficients, in parts of the largest value, that are dropped at the end of a series: two eps."""
-_RULE = np.polynomial.legendre.leggauss(32)
-_NODES = _RULE[0]
-"""(32,) in [-1, 1]: with few panels right to rounding for F_2' that a polynomial of `_DEGREE` holds."""
-_WEIGHTS = _RULE[1]
-_MOST_PANELS = 64
-"""Of the integral of F_2': enough for metrics that `_DEGREE` and `_HALVINGS` can resolve."""
-_DROP_SETTLED = 1e-14
-"""Change of Y, in [0, 1], with the number of panels that is rounding."""
-_DROP_ERROR = 1e-11
-"""Difference of Y by F_2 and by the integral of F_2' above which the derivative is wrong."""
-_SAMPLES = 257
-"""Of each function, by which the assumptions are judged."""
-_ROUNDING = 1e-12
-"""In parts of the largest value: differences of F_1, F_2 and slopes that are rounding."""
-_SLOPE_ROUNDING = 1e-10
-"""The same for F_2' on both sides of the equator, which a caller may have by differences."""
-_FLAT = 1e-9
-"""In parts of the largest |F_2'|: smaller slopes at the reach are those of a parallel."""
-_NEAREST = 1e-60
-"""Least depth - Y: at a parallel D is infinite, while so near to it the curvature has reached its limit."""
+_DEGREE = (
+    24  # of the polynomial on a panel: high enough for few panels, low enough for derivatives to keep their digits
+)
+_EPS = float(np.finfo(float).eps)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+_ROUNDING = 1e-12  # of the largest value: differences of F_1, F_2 and slopes that are rounding
 
 
 @dataclass(frozen=True)
 class Assumptions:
-    """Which assumptions a metric meets, see `assumptions`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> def catenoid(x):
-    ...     return np.cosh(x) ** 2, np.sinh(2.0 * x)
-    >>> geodesics.assumptions(catenoid, 1.0).falls_to_reach
-    False
-    """
+    """Assumptions that a metric meets. Made by `assumptions`."""
 
     equator_is_parallel: bool
     """(A1) F_2'(0) = 0."""
@@ -87,17 +53,7 @@ class Assumptions:
 
 @dataclass(frozen=True, eq=False)
 class TabulatedStretch:
-    """D and its derivatives by Chebyshev series in Y on panels.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> def sphere(x):
-    ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
-    >>> stretch = geodesics.surface_of_metric(sphere, np.pi / 2.0).stretch
-    >>> type(stretch).__name__, len(stretch.edges) >= 2
-    ('TabulatedStretch', True)
-    """
+    """D and its derivatives by Chebyshev series in Y on panels. Made by `surface_of_metric`."""
 
     edges: Array
     """(P + 1,) ascending depth - Y."""
@@ -111,16 +67,16 @@ class TabulatedStretch:
     def __call__(self, square: Array, rest: Array) -> tuple[Array, Array, Array]:
         """Y and depth - Y, (N,) each -> D, D', D'', (N,) each."""
         panel = np.clip(np.searchsorted(self.edges, rest, side="right") - 1, 0, len(self.series) - 1)
-        found = np.empty((3, *square.shape))
+        table = np.empty((3, *square.shape))
         for number in np.unique(panel):
             here = panel == number
             low, high = self.edges[number], self.edges[number + 1]
             place = ((high - rest[here]) - (rest[here] - low)) / (high - low)
-            found[:, here] = chebyshev.chebval(place, self.series[number].T)
+            table[:, here] = chebyshev.chebval(place, self.series[number].T)
+        value, slope, second = table[0], table[1], table[2]
         if not self.has_root:
-            return found[0], found[1], found[2]
-        value, slope, second = found
-        rest = np.maximum(rest, _NEAREST)
+            return value, slope, second
+        rest = np.maximum(rest, NEAREST)
         root_rest = np.sqrt(rest)
         return (
             value / root_rest,
@@ -130,34 +86,25 @@ class TabulatedStretch:
 
 
 def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None) -> Assumptions:
-    """Which assumptions on the metric F_1 dx^2 + F_2 d theta^2 hold for |x| <= reach, by 257 samples.
+    """Assumptions that the metric F_1 dx^2 + F_2 d theta^2 meets for |x| <= reach, by 257 samples.
 
     (A3), on the curvature, is `SurfaceOfRevolution.is_greatest_curvature_on_equator`.
 
-    Raises
-    ------
-    ShapeError
-        If the reach is not positive, or the functions give no finite numbers of the right shape, or F_2 <= 0 inside.
-
-    Notes
-    -----
     Source: Bonnard et al., section 2.1.
+    Raises ShapeError if the reach is not positive, or the functions give no finite numbers of the right shape, or F_2
+    <= 0 inside.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> def sphere(x):
     ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
-    >>> found = geodesics.assumptions(sphere, np.pi / 2.0)
+    >>> found = sp.rigid_body.geodesics.assumptions(sphere, np.pi / 2.0)
     >>> found.is_symmetric, found.falls_to_reach, found.end
     (True, True, 'pole')
     """
-    reach = number_argument(reach, "reach")
     if meridian is not None:
         check_function(meridian, "meridian", "a function")
-    if not (np.isfinite(reach) and reach > 0.0):
-        raise ShapeError(f"reach: the largest x must be positive and finite, got {what_came(reach)}")
-    x = reach * np.linspace(0.0, 1.0, _SAMPLES)
+    x = above_zero(reach, "reach") * np.linspace(0.0, 1.0, 257)
     north, north_slope = _values(profile, x)
     south, south_slope = _values(profile, -x)
     along, back = _meridian_values(meridian, x), _meridian_values(meridian, -x)
@@ -168,13 +115,14 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
     end = "boundary"
     if north[-1] <= _ROUNDING * scale:
         end = "pole"
-    elif abs(north_slope[-1]) <= _FLAT * steepness:
+    elif abs(north_slope[-1]) <= 1e3 * _ROUNDING * steepness:
         end = "parallel"
     return Assumptions(
         equator_is_parallel=bool(abs(north_slope[0]) <= _ROUNDING * steepness),
         is_symmetric=bool(
             np.abs(north - south).max() <= _ROUNDING * scale
-            and np.abs(north_slope + south_slope).max() <= _SLOPE_ROUNDING * steepness
+            # A caller may have slopes by differences.
+            and np.abs(north_slope + south_slope).max() <= 1e2 * _ROUNDING * steepness
             and np.abs(along - back).max() <= _ROUNDING * along.max()
         ),
         falls_to_reach=bool((north_slope[1:-1] < 0.0).all()),
@@ -185,36 +133,24 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
 def surface_of_metric(profile: Profile, reach: float, meridian: Meridian | None = None) -> SurfaceOfRevolution:
     """The surface with the metric F_1 dx^2 + F_2 d theta^2, |x| <= reach.
 
+    Source: Bonnard et al., sections 2.1 and 2.2; theory.md O1, O4, P1.
+    Raises ShapeError if the metric breaks an assumption: its equator is not a geodesic, it is not symmetric, or F_2
+    does not fall to the reach; AccuracyNotReached if it is too rough to be tabulated to rounding.
+
     Parameters
     ----------
     profile : F_2 with its derivative (m with m' where F_1 = 1), see `Profile`
     reach : the largest x: of a pole, where F_2 = 0, of the next parallel, where F_2' = 0, or of the chart's boundary
     meridian : F_1; 1 where not given
 
-    Raises
-    ------
-    ShapeError
-        If the metric breaks an assumption: its equator is no geodesic, it is not symmetric, or F_2 does not fall to the
-        reach; or if the derivative is not that of F_2.
-    AccuracyNotReached
-        If the metric is too rough to be tabulated to rounding.
-
-    Notes
-    -----
-    Source: Bonnard et al., sections 2.1 and 2.2; theory.md O1, O4, P1.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
     >>> def sphere(x):
     ...     return np.cos(x) ** 2, -np.sin(2.0 * x)
-    >>> surface = geodesics.surface_of_metric(sphere, np.pi / 2.0)
-    >>> print(f"{geodesics.cut_time(surface, 0.5):.6f} = pi")
+    >>> surface = sp.rigid_body.geodesics.surface_of_metric(sphere, np.pi / 2.0)
+    >>> print(f"{sp.rigid_body.geodesics.cut_time(surface, 0.5):.6f} = pi")
     3.141593 = pi
     """
-    reach = number_argument(reach, "reach")
-    if meridian is not None:
-        check_function(meridian, "meridian", "a function")
     found = assumptions(profile, reach, meridian)
     if not found.equator_is_parallel:
         raise ShapeError("(A1) fails: the equator x = 0 is no extremal, as F_2'(0) is not 0; count x from the equator")
@@ -240,16 +176,14 @@ class _Sampler:
         x = reach * np.linspace(0.0, 1.0, 65)
         middle, _ = _values(profile, x)
         truth = 1.0 - middle / self.equator
+        change, last = np.inf, np.full_like(x, np.inf)
         self.panels = 1
-        last = self.drop(np.zeros_like(x), x)
-        while self.panels < _MOST_PANELS:
-            self.panels *= 2
+        while change > 1e-14 and self.panels <= 64:
             finer = self.drop(np.zeros_like(x), x)
-            settled = np.abs(finer - last).max() <= _DROP_SETTLED
-            last = finer
-            if settled:
-                break
-        if np.abs(last - truth).max() > _DROP_ERROR:
+            change, last = np.abs(finer - last).max(), finer
+            self.panels *= 2
+        self.panels //= 2
+        if np.abs(last - truth).max() > 1e-11:
             at = x[int(np.abs(last - truth).argmax())]
             raise ShapeError(
                 f"profile: the derivative given is not that of F_2, or F_2 is too rough, up to x = {at:.6g}"
@@ -296,9 +230,9 @@ class _Sampler:
             coefficients = np.asarray(dct(samples[::-1], type=2)) / (_DEGREE + 1)
             coefficients[0] *= 0.5
             # Finer panels tolerate more, as the last digit of the functions given may be noise.
-            forgiven = min(_SETTLED * 1.5 ** np.log2(1.0 / (high - low)), _MOST_FORGIVEN)
+            forgiven = 7.0 * _EPS * min((high - low) ** -np.log2(1.5), 20.0)
             if np.abs(coefficients[-3:]).max() > forgiven * np.abs(samples).max():
-                if high - low < 0.5**_HALVINGS:
+                if high - low < 0.5**14:
                     raise AccuracyNotReached(
                         f"the metric is too rough near Y = {square[0]:.6g} to be tabulated to rounding; give a smooth "
                         "metric, with a derivative right to rounding"
@@ -308,7 +242,7 @@ class _Sampler:
                 waiting += [(low, middle), (middle, high)]
                 continue
             # The last ones are rounding, which every derivative would magnify.
-            coefficients = chebyshev.chebtrim(coefficients, _TRIMMED * np.abs(samples).max())
+            coefficients = chebyshev.chebtrim(coefficients, 2.0 * _EPS * np.abs(samples).max())
             coefficients = np.pad(coefficients, (0, max(0, 3 - len(coefficients))))
             scale = 2.0 / (self.depth * (high - low))
             first, second = (chebyshev.chebder(coefficients, order) * scale**order for order in (1, 2))

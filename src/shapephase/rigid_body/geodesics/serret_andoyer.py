@@ -15,10 +15,7 @@ The sign of p_y: phi grows here as y falls, d phi = -dy/sqrt(a_1 - w), so that p
 zero. The paper has d phi = +dy/sqrt(C - w), hence y = pi/2 + am(alpha phi, k) and p_y of the opposite sign: the
 same geodesics, mirrored in the equator (theory.md B-E5).
 
-Bonnard et al. number the moments in descending order: their I_1, I_2, I_3 are our I_3, I_2, I_1, their A < B < C our
-a_3, a_2, a_1. A metric takes the moments in any order and momenta in the caller's axes.
-
-Its geodesics are in `serret_andoyer_geodesics`.
+Moments may be in any order, momenta are in the caller's axes; Bonnard et al. have A < B < C for our a_3, a_2, a_1.
 
 Source: Bonnard, Cots and Shcherbakova 2013, sections 3.4 to 4.2 and lemma 4.2; theory.md R2 to R5, R10.
 """
@@ -36,21 +33,14 @@ from ...arrays import Array, common_shape, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
-from ._serret_andoyer_constants import constants_of, constants_of_momentum, separatrix_constants
+from .._arguments import check_entries
+from ._serret_andoyer_constants import constants_of, constants_of_momentum, moment_gaps, separatrix_constants
 from .serret_andoyer_geodesics import GeodesicFamily
 
 
 @dataclass(frozen=True, eq=False)
 class SerretAndoyerMetric:
-    """The metric of three principal moments, see `serret_andoyer_metric`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0])
-    >>> print(np.round(metric.curvature_range, 9))  # 1/3 on the equator
-    [-0.16666667  0.33333333]
-    """
+    """Metric of three principal moments. Made by `serret_andoyer_metric`."""
 
     moments: Array
     """(3,) three different principal moments about the caller's axes 1, 2, 3 [kg m^2]."""
@@ -79,8 +69,7 @@ class SerretAndoyerMetric:
     @property
     def alpha(self) -> float:
         """sqrt(a_1 - a_3), the rate of the elliptic argument along phi [1/(sqrt(kg) m)]."""
-        i1, _, i3 = self._ascending
-        return float(np.sqrt((i3 - i1) / (i3 * i1)))
+        return float(np.sqrt(moment_gaps(self.moments)[2]))
 
     @property
     def modulus(self) -> float:
@@ -111,13 +100,6 @@ class SerretAndoyerMetric:
     def w(self, y: ArrayLike) -> Array:
         """a_3 sin^2 y + a_2 cos^2 y, z/2 of the paper: (...) [rad] -> (...) [1/(kg m^2)].
 
-        Raises
-        ------
-        ShapeError
-            If an argument is not finite; so do all methods.
-
-        Notes
-        -----
         Source: Bonnard et al., before (7).
         """
         angle = finite_array(y, "y", unit="rad")
@@ -129,10 +111,9 @@ class SerretAndoyerMetric:
 
         Source: Bonnard et al. (7); the metric of the paper's introduction is half of it (theory.md B-E1).
         """
-        i1, i2, i3 = self._ascending
+        _, upper, whole = moment_gaps(self.moments)
         angle = finite_array(y, "y", unit="rad")
-        sine, cosine = np.sin(angle) ** 2, np.cos(angle) ** 2
-        return 1.0 / self.w(angle), 1.0 / (sine * (i3 - i1) / (i3 * i1) + cosine * (i2 - i1) / (i2 * i1))
+        return 1.0 / self.w(angle), 1.0 / (whole * np.sin(angle) ** 2 + upper * np.cos(angle) ** 2)
 
     def energy(self, y: ArrayLike, p_x: ArrayLike, p_y: ArrayLike) -> Array:
         """H = (w p_x^2 + (a_1 - w) p_y^2)/2: (...) each -> (...); [J] for p in [kg m^2/s].
@@ -218,14 +199,8 @@ class SerretAndoyerMetric:
     def geodesics(self, p_theta: ArrayLike) -> GeodesicFamily:
         """The geodesics of unit speed from the equator with these p_theta, |p_theta| <= sqrt(I_3): (...).
 
-        Raises
-        ------
-        ShapeError
-            If a p_theta is beyond `largest_momentum`.
-
-        Notes
-        -----
         Source: Bonnard et al., sections 4.2 and 4.3.
+        Raises ShapeError if a p_theta is beyond `largest_momentum`.
         """
         return GeodesicFamily(constants=constants_of(self.moments, p_theta))
 
@@ -242,30 +217,23 @@ class SerretAndoyerMetric:
         In the caller's axes. The class follows from the momenta as given, so that it is right to rounding next to the
         separatrix too.
 
-        Raises
-        ------
-        ShapeError
-            If a momentum is zero.
+        Raises ShapeError if a momentum is zero.
         """
         momentum = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s")
-        if np.any(np.all(momentum == 0.0, axis=-1)):
-            raise ShapeError("body_momentum: a zero momentum does not move; give one that is not zero")
+        zero = np.all(momentum == 0.0, axis=-1)
+        check_entries(zero, momentum, "body_momentum", "a zero momentum does not move; give one that is not zero")
         return GeodesicFamily(constants=constants_of_momentum(self.moments, momentum))
 
     @property
     def _rise(self) -> float:
-        """a_2 - a_3."""
-        _, i2, i3 = self._ascending
-        return float((i3 - i2) / (i3 * i2))
+        return moment_gaps(self.moments)[0]
 
     @property
     def _ascending(self) -> Array:
-        """I_1 < I_2 < I_3."""
         return ascending_moments(self.moments)[0]
 
     @property
     def _inverse(self) -> Array:
-        """a_1 > a_2 > a_3."""
         return 1.0 / self._ascending
 
     def _jacobi(self, phi: ArrayLike) -> tuple[Array, Array, Array, Array]:
@@ -280,23 +248,16 @@ class SerretAndoyerMetric:
 def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
     """The Serret-Andoyer metric of three different principal moments.
 
+    Equation :eq:`andoyer-metric` of the documentation.
+    Raises ShapeError if the moments are not positive, or two of them are equal.
+
     Parameters
     ----------
     moments : (3,) about the body axes 1, 2, 3, in any order [kg m^2]
 
-    Raises
-    ------
-    ShapeError
-        If the moments are not positive, or two of them are equal.
-
-    Notes
-    -----
-    Equation :eq:`andoyer-metric` of the documentation.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> metric = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0])
+    >>> metric = sp.rigid_body.geodesics.serret_andoyer_metric([3.0, 2.0, 1.0])
     >>> print(f"{metric.geodesics(1.7).first_return:.9f}")
     3.281674528
     """

@@ -1,8 +1,7 @@
 """Geodesics of the Serret-Andoyer metric in closed real form, their returns to the equator and conjugate points.
 
-Moments ascend, I_1 < I_2 < I_3, a_i = 1/I_i (A, B, C of Bonnard et al. are a_3, a_2, a_1, their I_1 our I_3; see
-`serret_andoyer`), and p = |p_theta|. With u = M t, the sine and cosine of am(alpha phi, k), Y = sn^2(alpha phi, k) and
-n <= 0 are, up to a common factor,
+Moments ascend, I_1 < I_2 < I_3, a_i = 1/I_i (see `serret_andoyer`), and p = |p_theta|. With u = M t, the sine and
+cosine of am(alpha phi, k), Y = sn^2(alpha phi, k) and n <= 0 are, up to a common factor,
 
     oscillating  I_2 < p^2 <= I_3   m sn(u) : k' dn(u)          n = -(1 - a_3 p^2)/(a_1 p^2 - 1)       f = cn
     rotating     I_1 <= p^2 < I_2   sn(u) : k' cn(u)            n = -(a_2 - a_3)/(a_1 - a_2)           f = dn
@@ -35,18 +34,15 @@ from numpy.typing import ArrayLike
 from scipy.special import elliprd, hyp2f1
 
 from ... import elliptic
+from ...arguments import whole_argument
 from ...arrays import Array, Mask, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
-from ...letters import what_came
 from ...roots import safe_newton
-from ._checks import check_entries
+from .._arguments import check_entries
 from ._serret_andoyer_constants import GeodesicClass, GeodesicConstants, moment_gaps
 
-_NOT_ZERO = 1e-100
-"""Stands for a cn that vanishes, at a pole of S, where only f S is finite; its square does not underflow."""
-_SERIES_PARAMETER = 0.4
-"""m up to which the second derivative of K is a hypergeometric series; Legendre's equation would divide by m."""
+_NOT_ZERO = 1e-100  # for cn = 0, at a pole of S, where only f S is finite; its square does not underflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +53,7 @@ class GeodesicFamily:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> family = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0]).geodesics([1.7, 1.5])
+    >>> family = sp.rigid_body.geodesics.serret_andoyer_metric([3.0, 2.0, 1.0]).geodesics([1.7, 1.5])
     >>> print(family.period.round(6), family.first_return.round(6))
     [11.363461 17.085156] [3.281675 5.095474]
     """
@@ -74,7 +69,7 @@ class GeodesicFamily:
 
     @property
     def is_oscillating(self) -> Mask:
-        """Whether they return to the equator, or stay on it: (...)."""
+        """True where they return to the equator, or stay on it: (...)."""
         return self.constants.oscillating
 
     @property
@@ -106,7 +101,7 @@ class GeodesicFamily:
 
     @property
     def first_return(self) -> Array:
-        """R, what theta gains in T/2, after which an oscillating geodesic is at the equator again: (...) [rad].
+        """R, the gain of theta in T/2, after which an oscillating geodesic is at the equator again: (...) [rad].
 
         Infinite on the separatrix. On oscillating geodesics decreasing and convex in p (proposition 9: see
         `first_return_slope`); odd in p.
@@ -159,10 +154,8 @@ class GeodesicFamily:
         Raises ShapeError for rotating geodesics, which have none.
         Source: Bonnard et al., section 4.2.
         """
-        bad = self.constants.kind < GeodesicClass.SEPARATRIX
-        check_entries(
-            bad, self.p_theta, "p_theta", "a largest phi needs an oscillating geodesic, |p_theta| >= sqrt(I_2)"
-        )
+        requirement = "a largest phi needs an oscillating geodesic, |p_theta| >= sqrt(I_2)"
+        check_entries(self.constants.kind < GeodesicClass.SEPARATRIX, self.p_theta, "p_theta", requirement)
         _, upper, whole = moment_gaps(self.constants.moments)
         # Y_+ = (1 - a_3 p^2)/((a_2 - a_3) p^2) and 1 - Y_+, up to a common factor.
         sine, cosine = np.sqrt(self.constants.at_equator), np.sqrt(np.maximum(-self.constants.at_crest, 0.0))
@@ -235,18 +228,11 @@ class GeodesicFamily:
         in the equator, of the geodesics that start downward; it starts with a cusp on the equator at p = sqrt(I_3) and
         tends to phi = -K/alpha, theta infinite, as p falls to sqrt(I_2).
 
-        Raises
-        ------
-        ShapeError
-            If the order is no such number, or a geodesic does not oscillate: the others have no conjugate point
-            (theory.md R13).
-
-        Notes
-        -----
         Source: Bonnard et al., section 4.4; theory.md R12.
+        Raises ShapeError if the order is no such number, or a geodesic does not oscillate: the others have no conjugate
+        point (theory.md R13).
         """
-        if isinstance(order, bool) or not isinstance(order, int | np.integer) or order < 1:
-            raise ShapeError(f"order: expected a whole number from 1 on, got {what_came(order)}")
+        order = whole_argument(order, "order", 1)
         a3 = float(1.0 / self.constants.moments[2])
         level = -order * self._period_slopes()[0] * self.constants.rate * self.constants.at_equator
         v = _argument_of_level(a3, self.constants.second_kind, self.complement, level)
@@ -275,23 +261,19 @@ class GeodesicFamily:
 
     def _denominator(self, cn: Array, dn: Array) -> Array:
         """f of the module's table."""
-        return np.where(
-            self.constants.oscillating, cn, np.where(self.constants.kind >= GeodesicClass.ROTATING, dn, 1.0)
-        )
+        inner = np.where(self.constants.kind >= GeodesicClass.ROTATING, dn, 1.0)
+        return np.where(self.constants.oscillating, cn, inner)
 
     def _tangent(self, u: Array) -> tuple[Array, Array, Array]:
         """Half turns of am(alpha phi), and up to a common factor the sine and cosine >= 0 of the remainder."""
         sn, cn, dn, amplitude = elliptic.jacobi(u, self.complement)
         _, upper, whole = moment_gaps(self.constants.moments)
-        oscillating = self.constants.oscillating
+        oscillating, extended = self.constants.oscillating, self.constants.kind == GeodesicClass.EXTENDED
         odd, turns = _half_turns(amplitude, cn)
-        sign = 1.0 - 2.0 * odd
-        sine = sn * np.where(
-            self.constants.kind == GeodesicClass.EXTENDED, np.sqrt(self.complement), self.constants.modulus
-        )
-        factor = np.sqrt(upper / whole)
-        turned = np.where(oscillating, sine, sign * sine), factor * np.where(oscillating, dn, np.abs(cn))
-        return np.where(oscillating, 0.0, turns), *turned
+        sine = sn * np.where(extended, np.sqrt(self.complement), self.constants.modulus)
+        sine = np.where(oscillating, sine, (1.0 - 2.0 * odd) * sine)
+        cosine = np.sqrt(upper / whole) * np.where(oscillating, dn, np.abs(cn))
+        return np.where(oscillating, 0.0, turns), sine, cosine
 
     def _second_kind_integral(self, u: Array, sn: Array, cn: Array, dn: Array) -> Array:
         """f S, for oscillating geodesics continued past the poles of S, where cn = 0.
@@ -334,16 +316,7 @@ class GeodesicFamily:
 
 @dataclass(frozen=True, eq=False)
 class EquatorialConjugatePoints:
-    """Points conjugate to a start on the equator, see `GeodesicFamily.conjugate_points`.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> family = geodesics.serret_andoyer_metric([3.0, 2.0, 1.0]).geodesics(1.7)
-    >>> points = family.conjugate_points()
-    >>> print(f"{points.phi:.6f} {points.theta:.6f}")
-    -0.094594 3.565678
-    """
+    """Points conjugate to a start on the equator. Made by `GeodesicFamily.conjugate_points`."""
 
     time: Array
     """(...) arc length from the start [sqrt(kg) m]."""
@@ -356,17 +329,17 @@ class EquatorialConjugatePoints:
 
 
 def _half_turns(amplitude: Array, cosine: Array) -> tuple[Array, Array]:
-    """Whether the number of half turns of an amplitude is odd, and this number; the cosine decides which is nearest."""
+    """1 where the number of half turns of an amplitude is odd, else 0, and this number; the cosine decides rounding."""
     odd = np.where(cosine < 0.0, 1.0, 0.0)
     return odd, 2.0 * np.rint(0.5 * (amplitude / np.pi - odd)) + odd
 
 
 def _second_derivative_of_k(m1: Array) -> Array:
-    """d^2 K/dm^2 by the hypergeometric series for small m, else by Legendre's equation."""
+    """d^2 K/dm^2 by the hypergeometric series for m up to 0.4, else by Legendre's equation, which divides by m."""
     m = 1.0 - m1
-    by_series = m <= _SERIES_PARAMETER
-    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, _SERIES_PARAMETER))
-    large = np.maximum(m, _SERIES_PARAMETER)
+    by_series = m <= 0.4
+    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, 0.4))
+    large = np.maximum(m, 0.4)
     small = np.where(by_series, 1.0 - large, m1)
     equation = (0.25 * elliptic.complete_k(small) - (small - large) * elliprd(0.0, 1.0, small) / 6.0) / (large * small)
     return np.where(by_series, series, equation)

@@ -39,27 +39,14 @@ from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...letters import what_came
 from ...roots import ROUNDING, safe_newton
+from .._arguments import above_zero, check_entries
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
-from ._checks import check_entries
 
-ClosedArcs = Callable[[Array, Array, Array, Array], Arcs]
-"""p >= 0, q, depth - q and phases in [-pi/2, pi/2], all (N,) -> `Arcs`: what `quadrature` finds by nodes."""
+ClosedArcs = Callable[[Array, Array, Array, Array], Arcs]  # p >= 0, q, depth - q, phases in [-pi/2, pi/2], all (N,)
 
-_ENDS = ("pole", "parallel", "boundary")
-_SEPARATRIX_MARGIN = 1e-9
-"""In parts of p: nearer to that of a parallel, which extremals approach without end, results lose half their digits."""
-_NEAREST = 1e-60
-"""Least depth - Y: at a parallel the stretch is infinite, while so near to it the curvature has reached its limit."""
-_REACH_ROUNDING = 1e-12
-"""In parts of the reach: so much further latitudes are taken for the reach."""
-_TIP_SLOPE_ERROR = 1e-9
-"""Poles whose slope of sqrt(m) is 1 but for so much are smooth; tabulated metrics are not known better."""
-_SAMPLES = 65
-"""Values of p, or of y, by which the trends of the first return and of the curvature are judged."""
-_CONSTANT_RETURN = 1e-11
-"""Rates of the first return, in parts of reach/m(0), that are rounding."""
-_CONSTANT_CURVATURE = 1e-10
-"""Range of the curvature, in parts of its largest value, that is rounding."""
+NEAREST = 1e-60  # least depth - Y: at a parallel the stretch is infinite, and the curvature has reached its limit
+_TABLE_ERROR = 1e-9  # relative error of tabulated metrics: of the slope at a smooth pole, of p next to a separatrix
+_PHASES = np.pi * np.arange(66) / 65  # at which the trends of the first return and of the curvature are sampled
 
 
 @made_by("geodesics.spheroid(...) or surface_of_metric(...)")
@@ -74,8 +61,7 @@ class SurfaceOfRevolution:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import geodesics
-    >>> sphere = geodesics.ellipsoid(1.0)
+    >>> sphere = sp.rigid_body.geodesics.ellipsoid(1.0)
     >>> sphere.equator, sphere.depth, sphere.end
     (1.0, 1.0, 'pole')
     """
@@ -112,17 +98,17 @@ class SurfaceOfRevolution:
 
     @property
     def has_smooth_poles(self) -> bool:
-        """Whether it closes to a smooth sphere: sqrt(m) has the slope 1 at its poles, which are no tips of cones."""
+        """True if it closes to a smooth sphere: sqrt(m) has the slope 1 at its poles, which are not tips of cones."""
         if self.end != "pole":
             return False
         stretch, _, _ = self.stretch(np.ones(1), np.zeros(1))
-        return bool(abs(stretch[0] / self.greatest_momentum - 1.0) < _TIP_SLOPE_ERROR)
+        return bool(abs(stretch[0] / self.greatest_momentum - 1.0) < _TABLE_ERROR)
 
     def height(self, latitude: ArrayLike) -> Array:
         """y of latitudes phi: (...) -> (...). Raises ShapeError beyond the reach."""
         phi = finite_array(latitude, "latitude")
         reach = self.reach
-        beyond = np.abs(phi) > reach * (1.0 + _REACH_ROUNDING)
+        beyond = np.abs(phi) > reach * (1.0 + 1e-12)
         check_entries(beyond, phi, "latitude", f"the surface reaches to {reach:.17g}")
         distance = np.minimum(np.abs(phi), reach).ravel()
         top = np.sqrt(self.depth)
@@ -155,7 +141,7 @@ class SurfaceOfRevolution:
         """Gauss curvature (D - 2 Y D')/D^3 at y: (...) -> (...)."""
         y = finite_array(height, "height")
         square = np.minimum(y * y, self.depth).ravel()
-        value, slope, _ = self.stretch(square, np.maximum(self.depth - square, _NEAREST))
+        value, slope, _ = self.stretch(square, np.maximum(self.depth - square, NEAREST))
         return ((value - 2.0 * square * slope) / value**3).reshape(y.shape)[()]
 
     def potential(self, latitude: ArrayLike, momentum: ArrayLike) -> Array:
@@ -174,10 +160,7 @@ class SurfaceOfRevolution:
     def parameters(self, momentum: ArrayLike) -> tuple[Array, Array, Array]:
         """p, q = 1 - p^2/m(0) and depth - q of extremals that oscillate: (...) -> (...) each.
 
-        Raises
-        ------
-        ShapeError
-            If the extremal with this p does not oscillate about the equator within the chart.
+        Raises ShapeError if the extremal with this p does not oscillate about the equator within the chart.
         """
         p = finite_array(momentum, "momentum")
         top, low = self.greatest_momentum, self.least_momentum
@@ -189,7 +172,7 @@ class SurfaceOfRevolution:
             over_tip = (magnitude == 0.0) & (not self.has_smooth_poles)
             check_entries(over_tip, p, "momentum", "no extremal passes a cone's tip")
         else:
-            least = low * (1.0 + _SEPARATRIX_MARGIN) if self.end == "parallel" else low
+            least = low * (1.0 + _TABLE_ERROR) if self.end == "parallel" else low
             requirement = f"extremals oscillate above {low:.17g}, the p of the {self.end}"
             check_entries(magnitude < least, p, "momentum", requirement)
         q = (top - magnitude) * (top + magnitude) / self.equator
@@ -199,11 +182,6 @@ class SurfaceOfRevolution:
         """Time, longitude and bend from the equator to a phase: (...), (...) [rad] -> `Arcs`.
 
         Any real phase. At p = 0 the longitude is the limit from p > 0, half a turn for every pole that is passed.
-
-        Raises
-        ------
-        ShapeError
-            See `parameters`.
         """
         p, q, room = self.parameters(momentum)
         chi = finite_array(phase, "phase", unit="rad")
@@ -289,16 +267,15 @@ class SurfaceOfRevolution:
         return quadrature(self.stretch, self.depth, self.end, *flat, self.splits)[3].reshape(np.shape(chi))
 
     def tameness(self) -> str:
-        """How the first return changes with p > 0: "decreasing" (tame), "increasing", "constant" or "neither".
+        """Trend of the first return with p > 0: "decreasing" (tame), "increasing", "constant" or "neither".
 
-        By its derivative at 65 values of p. Tame extremals, as the paper calls them, have no conjugate point before
+        By its derivative at 64 values of p. Tame extremals, as the paper calls them, have no conjugate point before
         they return to the equator.
         Source: Bonnard et al., definition 2.5 and proposition 2.
         """
-        rate = self.first_return_rate(self._sampled_momenta())
-        if np.abs(rate).max() <= _CONSTANT_RETURN * self.reach / self.equator:
-            return "constant"
-        return "decreasing" if rate.max() < 0.0 else "increasing" if rate.min() > 0.0 else "neither"
+        square = 0.5 - 0.5 * np.cos(_PHASES[1:-1])
+        rate = self.first_return_rate(np.sqrt(self.equator * (1.0 - self.depth * square)))
+        return _trend(rate, 1e-11 * self.reach / self.equator)
 
     def is_greatest_curvature_on_equator(self) -> bool:
         """Assumption (A3): the Gauss curvature is positive on the equator and nowhere greater (65 latitudes)."""
@@ -306,25 +283,29 @@ class SurfaceOfRevolution:
         return bool(curvature[0] > 0.0 and (curvature[1:] < curvature[0]).all())
 
     def curvature_trend(self) -> str:
-        """How the curvature goes from the equator to the reach: "decreasing", "increasing", "constant" or "neither"."""
+        """Trend of the curvature from the equator to the reach: "decreasing", "increasing", "constant" or "neither"."""
         curvature = self.curvature_at_height(self._sampled_heights())
-        change = np.diff(curvature)
-        if np.ptp(curvature) <= _CONSTANT_CURVATURE * np.abs(curvature).max():
+        if np.ptp(curvature) <= 1e-10 * np.abs(curvature).max():
             return "constant"
-        return "decreasing" if change.max() < 0.0 else "increasing" if change.min() > 0.0 else "neither"
-
-    def _sampled_momenta(self) -> Array:
-        square = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, _SAMPLES + 1) / (_SAMPLES + 1))
-        return np.sqrt(self.equator * (1.0 - self.depth * square))
+        return _trend(np.diff(curvature), 0.0)
 
     def _sampled_heights(self) -> Array:
-        return np.sqrt(self.depth * (0.5 - 0.5 * np.cos(np.pi * np.arange(_SAMPLES) / _SAMPLES)))
+        return np.sqrt(self.depth * (0.5 - 0.5 * np.cos(_PHASES[:-1])))
+
+
+def _trend(rates: Array, rounding: float) -> str:
+    """Trend of a function by its rates: "constant", "decreasing", "increasing" or "neither"."""
+    if np.abs(rates).max() <= rounding:
+        return "constant"
+    return "decreasing" if rates.max() < 0.0 else "increasing" if rates.min() > 0.0 else "neither"
 
 
 def surface_of_stretch(
     stretch: Stretch, equator: float, depth: float, end: str = "pole", closed_arcs: ClosedArcs | None = None
 ) -> SurfaceOfRevolution:
     """A surface by its stretch D(Y), see the module.
+
+    Raises AccuracyNotReached if D is too rough for the quadrature to settle.
 
     Parameters
     ----------
@@ -334,13 +315,6 @@ def surface_of_stretch(
     depth : Y at the reach; 1 for a pole
     end : "pole", "parallel" or "boundary"
     closed_arcs : the integrals along extremals in closed form, where known
-
-    Raises
-    ------
-    ShapeError
-        If m(0) or the depth is out of range, or D is not positive and finite.
-    AccuracyNotReached
-        If D is too rough for the quadrature to settle.
 
     Examples
     --------
@@ -352,12 +326,10 @@ def surface_of_stretch(
     check_function(stretch, "stretch", "a function of arrays")
     if closed_arcs is not None:
         check_function(closed_arcs, "closed_arcs", "a function of arrays")
-    equator = number_argument(equator, "equator", "m")
+    equator = above_zero(equator, "equator")
     depth = number_argument(depth, "depth")
-    if not isinstance(end, str) or end not in _ENDS:
-        raise ShapeError(f"end: expected one of {', '.join(_ENDS)}, got {what_came(end)}")
-    if not (np.isfinite(equator) and equator > 0.0):
-        raise ShapeError(f"equator: m(0) must be positive and finite, got {what_came(equator)}")
+    if not isinstance(end, str) or end not in ("pole", "parallel", "boundary"):
+        raise ShapeError(f"end: expected one of pole, parallel, boundary, got {what_came(end)}")
     if not (0.0 < depth <= 1.0) or (end == "pole") != (depth == 1.0):
         raise ShapeError(
             f"depth: 1 - m(reach)/m(0) must be in (0, 1), and 1 for a pole; got {what_came(depth)} for a {end}"
@@ -366,16 +338,9 @@ def surface_of_stretch(
     value, _, _ = stretch(square, depth - square)
     if not (np.isfinite(value).all() and (value > 0.0).all()):
         raise ShapeError("stretch: D(Y) must be positive and finite for 0 <= Y < depth")
-    splits = settled_splits(stretch, float(depth), end)
+    splits = settled_splits(stretch, depth, end)
     if splits is None:
         raise AccuracyNotReached("the metric is too rough: its integrals along extremals do not settle")
-    surface = SurfaceOfRevolution(
-        equator=float(equator),
-        depth=float(depth),
-        end=end,
-        stretch=stretch,
-        closed_arcs=closed_arcs,
-        splits=splits,
-    )
+    surface = SurfaceOfRevolution(equator, depth, end, stretch, closed_arcs, splits)
     finer = replace(surface, splits=splits + 1)
     return surface if abs(surface.reach - finer.reach) <= 1e-13 * finer.reach else finer

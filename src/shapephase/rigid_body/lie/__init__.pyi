@@ -17,13 +17,14 @@ from .cayley_klein import (
     cayley_klein_motion,
     cayley_klein_spinor,
 )
-from .dissipation import dissipated_power, double_bracket_equations, double_bracket_motion, symmetric_bracket
-from .euler_poincare import EulerPoincareMotion, euler_poincare_motion, euler_poincare_rate
-from .generalised_poinsot import (
+from .euler_poincare import (
+    EulerPoincareMotion,
     InvariableHyperplane,
     RollingContact,
     contact_conormal,
     contact_velocity,
+    euler_poincare_motion,
+    euler_poincare_rate,
     invariable_hyperplane,
     rolling_contact,
 )
@@ -36,7 +37,6 @@ from .group_kinematics import (
     space_momentum,
     space_velocity,
 )
-from .hamiltonian_attitude import HamiltonianMotion, hamiltonian_motion
 from .lagrangian import (
     ReducedBody,
     body_angular_velocity,
@@ -56,11 +56,8 @@ from .lagrangian import (
 )
 from .lie_algebra import (
     LieAlgebra,
-    complex_or_real,
     heisenberg,
-    inertia_operator,
     lie_algebra_from_matrices,
-    linear_solution,
     se2,
     se3,
     sl2r,
@@ -69,12 +66,16 @@ from .lie_algebra import (
     su2,
 )
 from .lie_poisson import (
+    HamiltonianMotion,
     angular_velocity,
     bracket_gradient,
     casimir_defect,
     coadjoint_orbit_form,
+    dissipated_power,
+    double_bracket_equations,
+    double_bracket_motion,
     euler_equations,
-    gradient_at,
+    hamiltonian_motion,
     hamiltonian_vector_field,
     kinetic_energy,
     lie_poisson_bracket,
@@ -84,6 +85,7 @@ from .lie_poisson import (
     quadratic_casimirs,
     sphere_area_form,
     sphere_symplectic_form,
+    symmetric_bracket,
 )
 from .magnetic_moment import (
     MagneticEquilibrium,
@@ -128,7 +130,6 @@ __all__ = [
     "cayley_klein_spinor",
     "coadjoint_action",
     "coadjoint_orbit_form",
-    "complex_or_real",
     "contact_conormal",
     "contact_velocity",
     "convective_lagrangian",
@@ -140,12 +141,10 @@ __all__ = [
     "euler_equations",
     "euler_poincare_motion",
     "euler_poincare_rate",
-    "gradient_at",
     "group_exponential",
     "hamiltonian_motion",
     "hamiltonian_vector_field",
     "heisenberg",
-    "inertia_operator",
     "invariable_hyperplane",
     "kinetic_energy",
     "legendre_transform",
@@ -154,7 +153,6 @@ __all__ = [
     "lie_poisson_bracket",
     "lie_poisson_motion",
     "linear_casimirs",
-    "linear_solution",
     "magnetic_equilibria",
     "magnetic_hamiltonian",
     "magnetic_precession",

@@ -1,13 +1,13 @@
 """Euler's equations as a cross product of two gradients, and the Lie groups behind them.
 
-With the energy H = Pi.I^-1 Pi / 2 and L = |Pi|^2 / 2, Euler's equations are Pi' = grad L x grad H. So they are
+With the energy H = Pi.I^-1 Pi / 2 and L = |Pi|^2 / 2, Euler's equations are Pi' = grad L x grad H. They have this form
 with K = a H + b L and N = c H + d L for every real matrix (a, b; c, d) of determinant -1 or 1, but for a sign:
 
     Pi' = grad K x grad N where ad - bc = -1,    Pi' = grad N x grad K where ad - bc = 1.
 
 K is then a Casimir of the bracket {F, G} = -grad K.(grad F x grad G) (of the opposite one for determinant 1), which is
 the minus Lie-Poisson bracket of the Lie algebra [a, b] = Q (a x b), Q the matrix of K; and N is the Hamiltonian. The
-signature of K says which algebra.
+signature of K decides which algebra.
 
 Marsden and Ratiu (15.11.1), (15.11.5) have the first form together with determinant 1, which runs time backwards.
 Source: Marsden and Ratiu, section 15.11, after Holm and Marsden 1991; theory.md M-E11, N1, N9.
@@ -21,42 +21,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import inertia_argument, moments_argument
+from ...arguments import moments_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import principal_axes
+from .._arguments import one_array, one_tensor
+from .lie_algebra import WRITTEN_DIGITS
 
-_ZERO = 1e-14
-"""Eigenvalue of a quadratic form, relative to the largest, that counts as zero: rounding leaves as much."""
-_CANCELLED = 16.0 * np.finfo(float).eps
-"""Sum, relative to its two terms, that counts as zero: the rounding of moments and of the matrix (a, b; c, d)."""
-_UNIT = 1e-9
-"""Farthest that a determinant may be from 1 or -1, relative to its terms: nine digits, as people write them."""
-_ASYMMETRY = 1e-9
-"""Largest difference of entries that mirror each other, relative to the largest entry: nine digits, as written."""
-
-_GROUPS = {
-    (3, 0): "SO(3)",
-    (2, 1): "SO(2,1)",
-    (2, 0): "SE(2)",
-    (1, 1): "SE(1,1)",
-    (1, 0): "Heisenberg",
-    (0, 0): "R^3",
-}
-"""Groups by the number of eigenvalues of the more frequent and of the less frequent sign."""
+# By the number of eigenvalues of the more frequent and of the less frequent sign.
+_GROUPS = {(3, 0): "SO(3)", (2, 1): "SO(2,1)", (2, 0): "SE(2)", (1, 1): "SE(1,1)", (1, 0): "Heisenberg", (0, 0): "R^3"}
 
 
 @dataclass(frozen=True, eq=False)
 class NambuPair:
     """K = Pi.casimir Pi / 2 and N = Pi.hamiltonian Pi / 2 with Pi' = orientation (grad K x grad N).
 
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> pair = lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
-    >>> pair.orientation
-    -1.0
+    Made by `nambu_pair`.
     """
 
     casimir: Array
@@ -69,13 +50,7 @@ class NambuPair:
     __repr__ = short_repr
 
     def values(self, momentum: ArrayLike) -> tuple[Array, Array]:
-        """K and N, both constant along a motion: (..., 3) -> (...), (...).
-
-        Raises
-        ------
-        ShapeError
-            If the last axis is not three finite numbers; so do all methods.
-        """
+        """K and N, both constant along a motion: (..., 3) -> (...), (...)."""
         pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
         return 0.5 * _dot(pi, pi @ self.casimir), 0.5 * _dot(pi, pi @ self.hamiltonian)
 
@@ -105,44 +80,26 @@ class NambuPair:
 
 
 def nambu_pair(inertia: ArrayLike, matrix: ArrayLike) -> NambuPair:
-    """K = a H + b L and N = c H + d L of a rigid body.
+    """K = a H + b L and N = c H + d L of a rigid body; coefficients of Pi^2 that vanish up to rounding are zero.
+
+    Source: Marsden and Ratiu (15.11.5), (15.11.6); theory.md M-E11.
+    Raises ShapeError if the determinant differs from 1 and -1 by more than 1e-9.
 
     Parameters
     ----------
     inertia : (3, 3) [kg m^2, body axes]
     matrix : (2, 2), (a, b; c, d) with ad - bc = 1 or -1
 
-    Returns
-    -------
-    NambuPair; coefficients of Pi^2 that vanish up to rounding are zero
-
-    Raises
-    ------
-    ShapeError
-        If the determinant differs from 1 and -1 by more than 1e-9.
-    UnphysicalInertiaError, SingularInertiaError
-        If the inertia is not symmetric, or not positive definite.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu (15.11.5), (15.11.6); theory.md M-E11.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> pair = lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
+    >>> pair = sp.rigid_body.lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), [[1.0, 0.0], [0.0, 1.0]])
     >>> pair.casimir.diagonal().tolist(), pair.hamiltonian.diagonal().tolist()
     ([1.0, 0.5, 0.25], [1.0, 1.0, 1.0])
     """
-    tensor = inertia_argument(finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
-    if tensor.ndim != 2:
-        raise ShapeError(f"inertia: expected one tensor (3, 3), got {tensor.shape}")
-    entries = finite_array(matrix, "matrix", (2, 2))
-    if entries.ndim != 2:
-        raise ShapeError(f"matrix: expected one matrix (2, 2), got {entries.shape}")
+    tensor, entries = one_tensor(inertia), one_array(matrix, "matrix", (2, 2))
     (a, b), (c, d) = entries
     determinant = a * d - b * c
-    if abs(abs(determinant) - 1.0) > _UNIT * (1.0 + abs(a * d) + abs(b * c)):
+    if abs(abs(determinant) - 1.0) > WRITTEN_DIGITS * (1.0 + abs(a * d) + abs(b * c)):
         raise ShapeError(
             f"matrix: (a, b; c, d) = {entries.tolist()} has ad - bc = {determinant:.9g}; it must be -1, or 1 for the "
             "reversed cross product: divide a row by it"
@@ -165,20 +122,13 @@ def cylinder_matrix(moments: ArrayLike) -> Array:
     The moments may be in any order; the cylinders are elliptic where the second one is the intermediate, as for the
     ascending moments of the book. The determinant is 1, as there, so Pi' = grad N x grad K.
 
-    Raises
-    ------
-    ShapeError
-        If the moments are not positive, or the first equals the third.
-
-    Notes
-    -----
     Source: Marsden and Ratiu (15.11.7).
+    Raises ShapeError if the moments are not positive, or the first equals the third.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> matrix = lie.cylinder_matrix([1.0, 2.0, 4.0])
-    >>> lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), matrix).casimir.diagonal().round(9).tolist()
+    >>> matrix = sp.rigid_body.lie.cylinder_matrix([1.0, 2.0, 4.0])
+    >>> sp.rigid_body.lie.nambu_pair(np.diag([1.0, 2.0, 4.0]), matrix).casimir.diagonal().round(9).tolist()
     [0.75, 0.25, 0.0]
     """
     first, _, third = moments_argument(moments)
@@ -190,23 +140,15 @@ def cylinder_matrix(moments: ArrayLike) -> Array:
 def structure_constants(form: ArrayLike) -> Array:
     """c[i, j, k] with [e_i, e_j] = sum of c[i, j, k] e_k for the bracket [a, b] = Q (a x b): (3, 3) -> (3, 3, 3).
 
+    Source: Marsden and Ratiu, theorem 15.11.3 and exercise 14.9-1.
+
     Parameters
     ----------
     form : (3, 3) symmetric, Q; Pi.Q Pi / 2 is then a Casimir of the Lie-Poisson bracket
 
-    Raises
-    ------
-    ShapeError
-        If the matrix is not symmetric.
-
-    Notes
-    -----
-    Source: Marsden and Ratiu, theorem 15.11.3 and exercise 14.9-1.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.structure_constants(np.eye(3))[0, 1].tolist()  # those of so(3)
+    >>> sp.rigid_body.lie.structure_constants(np.eye(3))[0, 1].tolist()  # those of so(3)
     [0.0, 0.0, 1.0]
     """
     return np.einsum("ijl,lk->ijk", so3.hat(np.eye(3)).transpose(1, 2, 0) * -1.0, _form(form))
@@ -219,23 +161,15 @@ def lie_group(form: ArrayLike) -> str:
     common sign. An eigenvalue below 1e-14 of the largest counts as zero. For a non-degenerate form the group is that
     of the rotations of the form.
 
-    Raises
-    ------
-    ShapeError
-        If the matrix is not symmetric.
-
-    Notes
-    -----
     Source: Marsden and Ratiu, theorem 15.11.3, which leaves out (+-0) and (000).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> [lie.lie_group(np.diag([1.0, 1.0, last])) for last in (1.0, -1.0, 0.0)]
+    >>> [sp.rigid_body.lie.lie_group(np.diag([1.0, 1.0, last])) for last in (1.0, -1.0, 0.0)]
     ['SO(3)', 'SO(2,1)', 'SE(2)']
     """
     values = np.linalg.eigvalsh(_form(form))
-    threshold = _ZERO * np.max(np.abs(values))
+    threshold = 1e-14 * np.max(np.abs(values))
     positive, negative = int(np.sum(values > threshold)), int(np.sum(values < -threshold))
     return _GROUPS[max(positive, negative), min(positive, negative)]
 
@@ -249,8 +183,7 @@ def maxwell_bloch_invariants(state: ArrayLike) -> tuple[Array, Array]:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> tuple(float(value) for value in lie.maxwell_bloch_invariants([1.0, 2.0, 3.0]))
+    >>> tuple(float(value) for value in sp.rigid_body.lie.maxwell_bloch_invariants([1.0, 2.0, 3.0]))
     (6.5, 3.5)
     """
     x, y, z = np.moveaxis(finite_array(state, "state", (3,)), -1, 0)
@@ -262,8 +195,7 @@ def maxwell_bloch_rate(state: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.maxwell_bloch_rate([1.0, 2.0, 3.0]).tolist()
+    >>> sp.rigid_body.lie.maxwell_bloch_rate([1.0, 2.0, 3.0]).tolist()
     [2.0, 3.0, -2.0]
     """
     x, y, z = np.moveaxis(finite_array(state, "state", (3,)), -1, 0)
@@ -274,15 +206,15 @@ def _coefficients(moments: Array, row: Array, rounding: Array) -> Array:
     """a / I_i + b, zero where the terms cancel up to rounding."""
     inverse = row[0] / moments
     total = inverse + row[1]
-    return np.where(np.abs(total) <= _CANCELLED * (np.abs(inverse) * rounding + abs(row[1])), 0.0, total)
+    return np.where(
+        np.abs(total) <= 16.0 * np.finfo(float).eps * (np.abs(inverse) * rounding + abs(row[1])), 0.0, total
+    )
 
 
 def _form(form: ArrayLike) -> Array:
-    matrix = finite_array(form, "form", (3, 3))
-    if matrix.shape != (3, 3):
-        raise ShapeError(f"form: expected one matrix (3, 3), got {matrix.shape}")
+    matrix = one_array(form, "form", (3, 3))
     skew = np.abs(matrix - matrix.T).max()
-    if skew > _ASYMMETRY * np.abs(matrix).max():
+    if skew > WRITTEN_DIGITS * np.abs(matrix).max():
         raise ShapeError(f"form: the matrix of a quadratic form is symmetric; its entries differ by {skew:.3g}")
     return 0.5 * (matrix + matrix.T)
 

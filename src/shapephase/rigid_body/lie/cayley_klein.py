@@ -19,46 +19,35 @@ from numpy.typing import ArrayLike, NDArray
 from ...arguments import inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from .._flow import ascending_times, flow
+from .._arguments import ascending_times
+from .._flow import flow
 from .lie_algebra import complex_or_real, su2
 from .lie_poisson import angular_velocity, kinetic_energy
 
-Spinor = NDArray[np.complex128]
-"""Vectors of C^2: (..., 2)."""
+Spinor = NDArray[np.complex128]  # vectors of C^2: (..., 2)
 
-_EQUAL_LENGTHS = 1e-6
-"""Largest relative difference of |z| and |start|, which a motion keeps equal: six digits, as people write them."""
-
-PAULI = 2j * su2().matrix_basis
-"""Pauli's matrices sigma_k: (3, 2, 2)."""
+PAULI = 2j * su2().matrix_basis  # Pauli's matrices sigma_k: (3, 2, 2)
 PAULI.setflags(write=False)
 
 
 def cayley_klein_momentum(z: ArrayLike) -> Array:
     """Pi_k = -z^H sigma_k z / 4, minus the momentum map of SU(2) on C^2: (..., 2) -> (..., 3) [kg m^2/s].
 
-    Raises ShapeError.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> print(lie.cayley_klein_momentum([2.0, 0.0]) + 0.0)
+    >>> print(sp.rigid_body.lie.cayley_klein_momentum([2.0, 0.0]) + 0.0)
     [ 0.  0. -1.]
     """
-    spinor = _spinor(z, "z")
-    return -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
+    return _momentum_map(_spinor(z, "z"))
 
 
 def cayley_klein_spinor(momentum: ArrayLike, phase: ArrayLike = 0.0) -> Spinor:
-    """A z with this momentum; its phase is the coordinate along the fibre: (..., 3), (...) -> (..., 2).
-
-    Raises ShapeError.
+    """Spinor z with this momentum; its phase is the coordinate along the fibre: (..., 3), (...) -> (..., 2).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> z = lie.cayley_klein_spinor([0.3, 0.4, 1.2])
-    >>> print(lie.cayley_klein_momentum(z).round(9))
+    >>> z = sp.rigid_body.lie.cayley_klein_spinor([0.3, 0.4, 1.2])
+    >>> print(sp.rigid_body.lie.cayley_klein_momentum(z).round(9))
     [0.3 0.4 1.2]
     """
     pi, angle = finite_array(momentum, "momentum", (3,)), finite_array(phase, "phase")
@@ -79,14 +68,9 @@ def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
     ----------
     first, second : (..., 2) complex, dF/dq + i dF/dp
 
-    Notes
-    -----
-    Raises ShapeError.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> float(np.real(lie.cayley_klein_bracket([1.0, 0.0], [1.0j, 0.0])))  # {q_1, p_1}
+    >>> float(np.real(sp.rigid_body.lie.cayley_klein_bracket([1.0, 0.0], [1.0j, 0.0])))  # {q_1, p_1}
     1.0
     """
     f, g = _spinor(first, "first"), _spinor(second, "second")
@@ -96,12 +80,9 @@ def cayley_klein_bracket(first: ArrayLike, second: ArrayLike) -> Array:
 def cayley_klein_gradient(omega: ArrayLike, z: ArrayLike) -> Spinor:
     """The gradient dF/dq + i dF/dp of a collective F(Pi(z)) with dF/dPi = omega: (..., 3), (..., 2) -> (..., 2).
 
-    Raises ShapeError.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.cayley_klein_gradient([0.0, 0.0, 2.0], [2.0, 0.0]).shape
+    >>> sp.rigid_body.lie.cayley_klein_gradient([0.0, 0.0, 2.0], [2.0, 0.0]).shape
     (2,)
     """
     return -0.5 * _turned(finite_array(omega, "omega", (3,)), _spinor(z, "z"))
@@ -110,16 +91,10 @@ def cayley_klein_gradient(omega: ArrayLike, z: ArrayLike) -> Spinor:
 def cayley_klein_hamiltonian(inertia: ArrayLike, z: ArrayLike) -> Array:
     """The kinetic energy as a function on C^2, K(Pi(z)): (..., 3, 3), (..., 2) -> (...) [J].
 
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If the inertia is not symmetric positive definite, or the shapes are not right.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> z = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
-    >>> print(f"{lie.cayley_klein_hamiltonian(np.diag([1.0, 2.0, 4.0]), z):.9f} J")
+    >>> z = sp.rigid_body.lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> print(f"{sp.rigid_body.lie.cayley_klein_hamiltonian(np.diag([1.0, 2.0, 4.0]), z):.9f} J")
     0.500000000 J
     """
     return kinetic_energy(inertia, cayley_klein_momentum(z))
@@ -128,13 +103,10 @@ def cayley_klein_hamiltonian(inertia: ArrayLike, z: ArrayLike) -> Array:
 def cayley_klein_equations(inertia: ArrayLike, z: ArrayLike) -> Spinor:
     """Hamilton's equations of the kinetic energy on C^2, z' = (i/2) (Omega . sigma) z: (..., 2) -> (..., 2).
 
-    Raises as `cayley_klein_hamiltonian`.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> z = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
-    >>> rate = lie.cayley_klein_equations(np.diag([1.0, 2.0, 4.0]), z)
+    >>> z = sp.rigid_body.lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> rate = sp.rigid_body.lie.cayley_klein_equations(np.diag([1.0, 2.0, 4.0]), z)
     >>> print(f"{np.linalg.norm(rate) / np.linalg.norm(z):.9f}")  # half of Omega_3 = 1/2
     0.250000000
     """
@@ -145,14 +117,11 @@ def cayley_klein_equations(inertia: ArrayLike, z: ArrayLike) -> Spinor:
 def cayley_klein_motion(inertia: ArrayLike, z: ArrayLike, times: ArrayLike) -> Spinor:
     """The rigid body's flow on C^2 from z at the first time: (..., 2), (N,) -> (..., N, 2).
 
-    Raises as `cayley_klein_hamiltonian`.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> start = lie.cayley_klein_spinor([0.3, 0.4, 1.2])
-    >>> z = lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])
-    >>> print(np.linalg.norm(lie.cayley_klein_momentum(z), axis=-1).round(9))
+    >>> start = sp.rigid_body.lie.cayley_klein_spinor([0.3, 0.4, 1.2])
+    >>> z = sp.rigid_body.lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])
+    >>> print(np.linalg.norm(sp.rigid_body.lie.cayley_klein_momentum(z), axis=-1).round(9))
     [1.3 1.3]
     """
     inverse = inverse_inertia_argument(inertia)
@@ -164,22 +133,18 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
 
     The U in SU(2) with z = U^H start, as a rotation: R^T takes the momentum of `start` to that of z.
 
-    Raises
-    ------
-    ShapeError
-        If the two lengths differ by more than 1e-6 of themselves, or are zero.
+    Raises ShapeError if the two lengths differ by more than 1e-6 of themselves, or are zero.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> start = lie.cayley_klein_spinor([0.0, 0.0, 2.0])
-    >>> z = lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])[-1]
-    >>> print(f"{sp.so3.angle(lie.cayley_klein_attitude(start, z)):.9f}")  # 1/2 rad/s for 1 s
+    >>> start = sp.rigid_body.lie.cayley_klein_spinor([0.0, 0.0, 2.0])
+    >>> z = sp.rigid_body.lie.cayley_klein_motion(np.diag([1.0, 2.0, 4.0]), start, [0.0, 1.0])[-1]
+    >>> print(f"{sp.so3.angle(sp.rigid_body.lie.cayley_klein_attitude(start, z)):.9f}")  # 1/2 rad/s for 1 s
     0.500000000
     """
     first, last = _spinor(start, "start"), _spinor(z, "z")
     length, other = np.linalg.norm(first, axis=-1), np.linalg.norm(last, axis=-1)
-    if not np.all((length > 0.0) & (np.abs(length - other) <= _EQUAL_LENGTHS * length)):
+    if not np.all((length > 0.0) & (np.abs(length - other) <= 1e-6 * length)):
         raise ShapeError("z: not on the sphere |z| = |start| of a motion; equal lengths above 0 are needed")
     a, b = (np.stack(_frame(x / n[..., None]), axis=-1) for x, n in ((first, length), (last, other)))
     unitary = a @ np.swapaxes(b.conj(), -1, -2)
@@ -191,6 +156,10 @@ def _frame(unit: Spinor) -> tuple[Spinor, Spinor]:
     return unit, np.stack([-unit[..., 1].conj(), unit[..., 0].conj()], axis=-1)
 
 
+def _momentum_map(spinor: Spinor) -> Array:
+    return -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
+
+
 def _turned(omega: Array, spinor: Spinor) -> Spinor:
     return np.einsum("...k,kab,...b->...a", omega, PAULI, spinor)
 
@@ -198,8 +167,7 @@ def _turned(omega: Array, spinor: Spinor) -> Spinor:
 def _collective_flow(gradient: Callable[[Array], Array], start: Spinor, times: Array) -> Spinor:
     def rate(state: Array) -> Array:
         spinor = state[..., :2] + 1j * state[..., 2:]
-        pi = -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
-        change = 0.5j * _turned(gradient(pi), spinor)
+        change = 0.5j * _turned(gradient(_momentum_map(spinor)), spinor)
         return np.concatenate([change.real, change.imag], axis=-1)
 
     states = flow(rate, np.concatenate([start.real, start.imag], axis=-1), times)

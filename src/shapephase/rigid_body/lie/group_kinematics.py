@@ -22,8 +22,7 @@ def group_exponential(algebra: LieAlgebra, a: ArrayLike) -> Matrices:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> quarter = lie.group_exponential(lie.so3(), [0.0, 0.0, np.pi / 2.0])
+    >>> quarter = sp.rigid_body.lie.group_exponential(sp.rigid_body.lie.so3(), [0.0, 0.0, np.pi / 2.0])
     >>> print(quarter.real.round(9) + 0.0)
     [[ 0. -1.  0.]
      [ 1.  0.  0.]
@@ -38,21 +37,17 @@ def group_exponential(algebra: LieAlgebra, a: ArrayLike) -> Matrices:
 def adjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
     """Ad_g as a matrix, the components of g E_i g^-1: (..., n, n) -> (..., d, d).
 
-    Raises
-    ------
-    LieAlgebraError
-        If g has no inverse, or does not map the algebra to itself: then it is not an element of the group.
+    Raises LieAlgebraError if g has no inverse, or does not map the algebra to itself: then it is not an element of the
+    group.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> half = np.diag([1.0, -1.0, -1.0])
-    >>> print(lie.adjoint_action(lie.so3(), half).round(9) + 0.0)
+    >>> print(sp.rigid_body.lie.adjoint_action(sp.rigid_body.lie.so3(), half).round(9) + 0.0)
     [[ 1.  0.  0.]
      [ 0. -1.  0.]
      [ 0.  0. -1.]]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     element, inverse = _element(algebra, g)
     turned = element[..., None, :, :] @ algebra.matrix_basis @ inverse[..., None, :, :]
     return np.swapaxes(algebra.coordinates(turned), -1, -2)
@@ -66,12 +61,10 @@ def coadjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> half = np.diag([1.0, -1.0, -1.0])
-    >>> print(lie.coadjoint_action(lie.so3(), half).diagonal().round(9))
+    >>> print(sp.rigid_body.lie.coadjoint_action(sp.rigid_body.lie.so3(), half).diagonal().round(9))
     [ 1. -1. -1.]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return np.swapaxes(adjoint_action(algebra, inverse), -1, -2)
 
@@ -79,14 +72,8 @@ def coadjoint_action(algebra: LieAlgebra, g: ArrayLike) -> Array:
 def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Array:
     """V^B = g^-1 V of a tangent vector at g: (..., n, n), (..., n, n) -> (..., d).
 
-    Raises
-    ------
-    LieAlgebraError
-        If g^-1 V is not an element of the algebra: V is not tangent to the group.
-
-    Notes
-    -----
     Source: Marsden and Ratiu, equation (15.4.4).
+    Raises LieAlgebraError if g^-1 V is not an element of the algebra: V is not tangent to the group.
 
     Examples
     --------
@@ -94,7 +81,6 @@ def body_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Arr
     >>> lie.body_velocity(lie.so3(), np.eye(3), sp.so3.hat(np.array([1.0, 2.0, 3.0]))).round(9).tolist()
     [1.0, 2.0, 3.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return algebra.coordinates(inverse @ _like(algebra, velocity, "velocity"))
 
@@ -111,7 +97,6 @@ def space_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Ar
     >>> lie.space_velocity(lie.so3(), turn, turn @ sp.so3.hat(np.array([1.0, 0.0, 0.0]))).round(9).tolist()
     [0.0, 1.0, 0.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     _, inverse = _element(algebra, g)
     return algebra.coordinates(_like(algebra, velocity, "velocity") @ inverse)
 
@@ -119,7 +104,7 @@ def space_velocity(algebra: LieAlgebra, g: ArrayLike, velocity: ArrayLike) -> Ar
 def body_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Array:
     """alpha^B, the pull-back of a covector at g by left translation, <alpha^B, a> = <alpha, g a>: -> (..., d).
 
-    Raises LieAlgebraError, ShapeError. Source: Marsden and Ratiu, equation (15.4.2).
+    Source: Marsden and Ratiu, equation (15.4.2).
 
     Examples
     --------
@@ -127,7 +112,6 @@ def body_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Arr
     >>> lie.body_momentum(lie.so3(), np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 1.0]))).tolist()
     [0.0, 0.0, 2.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     element, _ = _element(algebra, g)
     return _paired(_like(algebra, covector, "covector"), element[..., None, :, :] @ algebra.matrix_basis)
 
@@ -135,7 +119,7 @@ def body_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Arr
 def space_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Array:
     """alpha^S, the pull-back of a covector at g by right translation, <alpha^S, a> = <alpha, a g>: -> (..., d).
 
-    Raises LieAlgebraError, ShapeError. Source: Marsden and Ratiu, equation (15.4.1).
+    Source: Marsden and Ratiu, equation (15.4.1).
 
     Examples
     --------
@@ -143,7 +127,6 @@ def space_momentum(algebra: LieAlgebra, g: ArrayLike, covector: ArrayLike) -> Ar
     >>> lie.space_momentum(lie.so3(), np.eye(3), sp.so3.hat(np.array([0.0, 0.0, 1.0]))).tolist()
     [0.0, 0.0, 2.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     element, _ = _element(algebra, g)
     return _paired(_like(algebra, covector, "covector"), algebra.matrix_basis @ element[..., None, :, :])
 
@@ -162,6 +145,7 @@ def _element(algebra: LieAlgebra, g: ArrayLike) -> tuple[Matrices, Matrices]:
 
 
 def _like(algebra: LieAlgebra, value: ArrayLike, name: str) -> Matrices:
+    check_object(algebra, "LieAlgebra", "algebra")
     n = algebra.matrix_basis.shape[-1]
     matrices = complex_or_real(value, name, (n, n))
     if np.iscomplexobj(matrices) and not np.iscomplexobj(algebra.matrix_basis):

@@ -20,49 +20,33 @@ from ...display import short_repr
 from ...errors import LieAlgebraError, ShapeError
 from ...letters import what_came
 
-Matrices = NDArray[Any]
-"""Real or complex square matrices (..., n, n)."""
+Matrices = NDArray[Any]  # real or complex square matrices (..., n, n)
 
-_ROUNDING = 1e-12
-"""Largest defect of antisymmetry, of Jacobi's identity and of a closed basis, relative to the entries."""
-_OUTSIDE = 1e-9
-"""Distance of a matrix from the span of the basis, relative to its largest entry, up to which it is an element of the
-algebra; also the largest asymmetry of an operator. Nine digits, as people write them, are enough."""
-_SINGULAR = 1e-14
-"""Least ratio of an operator's eigenvalues, by magnitude: below it the smallest is rounding."""
-_INTEGER = 1e-14
-"""Fitted structure constants closer than this to an integer, relative to the largest, are that integer."""
+_ROUNDING = 1e-12  # largest defect of antisymmetry, of Jacobi's identity and of a closed basis, relative to the entries
+WRITTEN_DIGITS = 1e-9  # relative error of the entries of a matrix that a user writes with nine digits
+_NEAR_ZERO = 1e-14  # ratio of eigenvalues, or distance of structure constants from integers, that is rounding
 
 
 @dataclass(frozen=True, eq=False)
 class LieAlgebra:
     """A real Lie algebra of dimension d, [e_i, e_j] = c_ij^k e_k.
 
-    Attributes
-    ----------
-    structure : (d, d, d) structure constants c[i, j, k]
-    basis : (d, n, n) real or complex matrices with the same brackets, or None for an abstract algebra
-    name : for messages
-
-    Raises
-    ------
-    LieAlgebraError
-        If the constants are not antisymmetric in i and j, do not satisfy Jacobi's identity to rounding, or are not
-        those of the basis.
-    ShapeError
-        If an entry is not finite or the shapes do not fit.
+    Raises LieAlgebraError if the constants are not antisymmetric in i and j, do not satisfy Jacobi's identity to
+    rounding, or are not those of the basis.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> algebra = lie.so3()
+    >>> algebra = sp.rigid_body.lie.so3()
     >>> algebra.name, algebra.structure.shape
     ('so(3)', (3, 3, 3))
     """
 
     structure: Array
+    """(d, d, d) structure constants c[i, j, k]."""
     basis: Matrices | None = None
+    """(d, n, n) real or complex matrices with the same brackets, or None for an abstract algebra."""
     name: str = "Lie algebra"
+    """For messages."""
 
     __repr__ = short_repr
 
@@ -102,17 +86,17 @@ class LieAlgebra:
         return len(self.structure)
 
     def bracket(self, a: ArrayLike, b: ArrayLike) -> Array:
-        """The Lie bracket [a, b]: (..., d), (..., d) -> (..., d). Raises ShapeError."""
+        """The Lie bracket [a, b]: (..., d), (..., d) -> (..., d)."""
         return np.einsum("...i,...j,ijk->...k", self._vector(a, "a"), self._vector(b, "b"), self.structure)
 
     def ad(self, a: ArrayLike) -> Array:
-        """The adjoint operator ad_a, ad_a b = [a, b]: (..., d) -> (..., d, d). Raises ShapeError."""
+        """The adjoint operator ad_a, ad_a b = [a, b]: (..., d) -> (..., d, d)."""
         return np.einsum("...i,ijk->...kj", self._vector(a, "a"), self.structure)
 
     def coad(self, a: ArrayLike, mu: ArrayLike) -> Array:
         """The coadjoint operator, <ad*_a mu, b> = <mu, [a, b]>: (..., d), (..., d) -> (..., d).
 
-        For so(3) it is mu x a. Raises ShapeError.
+        For so(3) it is mu x a.
         """
         return np.einsum("...i,ijk,...k->...j", self._vector(a, "a"), self.structure, self._vector(mu, "mu"))
 
@@ -123,7 +107,7 @@ class LieAlgebra:
 
     @cached_property
     def is_unimodular(self) -> bool:
-        """Whether tr ad_a = 0 for every a, so that Lie-Poisson flows keep the volume of the dual."""
+        """True if tr ad_a = 0 for every a, so that Lie-Poisson flows keep the volume of the dual."""
         return bool(np.abs(np.einsum("ijj->i", self.structure)).max() <= _ROUNDING * np.abs(self.structure).max())
 
     def matrix(self, a: ArrayLike) -> Matrices:
@@ -133,10 +117,8 @@ class LieAlgebra:
     def coordinates(self, matrix: ArrayLike) -> Array:
         """The components of a matrix of the algebra, the inverse of `matrix`: (..., n, n) -> (..., d).
 
-        Raises
-        ------
-        LieAlgebraError
-            If the matrix is further from the span of the basis than 1e-9 of its largest entry, or there is no basis.
+        Raises LieAlgebraError if the matrix is further from the span of the basis than 1e-9 of its largest entry, or
+        there is no basis.
         """
         basis = self.matrix_basis
         matrices = _matrices(matrix, "matrix")
@@ -146,7 +128,7 @@ class LieAlgebra:
             )
         components = _flat(matrices) @ self._dual_basis
         left = np.abs(_flat(np.einsum("...i,imn->...mn", components, basis) - matrices)).max(axis=-1, initial=0.0)
-        if np.any(left > _OUTSIDE * np.abs(_flat(matrices)).max(axis=-1, initial=0.0)):
+        if np.any(left > WRITTEN_DIGITS * np.abs(_flat(matrices)).max(axis=-1, initial=0.0)):
             raise LieAlgebraError(f"matrix: not an element of {self.name}, off its span by {left.max():.3g}")
         return components
 
@@ -168,19 +150,15 @@ class LieAlgebra:
 def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra") -> LieAlgebra:
     """The Lie algebra spanned over the reals by matrices, the bracket being AB - BA.
 
+    Raises LieAlgebraError if the matrices are linearly dependent, or a bracket leaves their span.
+
     Parameters
     ----------
     basis : (d, n, n) real or complex matrices, linearly independent and closed under the bracket
 
-    Raises
-    ------
-    LieAlgebraError
-        If the matrices are linearly dependent, or a bracket leaves their span.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> plane = lie.lie_algebra_from_matrices([[[0.0, -1.0], [1.0, 0.0]]], "so(2)")
+    >>> plane = sp.rigid_body.lie.lie_algebra_from_matrices([[[0.0, -1.0], [1.0, 0.0]]], "so(2)")
     >>> plane.structure.tolist()
     [[[0.0]]]
     """
@@ -192,9 +170,8 @@ def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra"
     structure = _flat(_commutators(matrices)) @ np.linalg.pinv(_flat(matrices))
     # Constants that differ from integers by the rounding of the fit alone are integers.
     whole = np.round(structure)
-    structure = np.where(
-        np.abs(structure - whole) < _INTEGER * max(1.0, float(np.abs(structure).max())), whole, structure
-    )
+    near = np.abs(structure - whole) < _NEAR_ZERO * max(1.0, float(np.abs(structure).max()))
+    structure = np.where(near, whole, structure)
     return LieAlgebra(structure, matrices, name)
 
 
@@ -205,8 +182,7 @@ def so3() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.so3().structure[0, 1].tolist()  # [e_1, e_2] = e_3
+    >>> sp.rigid_body.lie.so3().structure[0, 1].tolist()  # [e_1, e_2] = e_3
     [0.0, 0.0, 1.0]
     """
     return so(3)
@@ -217,18 +193,15 @@ def so(n: int) -> LieAlgebra:
 
     For n = 3 the order is that of `so3.hat`. The basis is orthonormal for <A, B> = -tr(AB)/2.
 
-    Raises
-    ------
-    LieAlgebraError
-        For n below 2.
+    Raises LieAlgebraError for n below 2.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.so(4).structure.shape
+    >>> sp.rigid_body.lie.so(4).structure.shape
     (6, 6, 6)
     """
-    _whole(n, 2, "n")
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 2:
+        raise LieAlgebraError(f"n: a whole number from 2 up is needed, got {what_came(n)}")
     pairs = [(1, 2), (2, 0), (0, 1)] if n == 3 else list(combinations(range(n), 2))
     return lie_algebra_from_matrices(np.stack([_unit(n, j, i) - _unit(n, i, j) for i, j in pairs]), f"so({n})")
 
@@ -238,8 +211,7 @@ def sl2r() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.sl2r().structure[0, 1].tolist()  # [H, X] = 2 X
+    >>> sp.rigid_body.lie.sl2r().structure[0, 1].tolist()  # [H, X] = 2 X
     [0.0, 2.0, 0.0]
     """
     return lie_algebra_from_matrices(np.stack([np.diag([1.0, -1.0]), _unit(2, 0, 1), _unit(2, 1, 0)]), "sl(2, R)")
@@ -250,13 +222,11 @@ def se2() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.se2().structure.shape, lie.linear_casimirs(lie.se2()).shape
+    >>> sp.rigid_body.lie.se2().structure.shape, sp.rigid_body.lie.linear_casimirs(sp.rigid_body.lie.se2()).shape
     ((3, 3, 3), (0, 3))
     """
-    return lie_algebra_from_matrices(
-        np.stack([_unit(3, 1, 0) - _unit(3, 0, 1), _unit(3, 0, 2), _unit(3, 1, 2)]), "se(2)"
-    )
+    turn = _unit(3, 1, 0) - _unit(3, 0, 1)
+    return lie_algebra_from_matrices(np.stack([turn, _unit(3, 0, 2), _unit(3, 1, 2)]), "se(2)")
 
 
 def se3() -> LieAlgebra:
@@ -267,8 +237,7 @@ def se3() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.se3().structure.shape
+    >>> sp.rigid_body.lie.se3().structure.shape
     (6, 6, 6)
     """
     turns = np.zeros((3, 4, 4))
@@ -281,8 +250,7 @@ def su2() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.su2().structure[0, 1].round(12).tolist()
+    >>> sp.rigid_body.lie.su2().structure[0, 1].round(12).tolist()
     [0.0, 0.0, 1.0]
     """
     sigma = np.array([[[0, 1], [1, 0]], [[0, -1j], [1j, 0]], [[1, 0], [0, -1]]])
@@ -294,55 +262,33 @@ def heisenberg() -> LieAlgebra:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.linear_casimirs(lie.heisenberg()).round(9).tolist()  # the centre, z
+    >>> sp.rigid_body.lie.linear_casimirs(sp.rigid_body.lie.heisenberg()).round(9).tolist()  # the centre, z
     [[0.0, 0.0, 1.0]]
     """
     return lie_algebra_from_matrices(np.stack([_unit(3, 0, 1), _unit(3, 1, 2), _unit(3, 0, 2)]), "Heisenberg")
 
 
 def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
-    """A user's inertia operator, a symmetric isomorphism of the algebra with its dual: (d, d).
+    """Inertia operator, a symmetric isomorphism of the algebra with its dual: (d, d).
 
-    It need not be positive definite, as in Marsden and Ratiu's exercise 15.5-1.
-
-    Raises
-    ------
-    ShapeError
-        If the shape is wrong or an entry is not finite.
-    LieAlgebraError
-        If it is not symmetric to 1e-9 of its largest entry, or singular.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.inertia_operator(lie.so3(), np.diag([1.0, 2.0, 4.0])).shape
-    (3, 3)
+    It need not be positive definite, as in Marsden and Ratiu's exercise 15.5-1. Raises LieAlgebraError if it is not
+    symmetric to 1e-9 of its largest entry, or singular.
     """
     check_object(algebra, "LieAlgebra", "algebra")
     d = algebra.dimension
     operator = finite_array(inertia, "inertia", (d, d))
     if operator.ndim != 2:
         raise ShapeError(f"inertia: one ({d}, {d}) operator is needed, got {operator.shape}")
-    if np.abs(operator - operator.T).max() > _OUTSIDE * float(np.abs(operator).max()):
+    if np.abs(operator - operator.T).max() > WRITTEN_DIGITS * float(np.abs(operator).max()):
         raise LieAlgebraError("inertia: the operator is not symmetric; <I a, b> = <I b, a> is needed")
     values = np.abs(np.linalg.eigvalsh(operator))
-    if values.min() <= _SINGULAR * values.max():
+    if values.min() <= _NEAR_ZERO * values.max():
         raise LieAlgebraError(f"inertia: the operator is singular, its eigenvalues have magnitudes {np.sort(values)}")
     return 0.5 * (operator + operator.T)
 
 
 def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...]) -> NDArray[Any]:
-    """A user's finite array that may hold complex numbers, its last axes as in `finite_array`. Raises ShapeError.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.complex_or_real([1.0, 2.0j], "z", (2,)).tolist()
-    [(1+0j), 2j]
-    """
-    if not isinstance(trailing, tuple):
-        raise ShapeError(f"trailing: a tuple of lengths is needed, got {what_came(trailing)}")
+    """A user's finite array that may hold complex numbers, its last axes as in `finite_array`."""
     try:
         # asanyarray keeps the mask of a masked array, which `finite_array` refuses.
         entries = np.asanyarray(value)
@@ -354,14 +300,7 @@ def complex_or_real(value: ArrayLike, name: str, trailing: tuple[int | None, ...
 
 
 def linear_solution(operator: Array, right: Array) -> Array:
-    """x with operator x = right: (..., d, d), (..., d) -> (..., d).
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.linear_solution(np.diag([2.0, 4.0]), np.array([2.0, 8.0])).tolist()
-    [1.0, 2.0]
-    """
+    """x with operator x = right: (..., d, d), (..., d) -> (..., d)."""
     return np.linalg.solve(operator, right[..., None])[..., 0].astype(np.float64, copy=False)
 
 
@@ -369,12 +308,6 @@ def _unit(n: int, row: int, column: int) -> Array:
     matrix = np.zeros((n, n))
     matrix[row, column] = 1.0
     return matrix
-
-
-def _whole(value: int, least: int, name: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise LieAlgebraError(f"{name}: a whole number from {least} up is needed, got {what_came(value)}")
-    return int(value)
 
 
 def _commutators(basis: Matrices) -> Matrices:
@@ -395,7 +328,7 @@ def _check_basis(basis: Matrices, structure: Array) -> None:
 
 
 def _matrices(value: ArrayLike, name: str) -> Matrices:
-    """A user's square matrices, real or complex: (..., n, n), a copy. Raises ShapeError."""
+    """A user's square matrices, real or complex: (..., n, n), a copy."""
     array = complex_or_real(value, name, (None, None))
     if array.shape[-1] != array.shape[-2]:
         raise ShapeError(f"{name}: square matrices (..., n, n) are needed, got {array.shape}")

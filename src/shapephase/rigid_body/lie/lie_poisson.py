@@ -5,72 +5,71 @@ motion F' = {F, H} are mu' = ad*_{dH} mu, for the kinetic energy K = Pi . I^-1 P
 enter by their gradients, as values (..., d) or as callables of the momentum. Where no algebra is given it is so(3).
 
 Source: Marsden and Ratiu, section 15.3 and chapter 13.
+
+With double-bracket dissipation the energy of a free rigid body falls and its momentum stays on its sphere:
+Pi' = Pi x Omega + alpha Pi x (Pi x Omega) with alpha > 0, that is F' = {F, K} + {F, K}_sym with the symmetric bracket
+{F, G}_sym = -alpha (Pi x grad F) . (Pi x grad G); Marsden and Ratiu print it without the minus sign, with which the
+energy would grow.
+
+Source: Marsden and Ratiu, exercise 15.9-2; theory.md K4, M-E8.
+
+The attitude of a body whose angular velocity is the gradient of H follows R' = R hat(grad H(Pi)). H and the spatial
+momentum mu = R Pi, the lift of right-invariant fields, are constant, so that R alone is the state: Pi = R^T mu.
+
+Source: Bonnard, Cots and Shcherbakova 2013, remark 3 and proposition 5; theory.md Q4, Q9.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ... import so3
 from ...arguments import check_function, check_object, check_pair, inverse_inertia_argument
-from ...arrays import Array, finite_array
+from ...arrays import Array, common_batch, finite_array
+from ...display import short_repr
 from ...errors import ShapeError
-from .._flow import ascending_times, flow
-from .lie_algebra import LieAlgebra, so3
+from .._arguments import ascending_times
+from .._flow import flow
+from .lie_algebra import WRITTEN_DIGITS, LieAlgebra, so
 
-Gradient = ArrayLike | Callable[[Array], ArrayLike]
-"""The gradient of a function on the dual: values (..., d), or a callable of momenta (..., d)."""
+Gradient = ArrayLike | Callable[[Array], ArrayLike]  # on the dual: values (..., d), or a callable of momenta (..., d)
 
-_SO3 = so3()
-"""The algebra of a function that is not given one."""
-_TANGENT = 1e-9
-"""Part of a vector off the orbit's tangent plane, relative to its length, that is allowed: nine digits, as written."""
-_RANK = 1e-12
-"""Singular values of the Poisson tensor below this share of the largest are zero, and the leaf is smaller."""
-_NULL = 1e-10
-"""Singular values of a linear system below this share of the largest (or of 1) belong to its null space."""
+_SO3 = so(3)  # the algebra of a function that is not given one
+_RANK = 1e-12  # singular values of the Poisson tensor below this share of the largest are zero
+_NULL = 1e-10  # of linear equations in structure constants, which may have defects of 1e-12
 
 
 def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
     """B_ij = {mu_i, mu_j} = -c_ij^k mu_k: (..., d) -> (..., d, d). {F, G} = dF . B dG, and mu' = B dH.
 
-    For so(3) it is hat(Pi). Raises ShapeError.
+    For so(3) it is hat(Pi).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> print(lie.poisson_tensor([1.0, 2.0, 3.0]) + 0.0)
+    >>> print(sp.rigid_body.lie.poisson_tensor([1.0, 2.0, 3.0]) + 0.0)
     [[ 0. -3.  2.]
      [ 3.  0. -1.]
      [-2.  1.  0.]]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     return -np.einsum("ijk,...k->...ij", algebra.structure, _momentum(momentum, algebra))
 
 
 def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
     """{F, G}(mu) = -<mu, [dF, dG]>: (...), from the gradients of F and G at momenta (..., d).
 
-    Raises
-    ------
-    ShapeError
-        If a shape is wrong or an entry not finite.
-
-    Notes
-    -----
     Equation :eq:`bracket` of the documentation.
     Source: Marsden and Ratiu, equation (15.3.8); theory.md K1.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> x, y, z = np.eye(3)
-    >>> lie.lie_poisson_bracket(x, y, [0.0, 0.0, 5.0]).item()  # {Pi_1, Pi_2} = -Pi_3
+    >>> sp.rigid_body.lie.lie_poisson_bracket(x, y, [0.0, 0.0, 5.0]).item()  # {Pi_1, Pi_2} = -Pi_3
     -5.0
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     bracket = algebra.bracket(gradient_at(first, "first", mu), gradient_at(second, "second", mu))
     return -np.sum(mu * bracket, axis=-1)
@@ -89,19 +88,14 @@ def bracket_gradient(
     first, second : gradient (..., d) and Hessian (..., d, d) of F and of G at the momenta
     momentum : (..., d)
 
-    Notes
-    -----
-    Raises ShapeError.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> flat = np.zeros((3, 3))
-    >>> lie.bracket_gradient(([1.0, 0.0, 0.0], flat), ([0.0, 1.0, 0.0], flat), [1.0, 2.0, 3.0]).tolist()
+    >>> sp.rigid_body.lie.bracket_gradient(([1.0, 0.0, 0.0], flat), ([0.0, 1.0, 0.0], flat), [1.0, 2.0, 3.0]).tolist()
     [0.0, 0.0, -1.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
-    d, mu = algebra.dimension, _momentum(momentum, algebra)
+    mu = _momentum(momentum, algebra)
+    d = algebra.dimension
     for pair, name in ((first, "first"), (second, "second")):
         check_pair(pair, name, "a gradient and a Hessian")
     df, dg = finite_array(first[0], "first gradient", (d,)), finite_array(second[0], "second gradient", (d,))
@@ -114,15 +108,11 @@ def bracket_gradient(
 def hamiltonian_vector_field(hamiltonian: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
     """X_H(mu) = ad*_{dH} mu, with {F, H} = dF . X_H: (..., d) -> (..., d). For so(3) it is Pi x grad H.
 
-    Raises ShapeError.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.hamiltonian_vector_field([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]).tolist()  # Pi x grad H
+    >>> sp.rigid_body.lie.hamiltonian_vector_field([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]).tolist()  # Pi x grad H
     [0.0, -1.0, 0.0]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     return algebra.coad(gradient_at(hamiltonian, "hamiltonian", mu), mu)
 
@@ -132,27 +122,20 @@ def lie_poisson_motion(
 ) -> Array:
     """The motion mu' = ad*_{dH} mu from a momentum at the first time: (..., d), (N,) -> (..., N, d).
 
+    Raises AccuracyNotReached if the motion goes to infinity before the last time.
+
     Parameters
     ----------
     hamiltonian : gradient of H, momenta (..., d) -> (..., d)
     times : (N,) strictly ascending
 
-    Raises
-    ------
-    ShapeError
-        If the gradient, the momentum or the times are not right.
-    AccuracyNotReached
-        If the motion goes to infinity before the last time.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> inverse = np.array([1.0, 0.5, 0.25])
-    >>> pi = lie.lie_poisson_motion(lambda pi: inverse * pi, [0.3, 0.4, 1.2], [0.0, 1.0, 2.0])
+    >>> pi = sp.rigid_body.lie.lie_poisson_motion(lambda pi: inverse * pi, [0.3, 0.4, 1.2], [0.0, 1.0, 2.0])
     >>> print(np.linalg.norm(pi, axis=-1).round(9))
     [1.3 1.3 1.3]
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     start, instants = _momentum(momentum, algebra), ascending_times(times)
     check_function(hamiltonian, "hamiltonian", "a function that gives the gradient")
     gradient_at(hamiltonian, "hamiltonian", start)
@@ -169,15 +152,13 @@ def casimir_defect(function: Gradient, momentum: ArrayLike, algebra: LieAlgebra 
 
     Zero everywhere if and only if C is a Casimir.
 
-    Raises ShapeError. Source: Marsden and Ratiu, equation (15.3.12).
+    Source: Marsden and Ratiu, equation (15.3.12).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.casimir_defect([0.3, 0.4, 1.2], [0.3, 0.4, 1.2]).item()  # of |Pi|^2/2, a Casimir
+    >>> sp.rigid_body.lie.casimir_defect([0.3, 0.4, 1.2], [0.3, 0.4, 1.2]).item()  # of |Pi|^2/2, a Casimir
     0.0
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     return np.linalg.norm(hamiltonian_vector_field(function, momentum, algebra), axis=-1)
 
 
@@ -186,8 +167,7 @@ def linear_casimirs(algebra: LieAlgebra) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.linear_casimirs(lie.so3()).shape  # none
+    >>> sp.rigid_body.lie.linear_casimirs(sp.rigid_body.lie.so3()).shape  # none
     (0, 3)
     """
     check_object(algebra, "LieAlgebra", "algebra")
@@ -202,8 +182,7 @@ def quadratic_casimirs(algebra: LieAlgebra) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> print((lie.quadratic_casimirs(lie.so3())[0] * np.sqrt(3.0)).round(9) + 0.0)
+    >>> print((sp.rigid_body.lie.quadratic_casimirs(sp.rigid_body.lie.so3())[0] * np.sqrt(3.0)).round(9) + 0.0)
     [[1. 0. 0.]
      [0. 1. 0.]
      [0. 0. 1.]]
@@ -226,34 +205,27 @@ def coadjoint_orbit_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLik
     {F, G} = omega(X_F, X_G), and omega(X_H, v) = dH . v. Arguments in the order of all forms here, as
     `sphere_symplectic_form`, which it is on so(3).
 
+    Raises ShapeError if a vector is not tangent to the orbit, that is not an ad*_a mu, to 1e-9 of its length.
+
     Parameters
     ----------
     momentum : (..., d) the point mu
     first, second : (..., d) tangent vectors of the orbit
 
-    Raises
-    ------
-    ShapeError
-        If a vector is not tangent to the orbit, that is not an ad*_a mu, to 1e-9 of its length.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> x, y, z = np.eye(3)
-    >>> lie.coadjoint_orbit_form([0.0, 0.0, 5.0], x, y).item()
+    >>> sp.rigid_body.lie.coadjoint_orbit_form([0.0, 0.0, 5.0], x, y).item()
     -0.2
     """
-    check_object(algebra, "LieAlgebra", "algebra")
     mu = _momentum(momentum, algebra)
     tensor = poisson_tensor(mu, algebra)
     inverse = np.linalg.pinv(tensor, rcond=_RANK)
     u, v = finite_array(first, "first", mu.shape[-1:]), finite_array(second, "second", mu.shape[-1:])
     for name, vector in (("first", u), ("second", v)):
         off = np.linalg.norm((tensor @ inverse @ vector[..., None])[..., 0] - vector, axis=-1)
-        if np.any(off > _TANGENT * np.linalg.norm(vector, axis=-1)):
-            raise ShapeError(
-                f"{name}: not tangent to the coadjoint orbit, {off.max():.3g} of it points out of the leaf"
-            )
+        if np.any(off > WRITTEN_DIGITS * np.linalg.norm(vector, axis=-1)):
+            raise ShapeError(f"{name}: not tangent to the coadjoint orbit, {off.max():.3g} of it is off the leaf")
     return np.einsum("...ij,...j,...i->...", inverse, u, v)
 
 
@@ -264,8 +236,7 @@ def sphere_area_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLike) -
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.sphere_area_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()
+    >>> sp.rigid_body.lie.sphere_area_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()
     1.0
     """
     pi, u, v = (finite_array(x, n, (3,)) for x, n in ((momentum, "momentum"), (first, "first"), (second, "second")))
@@ -277,14 +248,11 @@ def sphere_symplectic_form(momentum: ArrayLike, first: ArrayLike, second: ArrayL
 
     omega(X_H, v) = dH . v for tangent v. Raises ShapeError for a zero momentum. Source: theory.md K2, D3.
 
-    Notes
-    -----
     Equation :eq:`symplectic` of the documentation.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.sphere_symplectic_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()  # -dA/|Pi|
+    >>> sp.rigid_body.lie.sphere_symplectic_form([0.0, 0.0, 2.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).item()  # -dA/|Pi|
     -0.5
     """
     area = sphere_area_form(momentum, first, second)
@@ -294,20 +262,12 @@ def sphere_symplectic_form(momentum: ArrayLike, first: ArrayLike, second: ArrayL
 def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     """Pi' = Pi x I^-1 Pi: (..., 3, 3), (..., 3) -> (..., 3) [kg m^2/s^2].
 
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If the inertia is not symmetric positive definite, or the shapes are not right.
-
-    Notes
-    -----
     Equations :eq:`euler-rigid` and :eq:`hamiltonian` of the documentation.
     Source: Marsden and Ratiu, equations (15.3.9), (15.3.10).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.euler_equations(np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0]).tolist()  # Pi x I^-1 Pi
+    >>> sp.rigid_body.lie.euler_equations(np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0]).tolist()  # Pi x I^-1 Pi
     [0.0, 0.75, 0.0]
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -315,12 +275,11 @@ def euler_equations(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
 
 def kinetic_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
-    """K = Pi . I^-1 Pi / 2: (..., 3, 3), (..., 3) -> (...) [J]. Raises as `euler_equations`; equation (15.3.3).
+    """K = Pi . I^-1 Pi / 2: (..., 3, 3), (..., 3) -> (...) [J]. Source: equation (15.3.3).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.kinetic_energy(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0]).item()
+    >>> sp.rigid_body.lie.kinetic_energy(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0]).item()
     0.5
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -330,12 +289,9 @@ def kinetic_energy(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
     """Omega = I^-1 Pi, the gradient of the kinetic energy: (..., 3, 3), (..., 3) -> (..., 3) [rad/s, body axes].
 
-    Raises as `euler_equations`.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.angular_velocity(np.diag([1.0, 2.0, 4.0]), [1.0, 1.0, 1.0]).tolist()
+    >>> sp.rigid_body.lie.angular_velocity(np.diag([1.0, 2.0, 4.0]), [1.0, 1.0, 1.0]).tolist()
     [1.0, 0.5, 0.25]
     """
     pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
@@ -343,14 +299,7 @@ def angular_velocity(inertia: ArrayLike, momentum: ArrayLike) -> Array:
 
 
 def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
-    """A user's gradient, values or a callable, at momenta (..., d). Raises ShapeError, WrongObjectError.
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.gradient_at(lambda mu: 2.0 * mu, "gradient", np.array([1.0, 2.0, 3.0])).tolist()
-    [2.0, 4.0, 6.0]
-    """
+    """Gradient, given by values or a callable, at momenta (..., d). Raises ShapeError, WrongObjectError."""
     if callable(gradient):
         check_function(gradient, name, "a gradient, or a function that gives it,")
     value = gradient(mu) if callable(gradient) else gradient
@@ -358,6 +307,7 @@ def gradient_at(gradient: Gradient, name: str, mu: Array) -> Array:
 
 
 def _momentum(value: ArrayLike, algebra: LieAlgebra) -> Array:
+    check_object(algebra, "LieAlgebra", "algebra")
     return finite_array(value, "momentum", (algebra.dimension,))
 
 
@@ -374,3 +324,156 @@ def _null_space(equations: Array) -> Array:
     _, values, vectors = np.linalg.svd(np.linalg.qr(equations, mode="r"))
     rank = int(np.sum(values > _NULL * max(float(values.max(initial=0.0)), 1.0)))
     return vectors[rank:]
+
+
+def symmetric_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """{F, G}_sym = -alpha (Pi x grad F) . (Pi x grad G), from gradients at momenta (..., 3): (...).
+
+    Parameters
+    ----------
+    first, second : gradients of F and G, values (..., 3) or callables of the momentum
+    momentum : (..., 3) body momentum [kg m^2/s]
+    alpha : (...) dissipation [s/(kg m^2)], positive where energy is lost
+
+    Examples
+    --------
+    >>> x, y, z = np.eye(3)
+    >>> sp.rigid_body.lie.symmetric_bracket(x, x, [0.0, 0.0, 2.0], 0.5).item()  # -alpha |Pi x e_x|^2
+    -2.0
+    """
+    pi, strength = finite_array(momentum, "momentum", (3,), unit="kg m^2/s"), finite_array(alpha, "alpha")
+    across = np.cross(pi, gradient_at(first, "first", pi))
+    return -strength * np.sum(across * np.cross(pi, gradient_at(second, "second", pi)), axis=-1)
+
+
+def double_bracket_equations(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """Pi' = Pi x Omega + alpha Pi x (Pi x Omega): (..., 3, 3), (..., 3), (...) -> (..., 3) [kg m^2/s^2].
+
+    Examples
+    --------
+    >>> sp.rigid_body.lie.double_bracket_equations(np.diag([1.0, 2.0, 4.0]), [0.0, 0.0, 2.0], 0.1).tolist()
+    [0.0, 0.0, 0.0]
+    """
+    pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    return _rate(pi, angular_velocity(inertia, pi), finite_array(alpha, "alpha")[..., None])
+
+
+def dissipated_power(inertia: ArrayLike, momentum: ArrayLike, alpha: ArrayLike) -> Array:
+    """-dK/dt = alpha |Pi x Omega|^2, zero at equilibria only: (...) [W].
+
+    Examples
+    --------
+    >>> from shapephase.rigid_body import lie
+    >>> lie.dissipated_power(np.diag([1.0, 2.0, 4.0]), [1.0, 0.0, 1.0], 2.0).item()  # alpha |Pi x Omega|^2
+    1.125
+    """
+    pi = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    torque = np.cross(pi, angular_velocity(inertia, pi))
+    return finite_array(alpha, "alpha") * np.sum(torque * torque, axis=-1)
+
+
+def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float, times: ArrayLike) -> Array:
+    """The body momentum under double-bracket dissipation, given at the first time: (..., 3), (N,) -> (..., N, 3).
+
+    Parameters
+    ----------
+    inertia : (3, 3) or (..., 3, 3) [kg m^2]
+    alpha : (...) dissipation [s/(kg m^2)]; a negative one drives the body
+    times : (N,) strictly ascending [s]
+
+    Examples
+    --------
+    >>> pi = sp.rigid_body.lie.double_bracket_motion(np.diag([1.0, 2.0, 4.0]), [0.6, 0.1, 0.5], 1.0, [0.0, 60.0])
+    >>> print(pi[-1].round(4) + 0.0, np.linalg.norm(pi, axis=-1).round(6))
+    [0.     0.     0.7874] [0.787401 0.787401]
+    """
+    pi, instants, strength = (
+        finite_array(momentum, "momentum", (3,), unit="kg m^2/s"),
+        ascending_times(times),
+        finite_array(alpha, "alpha")[..., None],
+    )
+    inverse = inverse_inertia_argument(inertia)
+    start = np.array(np.broadcast_to(pi, np.broadcast_shapes(pi.shape, inverse.shape[:-1], (*strength.shape[:-1], 3))))
+    return flow(lambda p: _rate(p, (inverse @ p[..., None])[..., 0], strength), start, instants)
+
+
+def _rate(pi: Array, omega: Array, strength: Array) -> Array:
+    torque = np.cross(pi, omega)
+    return torque + strength * np.cross(pi, torque)
+
+
+@dataclass(frozen=True, eq=False)
+class HamiltonianMotion:
+    """Motion of R' = R hat(grad H(Pi)). Made by `hamiltonian_motion`."""
+
+    times: Array
+    """(N,) [s]."""
+    attitude: Array
+    """(..., N, 3, 3) body axes to inertial axes."""
+    momentum: Array
+    """(..., 3) mu, inertial axes, constant [kg m^2/s]."""
+    body_momentum: Array
+    """(..., N, 3) Pi = R^T mu [kg m^2/s]."""
+    angular_velocity: Array
+    """(..., N, 3) grad H, body axes [rad/s]."""
+
+    __repr__ = short_repr
+
+
+def hamiltonian_motion(
+    hamiltonian: Callable[[Array], ArrayLike],
+    body_momentum: ArrayLike,
+    times: ArrayLike,
+    attitude: ArrayLike | None = None,
+) -> HamiltonianMotion:
+    """The motion, momentum and attitude, of a Hamiltonian of the body momentum alone, quadratic or not.
+
+    |Pi| and R Pi are exact to rounding; how well H is kept shows the error, which is a few 1e-12 in ten periods.
+    Where the inertial third axis is along mu, the azimuth of the body's third axis about it grows by `precession_rate`
+    of the momentum and the gradient: the quadrature of the paper's (4).
+
+    Source: Bonnard et al., remark 3, proposition 5 and (4); theory.md Q9.
+    Raises AccuracyNotReached if the motion is too rough to be followed.
+
+    Parameters
+    ----------
+    hamiltonian : gradient of H, momenta (..., 3) [kg m^2/s] -> (..., 3) [rad/s]
+    body_momentum : (..., 3) Pi at the first time [kg m^2/s]
+    times : (N,) strictly ascending [s]
+    attitude : (..., 3, 3) at the first time; None: the identity
+
+    Examples
+    --------
+    A rotor whose energy grows faster than the square of the momentum:
+
+    >>> def gradient(pi):
+    ...     return pi / np.array([1.0, 2.0, 4.0]) + 0.1 * pi**3
+    >>> motion = sp.rigid_body.lie.hamiltonian_motion(gradient, [0.3, 0.4, 1.2], np.linspace(0.0, 20.0, 5))
+    >>> pi = motion.body_momentum
+    >>> energy = np.sum(pi**2 / np.array([2.0, 4.0, 8.0]) + 0.025 * pi**4, axis=-1)
+    >>> print(energy.round(9))
+    [0.3176825 0.3176825 0.3176825 0.3176825 0.3176825]
+    """
+    check_function(hamiltonian, "hamiltonian", "a function that gives the gradient")
+    start, instants = finite_array(body_momentum, "body_momentum", (3,), unit="kg m^2/s"), ascending_times(times)
+    outward = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
+    shape = common_batch(body_momentum=start.shape[:-1], attitude=outward.shape[:-2])
+    start, outward = np.broadcast_to(start, (*shape, 3)), np.broadcast_to(outward, (*shape, 3, 3))
+    gradient_at(hamiltonian, "hamiltonian", start)
+    spatial = so3.apply(outward, start)
+
+    def rate(quat_xyzw: Array) -> Array:
+        pi = so3.apply(so3.transpose(so3.matrix_from_quat(so3.normalised(quat_xyzw))), spatial)
+        omega = np.broadcast_to(np.asarray(hamiltonian(pi), dtype=float), pi.shape)
+        turning = np.concatenate([0.5 * omega, np.zeros((*omega.shape[:-1], 1))], axis=-1)
+        return so3.quat_product(quat_xyzw, turning)
+
+    attitudes = so3.matrix_from_quat(so3.normalised(flow(rate, so3.quat_from_matrix(outward), instants)))
+    momenta = so3.apply(so3.transpose(attitudes), spatial[..., None, :])
+    return HamiltonianMotion(
+        times=instants,
+        attitude=attitudes,
+        momentum=spatial,
+        body_momentum=momenta,
+        angular_velocity=gradient_at(hamiltonian, "hamiltonian", momenta),
+    )

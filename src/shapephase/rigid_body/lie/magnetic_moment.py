@@ -19,52 +19,40 @@ from ...letters import what_came
 
 @dataclass(frozen=True, eq=False)
 class MagneticEquilibrium:
-    """An equilibrium of M' = M x B on the sphere |M| = magnitude; a centre.
+    """Equilibrium of M' = M x B on the sphere |M| = magnitude; a centre. Made by `magnetic_equilibria`.
 
     It is Lyapunov stable since |M - moment| is constant along every motion, and not asymptotically: all motions nearby
     circle it with the same frequency.
-
-    Attributes
-    ----------
-    moment : (..., 3)
-    energy : (...) M . B
-    spectrum : (..., 3) eigenvalues of the linearisation delta M' = delta M x B: 0 along the line of equilibria, and
-        +-i |B| on the sphere's tangent plane
-
-    Examples
-    --------
-    >>> from shapephase.rigid_body import lie
-    >>> along, opposite = lie.magnetic_equilibria(3.0, [0.0, 0.0, 2.0])
-    >>> float(along.energy), float(opposite.energy)
-    (6.0, -6.0)
     """
 
     moment: Array
+    """(..., 3)."""
     energy: Array
+    """(...) M . B."""
     spectrum: NDArray[np.complex128]
+    """(..., 3) eigenvalues of the linearisation delta M' = delta M x B: 0 along the line of equilibria, and +-i |B| on
+    the sphere's tangent plane."""
 
     __repr__ = short_repr
 
 
 def magnetic_hamiltonian(moment: ArrayLike, field: ArrayLike) -> Array:
-    """H = M . B, whose gradient is B: (..., 3), (..., 3) -> (...). Raises ShapeError.
+    """H = M . B, whose gradient is B: (..., 3), (..., 3) -> (...).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.magnetic_hamiltonian([1.0, 2.0, 3.0], [0.0, 0.0, 2.0]).item()
+    >>> sp.rigid_body.lie.magnetic_hamiltonian([1.0, 2.0, 3.0], [0.0, 0.0, 2.0]).item()
     6.0
     """
     return np.sum(finite_array(moment, "moment", (3,)) * finite_array(field, "field", (3,)), axis=-1)
 
 
 def magnetic_precession_rate(moment: ArrayLike, field: ArrayLike) -> Array:
-    """M' = M x B: (..., 3), (..., 3) -> (..., 3). Raises ShapeError.
+    """M' = M x B: (..., 3), (..., 3) -> (..., 3).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.magnetic_precession_rate([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]).tolist()
+    >>> sp.rigid_body.lie.magnetic_precession_rate([1.0, 0.0, 0.0], [0.0, 0.0, 2.0]).tolist()
     [0.0, -2.0, 0.0]
     """
     return np.cross(finite_array(moment, "moment", (3,)), finite_array(field, "field", (3,)))
@@ -73,12 +61,9 @@ def magnetic_precession_rate(moment: ArrayLike, field: ArrayLike) -> Array:
 def magnetic_precession(moment: ArrayLike, field: ArrayLike, t: ArrayLike) -> Array:
     """M(t) = exp(-t hat(B)) M(0), the turn about B at the rate -|B|: (..., 3), (..., 3), (N,) -> (..., N, 3).
 
-    Raises ShapeError.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> turned = lie.magnetic_precession([1.0, 0.0, 0.0], [0.0, 0.0, 2.0], [np.pi / 4.0])
+    >>> turned = sp.rigid_body.lie.magnetic_precession([1.0, 0.0, 0.0], [0.0, 0.0, 2.0], [np.pi / 4.0])
     >>> print(turned.round(9) + 0.0)  # a quarter turn, against the right-hand rule
     [[ 0. -1.  0.]]
     """
@@ -91,20 +76,16 @@ def magnetic_precession(moment: ArrayLike, field: ArrayLike, t: ArrayLike) -> Ar
 def magnetic_equilibria(magnitude: float, field: ArrayLike) -> tuple[MagneticEquilibrium, MagneticEquilibrium]:
     """The two equilibria on a sphere, along the field and opposite to it: both stable centres.
 
+    Raises ShapeError if the field is zero, where every moment is an equilibrium, or the magnitude is not positive.
+
     Parameters
     ----------
     magnitude : |M|, positive
     field : (..., 3) B, not zero
 
-    Raises
-    ------
-    ShapeError
-        If the field is zero, where every moment is an equilibrium, or the magnitude is not positive.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> [float(point.moment[2]) for point in lie.magnetic_equilibria(3.0, [0.0, 0.0, 2.0])]
+    >>> [float(point.moment[2]) for point in sp.rigid_body.lie.magnetic_equilibria(3.0, [0.0, 0.0, 2.0])]
     [3.0, -3.0]
     """
     axis, radius = finite_array(field, "field", (3,)), finite_array(magnitude, "magnitude")

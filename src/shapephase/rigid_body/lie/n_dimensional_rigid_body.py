@@ -12,17 +12,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...arguments import whole_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError, SingularInertiaError
-from ...letters import what_came
-from .lie_algebra import so
+from .lie_algebra import WRITTEN_DIGITS, so
 
-_ASYMMETRY = 1e-9
-"""Largest difference of entries that mirror each other, relative to the largest entry: nine digits, as written."""
-_NO_INERTIA = 1e-14
-"""Least inertia of a plane, relative to the largest eigenvalue of J: below it the sum of two is rounding."""
-_LARGEST_PFAFFIAN = 10
-"""Largest dimension of a Pfaffian: its expansion has (n - 1)!! terms, 945 for ten."""
+_LARGEST_PFAFFIAN = 10  # its expansion has (n - 1)!! terms, 945 for ten
 
 
 def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
@@ -30,15 +25,12 @@ def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
 
     For `euler_poincare_motion(so(n), ...)`.
 
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        If J is not symmetric, or two of its eigenvalues have no positive sum: their plane has no inertia.
+    Raises ShapeError, SingularInertiaError if J is not symmetric, or two of its eigenvalues have no positive sum: their
+    plane has no inertia.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
-    >>> lie.n_dimensional_inertia(np.diag([1.0, 2.0, 3.0])).diagonal().tolist()  # J_i + J_j
+    >>> sp.rigid_body.lie.n_dimensional_inertia(np.diag([1.0, 2.0, 3.0])).diagonal().tolist()  # J_i + J_j
     [5.0, 4.0, 3.0]
     """
     j = _second_moment(second_moment)
@@ -47,13 +39,12 @@ def n_dimensional_inertia(second_moment: ArrayLike) -> Array:
 
 
 def n_dimensional_momentum(second_moment: ArrayLike, angular_velocity: ArrayLike) -> Array:
-    """M = Omega J + J Omega: (n, n), antisymmetric (..., n, n) -> (..., n, n). Raises as `n_dimensional_inertia`.
+    """M = Omega J + J Omega: (n, n), antisymmetric (..., n, n) -> (..., n, n).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> omega = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> lie.n_dimensional_momentum(np.diag([1.0, 2.0, 3.0]), omega)[1, 0].item()
+    >>> sp.rigid_body.lie.n_dimensional_momentum(np.diag([1.0, 2.0, 3.0]), omega)[1, 0].item()
     3.0
     """
     j = _second_moment(second_moment)
@@ -64,13 +55,10 @@ def n_dimensional_momentum(second_moment: ArrayLike, angular_velocity: ArrayLike
 def n_dimensional_angular_velocity(second_moment: ArrayLike, momentum: ArrayLike) -> Array:
     """The Omega with Omega J + J Omega = M: (n, n), antisymmetric (..., n, n) -> (..., n, n).
 
-    Raises as `n_dimensional_inertia`.
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> lie.n_dimensional_angular_velocity(np.diag([1.0, 2.0, 3.0]), momentum)[1, 0].item()
+    >>> sp.rigid_body.lie.n_dimensional_angular_velocity(np.diag([1.0, 2.0, 3.0]), momentum)[1, 0].item()
     1.0
     """
     j = _second_moment(second_moment)
@@ -80,13 +68,12 @@ def n_dimensional_angular_velocity(second_moment: ArrayLike, momentum: ArrayLike
 
 
 def n_dimensional_rate(second_moment: ArrayLike, momentum: ArrayLike) -> Array:
-    """M' = [M, Omega]: (n, n), antisymmetric (..., n, n) -> (..., n, n). Raises as `n_dimensional_inertia`.
+    """M' = [M, Omega]: (n, n), antisymmetric (..., n, n) -> (..., n, n).
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> float(np.abs(lie.n_dimensional_rate(np.diag([1.0, 2.0, 3.0]), momentum)).max())  # a steady turn
+    >>> float(np.abs(sp.rigid_body.lie.n_dimensional_rate(np.diag([1.0, 2.0, 3.0]), momentum)).max())  # a steady turn
     0.0
     """
     omega = n_dimensional_angular_velocity(second_moment, momentum)
@@ -101,9 +88,8 @@ def momentum_traces(momentum: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> lie.momentum_traces(momentum).tolist()
+    >>> sp.rigid_body.lie.momentum_traces(momentum).tolist()
     [-18.0]
     """
     m = _antisymmetric(momentum, "momentum")
@@ -118,16 +104,12 @@ def momentum_traces(momentum: ArrayLike) -> Array:
 def pfaffian(momentum: ArrayLike) -> Array:
     """The Pfaffian, for even n the Casimir whose square is det M: (..., n, n) -> (...).
 
-    Raises
-    ------
-    ShapeError
-        If n is odd or above 10, or the matrix is not antisymmetric.
+    Raises ShapeError if n is odd or above 10, or the matrix is not antisymmetric.
 
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0, 2, 0, 0], [-2, 0, 0, 0], [0, 0, 0, 3], [0, 0, -3, 0]])
-    >>> print(f"{lie.pfaffian(momentum):.6f}, {np.linalg.det(momentum):.6f}")
+    >>> print(f"{sp.rigid_body.lie.pfaffian(momentum):.6f}, {np.linalg.det(momentum):.6f}")
     6.000000, 36.000000
     """
     m = _antisymmetric(momentum, "momentum")
@@ -140,34 +122,26 @@ def pfaffian(momentum: ArrayLike) -> Array:
 def manakov_integrals(second_moment: ArrayLike, momentum: ArrayLike, power: int) -> Array:
     """The coefficients of 1, lambda, ... in tr (M + lambda J^2)^k, all constant: (..., n, n) -> (..., k + 1).
 
+    Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
+    Raises ShapeError, SingularInertiaError as `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
+
     Parameters
     ----------
     second_moment : (n, n) symmetric J
     momentum : (..., n, n) antisymmetric M
     power : k, 1 or more
 
-    Raises
-    ------
-    ShapeError, SingularInertiaError
-        As `n_dimensional_inertia`, or if k is not a whole number of 1 or more.
-
-    Notes
-    -----
-    Source: Manakov 1976; (M + lambda J^2)' = [M + lambda J^2, Omega + lambda J].
-
     Examples
     --------
-    >>> from shapephase.rigid_body import lie
     >>> momentum = np.array([[0.0, -3.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    >>> lie.manakov_integrals(np.diag([1.0, 2.0, 3.0]), momentum, 2).tolist()
+    >>> sp.rigid_body.lie.manakov_integrals(np.diag([1.0, 2.0, 3.0]), momentum, 2).tolist()
     [-18.0, 0.0, 98.0]
     """
-    if isinstance(power, bool) or not isinstance(power, int | np.integer) or power < 1:
-        raise ShapeError(f"power: a whole number from 1 up is needed, got {what_came(power)}")
+    count = whole_argument(power, "power", 1)
     j = _second_moment(second_moment)
     m = _antisymmetric(momentum, "momentum", len(j))
     coefficients = [m, np.broadcast_to(j @ j, m.shape)]
-    for _ in range(power - 1):
+    for _ in range(count - 1):
         lower = [np.zeros(m.shape), *coefficients]
         coefficients = [a @ m + b @ (j @ j) for a, b in zip([*coefficients, np.zeros(m.shape)], lower)]
     return np.stack([np.trace(c, axis1=-2, axis2=-1) for c in coefficients], axis=-1)
@@ -188,10 +162,10 @@ def _second_moment(value: ArrayLike) -> Array:
     j = finite_array(value, "second_moment", (None, None), unit="kg m^2")
     if j.ndim != 2 or j.shape[0] != j.shape[1] or len(j) < 2:
         raise ShapeError(f"second_moment: one symmetric matrix (n, n), n >= 2, is needed, got {j.shape}")
-    if np.abs(j - j.T).max() > _ASYMMETRY * np.abs(j).max():
+    if np.abs(j - j.T).max() > WRITTEN_DIGITS * np.abs(j).max():
         raise ShapeError(f"second_moment: not symmetric, off by {np.abs(j - j.T).max():.3g}")
     moments = np.linalg.eigvalsh(j)
-    if not moments[0] + moments[1] > _NO_INERTIA * np.abs(moments).max():
+    if not moments[0] + moments[1] > 1e-14 * np.abs(moments).max():
         raise SingularInertiaError(
             f"second_moment: the two least eigenvalues {moments[:2]} give a plane no inertia; their sum must be above 0"
         )
@@ -203,6 +177,6 @@ def _antisymmetric(value: ArrayLike, name: str, n: int | None = None) -> Array:
     if m.shape[-1] != m.shape[-2] or m.shape[-1] < 2:
         raise ShapeError(f"{name}: matrices (..., n, n), n >= 2, are needed, got {m.shape}")
     symmetric = np.abs(m + np.swapaxes(m, -1, -2)).max(initial=0.0)
-    if symmetric > _ASYMMETRY * np.abs(m).max(initial=0.0):
+    if symmetric > WRITTEN_DIGITS * np.abs(m).max(initial=0.0):
         raise ShapeError(f"{name}: not antisymmetric, off by {symmetric:.3g}")
     return 0.5 * (m - np.swapaxes(m, -1, -2))
