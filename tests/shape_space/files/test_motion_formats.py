@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays as drawn
 
 import shapephase as sp
 from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryError, TrajectoryWarning, UnknownNameError
-from shapephase.shape_space.files.read import read_recorded_motion, read_shape_path, write_shape_path
+from shapephase.shape_space.files import read_recorded_motion, read_shape_path, write_shape_path
 from support.independent import mujoco_model
 from support.motion_writers import (
     NANO,

@@ -170,7 +170,7 @@ def plan_command(
     from ...optimal_control.plan_options import Search
     from ...optimal_control.planning import plan_reorientation
     from ...phases.phases import split
-    from ...shape_space.files.read import write_shape_path
+    from ...shape_space.files.write import write_shape_path
 
     limits = _limits(rate_limit, acceleration_limit, jerk_limit, effort)
     words = GoalWords(turn, rotate, about, point, symmetry, somersaults, half_twists)

@@ -71,6 +71,12 @@ class Closing:
         ends = [horizontal_lift(self.body, path).end for path in (self.opened, self.closed)]
         return so3.log(so3.transpose(ends[0]) @ ends[1])
 
+    @property
+    def record(self) -> dict[str, Any]:
+        """How the cycle was closed, ready for JSON."""
+        gap = dict(zip(self.body.joint_names, self.gap.tolist(), strict=True))
+        return {"by": self.by, "gap": gap, "seconds_added": self.seconds_added}
+
 
 def closed_path(
     recorded: Recorded, body: Body, *, within: float | str, by: str | None, penalty: float | None = None

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_flag, positive_argument
-from ...arrays import Array, Mask, finite_array, lock_arrays
+from ...arrays import FARTHEST, Array, Mask, finite_array, lock_arrays
+from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
 from ..ball_columns import ball_columns, neighbours_signs
-from ..curves import CLOSED
+from ..curves import CLOSED, PiecewisePolynomial
 from ..linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, LowPass, likeliest, width_of
 from ..shape_path import ShapePath
 from ._sample_origins import Prepared
@@ -37,6 +39,8 @@ _MEMORY_OF_FILTER = 6.0
 """Periods of the cut-off after which a sample counts by exp(-33)."""
 _EXACT = 1e-9
 """Noise below this share of the samples' spread counts as none: the samples are interpolated."""
+_MOST_SWING = 4.0 * FARTHEST
+"""[rad or m] between two samples: the terms of its cubics are then right to 1e-9."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +77,31 @@ class Smoothing:
     __repr__ = short_repr
 
     __post_init__ = lock_arrays
+
+    def spline_record(self, joint_names: tuple[str, ...]) -> dict[str, Any]:
+        """What a smoothing spline did, by joint, ready for JSON."""
+        return {
+            "penalty_s5": dict(zip(joint_names, self.penalty.tolist(), strict=True)),
+            "degrees_of_freedom": dict(zip(joint_names, self.degrees_of_freedom.tolist(), strict=True)),
+            "bias_rms": dict(zip(joint_names, np.sqrt(np.mean(self.bias**2, axis=0)).tolist(), strict=True)),
+            "bias_in_bars": self.bias_in_bars,
+        }
+
+    def filter_record(self, joint_names: tuple[str, ...]) -> dict[str, Any]:
+        """The low-pass filter, the noise it leaves and the motion it takes off, by joint, ready for JSON."""
+        assert self.low_pass is not None
+        assert self.in_band is not None
+        assert self.noise_in_band is not None
+        return {
+            "cut_off_hz": self.low_pass.cut_off,
+            "filter": "Butterworth, second order, forwards and backwards",
+            "rate_hz": self.low_pass.rate,
+            "noise": dict(zip(joint_names, self.noise.tolist(), strict=True)),
+            "twice_the_cut_off_hz": self.low_pass.twice.cut_off,
+            "rms_up_to_twice_the_cut_off": dict(zip(joint_names, self.in_band.tolist(), strict=True)),
+            "of_that_by_noise": dict(zip(joint_names, self.noise_in_band.tolist(), strict=True)),
+            "affected_at_ends_s": list(self.ends),
+        }
 
 
 def smoothed_path(
@@ -404,3 +433,21 @@ def _check_signal(shapes: Array, noise: Array, joint_names: Sequence[str]) -> No
 def _spread(samples: Array) -> Array:
     """Rms about the mean, along the first axis; exactly zero where nothing moves."""
     return np.where(np.ptp(samples, axis=0) > 0.0, samples.std(axis=0), 0.0)
+
+
+def check_swings(path: ShapePath, body: Body) -> None:
+    """Raise TrajectoryError where a spline swings so far between samples that rounding moves it off them."""
+    curve = path.curve
+    assert isinstance(curve, PiecewisePolynomial)
+    lengths = np.diff(curve.knots)
+    powers = lengths[:, None] ** np.arange(len(curve.coefficients))
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        swings = np.einsum("kpj,pk->pj", np.abs(curve.coefficients), powers)
+    if swings.size and not swings.max() <= _MOST_SWING:
+        piece, joint = np.unravel_index(int(np.argmax(np.nan_to_num(swings, nan=np.inf))), swings.shape)
+        raise TrajectoryError(
+            f"joint {body.joint_names[joint]}: a smooth path through the samples would swing by some "
+            f"{swings[piece, joint]:.2g} {body.joint_units[joint]} between {curve.knots[piece]:.9g} s and "
+            f"{curve.knots[piece + 1]:.9g} s; is there a gap, or are two samples nearly at one time? Keep what is "
+            "before or after it (trim, --trim), or drop a sample"
+        )
