@@ -20,8 +20,7 @@ from .curves import (
     Widened,
 )
 
-# Of the largest coefficient: what a series is resolved to by the scan.
-_ROUNDING = 32.0 * float(np.finfo(float).eps)
+_ROUNDING = 32.0 * float(np.finfo(float).eps)  # relative to the largest coefficient: the scan's resolution
 
 
 def exact_accelerations(curve: Curve, times: Array) -> Array | None:

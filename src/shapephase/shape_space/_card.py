@@ -13,8 +13,7 @@ from ..errors import ShapePhaseError
 if TYPE_CHECKING:
     from .shape_path import ShapePath
 
-# Largest difference of the ends [rad or m] at which a path closes, as it is shown.
-_CLOSED = 1e-9
+_CLOSED = 1e-9  # [rad or m] largest difference of the ends of a closed path
 
 
 def shape_path_card(self: ShapePath) -> Card:

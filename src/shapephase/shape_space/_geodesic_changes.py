@@ -9,10 +9,8 @@ from ..body.body import Body
 from ..body.momentum_gradients import energy_gradients
 from .shape_geodesic import ShapeGeodesic, integrals
 
-_STEP = 1e-4
-"""Of central differences [rad or m]: their error is a few 1e-8 of a correction that is as small as the geodesic."""
-_SETTLED = 1e-10
-"""Change of the field at which the iteration ends: each round gains a factor of about the length [rad]."""
+_STEP = 1e-4  # [rad or m] of central differences: error a few 1e-8 of a small correction
+_SETTLED = 1e-10  # change of the field at which to stop: a round gains a factor of about the length [rad]
 _MOST_ROUNDS = 40
 
 

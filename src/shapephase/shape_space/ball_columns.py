@@ -12,10 +12,8 @@ import numpy as np
 
 from ..arrays import Array
 
-_PARTS = ("x", "y", "z", "w")
-"""Behind the dot in the names of the four."""
-_SAME = 1e-9
-"""Difference of two quaternions of length one that are the same turn."""
+_PARTS = ("x", "y", "z", "w")  # endings of the four names, behind a dot
+_SAME = 1e-9  # difference of two unit quaternions of one rotation
 
 
 def ball_columns(names: Sequence[str] | None) -> tuple[slice, ...]:

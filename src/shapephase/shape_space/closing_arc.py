@@ -16,8 +16,7 @@ from .curves import PiecewisePolynomial
 from .shape_geodesic import ShapeGeodesic, shape_geodesic, shape_speed
 from .shape_path import ShapePath, interpolated
 
-PIECES = 4
-"""Cubics that a geodesic is written as; each is within some 1e-9 of a geodesic of a tenth of a radian."""
+PIECES = 4  # cubics of a geodesic: each within 1e-9 of a geodesic of 0.1 rad
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,11 +22,8 @@ from .body_path import check_closed, path_sampler, users_route_along
 from .path_series import evenly_divided, panel_edges
 from .shape_path import CLOSED, ShapePath
 
-# Points of the Gauss rule on a panel: they resolve a curvature that swings a few times there.
-_GAUSS_RULE = np.polynomial.legendre.leggauss(16)
-# Panels on each piece of the path, tried in turn until the integral changes no more; with 64 of them a result that
-# still changes comes from a break that was not declared.
-_PIECES = (2, 4, 8, 16, 32, 64)
+_GAUSS_RULE = np.polynomial.legendre.leggauss(16)  # 16 nodes resolve a few swings on a panel
+_PIECES = (2, 4, 8, 16, 32, 64)  # panels per piece, in turn: a change at 64 means an undeclared break
 
 
 def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordinates") -> Array:

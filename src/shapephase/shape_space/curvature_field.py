@@ -24,22 +24,14 @@ from .connection import connection_slopes
 from .shape_path import CLOSED, ShapePath
 
 _EPS = float(np.finfo(float).eps)
-# Random shapes at which flatness is tried: curvature that vanishes at all of them vanishes.
-_SHAPES = 16
-# Any seed serves; a fixed one gives the same answer each time.
-_SEED = 15
-# No joint of a body is meant to go further; such limits stand for none.
-_NO_LIMIT = 1e3
-# Rounding left no more than this of the curvature of 130 flat bodies.
-_ROUNDING = 16.0 * _EPS
-# Gauss nodes on each piece of a ray: twelve resolve it where the curvature swings about once.
-_NODES = 12
-# Pieces of a ray, tried in turn until the integral changes no more.
-_PIECES = (1, 2, 4, 8, 16, 32, 64)
-# Memory: rays, or pieces of rays, that are computed together.
-_ROWS = 2000
-# Of the tolerance: what the integral along one ray may contribute, so that the sum over the path keeps it.
-_SHARE = 0.01
+_SHAPES = 16  # random shapes: curvature that vanishes at all of them vanishes
+_SEED = 15  # any fixed seed: repeatable results
+_NO_LIMIT = 1e3  # [rad or m] wider limits stand for none
+_ROUNDING = 16.0 * _EPS  # largest rounding of the curvature of 130 flat bodies
+_NODES = 12  # Gauss nodes per piece of a ray: they resolve one swing of the curvature
+_PIECES = (1, 2, 4, 8, 16, 32, 64)  # of a ray, tried until the integral settles
+_ROWS = 2000  # rays, or pieces of rays, computed together: bounds memory
+_SHARE = 0.01  # of the tolerance for each ray: the sum over the path then keeps it
 
 
 def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:

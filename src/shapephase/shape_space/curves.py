@@ -16,15 +16,11 @@ from ..arrays import Array, Integers, check_reach, lock_arrays, read_only, real_
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 
-CLOSED = 1e-9
-"""[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
+CLOSED = 1e-9  # [rad or m] largest gap of a loop: files are written with ten digits or more
 _WHOLE_TURN = 2.0 * np.pi
-# Of the last break: times nearer to each other than this are one, however a path was stretched or reversed.
-_SAME_TIME = 1e-12
-# Knots of a loop repeated that are still written out.
-_MOST_REPEATED = 100_000
-# Sets of times of which a curve's values are kept, and numbers of all of them: sixteen megabytes.
-_MOST_KEPT = 32
+_SAME_TIME = 1e-12  # relative to the last break: nearer times are one after stretching or reversing
+_MOST_REPEATED = 100_000  # knots of a repeated loop that are written out
+_MOST_KEPT = 32  # sets of times with kept values; with the next number, 16 MB
 _MOST_NUMBERS = 2_000_000
 
 

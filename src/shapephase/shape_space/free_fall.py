@@ -15,34 +15,20 @@ import numpy as np
 from ..arrays import Array, Integers, Mask
 from ..errors import TrajectoryError
 
-GRAVITY = 9.81
-"""[m/s^2] On earth it differs by a quarter of a per cent, which moves nothing by a millimetre within a second."""
-_MODEL = 0.002
-"""[m] A centre of mass that is computed from a body's masses wanders by about this much as the body changes shape."""
-_CLEAR = 5.0
-"""A body at rest leaves this many times the noise on a window: so it is known from one that falls."""
-_OF_A_PARABOLA = 1.0 / (6.0 * np.sqrt(5.0))
-"""Rms of t^2 about its best straight line on a window of length one."""
-_CHANCE = 4.0
-"""Standard deviations by which the mean square of a window may exceed that of the noise."""
-_BAND = 3.0
-"""Standard deviations within which single samples follow the line, at the ends of the fall."""
-_CUT = 2.0
-"""Standard deviations: for so long a contact that accelerates the body by g may last unseen, and that much is cut."""
-_FEWEST = 6
-"""Samples of a window."""
-_APART = 1.0 / 60.0
-"""[s] Between samples of which the noise is that of a recording, too, and by which a body moves little."""
-_WANDER = 0.01
-"""[m] By which the computed centre of mass may sag in the middle of a flight: segments are not rigid, and not known."""
-_SAME = 0.03
-"""Of gravity: a measured fall that differs by less is searched for as it is."""
-UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
-"""Directions that may be up."""
-_AT_ONCE = 1024
-"""Windows: memory."""
-_NORMAL_MEDIAN = 0.6745
-"""The median of the size of a normal number of standard deviation one."""
+GRAVITY = 9.81  # [m/s^2] on earth within 0.25 %: a millimetre in a second
+_MODEL = 0.002  # [m] wander of a centre of mass computed from a body's masses as its shape changes
+_CLEAR = 5.0  # noise levels that a body at rest leaves on a window, to tell it from one that falls
+_OF_A_PARABOLA = 1.0 / (6.0 * np.sqrt(5.0))  # rms of t^2 about its best line on a window of length 1
+_CHANCE = 4.0  # standard deviations of a window's mean square above that of the noise
+_BAND = 3.0  # standard deviations of single samples off the line, at the ends of the fall
+_CUT = 2.0  # standard deviations: a contact with an acceleration of g stays hidden so long, and is cut
+_FEWEST = 6  # samples of a window
+_APART = 1.0 / 60.0  # [s] between samples with a recording's own noise, in which a body moves little
+_WANDER = 0.01  # [m] sag of the computed centre of mass in mid-flight: segments are not rigid, and not known
+_SAME = 0.03  # relative to gravity: a fall that differs by less is searched with it
+UP_AXES = ("x", "y", "z", "-x", "-y", "-z")  # directions that may be up
+_AT_ONCE = 1024  # windows: bounds memory
+_NORMAL_MEDIAN = 0.6745  # median of |x| of a standard normal x
 
 
 @dataclass(frozen=True)

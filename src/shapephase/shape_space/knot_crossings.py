@@ -21,12 +21,9 @@ from .curves import Curve, PiecewisePolynomial
 from .path_series import merged, panel_edges, resolved_series
 from .shape_path import ShapePath
 
-_ROUNDING = 64.0 * np.finfo(float).eps
-"""Of a coordinate's size: what rounding may leave of it where it goes through a knot."""
-_NEARLY_REAL = 1e-6
-"""Imaginary part of a zero, in halves of a panel: of a double zero rounding leaves its root."""
-_WHOLE = 1e-9
-"""[rad or m] by which a loop may end elsewhere and still be one."""
+_ROUNDING = 64.0 * np.finfo(float).eps  # relative to a coordinate's size, where it crosses a knot
+_NEARLY_REAL = 1e-6  # imaginary part in half panels: rounding leaves the root of a double zero
+_WHOLE = 1e-9  # [rad or m] largest gap of a loop
 
 
 def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:

@@ -11,22 +11,14 @@ import numpy as np
 
 from ..arrays import Array, lock_arrays
 
-ORDER = 3
-"""Of the derivative whose square is penalized: quintic splines, whose second derivative is smooth."""
-PILOT_ORDER = 5
-"""Of the smoother that knows the motion's third derivative at the ends, where a quintic spline has none."""
-BUTTERWORTH = 2
-"""Order of a Butterworth filter that is run forwards and backwards."""
-_HALF_POWER = np.sqrt(2.0) - 1.0
-"""At the cut-off, in place of 1 for each pass: both together then give 1/(1 + (sqrt(2) - 1)) = 1/sqrt(2), or -3 dB."""
-_NARROWEST = 10.0**-0.5
-"""Width that is tried, in steps of time: next to nothing is smoothed."""
-_WIDEST = 10.0**2.5
-"""Width that is tried, in steps of time: 300 samples are smoothed, and rounding goes into the bias beyond."""
-_WIDTHS_A_DECADE = 6
-"""Tried; the best of them and its neighbours have the least of a parabola between them."""
-_ROUNDED = 24
-"""Widths in a decade that are used: joints whose width is the same are smoothed together."""
+ORDER = 3  # of the penalized derivative: quintic splines have a smooth second derivative
+PILOT_ORDER = 5  # its spline shows the third derivative at the ends, where a quintic has none
+BUTTERWORTH = 2  # order of the filter, run forwards and backwards
+_HALF_POWER = np.sqrt(2.0) - 1.0  # in place of 1 at the cut-off: both passes give 1/sqrt(2), -3 dB
+_NARROWEST = 10.0**-0.5  # least width tried, in steps of time: next to no smoothing
+_WIDEST = 10.0**2.5  # largest width tried, in steps of time: beyond 300 samples rounding enters the bias
+_WIDTHS_A_DECADE = 6  # tried; a parabola through the best and its neighbours has the optimum
+_ROUNDED = 24  # widths per decade that are used: joints of equal width are smoothed together
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,7 @@ from ..letters import what_came
 from .path_samples import PathSamples, columns_without_samples, path_samples
 from .shape_path import ShapePath
 
-_MOST_NUMBERS = 4_000_000
-"""In memory at once; more times are taken one part after the other."""
+_MOST_NUMBERS = 4_000_000  # in memory at once; more times are taken in parts
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ from .closing_arc import ClosingArc
 from .curves import PiecewisePolynomial, Reordered
 from .shape_path import PathOrigin, ShapePath, interpolated
 
-# The quintic of least jerk from 0 to 1: the powers 3, 4, 5 of the share of the time.
-_REST_TO_REST = (10.0, -15.0, 6.0)
+_REST_TO_REST = (10.0, -15.0, 6.0)  # quintic of least jerk from 0 to 1: coefficients of s^3, s^4, s^5
 
 
 class SampleOrigin(PathOrigin, Protocol):

@@ -17,34 +17,20 @@ from .curves import CLOSED, polynomial_pieces
 if TYPE_CHECKING:
     from .shape_path import ShapePath
 
-SAME_TIME = 1e-12
-"""Of the duration: times nearer to each other are one."""
-_DEGREE = 16
-"""Of the series on a panel: five times that of a spline's pieces."""
-_RESOLVED = 1e-13
-"""Of the largest value: the last coefficients of a series that follows the function."""
-_LAST = 3
-"""Coefficients that tell."""
-_NARROWEST = 2.0**-16
-"""Of the whole: narrower panels are not halved; what is rougher is followed no better."""
-_PANELS_AT_ONCE = 512
-"""For some ten megabytes."""
-_EXTREME = 1e-14
-"""Of the largest value: error of an extreme."""
-_MOST_HALVINGS = 60
-"""Of a panel that may hold an extreme; a parabola needs 24."""
-_INTERVALS = 16
-"""Of a table on each panel, at first."""
-_PLACES = np.array([0.25, 0.5, 0.75])
-"""Of an interval, where the spline through a table is compared with the path."""
-_MOST_PARTS = 16
-"""Of an interval in one round: its error is far from the fourth power of its length when that is long."""
-_STEEPEST = 20.0
-"""An interval beside another one: a reader asks for gaps and samples that stand twice where they are 100 times so."""
-_MOST_ROUNDS = 48
-"""Intervals at a kink are halved about thirty times."""
-MOST_ROWS = 1_000_000
-"""Of a table that is made for a path."""
+SAME_TIME = 1e-12  # relative to the duration: nearer times are one
+_DEGREE = 16  # of the series on a panel: five times that of a spline's pieces
+_RESOLVED = 1e-13  # last coefficients of a resolved series, relative to the largest value
+_LAST = 3  # coefficients that show whether a series is resolved
+_NARROWEST = 2.0**-16  # relative to the whole: narrower panels are not halved
+_PANELS_AT_ONCE = 512  # some ten megabytes
+_EXTREME = 1e-14  # error of an extreme, relative to the largest value
+_MOST_HALVINGS = 60  # of a panel that may hold an extreme; a parabola needs 24
+_INTERVALS = 16  # of a table on each panel, at first
+_PLACES = np.array([0.25, 0.5, 0.75])  # in an interval, where a table's spline is compared
+_MOST_PARTS = 16  # of an interval in one round: the error of a long one is not yet of fourth order
+_STEEPEST = 20.0  # ratio of neighbouring intervals: from 100 on a reader reports gaps and doubled samples
+_MOST_ROUNDS = 48  # intervals at a kink are halved about thirty times
+MOST_ROWS = 1_000_000  # of a table made for a path
 
 
 def panel_edges(path: ShapePath, loops: int = 1) -> Array:

@@ -14,14 +14,10 @@ from ..body.couplings.coordinate_map import check_no_balls
 from ..errors import TrajectoryError
 from .connection import mechanical_connection
 
-_DEGREE = 6
-"""Of the polynomial for the acceleration along the way: between near shapes it is next to constant."""
-_ROUNDS = 40
-"""Of the iteration, which gains a factor of about the distance [rad] in each."""
-_SETTLED = 1e-10
-"""Change of the way, relative to its length, at which the iteration ends."""
-_STEP = 1e-4
-"""Of the central differences [rad or m]: their error is a few 1e-8 of a correction that is small itself."""
+_DEGREE = 6  # of the acceleration's polynomial: between near shapes it is nearly constant
+_ROUNDS = 40  # largest number: each gains a factor of about the distance [rad]
+_SETTLED = 1e-10  # relative change of the way at which the iteration ends
+_STEP = 1e-4  # [rad or m] of central differences: error a few 1e-8 of a small correction
 
 
 class ShapeGeodesic(NamedTuple):

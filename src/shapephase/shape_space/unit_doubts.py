@@ -14,17 +14,11 @@ from .curves import Fourier, PiecewisePolynomial
 from .path_series import evenly_divided, panel_edges
 from .shape_path import ShapePath
 
-DEGREE = np.pi / 180.0
-"""[rad]"""
-_FAR_BEYOND = 0.2
-"""Of the width of a joint's limits: a recording with noise leaves them by less."""
-_HALF_TURN = np.pi
-"""[rad] By less than this beyond its limits a joint may go in radians, where someone tries what limits forbid."""
-_LOOKS = 65
-"""Times of the first loop at which a path is looked at that is known only as a function; multiples of the golden ratio,
-which no swing of it repeats."""
-_LOOKS_OF_A_SWING = 8
-"""At such times a sine is within 8 % of its largest value."""
+DEGREE = np.pi / 180.0  # [rad]
+_FAR_BEYOND = 0.2  # of the width of a joint's limits: noise leaves them by less
+_HALF_TURN = np.pi  # [rad] beyond its limits a joint may go by less, to try forbidden postures
+_LOOKS = 65  # times of the first loop of a function, at multiples of the golden ratio: no swing repeats them
+_LOOKS_OF_A_SWING = 8  # times: a sine is then within 8 % of its largest value
 
 
 def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:

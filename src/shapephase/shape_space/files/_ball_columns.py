@@ -19,14 +19,10 @@ from .recording import Recording, warn
 
 _AXES = "xyz"
 _TURN = re.compile(r"(?P<joint>.+)(?:\.r(?P<small>[xyz])|_(?P<large>[XYZ])rotation)", re.DOTALL)
-_OFF_UNIT = 0.1
-"""A quaternion's length may be off one by so much: smooth curves between unit quaternions are shorter."""
-_ACROSS = 1e-6
-"""Cosine of the angle between axes that are at right angles."""
-_JUMP = 0.5 * np.pi
-"""[rad] Two hinges that go farther from one sample to the next jump, if the link turns by less than a third of it."""
-_MOST_ANGLE = 2.0 * np.pi
-"""[rad] An angle beyond it, of which nobody has said the unit, is rather in degrees."""
+_OFF_UNIT = 0.1  # allowed error of a quaternion's length: splines between unit quaternions are shorter
+_ACROSS = 1e-6  # cosine of the angle between orthogonal axes
+_JUMP = 0.5 * np.pi  # [rad] per sample of two hinges, while the link turns by less than a third of it
+_MOST_ANGLE = 2.0 * np.pi  # [rad] larger angles without a unit are rather in degrees
 
 
 def with_quaternions(

@@ -13,12 +13,9 @@ from ...errors import TrajectoryError
 from .labels import seconds
 from .recording import Recording, Table
 
-_UNRESOLVED = 2.0 * np.pi / 3.0
-"""[rad] A rotation that turns by more across a gap may as well have gone the other way round."""
-_ROUNDING = 1e-9
-"""Share of a length by which sums of time steps may exceed it."""
-_MOST_SHOWN = 4
-"""Columns and gaps that an error lists."""
+_UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] a larger rotation across a gap has an unknown direction
+_ROUNDING = 1e-9  # relative excess of a sum of time steps
+_MOST_SHOWN = 4  # columns and gaps that an error lists
 
 
 def fill_argument(fill: float | str | None) -> float | None:

@@ -36,15 +36,11 @@ from .labels import (
 from .recording import LONGEST_NAME, Recording, warn
 from .times import is_clock, part_of
 
-_STILL = 1e-9
-"""Range of a coordinate [rad, m or degrees] below which it was locked."""
-_FEW = 6
-"""Joints that a line about those without a column names."""
-_MOST_SHOWN = 50
-"""Columns that an error lists."""
+_STILL = 1e-9  # [rad, m or degrees] range of a locked coordinate
+_FEW = 6  # joints that the warning about missing columns lists
+_MOST_SHOWN = 50  # columns that an error lists
 _NO_JOINT = "no joint of the body"
-_SAME = 1e-6
-"""Difference of two coordinates, relative to their range: what printed digits leave of one that follows another."""
+_SAME = 1e-6  # relative to their range: printed digits of a coordinate that follows another
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,10 +13,9 @@ from ...errors import TrajectoryError
 from .nameless_joints import FREE_JOINT, nameless_joints
 from .recording import Table, warn
 
+# TUM RGB-D benchmark: pose behind the time, in trajectories of visual odometry
 _TUM = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
-"""A pose as trajectories of visual odometry have it, behind the time (TUM RGB-D benchmark)."""
-_FREE = ("base_x", "base_y", "base_z", "base_qw", "base_qx", "base_qy", "base_qz")
-"""A free joint of MuJoCo."""
+_FREE = ("base_x", "base_y", "base_z", "base_qw", "base_qx", "base_qy", "base_qz")  # MuJoCo's free joint
 _OFF_UNIT = 1e-3
 
 

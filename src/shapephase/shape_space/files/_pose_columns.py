@@ -22,27 +22,23 @@ _KINDS = {
 }
 _KIND_OF = {word: kind for kind, words in _KINDS.items() for word in words}
 _EULER = {"roll": "roll", "pitch": "pitch", "yaw": "yaw", "heading": "yaw"}
-_BASE = frozenset(
+_BASE = frozenset(  # words before the kind that name no other part of the body
     ("base", "link", "root", "pelvis", "body", "pose", "odom", "odometry", "state", "states", "transform", "field")
 ) | {"free", "floating", "freeflyer"}
-"""Words before the kind that are no other part of the body."""
-_FRAME = re.compile(r"[a-z]{1,2}")
-"""Letters of the frames between a kind and its component, as in `p_RS_R_x` and `sigma_BN_1`."""
+_FRAME = re.compile(r"[a-z]{1,2}")  # frames between a kind and its component, as in `p_RS_R_x`
 _JOINED = re.compile(r"(q|quat|t|p|r|mrp|sigma|rotvec|pos)([wxyz]|\d)")
 _SPLIT = re.compile(r"[/.\s_\[\]()]+")
-CANONICAL = {
+CANONICAL = {  # kind -> component -> name of its column
     QUATERNION: {part: f"base_q{part}" for part in "xyzw"},
     PLACE: {part: f"base_{part}" for part in "xyz"},
     MRP: {part: f"base_mrp_{part}" for part in "123"},
     VECTOR: {part: f"base_rotvec_{part}" for part in "xyz"},
     EULER: {part: f"base_{part}" for part in ("roll", "pitch", "yaw")},
 }
-"""Kind -> component -> the name of its column."""
-HINT = (
+HINT = (  # in messages about columns of the base
     "columns of the base are base_x, base_y, base_z and base_qx, base_qy, base_qz, base_qw or base_roll, base_pitch, "
     "base_yaw or base_mrp_1, base_mrp_2, base_mrp_3"
 )
-"""What a message says of columns of the base."""
 
 
 class _Part(NamedTuple):

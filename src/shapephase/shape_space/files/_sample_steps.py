@@ -21,22 +21,14 @@ from .recording import Recording, warn
 from .smoothing import filtered, filtered_attitudes
 from .times import part_of
 
-_APART = 5.0
-"""Times the largest rate of the next second: a body that moves on does not slow down so much from its first step on."""
-_NEXT = 1.0
-"""[s]"""
-_FEWEST = 4
-"""Steps in it: fewer are no recording, of which one expects small steps."""
-_NO_POSE = 0.02
-"""[rad or m] A smaller first step is noise, or a body that moves very little."""
-_DENSER = 1.1
-"""Factor to the usual rate: splines through uneven samples make that many even ones of them."""
-_ROUNDING = 1e-9
-"""Steps of time."""
-_GAP = 5.0
-"""Usual steps: samples farther apart are no part of one motion."""
-_UNRESOLVED = 2.0 * np.pi / 3.0
-"""[rad] From one sample to the next, the short way: turns up to twice as long the other way round show as much."""
+_APART = 5.0  # first rate over the largest of the next second: a moving body does not slow down so much
+_NEXT = 1.0  # [s]
+_FEWEST = 4  # steps in that second: fewer are no recording with small steps
+_NO_POSE = 0.02  # [rad or m] a smaller first step is noise, or a body that hardly moves
+_DENSER = 1.1  # largest even rate over the usual rate of uneven samples
+_ROUNDING = 1e-9  # in steps of time
+_GAP = 5.0  # usual steps: samples farther apart belong to different motions
+_UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] per sample: a turn of twice that, the other way round, gives the same samples
 
 
 def without_first_pose(recording: Recording, motion: Matched, body: Body) -> tuple[Recording, Matched]:

@@ -22,20 +22,14 @@ from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
 from .recording import Recording, SegmentPoses, warn
 
-OWN_AXES = "links"
-"""Instead of a calibration pose: segments have the axes of the body's links."""
-SHORT = 0.02
-"""[m] Between joints nearer to each other neither length nor direction is compared; lengths may differ by it."""
+OWN_AXES = "links"  # calibration: segments have the axes of the body's links
+SHORT = 0.02  # [m] tolerance of lengths; shorter ones are not compared
+# [rad] between the ways to the next joint: people are not straight; other arm poses give 90 deg.
 MOST_OFF_WAY = np.radians(20.0)
-"""[rad] From the way between two joints to the body's: people are not straight; arms hanging or held out differ by 90
-degrees."""
-_OTHER_POSE = np.radians(45.0)
-"""[rad] A segment that is turned by more between two calibration poses belongs to two different postures."""
-_FLAT = 1e-4
-"""Share of the largest singular value, below which points are on one line."""
-_THOUSAND = (500.0, 2000.0)
-"""Recorded lengths over the body's, where those are in millimetres."""
-_PARTS = {
+_OTHER_POSE = np.radians(45.0)  # [rad] a larger turn between two calibration poses means two postures
+_FLAT = 1e-4  # relative to the largest singular value: points on one line
+_THOUSAND = (500.0, 2000.0)  # recorded lengths in millimetres, over the body's in metres
+_PARTS = {  # part -> its names in Xsens, Theia and usual models, without the side
     "pelvis": ("pelvis", "hips"),
     "thigh": ("thigh", "upperleg", "upleg", "femur"),
     "shank": ("shank", "lowerleg", "lowleg", "tibia", "calf", "shin"),
@@ -45,13 +39,10 @@ _PARTS = {
     "forearm": ("forearm", "larm", "lowerarm", "lowarm"),
     "hand": ("hand",),
 }
-"""Part -> what Xsens, Theia and usual models call it, without its side."""
 _USUAL = {word: part for part, words in _PARTS.items() for word in words}
 _SIDED = re.compile(r"(?P<before>left|right|[lr](?=_))?_?(?P<part>.+?)_?(?P<behind>left|right|(?<=_)[lr])?")
-_ROOM = ("worldbody", "world", "ground")
-"""What files call the room among the segments."""
-_MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}
-"""Kind of model whose links the segments are -> how its files end."""
+_ROOM = ("worldbody", "world", "ground")  # names of the room among the segments
+_MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}  # kind of model whose links are the segments -> ending of its files
 
 
 @dataclass(frozen=True, kw_only=True)

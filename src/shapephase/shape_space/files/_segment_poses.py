@@ -21,22 +21,14 @@ from .formats.segment_poses import pose_columns
 from .recording import Recording, SegmentPoses, Table
 from .times import recording_of
 
-_LENGTH_TOLERANCE = 0.1
-"""Share by which a distance between joints may differ from the body's: momentum is then off by a fifth."""
-_MOST_OFF_HINGE = np.radians(15.0)
-"""[rad] rms of what hinges leave of a turn; a knee bends by some degrees to the side."""
-_MOST_DRIVERS = 3
-"""Coordinates that one turn can tell."""
-_TRIED = (129, 25, 11)
-"""Values of each of one, two or three coordinates between its limits, of which the nearest turn is searched from."""
-_ROUNDS = 8
-"""Steps of that search, by Gauss and Newton: it doubles its digits, from two on."""
-_STEP = 1e-5
-"""[rad] of its differences."""
-_FEWEST_LINKS = 2
-"""Links of a rigid part whose centre of mass is not that of the recorded one."""
-_ACROSS = 1e-6
-"""Cosine of the angle between hinges at right angles."""
+_LENGTH_TOLERANCE = 0.1  # relative error of a distance between joints: the momentum is then off by a fifth
+_MOST_OFF_HINGE = np.radians(15.0)  # [rad] rms that hinges leave of a turn; a knee bends sideways by some degrees
+_MOST_DRIVERS = 3  # coordinates that one turn determines
+_TRIED = (129, 25, 11)  # starting values of each of one, two or three coordinates, between its limits
+_ROUNDS = 8  # Gauss-Newton steps: digits double from two on
+_STEP = 1e-5  # [rad] of its central differences
+_FEWEST_LINKS = 2  # links of a rigid part with another centre of mass than the recorded segment
+_ACROSS = 1e-6  # cosine of the angle between orthogonal hinges
 
 
 @dataclass(frozen=True, eq=False)

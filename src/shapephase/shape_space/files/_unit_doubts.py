@@ -12,14 +12,10 @@ from .labels import ANGLES, LENGTHS, NO_UNIT
 from .recording import Recording, warn
 
 _WHOLE_TURN = 2.0 * np.pi
-_MANY_TURNS = 2.0 * _WHOLE_TURN
-"""Range of a joint without limits [rad] from which on one asks; wheels turn on, but who counts their turns says so."""
-_HALF_TURN = np.pi
-"""From one sample to the next [rad]: a recording that is so coarse tells nothing about the way between."""
-_SLACK = 1e-6
-"""Share of a limit, or of 1 rad or m where that is larger: optimisers and printed digits go beyond by less."""
-_MOST_SHOWN = 8
-"""Joints that a warning lists."""
+_MANY_TURNS = 2.0 * _WHOLE_TURN  # [rad] range of a joint without limits from which its unit must be stated
+_HALF_TURN = np.pi  # [rad] per sample: coarser samples do not determine the way between
+_SLACK = 1e-6  # relative to a limit, at least 1 rad or m: optimisers and printed digits exceed limits by less
+_MOST_SHOWN = 8  # joints that a warning lists
 
 
 def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> None:

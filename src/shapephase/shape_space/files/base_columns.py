@@ -20,29 +20,19 @@ from ._pose_columns import CANONICAL, MRP, VECTOR
 from .labels import ANGLES, LENGTHS, NO_UNIT, SI, Label, label
 from .recording import Recording
 
-ESTIMATE = "estimate"
-"""Instead of the axes of the base: they are found by a fit."""
-# In the tables that `Motion.write_csv` writes; they follow from the rest.
-_FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")
-# The same of `export_motion`, which writes velocities, too.
-_VELOCITIES = ("base_vx_m_s", "base_vy_m_s", "base_vz_m_s")
-_AGREES = 0.1
-"""Of the rates themselves, in the median: turns between samples that are off by less are the turns of these rates."""
-_CONTRADICTS = 0.5
-"""Of the rates themselves: turns that are off by more are others."""
+ESTIMATE = "estimate"  # axes of the base that a fit determines
+_FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")  # of `Motion.write_csv`; they follow from the rest
+_VELOCITIES = ("base_vx_m_s", "base_vy_m_s", "base_vz_m_s")  # written by `export_motion`
+_AGREES = 0.1  # median error of turns between samples, relative to the rates: both agree
+_CONTRADICTS = 0.5  # relative to the rates: turns that are off by more contradict them
 _PREFIXES = ("base", "pelvis", "root")
-# A quaternion may be off the unit length by this much: recordings keep as few as three digits.
-_OFF_UNIT = 1e-3
-_MOST_ANGLE = 2.0 * np.pi
-"""[rad] An angle of the base beyond it, of which nobody has said the unit, is rather in degrees."""
-_LEAST_SLIDES = 2
-"""Joints that slide the base, from which its place is known: of a single one, the others of its directions are held."""
-_FARTHEST = 50.0
-"""[m] A base farther from the origin, of which nobody has said the unit, is rather in millimetres."""
+_OFF_UNIT = 1e-3  # allowed error of a quaternion's length: recordings keep as few as three digits
+_MOST_ANGLE = 2.0 * np.pi  # [rad] larger angles without a unit are rather in degrees
+_LEAST_SLIDES = 2  # sliding joints that determine the place of the base; with one, the other directions are fixed
+_FARTHEST = 50.0  # [m] distances without a unit beyond it are rather in millimetres
 _AXES = "xyz"
 _SAME_AXES = "x y z"
-# Of the base, seen from a pelvis of OpenSim (x forward, y up, z right): x forward, y left, z up, as URDF has it.
-_OPENSIM_AXES = "x -z y"
+_OPENSIM_AXES = "x -z y"  # base axes of URDF (x forward, z up) in OpenSim's (x forward, y up, z right)
 
 
 class _Group(NamedTuple):

@@ -22,8 +22,7 @@ from ..shape_path import ShapePath
 from .labels import amounts
 from .smoothing import Recorded, Smoothing, prepared_path
 
-WAYS = ("smooth", "drift", "geodesic")
-"""A smoother that runs on from the end to the start; the gap taken off evenly in time; a geodesic put at the end."""
+WAYS = ("smooth", "drift", "geodesic")  # periodic smoother; gap taken off evenly in time; geodesic at the end
 _WHOLE_TURN = 2.0 * np.pi
 
 

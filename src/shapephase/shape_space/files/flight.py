@@ -23,19 +23,13 @@ from .base_columns import ESTIMATE
 from .recording import Recording
 from .times import part_of, samples_within, trim_argument
 
-AUTO = "auto"
-"""Instead of two times: the flight is found by the fall of the centre of mass."""
-ALL = "all"
-"""Instead of two times: the body is free all the time."""
-RECORDED = "recorded"
-"""Instead of two times: where the base is recorded, its fall; without places or a fall all of it; else no flight."""
-ANY_GRAVITY = "any"
-"""Instead of a gravity: units of length and time are not doubted."""
+AUTO = "auto"  # the flight is found by the fall of the centre of mass
+ALL = "all"  # the whole recording is the flight
+RECORDED = "recorded"  # as AUTO where the base is recorded, ALL without places or a fall, else no flight
+ANY_GRAVITY = "any"  # units of length and time are not checked
 _NUMBERED = re.compile(rf"{AUTO}:([1-9]\d{{0,5}})")
-# Entries of rotations that differ by less are rounding of one attitude.
-_STILL = 1e-12
-# Of a flight, to which six numbers are fitted.
-_FEWEST = 3
+_STILL = 1e-12  # rounding of the entries of a constant rotation
+_FEWEST = 3  # samples: a fit has six unknowns
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,7 @@ from .formats.text_tables import read_text
 from .recording import Table, digest, file_bytes
 from .tables import PACKED, TABLES, unpacked
 
-STANDARD_INPUT = "-"
-"""Instead of a file's name: a text table, or a motion of OpenSim."""
+STANDARD_INPUT = "-"  # file name: a text table or an OpenSim motion
 _TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
     ".mot": read_opensim,
     ".sto": read_opensim,
@@ -48,8 +47,7 @@ _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
 _ARRAYS = (".npz", ".npy")
 _WITH_BODY: dict[str, Callable[[Path, bytes, Body], Table]] = {".bvh": read_bvh}
 _BAGS = (".bag", ".mcap", ".db3")
-# What comes near, and how it becomes a motion of joints.
-_OTHERS = {
+_OTHERS = {  # similar files, and how to turn them into joint motions
     ".trc": INVERSE_KINEMATICS,
     ".mvn": "it is a suit's recording as its own program keeps it; export it there as MVNX, or as BVH",
     ".xls": "Excel's older files are not read; save it as .xlsx or .csv",

@@ -12,16 +12,11 @@ from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
 
 _DEGREE = np.pi / 180.0
-ANGLES = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3}
-"""Units of angles -> their size [rad]."""
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-"""Units of lengths -> their size [m]."""
-IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}
-"""Units of time -> how many there are in a second: whole milliseconds are divided by it without loss."""
-SI = "SI"
-"""The unit of a column in rad or m, whichever its joint has; `write_shape_path` says so where else one would ask."""
-NO_UNIT = "1"
-"""Of the numbers of a quaternion."""
+ANGLES = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3}  # unit -> size [rad]
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # unit -> size [m]
+IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}  # division keeps whole ms exact
+SI = "SI"  # unit of a column in rad or m, as its joint has it; written by `write_shape_path` where needed
+NO_UNIT = "1"  # of a quaternion's numbers
 _SPELLINGS = {
     "rad": ("rad", "rads", "radian", "radians"),
     "deg": ("deg", "degs", "degree", "degrees", "°"),
@@ -39,22 +34,19 @@ _SPELLINGS = {
 }
 _UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
 _BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))", re.DOTALL)
-# Behind an underscore any unit stands, behind a blank or a point only a word that is no part of a name.
+# Any unit may follow an underscore; only whole words follow a blank or a point.
 _SUFFIXED = re.compile(r"(?P<name>.*[^\s_.])(?P<mark>[\s_.]|(?=°))(?P<unit>[^\W\d_]+|°)", re.DOTALL)
 _WORDS = {"rad", "deg", "ms"}
-_NO_UNITS = ("", "-")
-"""What stands in the brackets of columns without a unit."""
-_OTHER_UNIT = re.compile(
+_NO_UNITS = ("", "-")  # in the brackets of columns without a unit
+_OTHER_UNIT = re.compile(  # units of rates, forces and other quantities beside a posture
     r"(rad|deg|°|m|cm|mm|rev|r)\s*([/ ]\s*(s|min)|s\^?-1|\s*s\^-1)\S*|rpm|n|nm|n\*m|n\.m|a|ma|v|w|°c|degc|pa|bar", re.I
 )
-"""Units of rates, forces and what else is recorded beside a posture."""
 _POSITIONS = ("position", "pos", "angle", "value", "q", "qpos")
-_COMPANIONS = (
+_COMPANIONS = (  # quantities recorded of a joint beside its position
     *("velocity", "vel", "speed", "dq", "qd", "qvel", "qdot", "rate", "acceleration", "acc", "ddq", "qdd"),
     *("effort", "torque", "tau", "force", "current", "temperature", "command", "cmd", "desired", "target", "reference"),
 )
-"""What is recorded of a joint beside its position."""
-_COUNTERS = (
+_COUNTERS = (  # columns that count rows, in lower case without marks
     "frame",
     "frames",
     "framenumber",
@@ -67,7 +59,6 @@ _COUNTERS = (
     "counter",
     "row",
 )
-"""Names of columns that count the rows, in small letters and without marks between words."""
 _QUANTITY = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\W\d_]*|°)")
 
 

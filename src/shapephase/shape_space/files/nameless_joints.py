@@ -18,18 +18,12 @@ from ...body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, Join
 from ...body.virtual_base import way_names
 from ...errors import TrajectoryError, TrajectoryWarning
 
-FREE_JOINT = 7
-"""Entries of a free joint: a place and a quaternion."""
-_SAMPLES = 50
-"""Of a motion, at which places of bodies are compared: enough for every joint to have moved."""
-_FITS = 0.01
-"""Of the extent of the body, rms: links that lie farther from where the file has its bodies are others."""
-_ALIKE = 5.0
-"""Times the least distance: orders within it are not told apart by places, which have few digits."""
-_AT_REST = 1e-6
-"""[rad/s] Bodies that turn no faster do not show how they turn."""
-_CONTRADICTS = 0.5
-"""Share of the rates themselves, rms: turns between samples that are off by more are others."""
+FREE_JOINT = 7  # entries of a free joint: a place and a quaternion
+_SAMPLES = 50  # at which places of bodies are compared: every joint has moved by then
+_FITS = 0.01  # relative to the body's extent, rms: links farther from the file's bodies are others
+_ALIKE = 5.0  # times the least distance: places with few digits do not distinguish such orders
+_AT_REST = 1e-6  # [rad/s] slower bodies do not show how they turn
+_CONTRADICTS = 0.5  # relative to the rates, rms: turns between samples that are off by more are others
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,8 @@ from .nameless_joints import NamelessJoints
 if TYPE_CHECKING:
     from ._segment_poses import SegmentMotion
 
-LONGEST_NAME = 256
-"""Characters of a column's name, as of a joint's name in a body's file."""
-_UNEVEN_STEPS = 100.0
-"""A step this many times longer or shorter than the median is probably a gap, or one sample recorded twice."""
+LONGEST_NAME = 256  # characters of a column's name, as of a joint's name in a body's file
+_UNEVEN_STEPS = 100.0  # over the median step, or under it: a gap, or one sample recorded twice
 
 
 class Rates(NamedTuple):

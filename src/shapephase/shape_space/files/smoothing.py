@@ -23,24 +23,15 @@ from ..shape_path import ShapePath
 from ._sample_origins import Prepared
 from .recording import warn
 
-_FEWEST = 5
-"""Samples; of fewer, what is motion and what is noise cannot be told apart."""
-_WIDEST_GAP = 5.0 * np.sqrt(2.0)
-"""Largest gap of a loop in noise levels: five standard deviations of the difference of two samples."""
-_REACH = 6.0
-"""Widths that are smoothed over: what is farther from a sample counts there by exp(-6/2) of 1/6 of it, or less."""
-_UNEVEN = 1e-3
-"""Share of a step by which steps of evenly spaced samples differ."""
-_SHORTEST = 0.5
-"""Length of an averaged unit quaternion: below, attitudes within the filter's reach are over 120 deg apart."""
-_REACH_OF_FILTER = 0.7
-"""Periods of the cut-off from an end: the weights of an open end are within 4 % of the largest weight inside."""
-_MEMORY_OF_FILTER = 6.0
-"""Periods of the cut-off after which a sample counts by exp(-33)."""
-_EXACT = 1e-9
-"""Noise below this share of the samples' spread counts as none: the samples are interpolated."""
-_MOST_SWING = 4.0 * FARTHEST
-"""[rad or m] between two samples: the terms of its cubics are then right to 1e-9."""
+_FEWEST = 5  # samples: fewer do not separate motion from noise
+_WIDEST_GAP = 5.0 * np.sqrt(2.0)  # noise levels: five standard deviations of the difference of two samples
+_REACH = 6.0  # widths: a sample farther away has a weight of exp(-6/2)/6 or less
+_UNEVEN = 1e-3  # relative spread of even steps
+_SHORTEST = 0.5  # length of an averaged unit quaternion: below, attitudes in reach are over 120 deg apart
+_REACH_OF_FILTER = 0.7  # periods of the cut-off from an end: weights are within 4 % of the largest inside
+_MEMORY_OF_FILTER = 6.0  # periods of the cut-off: a sample's weight is then exp(-33)
+_EXACT = 1e-9  # relative to the samples' spread: less noise is none, and samples are interpolated
+_MOST_SWING = 4.0 * FARTHEST  # [rad or m] between two samples: terms of its cubics are then right to 1e-9
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,13 +18,12 @@ from .recording import file_bytes
 if TYPE_CHECKING:
     import pandas as pd
 
-TABLES: dict[str, Callable[[Path, bytes, str | None], Any]] = {
+TABLES: dict[str, Callable[[Path, bytes, str | None], Any]] = {  # ending -> reader of name, bytes and topic
     **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".log", ".tum"), lambda w, d, part: read_text(w, d, section=part)),
     **dict.fromkeys((".xlsx", ".xlsm"), read_excel),
     ".parquet": lambda where, data, _: read_parquet(where, data),
     ".feather": lambda where, data, _: read_feather(where, data),
 }
-"""Endings of tables -> what reads them: of a file's name, its bytes, and the part of it that is wanted."""
 PACKED = ".gz"
 
 

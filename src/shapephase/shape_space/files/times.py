@@ -15,18 +15,13 @@ from ...letters import what_came
 from .labels import IN_A_SECOND, in_square_brackets, label, time_unit_argument
 from .recording import Recording, Table, times_from_zero
 
+# Names of a column of times, in lower case, without unit and marks between words.
 _TIMES = ("time", "times", "t", "timestamp", "timestamps", "stamp", "datetime", "elapsed", "elapsedtime", "timetag")
-"""Names of a column of times, in small letters, without its unit and marks between words."""
-_EPOCH = (6.3e8, 4.1e9)
-"""Seconds since 1970, from 1990 to 2100: times between them, in a unit in which steps are usual ones, are such."""
-_LONG_STEP = 10.0
-"""Steps as long as this [s] are rather those of another unit: a motion of joints is recorded more often."""
-_LONG_STEP_OF_MANY = 1.0
-"""The same [s] where samples are many, as in a recording: milliseconds at a thousand samples a second."""
-_MANY = 10
-"""Samples; a path written by hand has fewer."""
-_USUAL_STEP = 0.1
-"""[s]; what records joints takes ten samples a second or more."""
+_EPOCH = (6.3e8, 4.1e9)  # [s] since 1970, from 1990 to 2100, in the unit in which steps are usual ones
+_LONG_STEP = 10.0  # [s] joint motions are recorded more often: longer steps have another unit
+_LONG_STEP_OF_MANY = 1.0  # [s] in long recordings: milliseconds at a thousand samples a second
+_MANY = 10  # samples; a path written by hand has fewer
+_USUAL_STEP = 0.1  # [s] joints are recorded ten times a second or more
 
 
 def recording_of(

@@ -19,24 +19,14 @@ from ..connection import connection_slopes, curvature, horizontal_lift
 from ..shape_path import ShapePath
 from .smallest_loops import AxisLoop, loops_of_second_order, loops_of_third_order
 
-_NODES = 25
-"""Chebyshev points along a ray, odd so that the shape is one of them: they resolve a curvature that swings some six
-times there."""
-_HALF_WIDTH = 0.4
-"""[strokes] of those rays. Rounding of the m-th derivative grows as (25/0.4)^m."""
-_RAYS = 4
-"""Random directions of the higher derivatives. These are polynomials in the direction with values in three dimensions,
-so that three directions in general position span what all span."""
-_FAR_SHAPES = 6
-"""Random shapes to whose curvature the body is carried along straight paths."""
-_LOOKS = (0.25, 0.5, 0.75, 1.0)
-"""Where on those paths."""
-_FAR = 0.6
-"""[strokes] of such a shape from the shape, in each joint, at most."""
-_SEED = 26
-"""Any seed serves; a fixed one gives the same answer each time."""
-_LIFT_TOLERANCE = 1e-12
-"""[rad] of what carries a curvature back."""
+_NODES = 25  # Chebyshev points on a ray, the shape among them: they resolve six swings of the curvature
+_HALF_WIDTH = 0.4  # [strokes] of those rays; rounding of the m-th derivative grows as (25/0.4)^m
+_RAYS = 4  # random directions: derivatives are vectors in three dimensions, which three directions span
+_FAR_SHAPES = 6  # random shapes at the ends of straight paths
+_LOOKS = (0.25, 0.5, 0.75, 1.0)  # places on those paths
+_FAR = 0.6  # [strokes] largest distance of such a shape, in each joint
+_SEED = 26  # any fixed seed: repeatable results
+_LIFT_TOLERANCE = 1e-12  # [rad] of the lift that carries a curvature back
 
 
 @dataclass(frozen=True, eq=False)

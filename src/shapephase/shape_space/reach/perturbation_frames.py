@@ -21,20 +21,13 @@ from ..connection import integral, mechanical_connection
 from ..path_series import panel_edges, turn_of_a_loop
 from ..shape_path import ShapePath
 
-_MOST_DEGREE = 6
-"""Of the polynomials; the number of terms grows as the number of joints to this power."""
-_MOST_TERMS = 3000
-"""Of a polynomial; least squares with more take minutes."""
-_POINTS_PER_TERM = 4
-"""Shapes of the region for each term, at which the connection is made small."""
-_LEAST_POINTS = 512
-"""Such shapes at least."""
-_STEPS = 40
-"""Corrections of the frame at most: near the best one each is a hundredth of the last, or less."""
-_SMALL_STEP = 1e-11
-"""[rad] of a correction, which ends them."""
-_TURN_TOLERANCE = 1e-12
-"""Of the integral of the connection's size: where halving the panels of a path changes no more."""
+_MOST_DEGREE = 6  # of the polynomials; the number of terms is about n^degree
+_MOST_TERMS = 3000  # least squares with more take minutes
+_POINTS_PER_TERM = 4  # shapes at which the connection is made small
+_LEAST_POINTS = 512  # such shapes at least
+_STEPS = 40  # largest number of corrections: each is about a hundredth of the last
+_SMALL_STEP = 1e-11  # [rad] of the last correction
+_TURN_TOLERANCE = 1e-12  # change of the integral of the connection's size at which halving ends
 
 
 @dataclass(frozen=True, eq=False)

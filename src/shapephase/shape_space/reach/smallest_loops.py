@@ -19,17 +19,11 @@ from ...arrays import Array, Integers, lock_arrays
 from ...display import short_repr
 from ..shape_path import ShapePath
 
-_STARTS = 24
-"""Random directions from which the best figure of eight is sought; each climb ends at a local best."""
-_CLIMBS = 200
-"""Steps of such a climb at most."""
-_SEED = 3
-"""Any seed serves; a fixed one gives the same answer each time."""
-_SMALL_PLANE = 1e-12
-"""Part of the largest below which a plane of a loop is left out: rounding."""
-_FIRST_CORRECTION = 5
-"""Frequency of the circles that take away what an eight of frequencies 1 and 2 turns about other axes: with these no
-sum of three frequencies of the eight and one circle vanishes."""
+_STARTS = 24  # random directions of the climbs to the best figure of eight: each ends at a local optimum
+_CLIMBS = 200  # largest number of steps of a climb
+_SEED = 3  # any fixed seed: repeatable results
+_SMALL_PLANE = 1e-12  # rounding of a plane of a loop, relative to the largest
+_FIRST_CORRECTION = 5  # of the first correcting circle: no sum of three frequencies among 1, 2 and this vanishes
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from ...arrays import Array, Integers, Mask
 from ...integrator.resolved import ResolvedPath
 from ..curves import Curve
 
+# Times (N,), columns (N, 2 n) -> weights (2 n,) [rad per unit of a column], sizes (2 n,) [unit of a column].
 Judge = Callable[[Array, Array], tuple[Array, Array]]
-"""Times (N,), columns (N, 2 n) -> weights (2 n,) [rad per unit of a column], sizes (2 n,) [unit of a column]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -34,49 +34,27 @@ from ._scan_panels import (
 from .function_scan import FunctionScan, ScannedFunction
 
 _EPS = float(np.finfo(float).eps)
-# Panels of the only piece, of each of a few (up to four), and of each of many.
-_FIRST_PANELS = (4, 2, 1)
-# Rounding of a function's values, and of a series through them, in units of the largest.
-_ROUNDING = 32.0 * _EPS
-# Of the largest shape or rate of the path: a function that subtracts numbers as large as these is off by so much.
-_INNER_ROUNDING = 64.0 * _EPS
-# [rad], also of rates times half the width of a panel: steps within the function may be as high, by rounding as
-# of 1,000 + r - 1,000, or from piece to piece of what an integrator gave.
-_INNER_STEPS = 1e-12
-# Of what was left before a panel was halved: series gain digits by it, rounding stays.
-_STUBBORN = 0.2
-# In units of the rounding of the times: what shapes and rates change in that time is not theirs.
-_TIME_ROUNDING = 8.0
-# Of the duration: narrower panels would consist of rounding.
-_LEAST_WIDTH = 1e-13
-# Of the duration: from here on a panel that cannot be resolved is searched for a kink.
-_KINK_WIDTH = 2.0**-12
-# Panels before halving ends, besides 40 for every break: a path that needs more is rough, not merely long.
-_MOST_PANELS = 4000
-# [rad], of rates times half the width of a panel: noise up to this is left to the tolerance; more is refused.
-_MOST_NOISE = 1e-9
-# In units of the rounding of times: how well kinks are located.
-_KINK_TICKS = 2.0
-# Of the scatter between neighbouring times: a series through values that scatter is off by so much.
-_NOISE_MARGIN = 16.0
-# Of a panel: where noise is looked for, which is no node and no half of anything.
-_NOISE_PLACE = 0.4142
-# Of them the scatter is the median, which a single jump does not move.
-_NOISE_TIMES = 10
-# In units of the rounding of times: so near to each other no function changes.
-_NOISE_STEP = 64.0
-# [rad]: an integral of the rates that differs by more from the shapes on a panel is an error of the rates.
-_RATE_DEFECT = 1e-9
-# Of a Chebyshev polynomial at the end of its panel, times half its width.
-_END_SLOPES = np.arange(DEGREE + 1.0) ** 2
-# Of the largest value, in every coefficient of a series.
-_SLOPE_ROUNDING = 4.0 * _EPS
-# Of the last coefficients: what series of so many terms leave out of a slope.
-_SLOPE_MARGIN = 8.0
-# Of the largest slope: two panels that differ by less at their common end are one smooth function.
-_LEAST_CORNER = 1e-8
-# Times named in a warning.
-_NAMED_TIMES = 8
+_FIRST_PANELS = (4, 2, 1)  # of the only piece, of each of up to four, of each of more
+_ROUNDING = 32.0 * _EPS  # of a function's values and of a series through them, relative to the largest
+_INNER_ROUNDING = 64.0 * _EPS  # relative to the path's largest shape or rate, which the function may subtract
+_INNER_STEPS = 1e-12  # [rad] steps within the function, as by 1,000 + r - 1,000 or between an integrator's pieces
+_STUBBORN = 0.2  # share left after halving a panel: a series gains digits, rounding stays
+_TIME_ROUNDING = 8.0  # roundings of the times: changes in that time are not resolved
+_LEAST_WIDTH = 1e-13  # relative to the duration: narrower panels hold only rounding
+_KINK_WIDTH = 2.0**-12  # relative to the duration: narrower unresolved panels are searched for a kink
+_MOST_PANELS = 4000  # and 40 per break: a path that needs more is rough, not merely long
+_MOST_NOISE = 1e-9  # [rad], of rates times half a panel: less is covered by the tolerance, more is refused
+_KINK_TICKS = 2.0  # roundings of times: accuracy of a located kink
+_NOISE_MARGIN = 16.0  # error of a series through scattered values, over their scatter
+_NOISE_PLACE = 0.4142  # place in a panel for the noise test: no node, no half of anything
+_NOISE_TIMES = 10  # their median scatter is not moved by a single jump
+_NOISE_STEP = 64.0  # roundings of times: no function changes in so short a time
+_RATE_DEFECT = 1e-9  # [rad] larger differences between integrated rates and shapes are an error of the rates
+_END_SLOPES = np.arange(DEGREE + 1.0) ** 2  # Chebyshev slopes at a panel's end, times half its width
+_SLOPE_ROUNDING = 4.0 * _EPS  # in every coefficient of a series, relative to the largest value
+_SLOPE_MARGIN = 8.0  # truncation of a slope, over the last coefficients
+_LEAST_CORNER = 1e-8  # relative to the largest slope: a smaller difference at a common end is smooth
+_NAMED_TIMES = 8  # times that a warning lists
 
 
 def scanned(function: ScannedFunction, breaks: Array) -> FunctionScan:

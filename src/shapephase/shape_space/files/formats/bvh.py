@@ -15,12 +15,9 @@ from ....body.formats.bvh_text import Bone, BvhFaultError, Skeleton, bvh_skeleto
 from ....errors import TrajectoryError
 from ..recording import Table
 
-_WHOLE_TURN = 360.0
-"""[degrees] Files wrap angles; a hinge goes on by what is nearest."""
-_ZERO = 1e-5
-"""[degrees] What six decimals and rounding leave of an angle of zero."""
-_OTHER_AXES = 0.5
-"""Cosine of the angle between a bone's offsets in two files, below which its axes are others and not other persons'."""
+_WHOLE_TURN = 360.0  # [deg] files wrap angles; hinges go on to the nearest value
+_ZERO = 1e-5  # [deg] rounding of an angle of zero with six decimals
+_OTHER_AXES = 0.5  # least cosine between a bone's offsets in two files: other persons differ by less than other axes
 
 
 def read_bvh(where: Path, data: bytes, body: Body) -> Table:

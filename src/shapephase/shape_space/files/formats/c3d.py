@@ -18,17 +18,13 @@ from .column_tables import column_table
 from .parser_process import parsed
 from .segment_poses import matrix_poses
 
-INVERSE_KINEMATICS = (
+INVERSE_KINEMATICS = (  # the way from markers to joints
     "positions of markers are no angles of joints; find those by inverse kinematics first (in OpenSim: scale the "
     "model, run the Inverse Kinematics tool with these markers), and give the `.mot` file that it writes"
 )
-"""The way from markers to joints."""
-_BLOCK = 512
-"""Bytes of a block of a C3D file; its header is one."""
-_KEY = 0x50
-"""The second byte of every C3D file, and of its parameters."""
-_PROCESSORS = (84, 85, 86)
-"""How numbers are written: Intel, DEC, MIPS."""
+_BLOCK = 512  # bytes; the header is one block
+_KEY = 0x50  # second byte of every C3D file, and of its parameters
+_PROCESSORS = (84, 85, 86)  # number formats: Intel, DEC, MIPS
 _AXES = "xyz"
 
 

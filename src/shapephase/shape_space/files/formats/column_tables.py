@@ -13,10 +13,8 @@ from ....errors import TrajectoryError
 from ..recording import Table, is_blank, number
 from .table_heads import CLOCK, COMMA_NUMBER, DATE, is_value
 
-_MOST_FAULTS = 1000
-"""Entries of a column that are no numbers whose text is kept for messages."""
-_WHOLE = 2**53
-"""Beyond it doubles do not have all whole numbers: times in nanoseconds stay integers until their start is off."""
+_MOST_FAULTS = 1000  # entries of a column whose text is kept for messages
+_WHOLE = 2**53  # largest exact integer of a double: larger times in nanoseconds stay integers
 
 
 def column_table(

@@ -11,7 +11,7 @@ from ....arrays import Array
 from ....errors import TrajectoryError
 from ..recording import Table, warn
 
-_JOINTS = (
+_JOINTS = (  # in the order of a frame: four numbers w x y z of a ball joint, one of a hinge
     *(("chest", 4), ("neck", 4), ("right_hip", 4), ("right_knee", 1), ("right_ankle", 4), ("right_shoulder", 4)),
     *(
         ("right_elbow", 1),
@@ -22,12 +22,9 @@ _JOINTS = (
         ("left_elbow", 1),
     ),
 )
-"""In the order of a frame: of a spherical joint four numbers, w x y z, of a hinge one."""
-_BASE = 8
-"""Numbers of a frame before them: its duration, the place of the base, its quaternion w x y z."""
+_BASE = 8  # numbers before the joints: duration, place and quaternion w x y z of the base
 _WIDTH = _BASE + sum(count for _, count in _JOINTS)
-_OFF_UNIT = 0.01
-"""Distance from a length of 1: what rounding in a file does not explain."""
+_OFF_UNIT = 0.01  # error of a quaternion's length beyond rounding
 _LEAST_LENGTH = 1e-6
 
 

@@ -17,12 +17,9 @@ from ....errors import ShapeError, TrajectoryError, unknown_name
 from ..nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
 from ..recording import Rates
 
-_NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot|qdot)[_\[ ]?([0-9]{1,6})\]?")
-"""Labels of a table such as qpos_0, qpos[0] and qpos0."""
-_ROOT = 6
-"""Coordinates of a root that moves freely by three slides and three hinges."""
-_OFF_UNIT = 0.1
-"""A quaternion's length may be off one by so much: an audit has to see what is wrong."""
+_NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot|qdot)[_\[ ]?([0-9]{1,6})\]?")  # qpos_0, qpos[0], qpos0
+_ROOT = 6  # coordinates of a free root: three slides, three hinges
+_OFF_UNIT = 0.1  # allowed error of a quaternion's length: an audit has to see what is wrong
 _NAMES_THAT_SAY_IT = (
     "store arrays under names that say the order: qpos (place, quaternion w x y z, joints), or base_position, "
     "base_quat_xyzw and shapes beside joint_names"

@@ -15,14 +15,11 @@ from .ros_echo import echoed_columns, listed_names
 
 _PANDAS = ("DataFrame",)
 _XARRAY = ("Dataset", "DataArray")
-_STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))
-"""What the two parts of a stamp of ROS are called."""
+_STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))  # names of the two parts of a ROS stamp
 _NANO = 1_000_000_000
 _COUNTER = "counts the rows"
-_NAMES = ("name", "joint", "joint_name", "jointname")
-"""Columns of tables with one row for each joint, in small letters: which joint it is."""
-_VALUES = ("position", "pos", "angle", "joint_position")
-"""Columns of such tables: where it is."""
+_NAMES = ("name", "joint", "joint_name", "jointname")  # columns that name the joint of a row
+_VALUES = ("position", "pos", "angle", "joint_position")  # columns with its coordinate
 
 
 def is_frame(value: object) -> bool:

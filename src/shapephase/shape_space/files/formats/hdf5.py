@@ -14,8 +14,7 @@ from ..recording import Table
 from .named_arrays import arrays_table
 
 _MAGIC = b"\x89HDF\r\n\x1a\n"
-# Where HDF5 may begin: MATLAB writes 512 bytes of its own before it.
-_STARTS = (0, 512)
+_STARTS = (0, 512)  # offsets of HDF5: MATLAB writes 512 bytes before it
 
 
 def is_hdf5(data: bytes) -> bool:

@@ -13,8 +13,8 @@ from ..recording import Table
 from .hdf5 import is_hdf5
 from .named_arrays import arrays_table
 
+# Classes of variables that only MATLAB can read.
 _OBJECTS = ("opaque", "object", "function", "table", "timetable", "datetime", "duration", "string", "function_handle")
-"""Classes of variables that only MATLAB can read."""
 
 
 def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:

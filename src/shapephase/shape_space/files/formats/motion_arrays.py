@@ -21,14 +21,12 @@ from .floating_arrays import FloatingMotion, floating_motion, numbered_columns, 
 from .named_arrays import arrays_table
 
 _NPZ = "NPZ"
-_SCALAR_FIRST = [1, 2, 3, 0]
-"""Where the entries x, y, z, w stand in a quaternion that begins with its scalar part."""
-_READ = (
+_SCALAR_FIRST = [1, 2, 3, 0]  # places of x, y, z, w in a quaternion w x y z
+_READ = (  # arrays with a meaning
     *("time", "timestep", "fps", "shapes", "qpos", "qvel", "q", "v", "qdot", "Q", "Qdot", "joint_names", "provenance"),
     *("joint_pos", "joint_vel", "body_pos_w", "body_quat_w", "body_ang_vel_w"),
     *("base_quat_xyzw", "base_quat_wxyz", "base_position"),
 )
-"""The arrays of a file that have a meaning."""
 
 
 def read_arrays(

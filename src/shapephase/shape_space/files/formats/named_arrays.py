@@ -14,16 +14,13 @@ from .column_tables import column_table
 
 _MATRICES = ("shapes", "data", "q", "values")
 _NAMES = ("joint_names", "names", "colheaders", "labels", "columns", "headers")
-# Matrices with a column for each part of the base's motion, and what these columns are called in a table.
-_OF_THE_BASE = {
+_OF_THE_BASE = {  # matrices of the base's motion, and the labels of their columns in a table
     "base_quat_xyzw": ("base_qx", "base_qy", "base_qz", "base_qw"),
     "base_quat_wxyz": ("base_qw", "base_qx", "base_qy", "base_qz"),
     "base_position": ("base_x", "base_y", "base_z"),
 }
-_FIRST_TURNS = ("_Xrotation", ".rx")
-"""What the name of one of the three angles of a ball joint ends with."""
-_DEEPEST = 4
-"""Structures inside each other that are looked into."""
+_FIRST_TURNS = ("_Xrotation", ".rx")  # endings of the names of a ball joint's angles
+_DEEPEST = 4  # nested structures that are searched
 
 
 def arrays_table(

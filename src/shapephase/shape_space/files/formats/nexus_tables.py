@@ -9,8 +9,7 @@ from ....errors import TrajectoryError, unknown_name
 from .table_heads import check_names, unit_row
 
 _KINDS = ("joints", "model outputs", "segments", "trajectories", "devices", "imus")
-_HEAD = 5
-"""Rows of the head: kind, rate, names, axes, units."""
+_HEAD = 5  # rows of the head: kind, rate, names, axes, units
 _FRAMES = ("Frame", "Sub Frame")
 
 

@@ -12,14 +12,11 @@ from .frames import file_table
 from .segment_poses import body_kinematics
 from .text_tables import BLANKS, read_text, unix_text
 
-END = "endheader"
-"""The line that closes the header."""
-_HEADER_BYTES = 2**16
-"""A header has a dozen lines."""
-# SIMM's older words for what OpenSim calls nRows and nColumns.
+END = "endheader"  # line that closes the header
+_HEADER_BYTES = 2**16  # searched for the header, which has a dozen lines
+# SIMM's older words for OpenSim's nRows and nColumns.
 _COUNTS = {"nrows": "rows", "datarows": "rows", "ncolumns": "columns", "datacolumns": "columns"}
-_SPREADSHEET = ",;"
-"""What a spreadsheet puts between columns, and behind the lines of the header."""
+_SPREADSHEET = ",;"  # separators that a spreadsheet adds, behind header lines too
 
 
 def has_header(data: bytes) -> bool:

@@ -14,10 +14,8 @@ import numpy as np
 from ....child_process import limit_this_process, run_alone
 from ....errors import TrajectoryError
 
-_SECONDS = 30
-"""[s] for the imports and the file: the largest take five, and damaged ones may take forever."""
-_MEMORY = 2**30
-"""[bytes] beyond the imports: damaged headers make ezc3d ask for any."""
+_SECONDS = 30  # [s] imports and file: the largest take five, damaged ones forever
+_MEMORY = 2**30  # [bytes] beyond the imports: damaged headers make ezc3d request any amount
 
 
 def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:

@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-_STAMP = 3
-"""Columns of a header: seconds, nanoseconds, frame."""
+_STAMP = 3  # columns of a header: seconds, nanoseconds, frame
 _NANO = 1_000_000_000
 _POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
-_MATRIX = 36
-"""Entries of a covariance."""
+_MATRIX = 36  # entries of a covariance
 _LISTED = re.compile(r"(?P<stem>(?:.*[./])?)(?P<kind>name|position|velocity|effort)\[?(?P<number>\d+)\]?")
 Columns = list[tuple[str, Any]]
 

@@ -16,10 +16,8 @@ from .strict_yaml import Word, yaml_documents
 
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-_NANO = 10**9
-"""Nanoseconds in a second."""
-# What goals and planners wrap around a trajectory.
-_WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")
+_NANO = 10**9  # nanoseconds in a second
+_WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")  # keys of goals and planners around a trajectory
 _SECONDS = ("sec", "secs")
 _NANOSECONDS = ("nanosec", "nsecs", "nsec")
 

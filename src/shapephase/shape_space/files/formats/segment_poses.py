@@ -21,23 +21,14 @@ from ..recording import SegmentPoses, Table
 
 _QUATERNION = re.compile(r"(?P<segment>.+?)(?:_q|_quat_?|\.q|[./]orientation[./])(?P<part>[xyzw])", re.DOTALL)
 _PLACE = re.compile(r"(?P<segment>.+?)(?:_[pt]?|_pos_?|\.p?|[./]position[./])(?P<part>[xyz])", re.DOTALL)
-_TPOSE = "tpose"
-"""Calibration pose of a suit, arms held out."""
-_NPOSE = "npose"
-"""Name of the calibration pose with hanging arms."""
-_ARM = ("UpperArm", "ForeArm", "Hand")
-"""Segments of a suit's arm behind their side, from the shoulder on."""
-_KINEMATICS = ("X", "Y", "Z", "Ox", "Oy", "Oz")
-"""Columns of a body in OpenSim's BodyKinematics, behind its name: centre of mass, and angles about x, y, z as each
-turn before has left them."""
-_OFF_ROTATION = 1e-3
-"""Largest entry of S^T S - 1: files have single precision."""
-_OFF_UNIT = 0.1
-"""A quaternion's length may be off one by so much: what interpolates them leaves that."""
-_FEWEST = 2
-"""Segments of a table: one alone is the base."""
-_WHOLE_BODY = "center_of_mass"
-"""What BodyKinematics has behind the bodies, without angles."""
+_TPOSE = "tpose"  # calibration pose of a suit, arms held out
+_NPOSE = "npose"  # calibration pose with hanging arms
+_ARM = ("UpperArm", "ForeArm", "Hand")  # names behind the side, from the shoulder on
+_KINEMATICS = ("X", "Y", "Z", "Ox", "Oy", "Oz")  # BodyKinematics: centre of mass, intrinsic angles x y z
+_OFF_ROTATION = 1e-3  # largest entry of S^T S - 1: files have single precision
+_OFF_UNIT = 0.1  # allowed error of a quaternion's length, as interpolation leaves it
+_FEWEST = 2  # segments of a table: one alone is the base
+_WHOLE_BODY = "center_of_mass"  # BodyKinematics' last columns, without angles
 
 
 def read_mvnx(where: Path, data: bytes) -> Table:

@@ -6,8 +6,7 @@ from typing import Any
 
 from ....errors import MissingExtraError, TrajectoryError
 
-# A key whose value YAML 1.1 takes for part of the mapping around it.
-_MERGE = "<<"
+_MERGE = "<<"  # YAML 1.1 merges the value of this key into its mapping
 
 
 class Word(str):

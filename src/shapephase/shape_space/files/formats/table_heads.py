@@ -10,8 +10,7 @@ from typing import NamedTuple
 from ....errors import TrajectoryError
 from ..labels import unit_of
 
-COMMENT = re.compile(r'\s*"?(#|%|//)\s*')
-"""What a line of comment begins with."""
+COMMENT = re.compile(r'\s*"?(#|%|//)\s*')  # beginning of a comment line
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*", re.ASCII)
 CLOCK = re.compile(r"\d{1,3}:\d\d(:\d\d([.,]\d+)?)?", re.ASCII)

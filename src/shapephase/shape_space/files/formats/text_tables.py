@@ -19,20 +19,16 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
-BLANKS = " "
-"""The delimiter of columns with any number of blanks between them."""
-_HEAD_BYTES = 2**18
-"""Part of a text that is looked at before it is read."""
+BLANKS = " "  # delimiter: any number of blanks
+_HEAD_BYTES = 2**18  # beginning of a text, from which its layout follows
 _HEAD_ROWS = 12
-_SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)
-"""The first line of a table that a spreadsheet is delimiter its separator by."""
+_SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)  # a spreadsheet's first line that names the separator
 _COMMA_ENTRY = rb"\s*([-+]?\d*,\d+(?:,\d+)*(?:[eE][-+]?\d+)?)\s*"
 _PLAIN = re.compile(rb'(?:^|[;\t\n"])' + _COMMA_ENTRY + rb'(?=[;\t\n"]|$)')
 _QUOTED = re.compile(rb'(?:^|[,\n])\s*"' + _COMMA_ENTRY + rb'"(?=\s*[,\n]|$)')
 _POINT = re.compile(rb"\d\.\d")
 _THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(?:,\d{3})+")
-_GAPS = ["", "nan", "NaN", "NAN", "-nan", "-NaN"]
-"""Entries that are gaps; any other word is a fault."""
+_GAPS = ["", "nan", "NaN", "NAN", "-nan", "-NaN"]  # any other word is a fault
 
 
 class _Layout(NamedTuple):
