@@ -35,10 +35,7 @@ def check_gravity(fall: FreeFall, gravity: float, rate: float, where: str) -> No
 def check_parabola(times: Array, centres: Array, noise: float, gravity: float, where: str) -> None:
     """Check a stretch that is given in the same way: where it is a parabola, and bent enough for that to be seen.
 
-    Warns
-    -----
-    TrajectoryWarning
-        Where the centre of mass leaves every parabola: no free flight, or a body of another size.
+    Warns where the centre of mass leaves every parabola: no free flight, or a body of another size.
     """
     if len(times) < 4:
         return

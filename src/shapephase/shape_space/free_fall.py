@@ -91,19 +91,14 @@ class _Windows(NamedTuple):
 def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None, gravity: float = GRAVITY) -> FreeFall:
     """The longest stretch on which a centre of mass falls freely.
 
-    Parameters
-    ----------
     times : (N,) ascending [s]
     centres : (N, 3) of mass, axes of the recorder, one of which is vertical [m]
     where : the file, for messages
     up : the axis that points up, one of UP_AXES; None: x, y or z, whichever has the longest fall
     gravity : [m/s^2]
 
-    Raises
-    ------
-    TrajectoryError
-        If there is none that is long enough to tell it from rest; or, without `up`, if a longer one has an axis that
-        points down.
+    Raises TrajectoryError if there is none that is long enough to tell it from rest; or, without `up`, if a longer one
+    has an axis that points down.
     """
     noise = centre_noise(times, centres)
     if up is not None:

@@ -29,10 +29,7 @@ _WHOLE = 1e-9  # [rad or m] largest gap of a loop
 def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
     """Return a path, its columns in the order of the body's joints, with breaks where the body's motion is less smooth.
 
-    Raises
-    ------
-    TrajectoryError
-        If a spline goes from a quaternion of a ball joint to one of the other sign.
+    Raises TrajectoryError if a spline goes from a quaternion of a ball joint to one of the other sign.
     """
     if isinstance(body, ParticleBody):
         return route
@@ -75,8 +72,6 @@ def crossing_times(follows: CoordinateMap, curve: Curve, edges: Array) -> Array:
     Where a slope jumps at the knot and the joint is slow, the two times just before and behind: between them rounding
     may take it for on either side.
 
-    Parameters
-    ----------
     edges : (M,) times between which the curve is smooth and swings once at most, as `panel_edges` [s]
     """
     found = np.zeros(0)

@@ -140,8 +140,6 @@ def likeliest(
     Of the spline as a random function, whose derivative of the order is white noise of the variance noise^2/penalty:
     the penalty is the one of the greatest likelihood of what the samples say beyond a polynomial.
 
-    Parameters
-    ----------
     values, noise : (count, n), (n,) [rad or m]; a column without noise is left as it is
     groups : columns that have one penalty together
 

@@ -108,10 +108,7 @@ def times_of_fastest(path: ShapePath) -> Array:
 def spline_times(path: ShapePath) -> Array:
     """Times of a table, the cubic spline through which is the path to 1e-9 rad or m, or of its largest value: (N,).
 
-    Raises
-    ------
-    TrajectoryError
-        If that takes more than a million rows.
+    Raises TrajectoryError if that takes more than a million rows.
     """
     pieces = polynomial_pieces(path.curve)
     times = evenly_divided(panel_edges(path, path.loops), _INTERVALS) if pieces is None else pieces.knots
@@ -133,8 +130,6 @@ def spline_times(path: ShapePath) -> Array:
 def spline_error(path: ShapePath, times: Array) -> tuple[Array, Array]:
     """Largest difference between a path and the spline through a table of it, and when: (n,) [rad or m], (n,) [s].
 
-    Parameters
-    ----------
     times : (N,) ascending rows of the table; what is before and after them does not count
     """
     known = evenly_divided(panel_edges(path, path.loops), _INTERVALS)

@@ -53,14 +53,10 @@ def shape_geodesic(body: Body, start: ArrayLike, end: ArrayLike) -> ShapeGeodesi
 
     Its acceleration is g^-1 (grad(r'.g r')/2 - (r'.grad g) r'), integrated twice between the two ends.
 
-    Parameters
-    ----------
     start, end : (n,) [rad or m], a few tenths apart
 
-    Raises
-    ------
-    TrajectoryError
-        If the shapes are so far apart that the approximation does not settle, or joints move nothing.
+    Raises TrajectoryError if the shapes are so far apart that the approximation does not settle, or joints move
+    nothing.
     """
     check_object(body, "Body", "body")
     check_no_balls(body.chain.follows, "geodesics of shapes need")

@@ -32,11 +32,8 @@ def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool
 def warn_of_degrees(body: Body | ParticleBody, path: ShapePath) -> None:
     """Warn where the angles of a path, its columns in the order of the body's joints, look like degrees.
 
-    Warns
-    -----
-    TrajectoryWarning
-        If a joint goes more than half a turn beyond its limits, and in degrees all would stay within theirs. A
-        recording is asked for its unit when it is read, and no more here.
+    Warns if a joint goes more than half a turn beyond its limits, and in degrees all would stay within theirs. A
+    recording is asked for its unit when it is read, and no more here.
     """
     if path.record is not None or _farthest(path) <= _HALF_TURN:
         return

@@ -36,10 +36,7 @@ def with_quaternions(
 
     names : label -> name of the joint, as a caller has said
 
-    Raises
-    ------
-    TrajectoryError
-        If one of the three is missing, is no angle, or has a unit that can only be guessed.
+    Raises TrajectoryError if one of the three is missing, is no angle, or has a unit that can only be guessed.
     """
     table = recording.table
     made: dict[str, str] = {}
@@ -108,10 +105,7 @@ def continued_balls(shapes: Array, body: Body, recording: Recording, gaps: Gaps,
 
     columns : joint -> label
 
-    Raises
-    ------
-    TrajectoryError
-        If the length of one is far from one.
+    Raises TrajectoryError if the length of one is far from one.
     """
     balls = ball_columns(body.joint_names) if body.ball_joints else ()
     for ball, joint in zip(balls, body.ball_joints, strict=True):
@@ -149,10 +143,8 @@ def continued_hinges(shapes: Array, body: Body, recording: Recording) -> Array:
     Angles a, b, c about axes at right angles are the same turn as a + pi, pi - b, c + pi and those whole turns apart.
     Programs that write the three angles of a rotation go from one to the other where the first and third axis meet.
 
-    Warns
-    -----
-    TrajectoryWarning
-        With the first sample at which they do: the hinges then go near that place, where they are far from a rotation.
+    Warns with the first sample at which they do: the hinges then go near that place, where they are far from a
+    rotation.
     """
     if len(shapes) < 2:
         return shapes

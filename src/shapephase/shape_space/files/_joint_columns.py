@@ -105,18 +105,10 @@ class Matched(NamedTuple):
 def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Recording, Matched]:
     """The recording without gaps at its ends, and the shapes of a body that it holds.
 
-    Raises
-    ------
-    UnknownNameError
-        If a column is no joint of the body.
-    TrajectoryError
-        If a joint is missing or doubled, a value is no number or no possible coordinate, a quaternion is not of unit
-        length, a gap is not to be bridged, or the unit of a column can only be guessed.
-
-    Warns
-    -----
-    TrajectoryWarning
-        Where a joint leaves its limits, or jumps by about a whole turn from one sample to the next.
+    Raises UnknownNameError if a column is no joint of the body. Raises TrajectoryError if a joint is missing or
+    doubled, a value is no number or no possible coordinate, a quaternion is not of unit length, a gap is not to be
+    bridged, or the unit of a column can only be guessed. Warns where a joint leaves its limits, or jumps by about a
+    whole turn from one sample to the next.
     """
     where = recording.table.where
     for text in recording.table.columns:
@@ -355,8 +347,6 @@ def _rest_of_missing(
     Some may be missing without a word where at least one is there, and every column is explained: none is a joint that
     was misspelt.
 
-    Parameters
-    ----------
     companions : joint -> a column that has its rate or effort, so that it does move
     unexplained : whether columns were left out of which nobody knows what they are
     """

@@ -29,11 +29,8 @@ def named_columns(
     their numbers. Where the scalar part of a free joint's quaternion stands, first as MuJoCo has it or last as
     Pinocchio has it, numbers do not show.
 
-    Raises
-    ------
-    TrajectoryError
-        If the number of columns fits nothing, or fits two of these; for a free joint whose quaternion `names` does
-        not number.
+    Raises TrajectoryError if the number of columns fits nothing, or fits two of these; for a free joint whose
+    quaternion `names` does not number.
     """
     given = [label for label in table.columns if label in names]
     if not table.numbered or len(given) == len(table.columns):

@@ -52,15 +52,10 @@ class _Part(NamedTuple):
 def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, str]:
     """Label -> the name of a column of the base, of all labels that complete a quaternion, a place and so on.
 
-    Parameters
-    ----------
     targets : label -> the name that it goes by
     own : names of joints and columns that are known already
 
-    Raises
-    ------
-    TrajectoryError
-        For a quaternion numbered from 1, of which the number of the scalar part is not known.
+    Raises TrajectoryError for a quaternion numbered from 1, of which the number of the scalar part is not known.
     """
     families: dict[tuple[str, tuple[str, ...]], dict[str, str]] = {}
     for text, target in targets.items():

@@ -34,10 +34,7 @@ _UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] per sample: a turn of twice that, the o
 def without_first_pose(recording: Recording, motion: Matched, body: Body) -> tuple[Recording, Matched]:
     """The motion without a pose of zero angles that is apart from all others, which exporters put before it.
 
-    Warns
-    -----
-    TrajectoryWarning
-        Where that pose is left out, and where another first sample is as far from the second.
+    Warns where that pose is left out, and where another first sample is as far from the second.
     """
     later = recording.times[1:-1] - recording.times[1] if len(recording.times) > 2 else np.zeros(0)
     count = int(np.count_nonzero(later < _NEXT))
@@ -154,8 +151,6 @@ def surrounded(
 ) -> tuple[Recording, Matched, slice]:
     """The samples that are kept with those that the file has before and after them, and which of these are kept.
 
-    Parameters
-    ----------
     kept, motion : the samples that are kept
     untrimmed : the whole recording, where that can be read
     match : the joints and the base of a recording

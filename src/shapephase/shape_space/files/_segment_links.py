@@ -144,10 +144,7 @@ class Links:
     def calibration(self, recording: Recording, choices: SegmentChoices, record: dict[str, Any]) -> Calibration:
         """How the segments lie in their frames; what was decided goes to the record.
 
-        Raises
-        ------
-        TrajectoryError
-            If the file does not say it, or the body does not stand in its zero pose.
+        Raises TrajectoryError if the file does not say it, or the body does not stand in its zero pose.
         """
         at, stands = choices.calibration, dict(self.poses.stands or {})
         own = self.body.file is not None and self.body.file.suffix.lower() == _MODELS.get(

@@ -80,11 +80,8 @@ def without_segments(
 ) -> tuple[Table, dict[str, str | None]]:
     """The table with joints and base in the place of poses of segments, and the names that are left for its columns.
 
-    Raises
-    ------
-    TrajectoryError
-        If segments and links do not match, axes are not known, or lengths, ways between joints or turns of hinges are
-        none that the body can have.
+    Raises TrajectoryError if segments and links do not match, axes are not known, or lengths, ways between joints or
+    turns of hinges are none that the body can have.
     """
     names = dict(choices.names)
     if table.poses is None:

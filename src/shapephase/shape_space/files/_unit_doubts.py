@@ -24,8 +24,6 @@ def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> N
     That is so for angles like degrees, or lengths like millimetres: in radians or metres they would be far beyond the
     limits and in the other unit within, or a joint without limits would turn too far.
 
-    Parameters
-    ----------
     values : (N,) [rad or m], if these are the units
     """
     name, unit, table = body.joint_names[joint], body.joint_units[joint], recording.table

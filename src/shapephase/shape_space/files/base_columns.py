@@ -195,10 +195,8 @@ class BaseColumns:
 
         ignore_extra : whether columns without their companions are left out
 
-        Raises
-        ------
-        TrajectoryError
-            If some are missing, are there twice, are no possible numbers, or have a unit that can only be guessed.
+        Raises TrajectoryError if some are missing, are there twice, are no possible numbers, or have a unit that can
+        only be guessed.
         """
         table, left_out = self.recording.table, {}
         groups: dict[str, _Group] = {}

@@ -82,18 +82,12 @@ def closed_path(
 ) -> tuple[ShapePath, Smoothing, Closing]:
     """The loop of a recorded cycle.
 
-    Parameters
-    ----------
     within : the largest gap that is closed, a number in rad or m, or a text as "3deg" or "3deg,5mm"
     by : one of `WAYS`; None: a periodic smoother where a noise is given, else by the drift
     penalty : of the smoothing, as for `smoothed_path`
 
-    Raises
-    ------
-    UnknownNameError
-        For another way.
-    TrajectoryError
-        If the ends differ by more, or a joint that does not close has no noise to smooth.
+    Raises UnknownNameError for another way. Raises TrajectoryError if the ends differ by more, or a joint that does not
+    close has no noise to smooth.
     """
     check_object(body, "Body", "body")
     way = ("smooth" if recorded.smoothed else "drift") if by is None else by

@@ -122,11 +122,9 @@ def in_flight(
 ) -> tuple[Recording, Matched, Flight | None]:
     """The part of a recording and of its motion that is the flight; all of them where nobody asks for one.
 
-    Raises
-    ------
-    TrajectoryError
-        If the attitude of the base was not recorded, or, where the flight is to be found, its position; if none is
-        found, or less than three samples are in it; if it falls otherwise than by gravity, as units make it.
+    Raises TrajectoryError if the attitude of the base was not recorded, or, where the flight is to be found, its
+    position; if none is found, or less than three samples are in it; if it falls otherwise than by gravity, as units
+    make it.
     """
     said, where, base = choices.said, recording.table.where, motion.base
     if said is None or (said == RECORDED and not turns(base.attitude)):

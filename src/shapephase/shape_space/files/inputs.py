@@ -74,8 +74,6 @@ def read_input(
 ) -> tuple[Input, float | None]:
     """The table of a file, of standard input (`-`), or of what is in memory; and the time step, if it is still needed.
 
-    Parameters
-    ----------
     source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or what this
         function has returned
     topic : which part of a bag, a workbook or a `.mat` file; None: the only one
@@ -83,14 +81,8 @@ def read_input(
     order : of the joints in arrays without names, or None
     names : of columns, as a caller gives them
 
-    Raises
-    ------
-    InputFileNotFoundError
-        If there is no such file.
-    UnknownNameError
-        For an unknown ending of the file, or an unknown part.
-    TrajectoryError
-        For faults of the file.
+    Raises InputFileNotFoundError if there is no such file. Raises UnknownNameError for an unknown ending of the file,
+    or an unknown part. Raises TrajectoryError for faults of the file.
     """
     if topic is not None and not isinstance(topic, str):
         raise ShapeError(f"topic: a name is needed, got {what_came(topic)}")

@@ -225,12 +225,8 @@ def _number_and_unit(value: object, what: str) -> tuple[float, str | None]:
 def mapping_argument(names: Mapping[str, str | None] | None, labels: Iterable[str]) -> dict[str, str | None]:
     """A user's mapping with the labels as they stand in the file: the name without its unit will do, too.
 
-    Raises
-    ------
-    ShapeError
-        If it is no mapping of texts.
-    KeyError
-        With the name, if no label has it; TrajectoryError if several do.
+    Raises ShapeError if it is no mapping of texts. Raises KeyError with the name, if no label has it; TrajectoryError
+    if several do.
     """
     if names is None:
         return {}

@@ -57,15 +57,8 @@ def nameless_joints(body: Body, width: int, where: str, order: str | None) -> Na
 
     order : one of `WORDS`; None: MuJoCo's
 
-    Raises
-    ------
-    TrajectoryError
-        If the body has another number of joints.
-
-    Warns
-    -----
-    TrajectoryWarning
-        Where Isaac's order depends on how its importer sorted the joints of a link.
+    Raises TrajectoryError if the body has another number of joints. Warns where Isaac's order depends on how its
+    importer sorted the joints of a link.
     """
     word = order or MUJOCO
     found = joint_columns(body, width, word)
@@ -110,8 +103,6 @@ def placed_joints(
 ) -> tuple[NamelessJoints, int]:
     """Joints of an array whose bodies' places are known, and the order of the numbers of the base's quaternion.
 
-    Parameters
-    ----------
     joints : (N, n) without the free joint
     places : (N, b, 3) of the bodies, the base first [m]
     quaternions : (N, 4) of the base
@@ -124,10 +115,8 @@ def placed_joints(
     -------
     joints, and 0 for w x y z, 1 for x y z w
 
-    Raises
-    ------
-    TrajectoryError
-        If no order lets the links lie where the bodies are and turn as fast, or several do that say different things.
+    Raises TrajectoryError if no order lets the links lie where the bodies are and turn as fast, or several do that say
+    different things.
     """
     if places.ndim != 3 or places.shape[::2] != (len(joints), 3):
         raise TrajectoryError(

@@ -259,16 +259,9 @@ def no_number(entry: str, place: str) -> TrajectoryError:
 def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> Array:
     """Times checked and shifted to start at 0: (N,) -> (N,) [s].
 
-    Raises
-    ------
-    TrajectoryError
-        If there are fewer than two, they do not ascend, or their differences are not finite.
-
-    Warns
-    -----
-    TrajectoryWarning
-        Where one step is more than a hundred times as long, or as short, as most and as those beside it, or where
-        numbers so far from zero resolve the steps badly.
+    Raises TrajectoryError if there are fewer than two, they do not ascend, or their differences are not finite. Warns
+    where one step is more than a hundred times as long, or as short, as most and as those beside it, or where numbers
+    so far from zero resolve the steps badly.
     """
     if len(times) < 2:
         raise TrajectoryError(f"{where}: two samples or more are needed, got {len(times)}; give a longer motion")

@@ -218,8 +218,6 @@ def prepared_path(
 ) -> tuple[ShapePath, Smoothing]:
     """The path near recorded samples, as `smoothed_path`.
 
-    Parameters
-    ----------
     turns : (n,) whole turns that are taken off evenly before, and given back afterwards [rad]
     drift : whether the gap between last and first sample is taken off evenly
     """

@@ -34,18 +34,13 @@ def recording_of(
 ) -> Recording:
     """The samples of a table between two of its times, with times that begin at 0.
 
-    Parameters
-    ----------
     joint_names : of the body: a joint of the name `t` has no times
     names : label -> name or None, as `_labels.mapping_argument` gives it
     time_unit : of the column of times; None: as the file says
     timestep : [s], where no column has times
     trim : the first and the last time to be kept, as the file tells them
 
-    Raises
-    ------
-    TrajectoryError
-        If there are no times, they do not ascend, or their unit can only be guessed.
+    Raises TrajectoryError if there are no times, they do not ascend, or their unit can only be guessed.
     """
     unit = time_unit_argument(time_unit)
     guessed = False

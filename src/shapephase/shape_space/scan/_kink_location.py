@@ -29,8 +29,6 @@ def located_kink(
 ) -> float | None:
     """The time of the only kink in a short stretch; None where there is none, or something else.
 
-    Parameters
-    ----------
     at : times (N,) -> values (N, c)
     limits : between which the function may be evaluated
     floor : (c,) rounding of the values

@@ -60,23 +60,11 @@ _NAMED_TIMES = 8  # times that a warning lists
 def scanned(function: ScannedFunction, breaks: Array) -> FunctionScan:
     """Look at a function of which only its values are known.
 
-    Parameters
-    ----------
     breaks : (M,) times between which it is said to be smooth, first and last its ends [s]
 
-    Raises
-    ------
-    TrajectoryError
-        If what must be continuous jumps, or a rate is not the derivative of its value.
-    NoisyPathError
-        If the values carry noise.
-    AccuracyNotReached
-        If it is too rough for some thousands of panels.
-
-    Warns
-    -----
-    UndeclaredBreakWarning
-        Of kinks that are not among the breaks.
+    Raises TrajectoryError if what must be continuous jumps, or a rate is not the derivative of its value. Raises
+    NoisyPathError if the values carry noise. Raises AccuracyNotReached if it is too rough for some thousands of panels.
+    Warns of kinks that are not among the breaks.
     """
     return _Scan(function, breaks).result()
 

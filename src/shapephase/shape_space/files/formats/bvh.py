@@ -27,10 +27,8 @@ def read_bvh(where: Path, data: bytes, body: Body) -> Table:
     that jumps by more than half a turn from one frame to the next is continued by whole turns. Bones that the base
     hangs on move it.
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with the line; for a body that is not from a BVH file, or from one whose bones have other axes.
+    Raises TrajectoryError for faults, with the line; for a body that is not from a BVH file, or from one whose bones
+    have other axes.
     """
     check_object(body, "Body", "body")
     metre = body.length_unit

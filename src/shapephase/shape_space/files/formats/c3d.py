@@ -35,10 +35,8 @@ def read_c3d(where: Path, data: bytes) -> Table:
 
     The file is parsed in a process of its own: a damaged one can crash ezc3d.
 
-    Raises
-    ------
-    TrajectoryError, MissingExtraError
-        For faults, with the frame; for a file that has markers alone; without ezc3d.
+    Raises TrajectoryError, MissingExtraError for faults, with the frame; for a file that has markers alone; without
+    ezc3d.
     """
     if importlib.util.find_spec("ezc3d") is None:
         raise MissingExtraError("C3D files need ezc3d; install it with: pip install 'shapephase[data]'")

@@ -29,17 +29,12 @@ def column_table(
 ) -> Table:
     """The table of columns that have labels: what is no number is NaN there, and a fault; dates become seconds.
 
-    Parameters
-    ----------
     columns : label and values (N,)
     units : label -> unit, where it is said beside the label
     rows : (N,) the numbers of the samples in messages; None: from 0
     comma : whether texts have decimal commas
 
-    Raises
-    ------
-    TrajectoryError
-        For labels that are no texts, empty or doubled, and columns of several lengths.
+    Raises TrajectoryError for labels that are no texts, empty or doubled, and columns of several lengths.
     """
     found: dict[str, Array] = {}
     faults: dict[str, dict[int, str]] = {}

@@ -35,10 +35,7 @@ def read_deepmimic(where: Path, data: bytes) -> Table:
     joints of these names. Quaternions are made as long as 1, as DeepMimic does it (`cKinTree::PostProcessPose`): its
     own files have some of other lengths.
 
-    Raises
-    ------
-    TrajectoryError
-        For JSON that is no such motion.
+    Raises TrajectoryError for JSON that is no such motion.
     """
     try:
         said = json.loads(data)

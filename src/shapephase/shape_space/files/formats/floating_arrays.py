@@ -87,14 +87,9 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
     What a file means by `q` follows from the number of its coordinates, and of Pinocchio's and Drake's order from
     which columns are a quaternion of length one. Coordinates may stand along either axis.
 
-    Parameters
-    ----------
     order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
 
-    Raises
-    ------
-    TrajectoryError, ShapeError
-        For arrays that fit no order, or several.
+    Raises TrajectoryError, ShapeError for arrays that fit no order, or several.
     """
     kind = next((name for name in ("qpos", "q", "Q") if name in arrays), None)
     if kind is None:
@@ -147,8 +142,6 @@ def with_free_joint(
 ) -> FloatingMotion:
     """Motion in rows of coordinates: of the free base, where it is there, and of the joints.
 
-    Parameters
-    ----------
     places : (N, 7 + m), or without a free joint (N, m)
     rates : (N, 6 + k), of a ball joint its angular velocity in axes of the link that it moves; or None
     names : of the columns of the joints; None: those of an order

@@ -33,10 +33,7 @@ def read_frame(frame: Any) -> Table:
     Attributes `units` of variables of xarray say their units. Of an array in two dimensions, the coordinate of the
     second names the joints.
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with column and row.
+    Raises TrajectoryError for faults, with column and row.
     """
     if not _is(frame, "pandas", _PANDAS):
         return _of_xarray(frame)

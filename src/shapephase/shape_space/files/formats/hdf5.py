@@ -25,10 +25,8 @@ def is_hdf5(data: bytes) -> bool:
 def read_hdf5(where: Path, data: bytes, chosen: str | None) -> Table:
     """Motion in an HDF5 file, its arrays as those of a `.mat` file; the attribute `units` of one says its unit.
 
-    Raises
-    ------
-    TrajectoryError, UnknownNameError, MissingExtraError
-        For faults; for a structure that is not there; without h5py.
+    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults; for a structure that is not there; without
+    h5py.
     """
     try:
         import h5py

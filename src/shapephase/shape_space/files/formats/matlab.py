@@ -22,10 +22,8 @@ def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:
 
     Objects of MATLAB, tables among them, are not read.
 
-    Raises
-    ------
-    TrajectoryError, UnknownNameError, MissingExtraError
-        For faults; for a structure that is not there; without pymatreader or h5py.
+    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults; for a structure that is not there; without
+    pymatreader or h5py.
     """
     try:
         import pymatreader

@@ -59,16 +59,11 @@ def arrays_motion(
     order of joints and that of a quaternion's numbers, is the one in which the links lie at `body_pos_w` and turn as
     `body_ang_vel_w` says. With `shapes` there are `time` and `joint_names`, too; else vectors by name are the joints.
 
-    Parameters
-    ----------
     timestep : [s], for arrays without times
     order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
     kind : of the source, for people
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with the array and the entry.
+    Raises TrajectoryError for faults, with the array and the entry.
     """
     try:
         if "shapes" in arrays and {"qpos", "q", "Q"} & set(arrays):
@@ -94,10 +89,7 @@ def arrays_motion(
 def of_numbered_columns(table: Table, body: Body, order: str | None) -> Table:
     """The table with base and joints instead of columns such as `qpos_0`, `q[1]`; others are as they were.
 
-    Raises
-    ------
-    TrajectoryError, ShapeError
-        If they are no order of coordinates of the body.
+    Raises TrajectoryError, ShapeError if they are no order of coordinates of the body.
     """
     numbered = numbered_columns(table.columns, table.where)
     taken = [label for labels in numbered.values() for label in labels]

@@ -34,16 +34,11 @@ def arrays_table(
 ) -> Table:
     """The table that arrays by name hold: vectors of one length, or a matrix beside the names of its columns.
 
-    Parameters
-    ----------
     entries : name -> array of numbers, list of texts, or entries of a structure
     chosen : the structure that has the motion; None: the arrays on top, or the only structure
     ordered : whether entries stand in the order in which they were written
 
-    Raises
-    ------
-    TrajectoryError, UnknownNameError
-        If there is no motion, more than one, or no such structure.
+    Raises TrajectoryError, UnknownNameError if there is no motion, more than one, or no such structure.
     """
     inside: Mapping[str, Any] = entries
     if chosen is not None:

@@ -31,10 +31,7 @@ def read_opensim(where: Path, data: bytes) -> Table:
     the coordinate and `.../<coordinate>/speed` is left out. Where a spreadsheet has saved it, commas are between
     columns.
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with line and column.
+    Raises TrajectoryError for faults, with line and column.
     """
     text = unix_text(data, where)
     lines = text[:_HEADER_BYTES].decode(errors="replace").split("\n")

@@ -46,10 +46,7 @@ def read_ros_yaml(where: Path, data: bytes) -> Table:
 
     Several trajectories follow each other by their header stamps; states are merged as in a bag.
 
-    Raises
-    ------
-    TrajectoryError, MissingExtraError
-        For faults, with line or point; without PyYAML.
+    Raises TrajectoryError, MissingExtraError for faults, with line or point; without PyYAML.
     """
     check_text(data, where)
     documents = [_unwrapped(document) for document in yaml_documents(data.decode("utf-8-sig"), str(where))]
@@ -77,14 +74,9 @@ def read_bag(where: Path, topic: str | None) -> Table:
     that carry some of the joints are merged when together they have all of them at each time. Message definitions in
     the bag are not used: a bag with other definitions of these types is refused.
 
-    Raises
-    ------
-    InputFileNotFoundError, UnknownNameError
-        If there is no such file, or no such topic.
-    TrajectoryError
-        For more than one topic with motions and none chosen; for faults, with the message.
-    MissingExtraError
-        Without rosbags.
+    Raises InputFileNotFoundError, UnknownNameError if there is no such file, or no such topic. Raises TrajectoryError
+    for more than one topic with motions and none chosen; for faults, with the message. Raises MissingExtraError without
+    rosbags.
     """
     try:
         import rosbags.highlevel  # noqa: F401

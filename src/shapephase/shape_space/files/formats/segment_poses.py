@@ -34,10 +34,7 @@ _WHOLE_BODY = "center_of_mass"  # BodyKinematics' last columns, without angles
 def read_mvnx(where: Path, data: bytes) -> Table:
     """The poses of a suit's segments, and its calibration poses; the room's z axis is up.
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with the line.
+    Raises TrajectoryError for faults, with the line.
     """
     try:
         suit = read_suit(data)
@@ -86,10 +83,7 @@ def body_kinematics(table: Table, kind: str) -> Table:
 
     kind : first line of the file
 
-    Raises
-    ------
-    TrajectoryError
-        For velocities and accelerations, which have columns of these names, too.
+    Raises TrajectoryError for velocities and accelerations, which have columns of these names, too.
     """
     bodies = [name.removesuffix("_Ox") for name in table.columns if name.endswith("_Ox")]
     labels = {body: [f"{body}_{axis}" for axis in _KINEMATICS] for body in bodies}
@@ -135,10 +129,7 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
 
     names : label or segment -> joint or link, or None for what is left out
 
-    Raises
-    ------
-    TrajectoryError
-        If places are missing, a quaternion is none, or a unit is none of lengths.
+    Raises TrajectoryError if places are missing, a quaternion is none, or a unit is none of lengths.
     """
     parts: dict[str, dict[str, str]] = {}
     places: dict[str, dict[str, str]] = {}

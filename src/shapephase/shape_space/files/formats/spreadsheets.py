@@ -20,14 +20,10 @@ _HEAD_ROWS = 12
 def read_excel(where: Path, data: bytes, sheet: str | None) -> pd.DataFrame:
     """A sheet of an Excel workbook: a row of names, and rows of numbers; formulas count as they were last computed.
 
-    Parameters
-    ----------
     sheet : its name; None: the only one that is not empty
 
-    Raises
-    ------
-    TrajectoryError, UnknownNameError, MissingExtraError
-        For faults, with row and column; for a sheet that is not there; without openpyxl.
+    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults, with row and column; for a sheet that is not
+    there; without openpyxl.
     """
     try:
         import openpyxl
@@ -83,10 +79,7 @@ def _sheet_frame(rows: list[tuple[int, list[Any]]], where: Path) -> pd.DataFrame
 def read_parquet(where: Path, data: bytes) -> pd.DataFrame:
     """A Parquet file of numbers and times; the metadata `unit` or `units` of a column says its unit.
 
-    Raises
-    ------
-    TrajectoryError, MissingExtraError
-        For faults, with row and column; without pyarrow.
+    Raises TrajectoryError, MissingExtraError for faults, with row and column; without pyarrow.
     """
     return _arrow(where, data, "Parquet")
 

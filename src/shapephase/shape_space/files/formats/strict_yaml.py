@@ -18,12 +18,8 @@ class Word(str):
 def yaml_documents(text: str, where: str) -> list[Any]:
     """Documents of a YAML text that are not empty: dictionaries by text, lists, and `Word`s.
 
-    Raises
-    ------
-    MissingExtraError
-        Without PyYAML.
-    TrajectoryError
-        For text that is not YAML, unknown tags, doubled keys and merge keys; the line is named.
+    Raises MissingExtraError without PyYAML. Raises TrajectoryError for text that is not YAML, unknown tags, doubled
+    keys and merge keys; the line is named.
     """
     try:
         import yaml

@@ -38,15 +38,10 @@ class Head(NamedTuple):
 def head_of(rows: Sequence[Sequence[str]], comment: Sequence[str] | None, where: str) -> Head:
     """The head of a table by its first rows.
 
-    Parameters
-    ----------
     rows : the first rows that are not empty, comments above them left out
     comment : the entries of the last line of comment above them, which may be the names
 
-    Raises
-    ------
-    TrajectoryError
-        If the first row may be numbers of columns or a sample; for names that stand twice.
+    Raises TrajectoryError if the first row may be numbers of columns or a sample; for names that stand twice.
     """
     first, second = rows[0], rows[1] if len(rows) > 1 else ()
     kinds = [is_value(entry) for entry in first if entry]

@@ -61,16 +61,11 @@ def read_text(
     stand in the first row, behind `#` or `%`, in several rows as Vicon Nexus writes it, or nowhere; a row of units may
     follow. The frame's `attrs` have what else the header says.
 
-    Parameters
-    ----------
     section : which part of a file of Nexus with several of them
     start : lines before the table
     delimiter : between columns; None: by the header
 
-    Raises
-    ------
-    TrajectoryError
-        For a row of another length than the header, with its number; for what is no text.
+    Raises TrajectoryError for a row of another length than the header, with its number; for what is no text.
     """
     text = unix_text(data, where)
     layout = _layout(text, where, section, start, delimiter)
