@@ -11,9 +11,8 @@ from numpy.polynomial import polynomial
 from ..arrays import Array
 from ..body.body import Body
 from ..body.momentum_gradients import energy_gradients
-from ._geodesic_changes import changes_by_ends
 from .curves import PiecewisePolynomial
-from .shape_geodesic import ShapeGeodesic, shape_geodesic, shape_speed
+from .shape_geodesic import ShapeGeodesic, changes_by_ends, shape_geodesic, shape_speed
 from .shape_path import ShapePath, interpolated
 
 PIECES = 4  # cubics of a geodesic: each within 1e-9 of a geodesic of 0.1 rad

@@ -46,9 +46,7 @@ from .curves import (
     swings_of,
 )
 from .path_series import spline_times
-from .scan._derived_scan import DerivedScan, JoinedScan
-from .scan._rate_check import check_rates
-from .scan.function_scan import FunctionScan, path_function
+from .scan.function_scan import DerivedScan, FunctionScan, JoinedScan, check_rates, path_function
 from .scan.scanning import scanned
 
 _WHOLE_TURN = 2.0 * np.pi

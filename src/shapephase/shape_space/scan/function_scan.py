@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...arrays import Array, Integers, Mask
-from ...integrator.resolved import ResolvedPath
+from ...arrays import Array, Integers, Mask, check_finite
+from ...errors import TrajectoryError
+from ...integrator.resolved import ResolvedPath, joined
 from ..curves import Curve
+
+if TYPE_CHECKING:
+    from ..shape_path import ShapePath
 
 # Times (N,), columns (N, 2 n) -> weights (2 n,) [rad per unit of a column], sizes (2 n,) [unit of a column].
 Judge = Callable[[Array, Array], tuple[Array, Array]]
@@ -197,3 +202,70 @@ class FunctionScan:
             calls=sum(scan.calls for scan in scans),
             noise=max(scan.noise for scan in scans),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class DerivedScan:
+    """The scan of a path, changed by one of the methods of `FunctionScan`, or left as it is; found when it is needed.
+
+    Attributes
+    ----------
+    path : the one that was looked at, or will be
+    change : the name of the method; None: nothing changes
+    arguments : of the method
+    """
+
+    path: ShapePath
+    change: str | None = None
+    arguments: tuple[Any, ...] = ()
+
+    def __call__(self) -> FunctionScan:
+        """Find it."""
+        scan = self.path._scan
+        return scan if self.change is None else getattr(scan, self.change)(*self.arguments)
+
+
+@dataclass(frozen=True, eq=False)
+class JoinedScan:
+    """The scan of paths one after another, each with all its loops; found when it is needed."""
+
+    paths: Sequence[ShapePath]
+
+    def __call__(self) -> FunctionScan:
+        """Find it."""
+        scans = [path._scan for path in self.paths]
+        whole = [joined([scan.resolved] * path.loops) for scan, path in zip(scans, self.paths, strict=True)]
+        found: list[Array] = []
+        start = 0.0
+        for scan, path in zip(scans, self.paths, strict=True):
+            found += [start + scan.duration * loop + scan.found_breaks for loop in range(path.loops)]
+            start += path.duration
+        return FunctionScan.of_several(scans, joined(whole), np.concatenate(found))
+
+
+def check_rates(curve: Curve, breaks: Array) -> None:
+    """Compare the function's rates with differences of its shapes away from the breaks.
+
+    At two steps: where these disagree with each other, as on the flank of a burst, nothing follows from them.
+    """
+    left, width = breaks[:-1], np.diff(breaks)
+    middle = left + 0.381 * width
+    coarse, _, _ = _differences(curve, middle, 1e-4 * width)
+    slope, rate, spread = _differences(curve, middle, 1e-5 * width)
+    scale = np.abs(rate) + np.maximum(spread, 1e-9) / breaks[-1]
+    wrong = np.abs(slope - rate) > 1e-3 * scale + 10.0 * np.abs(slope - coarse)
+    if wrong.any():
+        where, joint = (int(i) for i in np.argwhere(wrong)[0])
+        raise TrajectoryError(
+            f"the path's function gives the rate {rate[where, joint]:.6g} of joint number {joint} at "
+            f"{middle[where]:.6g} s, but its shapes change at {slope[where, joint]:.6g}; return (shapes, rates)"
+        )
+
+
+def _differences(curve: Curve, middle: Array, step: Array) -> tuple[Array, Array, Array]:
+    """Slopes of the shapes by central differences of order four, rates as given, spread of the shapes."""
+    shapes, rates = curve(np.concatenate([middle + k * step for k in (-2, -1, 0, 1, 2)]))
+    check_finite(shapes, "shapes of the path's function")
+    a, b, _, d, e = shapes.reshape(5, len(middle), -1)
+    slopes = (a - 8 * b + 8 * d - e) / (12 * step[:, None])
+    return slopes, rates.reshape(5, len(middle), -1)[2], np.ptp(shapes, axis=0)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ....errors import TrajectoryError, unknown_name
+from ....errors import MissingExtraError, TrajectoryError, unknown_name
+from ....warning_filters import quiet
+from ..labels import unit_of
 from ..recording import Table
 from .column_tables import column_table
 
@@ -21,6 +25,10 @@ _OF_THE_BASE = {  # matrices of the base's motion, and the labels of their colum
 }
 _FIRST_TURNS = ("_Xrotation", ".rx")  # endings of the names of a ball joint's angles
 _DEEPEST = 4  # nested structures that are searched
+_MAGIC = b"\x89HDF\r\n\x1a\n"
+_STARTS = (0, 512)  # offsets of HDF5: MATLAB writes 512 bytes before it
+# Classes of variables that only MATLAB can read.
+_OBJECTS = ("opaque", "object", "function", "table", "timetable", "datetime", "duration", "string", "function_handle")
 
 
 def arrays_table(
@@ -146,3 +154,103 @@ def _described(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"an array {value.shape} of {value.dtype}" if value.size != 1 else "a single value"
     return "a structure" if isinstance(value, Mapping) else "text" if isinstance(value, list) else "of another kind"
+
+
+def is_hdf5(data: bytes) -> bool:
+    """Whether bytes begin as HDF5."""
+    return any(data[start : start + len(_MAGIC)] == _MAGIC for start in _STARTS)
+
+
+def read_hdf5(where: Path, data: bytes, chosen: str | None) -> Table:
+    """Motion in an HDF5 file, its arrays as those of a `.mat` file; the attribute `units` of one says its unit.
+
+    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults; for a structure that is not there; without
+    h5py.
+    """
+    try:
+        import h5py
+    except ImportError:
+        raise MissingExtraError("HDF5 files need h5py; install it with: pip install 'shapephase[data]'") from None
+    entries: dict[str, Any] = {}
+    units: dict[str, str] = {}
+
+    def keep(path: str, item: Any) -> None:
+        *above, name = path.split("/")
+        inside = entries
+        for group in above:
+            inside = inside[group]
+        if isinstance(item, h5py.Group):
+            inside[name] = {}
+            return
+        said = item.attrs.get("units", item.attrs.get("unit", ""))
+        unit = unit_of(said.decode() if isinstance(said, bytes) else str(said))
+        if unit is not None:
+            units[name] = unit
+        is_text = h5py.check_string_dtype(item.dtype) is not None
+        value = np.asarray(item.asstr()[()] if is_text else item[()])
+        inside[name] = value.ravel().tolist() if is_text else None if value.dtype.kind == "O" else value
+
+    try:
+        with h5py.File(io.BytesIO(data), "r") as file:
+            # Every object once, groups before their members; links that lead out of the file are not followed.
+            file.visititems(keep)
+    except Exception as error:  # a damaged file fails inside h5py in many ways
+        raise TrajectoryError(
+            f"{where}: no HDF5 file that can be read ({type(error).__name__}: {error!s:.200}); write it anew"
+        ) from None
+    return arrays_table(str(where), "HDF5", entries, chosen, units, ordered=False)
+
+
+def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:
+    """Motion in a `.mat` file: vectors by name, or a matrix with names of its columns, on top or in a structure.
+
+    Objects of MATLAB, tables among them, are not read.
+
+    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults; for a structure that is not there; without
+    pymatreader or h5py.
+    """
+    try:
+        import pymatreader
+
+        with quiet():
+            entries, listed = pymatreader.read_mat(where), pymatreader.whosmat(where)
+    except ImportError:
+        raise MissingExtraError(
+            "MATLAB files need pymatreader and h5py; install them with: pip install 'shapephase[data]'"
+        ) from None
+    except Exception as error:  # a damaged file fails inside SciPy and h5py in many ways
+        raise TrajectoryError(
+            f"{where}: no MATLAB file that can be read ({type(error).__name__}: {error!s:.200}); save it anew with "
+            "save(file, '-v7')"
+        ) from None
+    classes = {name: kind for name, _, kind in listed}
+    objects = [name for name, kind in classes.items() if kind in _OBJECTS]
+    if objects and len(objects) == len(classes):
+        raise TrajectoryError(
+            f"{where}: {', '.join(objects[:5])}: tables and other objects of MATLAB are not read; write the table with "
+            "parquetwrite or writetable, or save it as a structure with save(file, '-struct', 's')"
+        )
+    # HDF5 keeps no order of names, and pymatreader returns them in any.
+    unordered = is_hdf5(data)
+    names = sorted(entries) if unordered else list(entries)
+    readable = {name: _plain(entries[name], unordered) for name in names if classes.get(name, "opaque") not in _OBJECTS}
+    # pymatreader reads what is true or false as ones and zeros.
+    for name, value in readable.items():
+        if classes[name] == "logical" and isinstance(value, np.ndarray):
+            readable[name] = value.astype(bool)
+    return arrays_table(str(where), "MATLAB 7.3" if unordered else "MATLAB", readable, chosen, ordered=not unordered)
+
+
+def _plain(value: Any, unordered: bool) -> Any:
+    """A structure as a dictionary, texts as a list, numbers as an array; None for anything else."""
+    if isinstance(value, dict):
+        return {name: _plain(value[name], unordered) for name in (sorted(value) if unordered else value)}
+    entries = value if isinstance(value, list) else [value]
+    if entries and all(isinstance(entry, str) for entry in entries):
+        return [entry.strip() for entry in entries]
+    if isinstance(value, list | None):
+        return None
+    array = np.asarray(value)
+    if array.dtype.kind == "U":
+        return [entry.strip() for entry in array.ravel().tolist()]
+    return None if array.dtype.kind == "O" else array

@@ -12,8 +12,7 @@ import numpy as np
 
 from ....arrays import Integers
 from ....errors import TrajectoryError
-from .nexus_tables import nexus_head
-from .table_heads import COMMA_NUMBER, COMMENT, head_of, is_value, numbers
+from .table_heads import COMMA_NUMBER, COMMENT, head_of, is_value, nexus_head, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
