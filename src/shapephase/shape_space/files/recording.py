@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -198,6 +198,26 @@ class Recording:
     def place(self, index: int) -> str:
         """The file and the sample, for messages."""
         return f"{self.table.where}: {self.table.row} {self.table.rows[index]}"
+
+
+def checked_quaternions(quaternions: Array, recording: Recording, owner: str, tolerance: float) -> Array:
+    """Quaternions x y z w (N, 4) with the length 1. Raises TrajectoryError where one is farther from it."""
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(quaternions, axis=-1)
+    worst = int(np.argmax(np.abs(lengths - 1.0)))
+    if not abs(lengths[worst] - 1.0) <= tolerance:
+        raise TrajectoryError(
+            f"{recording.place(worst)}: the quaternion x y z w of {owner} has the norm {lengths[worst]:.6g}; 1 is "
+            "needed"
+        )
+    return quaternions / lengths[:, None]
+
+
+def listed(names: Iterable[str], most: int) -> str:
+    """Names for a message, at most so many of them."""
+    names = list(names)
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
 
 
 def warn(message: str) -> None:
