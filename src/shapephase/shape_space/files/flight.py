@@ -136,7 +136,7 @@ def in_flight(
             "momentum instead of a flight: momentum=[0, 0, 0] (--momentum 0 0 0)"
         )
     fall, flights, by = None, (), "times" if isinstance(said, tuple) else ALL
-    samples = samples_within(recording, said) if isinstance(said, tuple) else np.arange(len(recording.times))
+    samples = samples_within(recording.table, said) if isinstance(said, tuple) else np.arange(len(recording.times))
     centres = None if said == AUTO else _places(motion, body)
     if said == AUTO or (said == RECORDED and centres is not None):
         fall = _fall(recording, motion, body, choices)

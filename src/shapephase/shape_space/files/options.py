@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...arguments import check_choice, positive_argument
 from ...body.joint_orders import WORDS
-from ...errors import ShapeError, TrajectoryError, WrongObjectError, unknown_name
+from ...errors import TrajectoryError, WrongObjectError, unknown_name
 from ...letters import what_came
 from ._gaps import fill_argument
 from ._joint_columns import JointChoices
@@ -20,7 +20,7 @@ from ._segment_links import SegmentChoices
 from .base_columns import base_choices
 from .closing import close_argument
 from .flight import FlightChoices, flight_choices
-from .mapping_files import read_names
+from .mapping_files import names_argument
 from .times import trim_argument
 
 Read = TypeVar("Read", bound=Callable[..., Any])
@@ -144,7 +144,7 @@ class Reading:
                 f"close_by={what_came(given('close_by'))}: how large a gap is to be closed? Give close, as 0.05 or "
                 "'3deg'"
             )
-        names = _names(given("names"))
+        names = names_argument(given("names"))
         return cls(
             names=names,
             listed=isinstance(given("names"), list | tuple),
@@ -174,14 +174,3 @@ class Reading:
             close_by=given("close_by"),
             loop=given("close") is None,
         )
-
-
-def _names(names: Any) -> Mapping[str, str | None] | None:
-    """Names with a file of them read, and a list as names of columns by their numbers."""
-    if isinstance(names, str | os.PathLike):
-        return read_names(names)
-    if isinstance(names, list | tuple):
-        return {str(number): name for number, name in enumerate(names, start=1)}
-    if names is not None and not isinstance(names, Mapping):
-        raise ShapeError(f"names: a mapping, name in the file -> joint, is needed, got {what_came(names)}")
-    return names

@@ -22,7 +22,8 @@ from ._segment_poses import SegmentMotion, without_segments
 from .closing import Closing, closed_path
 from .flight import Flight, in_flight
 from .inputs import read_input
-from .labels import amounts, mapping_argument
+from .labels import amounts
+from .mapping_files import names_by_label
 from .options import Reading, ReadingOptions, show_options
 from .recording import LONGEST_NAME, Recording, Table
 from .smoothing import Recorded, Smoothing, check_swings, is_even, prepared_path
@@ -307,7 +308,7 @@ def _names_of_columns(names: Mapping[str, str | None], how: Reading, table: Tabl
         )
     labels = [text for text in (*table.columns, *table.unread) if len(text) <= LONGEST_NAME]
     try:
-        return mapping_argument(names, labels)
+        return names_by_label(names, labels)
     except KeyError as error:
         raise unknown_name(f"column of {table.where} in names", error.args[0], labels[:_MOST_SHOWN]) from None
 
