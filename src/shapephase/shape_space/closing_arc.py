@@ -22,8 +22,6 @@ PIECES = 4  # cubics of a geodesic: each within 1e-9 of a geodesic of 0.1 rad
 class ClosingArc:
     """The way back from the end of a path to its start, as fast as the path itself, rms.
 
-    Attributes
-    ----------
     body : in whose metric it is the shortest
     opened : the path
     way : the geodesic, from the last shape to the first

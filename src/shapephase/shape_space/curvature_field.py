@@ -195,8 +195,6 @@ def stokes_holonomy(
 class _Cone:
     """The straight rays from a centre to a loop.
 
-    Attributes
-    ----------
     worst : the largest change left when the pieces of a ray were halved, as a turn of the whole loop [rad]
     """
 

@@ -35,8 +35,6 @@ class Curve(Protocol):
 class Swings(NamedTuple):
     """How fast a curve can change, known before it is sampled.
 
-    Attributes
-    ----------
     most : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
     smooth_loop : whether it also goes smoothly from its end to its start
     """

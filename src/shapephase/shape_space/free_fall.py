@@ -68,8 +68,6 @@ class FreeFall:
 class _Windows(NamedTuple):
     """Short stretches, and what the best straight lines leave of the centre of mass and of the square of the time.
 
-    Attributes
-    ----------
     starts, ends : (W,) first and last samples
     squares : (W,) of what is left of the centre of mass, summed [m^2]
     mixed : (W, 3) of that times what is left of the square of the time, summed [m s^2]

@@ -31,8 +31,6 @@ class LinearSmoother:
     With `digital`, the values are those of a Butterworth filter of second order run forwards and backwards over evenly
     spaced samples: 1/(1 + penalty K) is its squared frequency response, and ends are free as those of a spline.
 
-    Attributes
-    ----------
     times : (N,) of the samples, ascending from 0 [s]
     periodic : whether first and last sample are measurements of one value, which then weighs twice
     penalties : (n,) of each column [s^(2 order - 1)]; of zero, nothing is smoothed
@@ -93,8 +91,6 @@ class LinearSmoother:
 class LowPass:
     """A Butterworth filter of second order, run forwards and backwards.
 
-    Attributes
-    ----------
     cut_off : at which both passes together leave 1/sqrt(2) of an amplitude [Hz]
     rate : samples a second [Hz]
 

@@ -42,8 +42,6 @@ class SampleOrigin(PathOrigin, Protocol):
 class PathBasis(NamedTuple):
     """A path at N times by the coefficients of its polynomials.
 
-    Attributes
-    ----------
     pieces : (N,) the piece of each time
     powers, slopes, bends : (N, order) derivatives of the shape, of its rate, and of its acceleration, by the
         coefficients of that piece
@@ -61,8 +59,6 @@ class PathBasis(NamedTuple):
 class PathSamples:
     """Samples of a path, its joints in the order of the path's columns.
 
-    Attributes
-    ----------
     curve : the polynomials through the samples, or through what was made of them
     order : (n,) which column of theirs is which of the path's
     origin : how the values at their knots follow from the samples; None: they are the samples

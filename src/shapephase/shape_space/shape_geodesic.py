@@ -24,8 +24,6 @@ _STEP = 1e-4  # [rad or m] of central differences: error a few 1e-8 of a small c
 class ShapeGeodesic(NamedTuple):
     """A geodesic on [0, 1], at constant speed.
 
-    Attributes
-    ----------
     nodes : (N,) from 0 to 1
     shapes : (N, n) there [rad or m]
     rates : (N, n) by the parameter [rad or m]

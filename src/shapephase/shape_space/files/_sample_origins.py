@@ -20,8 +20,6 @@ from ..shape_path import ShapePath, interpolated
 class Prepared:
     """Samples, from which turns and drift are taken off, which are smoothed, and through which a spline is put.
 
-    Attributes
-    ----------
     samples : (N, n) as recorded [rad or m]
     smoother : of columns (n,); knows the times of the samples, and whether the spline is periodic
     pilot : a smoother of a higher order, by whose motion it is known what the other one takes off; None: unknown
@@ -142,8 +140,6 @@ class Prepared:
 class Resampled:
     """Values of a path through samples, evenly in time, through which another spline is put.
 
-    Attributes
-    ----------
     inner : the path through samples
     times : (M,) of its values [s]
     count : how many values may differ: of a periodic spline the last is the first

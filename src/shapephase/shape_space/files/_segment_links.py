@@ -49,8 +49,6 @@ _MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}  # kind of model whose links are
 class SegmentChoices:
     """How segments become links, as the caller chose.
 
-    Attributes
-    ----------
     names : segment -> link, or None for a segment to be left out
     calibration : a time, as the file tells it; the name of a pose of the file; "links"; None: as the file says
     length_tolerance : share by which lengths may differ from the body's
@@ -94,8 +92,6 @@ class Calibration(NamedTuple):
 class Links:
     """Frames of a body's chain that segments show.
 
-    Attributes
-    ----------
     frames : parents before children; the first is the base
     above : place of a frame among them -> that of the nearest one towards the base
     left_out : segments that show no frame

@@ -87,8 +87,6 @@ def check_options(given: Mapping[str, Any], options: type, function: str) -> Non
 class Reading:
     """How a recording is read, checked.
 
-    Attributes
-    ----------
     names : column or segment -> joint or link, None to leave it out; None: not given
     listed : True where names were a list, one for each column
     joints, segments, flight : how columns become joints and base, segments links, and what a flight is

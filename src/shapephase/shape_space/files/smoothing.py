@@ -165,8 +165,6 @@ def smoothed_path(
 class Recorded:
     """Samples of joints and what is known of their noise.
 
-    Attributes
-    ----------
     times, shapes : (N,) ascending [s], (N, n) [rad or m]
     noise : (n,) rms [rad or m]
     joint_names : n names, or None

@@ -223,8 +223,6 @@ def reachable(
 class _Field:
     """The curvature of a body around a shape, in strokes.
 
-    Attributes
-    ----------
     here : (n, n, 3) F_ij at the shape
     slopes : (n, n, n, 3) D_k F_ij there, k first
     magnitude : of the terms that F is the difference of

@@ -24,8 +24,6 @@ Judge = Callable[[Array, Array], tuple[Array, Array]]
 class Words:
     """How messages speak of a function.
 
-    Attributes
-    ----------
     units : of values and of rates
     continuous : why a value cannot jump
     rate, values, returned : of what is a derivative: its name, what it is the derivative of, what to return
@@ -47,8 +45,6 @@ class ScannedFunction:
     attitude is off when the value is; a rate times its weight is the rate of that turn [rad/s]. Then one set of
     thresholds serves joints, metres and kg m^2, and does not depend on the units in which a body is described.
 
-    Attributes
-    ----------
     curve : values and rates at times (N,): (N, n), (N, n)
     judge : the weights, and the sizes of the numbers that columns are computed from where these are larger than the
         columns themselves: of them the rounding is
@@ -208,8 +204,6 @@ class FunctionScan:
 class DerivedScan:
     """The scan of a path, changed by one of the methods of `FunctionScan`, or left as it is; found when it is needed.
 
-    Attributes
-    ----------
     path : the one that was looked at, or will be
     change : the name of the method; None: nothing changes
     arguments : of the method

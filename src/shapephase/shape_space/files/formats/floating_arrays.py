@@ -29,8 +29,6 @@ _NAMES_THAT_SAY_IT = (
 class FreeJoint(NamedTuple):
     """How a program lays out the coordinates of a free base, which stand before those of the joints.
 
-    Attributes
-    ----------
     title : of the program and its array
     quaternion : columns of x, y, z and w
     position : columns of the place
@@ -57,8 +55,6 @@ DRAKE_Q = FreeJoint("Drake q", [1, 2, 3, 0], [4, 5, 6], [0, 1, 2], [3, 4, 5], "w
 class FloatingMotion(NamedTuple):
     """Base and joints of a floating body at N samples.
 
-    Attributes
-    ----------
     title : of the program and its array
     names : of the columns of `joints`
     joints : (N, m) [rad or m]

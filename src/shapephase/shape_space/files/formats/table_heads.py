@@ -25,8 +25,6 @@ _FRAMES = ("Frame", "Sub Frame")
 class Head(NamedTuple):
     """What the first rows of a table say.
 
-    Attributes
-    ----------
     names : of the columns; empty where a column has none
     units : name -> unit, of a row of units
     skipped : rows before the first one of numbers
@@ -107,8 +105,6 @@ def _counts(row: Sequence[str]) -> bool:
 class NexusHead(NamedTuple):
     """The head of a section.
 
-    Attributes
-    ----------
     names : of the columns, `KneeAngles_x` of the subject's `KneeAngles` and its axis X
     units : name -> unit
     rate : frames a second

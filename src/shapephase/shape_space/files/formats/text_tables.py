@@ -33,8 +33,6 @@ _GAPS = ["", "nan", "NaN", "NAN", "-nan", "-NaN"]  # any other word is a fault
 class _Layout(NamedTuple):
     """Where the numbers of a text begin, and how they stand there.
 
-    Attributes
-    ----------
     names : of the columns
     units : name -> unit
     first : the line of the first sample, from 0
