@@ -40,16 +40,18 @@ def without_first_pose(recording: Recording, motion: Matched, body: Body) -> tup
     count = int(np.count_nonzero(later < _NEXT))
     if count < _FEWEST:
         return recording, motion
-    few = motion.kept(np.arange(count + 2))
+    beginning = motion.kept(np.arange(count + 2))
     lengths = np.diff(recording.times[: count + 2])
-    for what, unit, steps in _steps(few, body):
+    for names, unit, steps in _steps(beginning, body):
         rates = steps.max(axis=1, initial=0.0) / lengths
         if not (rates[0] > _APART * rates[1:].max() and steps[0].max() > _NO_POSE):
             continue
-        name, far = what[int(np.argmax(steps[0]))], float(steps[0].max())
-        far, unit = (float(np.degrees(far)), "deg") if unit == "rad" else (far, unit)
-        often = f"over {_APART:g} times the largest step of the next {_NEXT:g} s"
-        moved = f"{name} goes {far:.3g} {unit} to the next {recording.table.row}, {often}"
+        size = float(steps[0].max())
+        shown = f"{np.degrees(size):.3g} deg" if unit == "rad" else f"{size:.3g} {unit}"
+        moved = (
+            f"{names[int(np.argmax(steps[0]))]} goes {shown} to the next {recording.table.row}, over {_APART:g} times "
+            f"the largest step of the next {_NEXT:g} s"
+        )
         if recording.table.zero_pose:
             warn(f"{recording.place(0)}: left out: all angles are zero, and {moved}: a pose put before the motion")
             samples = np.arange(1, len(recording.times))
@@ -71,13 +73,13 @@ def warn_of_fast_turns(recording: Recording, motion: Matched, body: Body) -> Non
     sample, column = divmod(int(np.argmax(steps)), len(balls))
     if steps[sample, column] < _UNRESOLVED:
         return
-    row, before = recording.table.row, recording.table.rows[sample]
     clock = recording.first + recording.times[sample + 1] * IN_A_SECOND[recording.time_unit]
     others = int(np.count_nonzero(steps >= _UNRESOLVED)) - 1
     warn(
         f"{recording.place(sample + 1)}: {balls[column].name} turns by {np.degrees(steps[sample, column]):.3g} deg "
-        f"from {row} {before}, at {clock:.6g} {recording.time_unit}{f' ({others} more such steps)' if others else ''}: "
-        "samples so far apart do not say which way round; the shorter way is taken"
+        f"from {recording.table.row} {recording.table.rows[sample]}, at {clock:.6g} {recording.time_unit}"
+        f"{f' ({others} more such steps)' if others else ''}: samples so far apart do not say which way round; the "
+        "shorter way is taken"
     )
 
 
@@ -116,24 +118,21 @@ def low_passed(times: Array, motion: Matched, cut_off: float) -> Matched:
 
 
 def _steps(motion: Matched, body: Body) -> list[tuple[list[str], str, Array]]:
-    """Names of what turns and of what slides, and how far each goes from sample to sample: (N - 1, k) [rad or m]."""
+    """Names of turning and of sliding parts, unit, and steps from sample to sample: (N - 1, k) [rad or m]."""
     shapes, base = motion.shapes, motion.base
-    turning: list[tuple[str, Array]] = []
-    sliding: list[tuple[str, Array]] = []
+    steps: dict[str, dict[str, Array]] = {"rad": {}, "m": {}}
     for joint, (name, unit) in enumerate(zip(body.joint_names, body.joint_units, strict=True)):
-        if unit in ("rad", "m"):
-            (turning if unit == "rad" else sliding).append((name, np.abs(np.diff(shapes[:, joint]))))
+        if unit in steps:
+            steps[unit][name] = np.abs(np.diff(shapes[:, joint]))
     for ball in body.chain.follows.balls:
-        turning.append((ball.name, _angles(ball.turns(shapes))))
+        steps["rad"][ball.name] = _angles(ball.turns(shapes))
     if base.attitude is not None:
-        turning.append(("the base", _angles(base.attitude)))
+        steps["rad"]["the base"] = _angles(base.attitude)
     if base.position is not None:
-        sliding.append(("the base", np.linalg.norm(np.diff(base.position, axis=0), axis=1)))
+        steps["m"]["the base"] = np.linalg.norm(np.diff(base.position, axis=0), axis=1)
     return [
-        ([name for name, _ in kind], unit, np.stack([steps for _, steps in kind], axis=1, dtype=np.float64))
-        if kind
-        else ([], unit, np.zeros((len(shapes) - 1, 0)))
-        for kind, unit in ((turning, "rad"), (sliding, "m"))
+        (list(parts), unit, np.array([*parts.values()], dtype=np.float64).reshape(-1, len(shapes) - 1).T)
+        for unit, parts in steps.items()
     ]
 
 
@@ -156,7 +155,7 @@ def surrounded(
     match : the joints and the base of a recording
     fill : the longest gap that is bridged [s], or None
     """
-    # Nobody has asked for these samples: what is doubtful or wrong in them is not reported.
+    # Faults and doubts of these samples, which the caller left out, are not reported.
     with suppress(TrajectoryError), warnings.catch_warnings():
         warnings.simplefilter("ignore", TrajectoryWarning)
         whole = untrimmed()
@@ -169,7 +168,7 @@ def surrounded(
 
 
 def _readable(whole: Recording, first: int, past: int, broken: Integers) -> tuple[int, int]:
-    """From where and up to where samples follow each other without a gap, and all of them are numbers."""
+    """Ends of the stretch around some samples that has no gaps and no missing numbers."""
     steps = np.diff(whole.times)
     usual = float(np.median(steps[first : past - 1]))
     apart = np.flatnonzero(steps > _GAP * usual)
@@ -179,15 +178,15 @@ def _readable(whole: Recording, first: int, past: int, broken: Integers) -> tupl
 
 
 def _broken(whole: Recording, left_out: Collection[str], fill: float | None) -> Integers:
-    """Samples that are no numbers in some column, and not bridged."""
-    table = whole.table
-    more = (table.base_quat_xyzw, table.base_position)
+    """Samples that lack a number in some column, and are not bridged."""
+    table, count = whole.table, len(whole.times)
     columns = [values for label, values in table.columns.items() if label not in left_out]
-    missing = np.zeros(len(whole.times) + 2, dtype=bool)
-    for values in (*columns, *(values for values in more if values is not None)):
-        missing[1:-1] |= ~np.isfinite(values).reshape(len(whole.times), -1).all(axis=1)
+    columns += [values for values in (table.base_quat_xyzw, table.base_position) if values is not None]
+    missing = np.zeros(count + 2, dtype=bool)
+    for values in columns:
+        missing[1:-1] |= ~np.isfinite(values).reshape(count, -1).all(axis=1)
     edges = np.flatnonzero(np.diff(missing.astype(int))).reshape(-1, 2)
     for first, past in edges.tolist():
-        if fill is not None and first > 0 and past < len(whole.times):
+        if fill is not None and first > 0 and past < count:
             missing[first + 1 : past + 1] = whole.times[past] - whole.times[first - 1] > fill
     return np.flatnonzero(missing[1:-1])
