@@ -14,19 +14,17 @@ from ..arguments import (
     breaks_argument,
     check_flag,
     check_function,
-    check_time_steps,
-    names_argument,
     positive_argument,
     times_argument,
 )
 from ..arrays import Array, check_reach, finite_array, lock_arrays, read_only
-from ..display import card_html, card_text
-from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
+from ..card_pictures import MOST_POINTS, curves_picture
+from ..display import Card, card_html, card_text, numbers
+from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
-from ._card import shape_path_card
-from .ball_columns import ball_columns, factors_between, neighbours_signs
+from .ball_columns import ball_columns, factors_between
 from .curves import (
     CLOSED,
     Curve,
@@ -45,6 +43,7 @@ from .curves import (
     returned_pair,
     swings_of,
 )
+from .interpolation import path_joint_names, rest_to_rest_curve, same_shape, sample_arguments, spline_curve
 from .path_series import spline_times
 from .scan.function_scan import DerivedScan, FunctionScan, JoinedScan, check_rates, path_function
 from .scan.scanning import scanned
@@ -101,7 +100,6 @@ class ShapePath:
 
     __post_init__ = lock_arrays
     __repr__, _repr_html_ = card_text, card_html
-    _card = shape_path_card
 
     @staticmethod
     def fourier(
@@ -136,7 +134,7 @@ class ShapePath:
             period,
             breaks=np.array([0.0, period]),
             n_shape=len(middle),
-            joint_names=_names(joint_names, len(middle)),
+            joint_names=path_joint_names(joint_names, len(middle)),
             # Harmonics that are all multiples of one number make a shorter loop, repeated.
             loops=max(1, int(np.gcd.reduce(curve.occupied))),
         )
@@ -160,23 +158,9 @@ class ShapePath:
         TrajectoryError
             If times do not ascend, there are fewer than two samples, or a periodic path does not close.
         """
-        t, r, balls = _samples(times, shapes, joint_names)
-        factors = factors_between(r[-1], r[0], balls)
-        closes = _closes(r[-1], r[0] * factors) and len(t) > 2
         check_flag(periodic, "periodic", allow_none=True)
-        if periodic and not closes:
-            joint = int(np.argmax(np.abs(r[-1] - r[0])))
-            raise TrajectoryError(
-                f"a periodic spline needs the last sample to equal the first (and three samples or more); joint number "
-                f"{joint} ends {r[-1, joint] - r[0, joint]:.6g} from its start"
-            )
-        use_period = closes if periodic is None else periodic
-        if use_period and np.any(np.abs(factors - 1.0) > CLOSED):
-            return _piecewise(t, _flipping_coefficients(t, r[:-1], factors), joint_names, "not-a-knot")
-        if use_period:
-            r = np.concatenate([r[:-1], r[:1]])
-        through: Interpolation = "periodic" if use_period else "not-a-knot"
-        return _piecewise(t, _spline_coefficients(t, r, use_period), joint_names, through)
+        t, r, balls = sample_arguments(times, shapes, joint_names)
+        return _piecewise(spline_curve(t, r, balls, periodic), joint_names)
 
     @staticmethod
     def waypoints(times: ArrayLike, shapes: ArrayLike, *, joint_names: Sequence[str] | None = None) -> ShapePath:
@@ -185,14 +169,8 @@ class ShapePath:
         r = r_i + (r_(i+1) - r_i) (10 s^3 - 15 s^4 + 6 s^5), s = (t - t_i)/(t_(i+1) - t_i).
         Parameters and errors as `spline`.
         """
-        t, r, _ = _samples(times, shapes, joint_names)
-        moves = np.diff(r, axis=0)
-        steps = np.diff(t)[:, None]
-        coefficients = np.zeros((6, *moves.shape))
-        for power, factor in ((3, 10.0), (4, -15.0), (5, 6.0)):
-            coefficients[power] = factor * moves / steps**power
-        coefficients[0] = r[:-1]
-        return _piecewise(t, coefficients, joint_names, "rest to rest")
+        t, r, _ = sample_arguments(times, shapes, joint_names)
+        return _piecewise(rest_to_rest_curve(t, r), joint_names)
 
     @staticmethod
     def function(
@@ -224,7 +202,7 @@ class ShapePath:
         if start.ndim != 2 or start.shape[0] != 1:
             raise ShapeError(f"the function must return shapes (N, n) for times (N,); for N = 1 it gave {start.shape}")
         curve = Function(f, start.shape[1])
-        path = ShapePath(curve, period, edges, start.shape[1], _names(joint_names, start.shape[1]))
+        path = ShapePath(curve, period, edges, start.shape[1], path_joint_names(joint_names, start.shape[1]))
         check_rates(curve, edges)
         return path
 
@@ -345,7 +323,7 @@ class ShapePath:
         factors = factors_between(end, start, ball_columns(names))
         start = start * factors
         offset = np.round((end - start) / _WHOLE_TURN) * _WHOLE_TURN
-        if not _closes(end, start + offset):
+        if not same_shape(end, start + offset):
             joint = int(np.argmax(np.abs(end - start - offset)))
             raise TrajectoryError(
                 f"paths do not join: joint {names[joint] if names else joint} ends at {end[joint]:.9g} and the next "
@@ -379,7 +357,7 @@ class ShapePath:
         (start, end), _ = self.curve(np.array([0.0, self.duration]))
         gap = end - start * factors_between(end, start, ball_columns(self.joint_names))
         turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN
-        if not _closes(gap, turns):
+        if not same_shape(gap, turns):
             joint = int(np.argmax(np.abs(gap - turns)))
             raise OpenPathError(f"only a loop can be repeated; joint {self._joint(joint)} ends {gap[joint]:.9g} off")
         starts = self.duration * np.arange(count)
@@ -442,6 +420,25 @@ class ShapePath:
         curve = Reordered(self.curve, order)
         return replace(self, curve=curve, joint_names=expected, scanner=DerivedScan(self, "reordered", (order,)))
 
+    def _card(self) -> Card:
+        """How long it is, which joints move by how much, whether it closes; with its joints in time."""
+        try:
+            shapes = self.shape(np.linspace(0.0, self.duration, MOST_POINTS))
+        except ShapePhaseError as error:
+            return Card("ShapePath", [("duration", numbers(self.duration, "s")), ("cannot be evaluated", str(error))])
+        spans = np.ptp(shapes, axis=0) if self.n_shape else np.zeros(1)
+        widest = int(np.argmax(spans))
+        name = self.joint_names[widest] if self.joint_names else f"joint {widest}"
+        gap = float(np.max(np.abs(shapes[-1] - shapes[0]), initial=0.0))
+        rows = [
+            ("duration", numbers(self.duration, "s") + (f", {self.loops} loops" if self.loops > 1 else "")),
+            ("joints", f"{self.n_shape}, {np.count_nonzero(spans > 0.0)} of them move"),
+            ("widest", f"{name}, by {spans[widest]:.4g} rad or m"),
+            ("breaks", f"{len(self.breaks)}"),
+            ("closes", "yes" if gap <= CLOSED else f"no, by {gap:.4g} rad or m"),
+        ]
+        return Card("ShapePath", rows, curves_picture(shapes, "joints in time") if self.n_shape else "")
+
     def _joint(self, column: int) -> str:
         return self.joint_names[column] if self.joint_names else f"number {column}"
 
@@ -463,62 +460,9 @@ def interpolated(
     return ShapePath.spline(knots, whole, periodic, joint_names=joint_names)
 
 
-def _piecewise(
-    times: Array, coefficients: Array, joint_names: Sequence[str] | None, through: Interpolation
-) -> ShapePath:
-    n_shape = coefficients.shape[2]
-    curve = PiecewisePolynomial(times, coefficients, through)
-    return ShapePath(curve, float(times[-1]), times, n_shape, _names(joint_names, n_shape))
-
-
-def _spline_coefficients(times: Array, shapes: Array, periodic: bool) -> Array:
-    from scipy.interpolate import CubicSpline
-
-    spline = CubicSpline(times, shapes, bc_type="periodic" if periodic else "not-a-knot")
-    pieces = np.broadcast_to(spline.c[::-1], (len(spline.c), len(times) - 1, shapes.shape[1]))
-    return np.ascontiguousarray(pieces)
-
-
-def _flipping_coefficients(times: Array, shapes: Array, factors: Array) -> Array:
-    """Of the spline whose columns are multiplied by factors from one end to the other, of ball joints -1, and go on as
-    smoothly: the first half of one that is gone through twice."""
-    signs = np.where(factors < 0.0, -1.0, 1.0)
-    twice = np.concatenate([times, times[-1] + times[1:]])
-    coefficients = _spline_coefficients(twice, np.concatenate([shapes, shapes * signs, shapes[:1]]), True)
-    return np.ascontiguousarray(coefficients[:, : len(times) - 1])
-
-
-def _samples(
-    times: ArrayLike, shapes: ArrayLike, joint_names: Sequence[str] | None
-) -> tuple[Array, Array, tuple[slice, ...]]:
-    """Times, shapes, and which columns are ball joints."""
-    t = finite_array(times, "times", (None,), unit="s")
-    r = finite_array(shapes, "shapes", (None, None))
-    if t.ndim != 1 or r.ndim != 2 or len(t) != len(r):
-        raise ShapeError(f"times (N,) and shapes (N, n) are needed, got {t.shape} and {r.shape}")
-    check_reach(r, "shapes")
-    if len(t) < 2:
-        raise TrajectoryError(f"a path needs two samples or more, got {len(t)}")
-    late = np.flatnonzero(np.diff(t) <= 0.0)
-    if len(late):
-        row = int(late[0]) + 1
-        raise TrajectoryError(f"times must ascend: sample {row} at {t[row]:.9g} s follows {t[row - 1]:.9g} s")
-    check_time_steps(t - t[0])
-    balls = ball_columns(_names(joint_names, r.shape[1]))
-    return t - t[0], neighbours_signs(r, balls), balls
-
-
-def _closes(a: Array, b: Array) -> bool:
-    return bool(np.all(np.abs(a - b) <= CLOSED * np.maximum(1.0, np.abs(a))))
-
-
-def _names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[str, ...] | None:
-    if joint_names is None:
-        return None
-    names = names_argument(joint_names, "joint_names", f"{n_shape} names")
-    if len(names) != n_shape or len(set(names)) != len(names):
-        raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {what_came(names)}")
-    return names
+def _piecewise(curve: PiecewisePolynomial, joint_names: Sequence[str] | None) -> ShapePath:
+    n_shape = curve.coefficients.shape[2]
+    return ShapePath(curve, float(curve.knots[-1]), curve.knots, n_shape, path_joint_names(joint_names, n_shape))
 
 
 def _joined_names(first: ShapePath, second: ShapePath) -> tuple[str, ...] | None:

@@ -1,0 +1,97 @@
+"""Piecewise polynomials through samples: cubic splines, and quintics from rest to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import check_time_steps, names_argument
+from ..arrays import Array, check_reach, finite_array
+from ..errors import ShapeError, TrajectoryError
+from ..letters import what_came
+from .ball_columns import ball_columns, factors_between, neighbours_signs
+from .curves import CLOSED, PiecewisePolynomial
+
+
+def sample_arguments(
+    times: ArrayLike, shapes: ArrayLike, joint_names: Sequence[str] | None
+) -> tuple[Array, Array, tuple[slice, ...]]:
+    """Times from 0 (N,), shapes (N, n) with continuous quaternions, and columns of ball joints, checked.
+
+    Raises ShapeError, TrajectoryError.
+    """
+    t = finite_array(times, "times", (None,), unit="s")
+    r = finite_array(shapes, "shapes", (None, None))
+    if t.ndim != 1 or r.ndim != 2 or len(t) != len(r):
+        raise ShapeError(f"times (N,) and shapes (N, n) are needed, got {t.shape} and {r.shape}")
+    check_reach(r, "shapes")
+    if len(t) < 2:
+        raise TrajectoryError(f"a path needs two samples or more, got {len(t)}")
+    late = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(late):
+        row = int(late[0]) + 1
+        raise TrajectoryError(f"times must ascend: sample {row} at {t[row]:.9g} s follows {t[row - 1]:.9g} s")
+    check_time_steps(t - t[0])
+    balls = ball_columns(path_joint_names(joint_names, r.shape[1]))
+    return t - t[0], neighbours_signs(r, balls), balls
+
+
+def path_joint_names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[str, ...] | None:
+    """Names of the joints of a path, checked. Raises TrajectoryError."""
+    if joint_names is None:
+        return None
+    names = names_argument(joint_names, "joint_names", f"{n_shape} names")
+    if len(names) != n_shape or len(set(names)) != len(names):
+        raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {what_came(names)}")
+    return names
+
+
+def same_shape(a: Array, b: Array) -> bool:
+    """True where two shapes (n,) are equal to the accuracy of files."""
+    return bool(np.all(np.abs(a - b) <= CLOSED * np.maximum(1.0, np.abs(a))))
+
+
+def spline_curve(times: Array, shapes: Array, balls: Sequence[slice], periodic: bool | None) -> PiecewisePolynomial:
+    """The C2 cubic spline through samples; periodic None: where the last sample equals the first.
+
+    Raises TrajectoryError if a periodic one does not close.
+    """
+    factors = factors_between(shapes[-1], shapes[0], balls)
+    closes = same_shape(shapes[-1], shapes[0] * factors) and len(times) > 2
+    if periodic and not closes:
+        joint = int(np.argmax(np.abs(shapes[-1] - shapes[0])))
+        raise TrajectoryError(
+            f"a periodic spline needs the last sample to equal the first (and three samples or more); joint number "
+            f"{joint} ends {shapes[-1, joint] - shapes[0, joint]:.6g} from its start"
+        )
+    if not (closes if periodic is None else periodic):
+        return PiecewisePolynomial(times, _spline_coefficients(times, shapes, False), "not-a-knot")
+    if np.any(np.abs(factors - 1.0) > CLOSED):
+        # A quaternion ends at its negative: the spline is the first half of one that is gone through twice.
+        signs = np.where(factors < 0.0, -1.0, 1.0)
+        twice = np.concatenate([times, times[-1] + times[1:]])
+        loop = np.concatenate([shapes[:-1], shapes[:-1] * signs, shapes[:1]])
+        coefficients = _spline_coefficients(twice, loop, True)[:, : len(times) - 1]
+        return PiecewisePolynomial(times, np.ascontiguousarray(coefficients), "not-a-knot")
+    shapes = np.concatenate([shapes[:-1], shapes[:1]])
+    return PiecewisePolynomial(times, _spline_coefficients(times, shapes, True), "periodic")
+
+
+def rest_to_rest_curve(times: Array, shapes: Array) -> PiecewisePolynomial:
+    """Straight moves from rest to rest through waypoints, each by the quintic of least jerk."""
+    moves, steps = np.diff(shapes, axis=0), np.diff(times)[:, None]
+    coefficients = np.zeros((6, *moves.shape))
+    for power, factor in ((3, 10.0), (4, -15.0), (5, 6.0)):
+        coefficients[power] = factor * moves / steps**power
+    coefficients[0] = shapes[:-1]
+    return PiecewisePolynomial(times, coefficients, "rest to rest")
+
+
+def _spline_coefficients(times: Array, shapes: Array, periodic: bool) -> Array:
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(times, shapes, bc_type="periodic" if periodic else "not-a-knot")
+    pieces = np.broadcast_to(spline.c[::-1], (len(spline.c), len(times) - 1, shapes.shape[1]))
+    return np.ascontiguousarray(pieces)
