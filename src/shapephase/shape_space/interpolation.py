@@ -1,4 +1,4 @@
-"""Piecewise polynomials through samples: cubic splines, and quintics from rest to rest."""
+"""Curves from samples or coefficients: cubic splines, quintics from rest to rest, Fourier series."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..arrays import Array, check_reach, finite_array
 from ..errors import ShapeError, TrajectoryError
 from ..letters import what_came
 from .ball_columns import ball_columns, factors_between, neighbours_signs
-from .curves import CLOSED, PiecewisePolynomial
+from .curves import CLOSED, Fourier, PiecewisePolynomial
 
 
 def sample_arguments(
@@ -46,6 +46,30 @@ def path_joint_names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[s
     if len(names) != n_shape or len(set(names)) != len(names):
         raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {what_came(names)}")
     return names
+
+
+def joined_names(
+    first: tuple[int, tuple[str, ...] | None], second: tuple[int, tuple[str, ...] | None]
+) -> tuple[str, ...] | None:
+    """Names of two paths that follow each other, by the numbers and names of their joints. Raises TrajectoryError."""
+    if first[0] != second[0]:
+        raise TrajectoryError(f"paths of {first[0]} and {second[0]} joints cannot follow each other")
+    if first[1] and second[1] and first[1] != second[1]:
+        raise TrajectoryError(f"paths with other joints or another order of joints: {first[1]} and {second[1]}")
+    return first[1] or second[1]
+
+
+def fourier_curve(mean: ArrayLike, cosines: ArrayLike, sines: ArrayLike, period: float) -> Fourier:
+    """A Fourier series, its coefficients checked. Raises ShapeError, TrajectoryError."""
+    middle = finite_array(mean, "mean", (None,))
+    a = finite_array(cosines, "cosines", (len(middle), None))
+    b = finite_array(sines, "sines", a.shape)
+    if middle.ndim != 1 or a.ndim != 2 or b.ndim != 2:
+        shapes = f"{middle.shape}, {a.shape} and {b.shape}"
+        raise ShapeError(f"mean (n,), cosines (n, K) and sines (n, K) are needed, got {shapes}")
+    for values, name in ((middle, "mean"), (a, "cosines"), (b, "sines")):
+        check_reach(values, name)
+    return Fourier(middle.copy(), a.copy(), b.copy(), period)
 
 
 def same_shape(a: Array, b: Array) -> bool:

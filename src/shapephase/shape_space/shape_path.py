@@ -17,7 +17,7 @@ from ..arguments import (
     positive_argument,
     times_argument,
 )
-from ..arrays import Array, check_reach, finite_array, lock_arrays, read_only
+from ..arrays import Array, lock_arrays, read_only
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, numbers
 from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError, unknown_name
@@ -28,7 +28,6 @@ from .ball_columns import ball_columns, factors_between
 from .curves import (
     CLOSED,
     Curve,
-    Fourier,
     Function,
     Interpolation,
     Joined,
@@ -43,7 +42,15 @@ from .curves import (
     returned_pair,
     swings_of,
 )
-from .interpolation import path_joint_names, rest_to_rest_curve, same_shape, sample_arguments, spline_curve
+from .interpolation import (
+    fourier_curve,
+    joined_names,
+    path_joint_names,
+    rest_to_rest_curve,
+    same_shape,
+    sample_arguments,
+    spline_curve,
+)
 from .path_series import spline_times
 from .scan.function_scan import DerivedScan, FunctionScan, JoinedScan, check_rates, path_function
 from .scan.scanning import scanned
@@ -76,7 +83,7 @@ class ShapePath:
     loops : the path is its first `duration / loops` seconds, this many times
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
-    scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
+    scanner : derives `scan` from the scan of the path that this one was made of; None: the path itself is scanned
     origin : how it follows from recorded samples; None: these are the values at its knots, or there are none
 
     Examples
@@ -110,7 +117,7 @@ class ShapePath:
         *,
         joint_names: Sequence[str] | None = None,
     ) -> ShapePath:
-        """The closed loop r = mean + sum_k a_k cos(2 pi k t/T) + b_k sin(2 pi k t/T), k = 1 ... K.
+        """Closed loop r = mean + sum_k a_k cos(2 pi k t/T) + b_k sin(2 pi k t/T), k = 1 ... K.
 
         Parameters
         ----------
@@ -119,22 +126,13 @@ class ShapePath:
         duration : T [s]
         joint_names : n names, to be matched with a body's by name
         """
-        middle = finite_array(mean, "mean", (None,))
-        a = finite_array(cosines, "cosines", (len(middle), None))
-        b = finite_array(sines, "sines", a.shape)
-        if middle.ndim != 1 or a.ndim != 2 or b.ndim != 2:
-            shapes = f"{middle.shape}, {a.shape} and {b.shape}"
-            raise ShapeError(f"mean (n,), cosines (n, K) and sines (n, K) are needed, got {shapes}")
-        for values, name in ((middle, "mean"), (a, "cosines"), (b, "sines")):
-            check_reach(values, name)
-        period = positive_argument(duration)
-        curve = Fourier(middle.copy(), a.copy(), b.copy(), period)
+        curve = fourier_curve(mean, cosines, sines, positive_argument(duration))
         return ShapePath(
             curve,
-            period,
-            breaks=np.array([0.0, period]),
-            n_shape=len(middle),
-            joint_names=path_joint_names(joint_names, len(middle)),
+            curve.period,
+            breaks=np.array([0.0, curve.period]),
+            n_shape=len(curve.mean),
+            joint_names=path_joint_names(joint_names, len(curve.mean)),
             # Harmonics that are all multiples of one number make a shorter loop, repeated.
             loops=max(1, int(np.gcd.reduce(curve.occupied))),
         )
@@ -143,13 +141,13 @@ class ShapePath:
     def spline(
         times: ArrayLike, shapes: ArrayLike, periodic: bool | None = None, *, joint_names: Sequence[str] | None = None
     ) -> ShapePath:
-        """The C2 cubic spline through samples; its knots are its breaks.
+        """C2 cubic spline through samples; its knots are its breaks.
 
         Parameters
         ----------
         times : (N,) ascending [s]; the path starts at 0, so times are shifted
-        shapes : (N, n) [rad or m]; the numbers of ball joints, which names tell, are taken with the sign that is
-            nearer to the sample before: a quaternion and its negative are one turn
+        shapes : (N, n) [rad or m]; quaternions of ball joints, known by their names, get the sign that is nearer to the
+            sample before
         periodic : smooth where the end meets the start; None: when the last sample equals the first to 1e-9.
             Otherwise the ends are not-a-knot.
 
@@ -180,15 +178,15 @@ class ShapePath:
         *,
         joint_names: Sequence[str] | None = None,
     ) -> ShapePath:
-        """A path given by a function of times (N,) that returns shapes (N, n) and rates (N, n).
+        """Path given by a function of times (N,) that returns shapes (N, n) and rates (N, n).
 
         Parameters
         ----------
         breaks : interior times where a derivative jumps [s]; the function is evaluated just inside them
 
-        Before a body follows it, the path is looked at once, at some 5,500 times (`scan`). Whatever is wider than
-        1/2,000 of the duration is found; what is narrower and leaves the shape as it was has to be declared as a
-        break. Kinks are located and taken as breaks, with a warning.
+        Before a body follows it, the path is sampled once at some 5,500 times (`scan`). Features wider than 1/2,000 of
+        the duration are found; a narrower one that leaves the shape as it was has to be declared as a break. Kinks are
+        located and taken as breaks, with a warning.
 
         Raises
         ------
@@ -207,40 +205,40 @@ class ShapePath:
         return path
 
     def shape(self, t: ArrayLike) -> Array:
-        """r(t): times (...) of [0, duration] -> (..., n) [rad or m]. Raises TrajectoryError outside."""
+        """Shapes r(t): times (...) of [0, duration] -> (..., n) [rad or m]. Raises TrajectoryError outside."""
         return self._evaluated(t)[0]
 
     def rate(self, t: ArrayLike) -> Array:
-        """r'(t): times (...) of [0, duration] -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
+        """Rates r'(t): times (...) of [0, duration] -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
         return self._evaluated(t)[1]
 
     def acceleration(self, t: ArrayLike) -> Array:
-        """r''(t): times (...) of [0, duration] -> (..., n) [rad/s^2 or m/s^2]; at a break that of what follows.
+        """Accelerations r''(t): times (...) of [0, duration] -> (..., n) [rad/s^2 or m/s^2]; at a break the later one.
 
-        Exact, but of a path known only as a function: there by its rates as the scan resolved them. Raises
-        TrajectoryError outside, and as `scan`.
+        They are exact, but for functions: there they follow from the rates that the scan resolved. Raises
+        TrajectoryError outside, and the errors of `scan`.
         """
         times = times_argument(t, self.duration)
-        found = exact_accelerations(self.curve, times.ravel())
-        if found is None:
-            found = resolved_accelerations(self._scan.resolved, self.loops, times.ravel())
-        return found.reshape(*times.shape, self.n_shape)
+        accelerations = exact_accelerations(self.curve, times.ravel())
+        if accelerations is None:
+            accelerations = resolved_accelerations(self._scan.resolved, self.loops, times.ravel())
+        return accelerations.reshape(*times.shape, self.n_shape)
 
     def at_samples(self, times: Array) -> tuple[Array, Array]:
-        """What `curve` gives at times at which a body is sampled, read-only: kept for the next momentum or body."""
+        """Shapes and rates at times at which a body is sampled, read-only: kept for the next momentum or body."""
         return self._seen(self.curve, times)
 
     @cached_property
     def swings(self) -> Swings:
-        """How often the path can swing between two breaks, and whether one loop goes on smoothly in the next."""
+        """Largest number of swings between two breaks, and whether one loop goes on smoothly in the next."""
         most, smooth = swings_of(self.curve)
         return Swings(most / self.loops, len(self.breaks) == 2) if smooth and most is not None else Swings(most)
 
     @property
     def smoothness(self) -> Smoothness:
-        """Of whatever depends smoothly on shapes and rates."""
+        """Smoothness of quantities that depend smoothly on shapes and rates."""
         if not self.n_shape:
-            # A rigid body: nothing moves, however many samples say so.
+            # A rigid body.
             return Smoothness(breaks=self.breaks[[0, -1]], oscillations=0.0)
         scan = self.scan
         breaks = self.breaks
@@ -257,10 +255,7 @@ class ShapePath:
 
     @property
     def scan(self) -> FunctionScan | None:
-        """What one look at a path known only as a function found, and what it cost; None for the known kinds.
-
-        Of a path repeated, that of its first loop. Found once, when it is first needed, and kept: paths made of this
-        one do not look again.
+        """Scan of the first loop of a path known only as a function, kept for paths made of it; else None.
 
         Raises
         ------
@@ -272,7 +267,7 @@ class ShapePath:
         Warns
         -----
         UndeclaredBreakWarning
-            Of kinks that were not declared.
+            For kinks that were not declared.
         """
         return self._scan if self.swings.most is None else None
 
@@ -286,19 +281,19 @@ class ShapePath:
 
     @property
     def gap(self) -> Array:
-        """Where the path ends, seen from where it begins: (n,) [rad or m]; zero for a loop."""
+        """End of the path minus its start: (n,) [rad or m]; zero for a loop."""
         ends, _ = self.curve(np.array([0.0, self.duration]))
         return ends[1] - ends[0]
 
     def reversed(self) -> ShapePath:
-        """The same shapes in the opposite order of time."""
+        """The path backwards in time."""
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
         curve = Reversed(self.curve, self.duration)
         return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"), origin=None)
 
     def stretched(self, factor: float) -> ShapePath:
-        """The same shapes, `factor` times as slowly."""
+        """The path `factor` times as slowly."""
         scale = positive_argument(factor, "factor", "a number")
         duration = self.duration * scale
         breaks = self.breaks * scale
@@ -318,7 +313,7 @@ class ShapePath:
         TrajectoryError
             If the joints differ, or `other` starts at another shape than the one where this path ends.
         """
-        names = _joined_names(self, other)
+        names = joined_names((self.n_shape, self.joint_names), (other.n_shape, other.joint_names))
         end, start = self.shape(self.duration), other.shape(0.0)
         factors = factors_between(end, start, ball_columns(names))
         start = start * factors
@@ -334,14 +329,8 @@ class ShapePath:
         breaks[-1] = duration
         following = other.curve if np.all(factors == 1.0) else Multiplied(other.curve, factors)
         curve = Joined(self.curve, self.duration, following, other.duration, offset)
-        return ShapePath(
-            curve,
-            duration,
-            breaks,
-            self.n_shape,
-            names,
-            scanner=JoinedScan([self, other]) if following is other.curve else None,
-        )
+        scanner = JoinedScan([self, other]) if following is other.curve else None
+        return ShapePath(curve, duration, breaks, self.n_shape, names, scanner=scanner)
 
     def repeated(self, count: int) -> ShapePath:
         """The loop `count` times in a row.
@@ -349,8 +338,7 @@ class ShapePath:
         Raises
         ------
         OpenPathError
-            If the path does not end where it begins (to whole turns of joints, and signs of quaternions of ball joints,
-            which jump at the ends of loops, where they mean the same turn).
+            If the path does not end where it begins, up to whole turns of joints, and signs of quaternions.
         """
         if not isinstance(count, int | float | np.number) or not np.isfinite(count) or count < 1 or count % 1:
             raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {what_came(count)}")
@@ -359,7 +347,8 @@ class ShapePath:
         turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN
         if not same_shape(gap, turns):
             joint = int(np.argmax(np.abs(gap - turns)))
-            raise OpenPathError(f"only a loop can be repeated; joint {self._joint(joint)} ends {gap[joint]:.9g} off")
+            name = self.joint_names[joint] if self.joint_names else f"number {joint}"
+            raise OpenPathError(f"only a loop can be repeated; joint {name} ends {gap[joint]:.9g} off")
         starts = self.duration * np.arange(count)
         breaks = np.concatenate([*(start + self.breaks[:-1] for start in starts), [count * self.duration]])
         if self.swings.smooth_loop:
@@ -377,11 +366,9 @@ class ShapePath:
 
     @cached_property
     def sample_times(self) -> Array:
-        """Times of a table that describes the path: (N,) [s].
+        """Times of a table whose cubic spline is the path to 1e-9 rad or m, or of its largest value above 1: (N,) [s].
 
-        The cubic spline through the samples, as a reader of the table makes it, is the path to 1e-9 rad or m (of its
-        largest value where that is above 1): a spline's own knots, some 400 times for each swing of a series, and ever
-        nearer ones towards a kink.
+        These are a spline's own knots, some 400 times for each swing of a series, and ever nearer ones towards a kink.
 
         Raises
         ------
@@ -391,7 +378,7 @@ class ShapePath:
         return read_only(spline_times(self))
 
     def matched(self, joint_names: Sequence[str], owner: str) -> ShapePath:
-        """The same path with its columns in the order of `joint_names`, found by name where the path has names.
+        """The path with its columns in the order of `joint_names`, matched by name where the path has names.
 
         Raises
         ------
@@ -403,11 +390,11 @@ class ShapePath:
         """
         expected = tuple(joint_names)
         if self.joint_names is None:
-            if self.n_shape != len(expected):
-                raise TrajectoryError(
-                    f"the path has {self.n_shape} joints, {owner} has {len(expected)}: {', '.join(expected)}"
-                )
-            return self
+            if self.n_shape == len(expected):
+                return self
+            raise TrajectoryError(
+                f"the path has {self.n_shape} joints, {owner} has {len(expected)}: {', '.join(expected)}"
+            )
         for name in self.joint_names:
             if name not in expected:
                 raise unknown_name(f"joint of {owner}", name, expected)
@@ -421,7 +408,7 @@ class ShapePath:
         return replace(self, curve=curve, joint_names=expected, scanner=DerivedScan(self, "reordered", (order,)))
 
     def _card(self) -> Card:
-        """How long it is, which joints move by how much, whether it closes; with its joints in time."""
+        """Duration, joints that move, widest joint and closure, with a picture of the joints in time."""
         try:
             shapes = self.shape(np.linspace(0.0, self.duration, MOST_POINTS))
         except ShapePhaseError as error:
@@ -438,9 +425,6 @@ class ShapePath:
             ("closes", "yes" if gap <= CLOSED else f"no, by {gap:.4g} rad or m"),
         ]
         return Card("ShapePath", rows, curves_picture(shapes, "joints in time") if self.n_shape else "")
-
-    def _joint(self, column: int) -> str:
-        return self.joint_names[column] if self.joint_names else f"number {column}"
 
     def _evaluated(self, t: ArrayLike) -> tuple[Array, Array]:
         times = times_argument(t, self.duration)
@@ -463,14 +447,3 @@ def interpolated(
 def _piecewise(curve: PiecewisePolynomial, joint_names: Sequence[str] | None) -> ShapePath:
     n_shape = curve.coefficients.shape[2]
     return ShapePath(curve, float(curve.knots[-1]), curve.knots, n_shape, path_joint_names(joint_names, n_shape))
-
-
-def _joined_names(first: ShapePath, second: ShapePath) -> tuple[str, ...] | None:
-    if first.n_shape != second.n_shape:
-        raise TrajectoryError(f"paths of {first.n_shape} and {second.n_shape} joints cannot follow each other")
-    named = {path.joint_names for path in (first, second)} - {None}
-    if len(named) > 1:
-        raise TrajectoryError(
-            f"paths with other joints or another order of joints: {first.joint_names} and {second.joint_names}"
-        )
-    return named.pop() if named else None
