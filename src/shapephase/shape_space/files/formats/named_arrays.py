@@ -1,4 +1,4 @@
-"""Arrays by name, as in files of MATLAB and HDF5: which of them are the times and the joints."""
+"""Arrays by name, as in files of MATLAB and HDF5, as columns of times and joints."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def arrays_table(
     *,
     ordered: bool = True,
 ) -> Table:
-    """The table that arrays by name hold: vectors of one length, or a matrix beside the names of its columns.
+    """Table of arrays by name: vectors of one length, or a matrix beside the names of its columns.
 
     entries : name -> array of numbers, list of texts, or entries of a structure
     chosen : the structure that has the motion; None: the arrays on top, or the only structure
-    ordered : whether entries stand in the order in which they were written
+    ordered : True if entries stand in the order in which they were written
 
     Raises TrajectoryError, UnknownNameError if there is no motion, more than one, or no such structure.
     """
@@ -62,14 +62,26 @@ def arrays_table(
                 f"{where}: {kind} keeps no order of names, and {turns[0]!r} is one of three turns in the order of "
                 "their columns; write the quaternion in columns .x, .y, .z, .w, or a matrix beside joint_names"
             )
-        columns = columns or _vectors(where, inside)
+        columns = columns or [
+            (name, vector) for name, value in inside.items() if (vector := _vector(where, name, value)) is not None
+        ]
         if columns:
             base = _base_columns(where, inside)
             of_base = {label: units[name] for label, name, _ in base if units and name in units}
             read = {*used, *(label for label, _ in columns), *(name for _, name, _ in base)}
             columns += [(label, values) for label, _, values in base]
             table = column_table(where, kind, columns, units={**(units or {}), **of_base}, row="sample")
-            return _with_unread(table, {name: value for name, value in inside.items() if name not in read})
+            unread = {name: value for name, value in inside.items() if name not in read}
+            # Matrices as long as the columns, whose columns have no names.
+            unnamed = [
+                name
+                for name in _MATRICES
+                if isinstance(value := unread.get(name), np.ndarray)
+                and value.ndim > 1
+                and len(table.rows) in value.shape
+            ]
+            described = {name: _described(value) for name, value in unread.items()}
+            return replace(table, unread=described, unnamed=unnamed)
         groups = {name: value for name, value in inside.items() if isinstance(value, Mapping)}
         if len(groups) != 1:
             break
@@ -84,43 +96,26 @@ def arrays_table(
     )
 
 
-def _with_unread(table: Table, entries: Mapping[str, Any]) -> Table:
-    """The table, and what else there is beside its columns."""
-    unread = {name: _described(value) for name, value in entries.items()}
-    unnamed = [
-        name
-        for name in _MATRICES
-        if isinstance(value := entries.get(name), np.ndarray) and value.ndim > 1 and len(table.rows) in value.shape
-    ]
-    return replace(table, unread=unread, unnamed=unnamed)
-
-
 def _matrix(where: str, entries: Mapping[str, Any]) -> tuple[list[tuple[object, Any]], tuple[str, ...]]:
     """The columns of a matrix that has names, and of vectors as long as it; and which entries these are."""
     named = next((key for key in _NAMES if _are_texts(entries.get(key))), None)
-    found = [key for key in _MATRICES if isinstance(value := entries.get(key), np.ndarray) and value.ndim == 2]
-    if named is None or not found:
+    key = next((key for key in _MATRICES if isinstance(v := entries.get(key), np.ndarray) and v.ndim == 2), None)
+    if named is None or key is None:
         return [], ()
-    matrix, names = entries[found[0]], entries[named]
+    matrix, names = entries[key], entries[named]
     if matrix.shape[1] != len(names):
-        raise TrajectoryError(f"{where}: {found[0]} has {matrix.shape[1]} columns, and there are {len(names)} names")
+        raise TrajectoryError(f"{where}: {key} has {matrix.shape[1]} columns, and there are {len(names)} names")
     others = [
         (name, vector)
         for name, value in entries.items()
-        if name != found[0] and (vector := _vector(where, name, value)) is not None and len(vector) == len(matrix)
+        if name != key and (vector := _vector(where, name, value)) is not None and len(vector) == len(matrix)
     ]
-    return [*others, *((name, matrix[:, k]) for k, name in enumerate(names))], (named, found[0])
-
-
-def _vectors(where: str, entries: Mapping[str, Any]) -> list[tuple[object, Any]]:
-    """Vectors as long as the longest; single numbers, such as a sampling rate, are none."""
-    found = ((name, _vector(where, name, value)) for name, value in entries.items())
-    return [(name, vector) for name, vector in found if vector is not None]
+    return [*others, *((name, matrix[:, k]) for k, name in enumerate(names))], (named, key)
 
 
 def _base_columns(where: str, entries: Mapping[str, Any]) -> list[tuple[str, str, Any]]:
-    """Label, matrix and values of the columns that say where the base is and how it is turned."""
-    found: list[tuple[str, str, Any]] = []
+    """Label, matrix and values of the columns of the base's place and attitude."""
+    columns: list[tuple[str, str, Any]] = []
     for name, labels in _OF_THE_BASE.items():
         if name not in entries:
             continue
@@ -129,15 +124,14 @@ def _base_columns(where: str, entries: Mapping[str, Any]) -> list[tuple[str, str
             raise TrajectoryError(
                 f"{where}: {name} is {_described(value)}; a matrix of {len(labels)} columns is needed"
             )
-        found += [(label, name, value[:, k]) for k, label in enumerate(labels)]
-    return found
+        columns += [(label, name, value[:, k]) for k, label in enumerate(labels)]
+    return columns
 
 
 def _vector(where: str, name: str, value: Any) -> Any:
-    """A vector of two entries or more, a matrix of one row or column among them; None for anything else.
+    """A vector of two entries or more, also a matrix of one row or column; None for anything else.
 
-    Raises TrajectoryError for one of complex numbers. Those of true and false are kept as they are: where one is used,
-    the table says that these are no numbers.
+    Raises TrajectoryError for complex numbers. Vectors of true and false are kept: a table reports them where used.
     """
     if not isinstance(value, np.ndarray) or value.size < 2 or value.size != max(value.shape, default=0):
         return None
@@ -157,12 +151,12 @@ def _described(value: Any) -> str:
 
 
 def is_hdf5(data: bytes) -> bool:
-    """Whether bytes begin as HDF5."""
+    """True for bytes that begin as HDF5 does."""
     return any(data[start : start + len(_MAGIC)] == _MAGIC for start in _STARTS)
 
 
 def read_hdf5(where: Path, data: bytes, chosen: str | None) -> Table:
-    """Motion in an HDF5 file, its arrays as those of a `.mat` file; the attribute `units` of one says its unit.
+    """Motion in an HDF5 file, its arrays as those of a `.mat` file; the attribute `units` of one is its unit.
 
     Raises TrajectoryError, UnknownNameError, MissingExtraError for faults; for a structure that is not there; without
     h5py.
@@ -182,8 +176,8 @@ def read_hdf5(where: Path, data: bytes, chosen: str | None) -> Table:
         if isinstance(item, h5py.Group):
             inside[name] = {}
             return
-        said = item.attrs.get("units", item.attrs.get("unit", ""))
-        unit = unit_of(said.decode() if isinstance(said, bytes) else str(said))
+        stated = item.attrs.get("units", item.attrs.get("unit", ""))
+        unit = unit_of(stated.decode() if isinstance(stated, bytes) else str(stated))
         if unit is not None:
             units[name] = unit
         is_text = h5py.check_string_dtype(item.dtype) is not None

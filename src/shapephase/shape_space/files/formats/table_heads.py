@@ -1,4 +1,4 @@
-"""What stands above the numbers of a table: names of columns, units, comments; or nothing."""
+"""Heads of tables: names of columns, units, comments, or nothing; and the five rows of Vicon Nexus."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _FRAMES = ("Frame", "Sub Frame")
 
 
 class Head(NamedTuple):
-    """What the first rows of a table say.
+    """Content of the first rows of a table.
 
     names : of the columns; empty where a column has none
     units : name -> unit, of a row of units
     skipped : rows before the first one of numbers
-    numbered : whether no names are there, and columns are called by their numbers from 1
+    numbered : True if there are no names, and columns are called by their numbers from 1
     """
 
     names: tuple[str, ...]
@@ -64,12 +64,12 @@ def head_of(rows: Sequence[Sequence[str]], comment: Sequence[str] | None, where:
 
 
 def numbers(count: int) -> tuple[str, ...]:
-    """What columns without names are called."""
+    """Labels of columns without names: their numbers from 1."""
     return tuple(str(k + 1) for k in range(count))
 
 
 def is_value(entry: str) -> bool:
-    """Whether an entry is a number, a date or a time of day, no name."""
+    """True for an entry that is a number, a date or a time of day, no name."""
     return any(kind.fullmatch(entry) for kind in (_NUMBER, COMMA_NUMBER, DATE, CLOCK))
 
 
@@ -83,11 +83,9 @@ def check_names(names: Sequence[str], where: str) -> None:
 
 def unit_row(names: Sequence[str], entries: Sequence[str]) -> dict[str, str] | None:
     """Name -> unit, where a row has nothing but units, and at least one; else None."""
-    said = [(name, entry.strip()) for name, entry in zip(names, entries) if entry.strip()]
-    found = {name: unit_of(entry.strip("[]() ")) for name, entry in said if entry not in _NO_UNIT_CELLS}
-    if not found or None in found.values():
-        return None
-    return {name: unit for name, unit in found.items() if unit is not None}
+    cells = [(name, entry.strip()) for name, entry in zip(names, entries) if entry.strip() not in ("", *_NO_UNIT_CELLS)]
+    units = {name: unit for name, cell in cells if (unit := unit_of(cell.strip("[]() "))) is not None}
+    return units if units and len(units) == len(dict(cells)) else None
 
 
 def _named(names: Sequence[str], skipped: int, rows: Sequence[Sequence[str]], where: str) -> Head:
@@ -97,13 +95,13 @@ def _named(names: Sequence[str], skipped: int, rows: Sequence[Sequence[str]], wh
 
 
 def _counts(row: Sequence[str]) -> bool:
-    """Whether entries are 0, 1, 2 and so on, as pandas numbers columns without names; the first may be empty."""
+    """True for entries 0, 1, 2 and so on, as pandas numbers columns without names; the first may be empty."""
     own = row if row[0] else row[1:]
     return len(own) > 1 and [*own] == [str(k) for k in range(len(own))]
 
 
 class NexusHead(NamedTuple):
-    """The head of a section.
+    """Head of a section of a Nexus table.
 
     names : of the columns, `KneeAngles_x` of the subject's `KneeAngles` and its axis X
     units : name -> unit
@@ -133,14 +131,16 @@ def nexus_head(text: bytes, lines: list[str], start: int, section: str | None, w
             )
         return None
     whole = text.decode().split("\n")
-    found = {_kind(whole[k], delimiter): k for k in range(len(whole)) if _begins(whole, k, delimiter)}
-    if section is not None and section.lower() not in found:
-        raise unknown_name(f"section of {where}", section, [kind.title() for kind in found])
-    if section is None and len(found) > 1:
-        listed = ", ".join(kind.title() for kind in found)
-        one = next(iter(found)).title()
-        raise TrajectoryError(f"{where}: several sections, {listed}; choose one with topic={one!r} (--topic '{one}')")
-    place = found[section.lower()] if section is not None else start
+    sections = {_kind(whole[k], delimiter): k for k in range(len(whole)) if _begins(whole, k, delimiter)}
+    titles = [kind.title() for kind in sections]
+    if section is not None and section.lower() not in sections:
+        raise unknown_name(f"section of {where}", section, titles)
+    if section is None and len(sections) > 1:
+        raise TrajectoryError(
+            f"{where}: several sections, {', '.join(titles)}; choose one with topic={titles[0]!r} (--topic "
+            f"'{titles[0]}')"
+        )
+    place = sections[section.lower()] if section is not None else start
     rows = [next(csv.reader([whole[place + k]], delimiter=delimiter)) for k in range(_HEAD)]
     width = max(len(row) for row in rows)
     titles, axes, units = ([entry.strip() for entry in row] + [""] * (width - len(row)) for row in rows[2:])
@@ -159,7 +159,7 @@ def _kind(line: str, delimiter: str) -> str:
 
 
 def _begins(lines: list[str], place: int, delimiter: str) -> bool:
-    """Whether a section begins in a line: its kind, a rate below it, and then the names and `Frame`."""
+    """True where a section begins in a line: its kind, a rate below it, and then the names and `Frame`."""
     if place + _HEAD >= len(lines) or _kind(lines[place], delimiter) not in _KINDS:
         return False
     rate = lines[place + 1].split(delimiter)[0].strip().strip('"')
