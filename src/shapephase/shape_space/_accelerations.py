@@ -65,7 +65,7 @@ def exact_accelerations(curve: Curve, times: Array) -> Array | None:
 
 
 def resolved_accelerations(resolved: ResolvedPath, loops: int, times: Array) -> Array:
-    """The same by the derivative of the series of the rates, of a path in loops from those of the first: (N, n)."""
+    """Accelerations by the derivative of the series of the rates, of all loops by the first one: (N, n)."""
     n_shape, edges = resolved.coefficients.shape[2] // 2, resolved.edges
     rates = PiecewiseChebyshev(edges, _continuous(resolved.coefficients[:, :, n_shape:], edges))
     loop = np.minimum(np.floor(times / resolved.duration), loops - 1)

@@ -45,7 +45,7 @@ def users_route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
 def path_gap(body: Body | ParticleBody, path: ShapePath) -> Array:
     """Where the path ends, seen from where it begins, whole turns of continuous joints taken off: (n,).
 
-    Of a ball joint by quaternions of length one, whose sign is that of the start.
+    Ball joints count by quaternions of length one, with the sign of the start.
     """
     gap = path.gap
     if not isinstance(body, ParticleBody) and body.chain.follows.balls:
@@ -90,7 +90,7 @@ def channels_along(body: Body | ParticleBody, path: ShapePath, times: Array) -> 
 
 
 def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array | None:
-    """The same at shapes and rates (N, n); None for particles, too, which have no links, and for ball joints."""
+    """Channels at shapes and rates (N, n); None without machine code, links or rows, and for ball joints."""
     if isinstance(body, ParticleBody) or not body.chain.has_rows or not machine_code.is_used():
         return None
     return tree_channels(body.chain.rows, shapes, rates)
@@ -116,5 +116,5 @@ class FamilyVariants:
         return many_inverted(*self._family.some(rows).sample(shapes, rates), times)
 
     def alone(self, row: int) -> Sampler:
-        """Of one of them."""
+        """Sampler of one of them."""
         return path_sampler(self._family[row], self._path)

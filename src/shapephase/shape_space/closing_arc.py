@@ -1,4 +1,4 @@
-"""The geodesic that closes a recorded path, and how it answers to the path that it closes."""
+"""The geodesic that closes a recorded path, and its derivatives by that path."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ClosingArc:
 
     @cached_property
     def speed(self) -> float:
-        """Of the path, rms [kg^(1/2) m/s]."""
+        """Rms speed of the path [kg^(1/2) m/s]."""
         speeds = shape_speed(self.body, *self.opened.curve(self.opened.breaks))
         return float(np.sqrt(np.mean(speeds**2)))
 

@@ -74,7 +74,7 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordin
 
     A small square of side e in the joints i, j, gone round from i to j, turns the body by exp(-e^2 F_ij).
 
-    Of rates, with e_a the directions in which one of them is 1, it is F(e_a, e_b) = e_a(A_b) - e_b(A_a) - A([e_a, e_b])
+    For rates, e_a the directions in which one of them is 1, it is F(e_a, e_b) = e_a(A_b) - e_b(A_a) - A([e_a, e_b])
     - A_a x A_b: those of a ball joint do not commute, [e_x, e_y] = e_z and so on.
 
     Parameters

@@ -39,7 +39,7 @@ def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, toleranc
 
     Parameters
     ----------
-    shapes : (..., n) where to look [rad or m]; None: at 16 random shapes, always the same, spread over the joint
+    shapes : (..., n) to be examined [rad or m]; None: 16 random shapes, always the same, spread over the joint
         limits, and over a whole turn (or 2 pi m) where a joint has none
     tolerance : of each F_ij relative to |d_i A_j| + |d_j A_i| + |A_i| |A_j|, the terms that it is the difference of;
         beyond that only what rounding leaves of them is taken for zero: wheels too small to turn the body by a

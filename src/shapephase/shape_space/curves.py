@@ -50,7 +50,7 @@ def most_swings(counts: Sequence[float | None]) -> float | None:
 
 
 class KeptValues:
-    """What a curve is at sets of times that are asked for again and again; too many, and all are forgotten."""
+    """Values of a curve at sets of times that are used repeatedly; all are dropped when there are too many."""
 
     def __init__(self) -> None:
         self._known: dict[bytes, tuple[Array, Array]] = {}
@@ -88,7 +88,7 @@ class Fourier:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         harmonics, weights = self._weights
         phase = times[:, None] * harmonics
         both = np.concatenate([np.cos(phase), np.sin(phase)], axis=1) @ weights
@@ -134,7 +134,7 @@ class PiecewisePolynomial:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         piece = np.searchsorted(self.knots[1:-1], times, side="right")
         since = (times - self.knots[piece])[:, None]
         shapes, rates = np.zeros((2, len(times), self.coefficients.shape[2]))
@@ -147,7 +147,7 @@ class PiecewisePolynomial:
 
 
 def polynomial_pieces(curve: Curve) -> PiecewisePolynomial | None:
-    """The same curve as polynomials between knots; None where it is none."""
+    """Polynomials between knots that are the curve; None for other curves."""
     if isinstance(curve, PiecewisePolynomial):
         return curve
     if isinstance(curve, Joined):
@@ -235,7 +235,7 @@ class Function:
         return self
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = returned_pair(self.f(times))
         expected_shape = (len(times), self.n_shape)
         for name, part in (("shapes", shapes), ("rates", rates)):
@@ -260,7 +260,7 @@ class Reversed:
     __repr__ = short_repr
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = self.curve(self.duration - times)
         return shapes, -rates
 
@@ -276,7 +276,7 @@ class Stretched:
     __repr__ = short_repr
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = self.curve(np.minimum(times / self.factor, self.duration))
         return shapes, rates / self.factor
 
@@ -293,7 +293,7 @@ class Reordered:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = self.curve(times)
         return shapes[:, self.order], rates[:, self.order]
 
@@ -310,7 +310,7 @@ class Multiplied:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = self.curve(times)
         return shapes * self.factors, rates * self.factors
 
@@ -328,7 +328,7 @@ class Widened:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = np.zeros((2, len(times), self.n_shape))
         shapes[:, self.columns], rates[:, self.columns] = self.curve(times)
         return shapes, rates
@@ -349,7 +349,7 @@ class Joined:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         late = times >= self.first_duration
         shapes, rates = (np.empty((len(times), len(self.offset))) for _ in range(2))
         shapes[~late], rates[~late] = self.first(times[~late])
@@ -373,7 +373,7 @@ class Repeated:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         # Compared with the very numbers that stand in the breaks, so that a time just before one stays in its loop.
         starts = self.period * np.arange(self.count)
         loop = np.searchsorted(starts, times, side="right") - 1

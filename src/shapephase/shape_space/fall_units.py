@@ -1,4 +1,4 @@
-"""What a measured fall says about the units of a recording: 9.81 m/s^2 over it, against slips that are usual."""
+"""Errors of units in a recording that a measured fall shows: 9.81 m/s^2 over it, against slips that are usual."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def check_parabola(times: Array, centres: Array, noise: float, gravity: float, w
             TrajectoryWarning,
             stacklevel=6,
         )
-    # What is not bent has no weight, or is too short to tell.
+    # What is not bent has no weight, or is too short to be compared.
     elif size > _BARS * bar:
         _check(size, bar, gravity, 1.0 / float(np.median(np.diff(times))), where)
 
@@ -71,7 +71,7 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
             if found is None:
                 continue
             time = lasts(seen, found.ends) / trial.times
-            # In the lengths of the file, too: whatever moves smoothly bends a little, and looks like a slow fall.
+            # In the lengths of the file, too: whatever moves smoothly bends a little, and resembles a slow fall.
             if is_long(found, seen, trial.lengths) and found.gravity > _SEEN * found.gravity_bar:
                 falls.append((time, found.off / found.gravity, found))
     if not falls:

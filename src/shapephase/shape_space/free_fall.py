@@ -1,7 +1,7 @@
 """The stretch of a recording on which the body falls freely: its centre of mass accelerates as gravity alone makes it.
 
 Less what gravity does, the centre of mass then goes along a straight line. Up is one direction for the whole recording:
-the one that is given, else that axis of the recorder with the longest fall. No axis points down unless that is said:
+the one that is given, else that axis of the recorder with the longest fall. No axis points down unless that is given:
 what accelerates upwards by g pushes off, or lands.
 """
 
@@ -17,7 +17,7 @@ from ..errors import TrajectoryError
 
 GRAVITY = 9.81  # [m/s^2] on earth within 0.25 %: a millimetre in a second
 _MODEL = 0.002  # [m] wander of a centre of mass computed from a body's masses as its shape changes
-_CLEAR = 5.0  # noise levels that a body at rest leaves on a window, to tell it from one that falls
+_CLEAR = 5.0  # noise levels that a body at rest leaves on a window, in contrast to one that falls
 _OF_A_PARABOLA = 1.0 / (6.0 * np.sqrt(5.0))  # rms of t^2 about its best line on a window of length 1
 _CHANCE = 4.0  # standard deviations of a window's mean square above that of the noise
 _BAND = 3.0  # standard deviations of single samples off the line, at the ends of the fall
@@ -95,7 +95,7 @@ def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None
     up : the axis that points up, one of UP_AXES; None: x, y or z, whichever has the longest fall
     gravity : [m/s^2]
 
-    Raises TrajectoryError if there is none that is long enough to tell it from rest; or, without `up`, if a longer one
+    Raises TrajectoryError if there is none that is long enough to differ from rest; or, without `up`, if a longer one
     has an axis that points down.
     """
     noise = centre_noise(times, centres)
@@ -144,7 +144,7 @@ def falls_along(times: Array, centres: Array, up: str, gravity: float) -> FreeFa
 
 
 def _shortest(noise: float, gravity: float) -> float:
-    """How long a fall has to be to be told from rest [s]."""
+    """Shortest fall that differs from rest [s]."""
     return float(np.sqrt(_CLEAR * noise / (0.5 * gravity * _OF_A_PARABOLA)))
 
 
@@ -211,7 +211,7 @@ def measured_fall(times: Array, centres: Array, noise: float) -> tuple[Array, fl
 
 
 def _white_noise(times: Array, centres: Array) -> float:
-    """Of a coordinate, by how far four neighbours are off every parabola: in the median smooth motion counts little."""
+    """Noise of a coordinate, by the median distance of four neighbours from every parabola: motion counts little."""
     if len(times) < 4:
         return 0.0
     four = np.stack([times[k : len(times) - 3 + k] for k in range(4)], axis=1)
@@ -250,7 +250,7 @@ def lasts(times: Array, ends: tuple[int, int]) -> float:
 def _bounded(
     times: Array, straight: Array, first: int, last: int, noise: float, window: float, gravity: float
 ) -> tuple[int, int] | None:
-    """The same stretch with its ends where the line is left, less what a contact may last unseen."""
+    """The stretch with its ends where the line is left, less the time of a hidden contact."""
     cut = float(np.sqrt(2.0 * _CUT * noise / gravity))
     start = _end_of_line(-times[::-1], straight[::-1], len(times) - 1 - first, noise, window)
     ends = (len(times) - 1 - start, _end_of_line(times, straight, last, noise, window))

@@ -133,8 +133,8 @@ def likeliest(
 ) -> LinearSmoother:
     """The smoother of the penalties that are likeliest for samples whose noise is known.
 
-    Of the spline as a random function, whose derivative of the order is white noise of the variance noise^2/penalty:
-    the penalty is the one of the greatest likelihood of what the samples say beyond a polynomial.
+    The spline is taken as a random function, whose derivative of the order is white noise of the variance
+    noise^2/penalty: the penalty has the greatest likelihood of the samples beyond a polynomial.
 
     values, noise : (count, n), (n,) [rad or m]; a column without noise is left as it is
     groups : columns that have one penalty together
@@ -213,7 +213,7 @@ class _Roughness:
         """What is penalized at all: all but constants, or polynomials below the order."""
 
     def penalty_of(self, width: float) -> float:
-        """Of a width in steps of time: what swings with it, in radians a step, is halved [s^(2 order - 1)]."""
+        """Penalty of a width in steps of time: a swing with it, in radians a step, is halved [s^(2 order - 1)]."""
         return float(width ** (2 * self._order) * self._unit ** (2 * self._order - 1))
 
     def solve_linear(self, penalty: float, right: Array) -> Array:
@@ -223,7 +223,7 @@ class _Roughness:
         return self._with(self._factor(penalty), right)
 
     def likelihood(self, penalty: float, values: Array) -> tuple[Array, float]:
-        """Of values (count, n): y . W (y - S y) of each (n,), and the logarithm of the determinant of the samples'
+        """Misfits y . W (y - S y) of values (count, n): (n,), and the logarithm of the determinant of the samples'
         covariance in units of the noise, but for what no penalty changes."""
         factor = self._factor(penalty)
         weighted = self.weights[:, None] * values
@@ -232,7 +232,7 @@ class _Roughness:
         return (weighted * off).sum(axis=0), determinant - self.modes * float(np.log(self._scaled(penalty)))
 
     def trace(self, penalty: float) -> float:
-        """Of S = (W + penalty K)^-1 W: count minus the slope of half the determinant's logarithm by log r."""
+        """Trace of S = (W + penalty K)^-1 W: count minus the slope of half the determinant's logarithm by log r."""
         step = 1e-3
         ahead, behind = (
             float(np.log(np.abs(self._factor(penalty * factor).U.diagonal())).sum())
@@ -300,7 +300,7 @@ def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
 
     count = len(times) - periodic
     splines = count if periodic else max(count - order, 0)
-    # Of a loop knots go on, round after round.
+    # The knots of a loop go on, round after round.
     rounds = np.arange(splines + order if periodic else count)
     knots_in_turn = times[:count][rounds % count] + times[-1] * (rounds // count)
     first = np.arange(splines)

@@ -51,12 +51,12 @@ class PathErrors:
 
     @property
     def rate(self) -> Array:
-        """The same of their rates: (N, n) [rad/s or m/s]."""
+        """Standard deviations of their rates: (N, n) [rad/s or m/s]."""
         return self._deviations(1)
 
     @property
     def acceleration(self) -> Array:
-        """The same of their accelerations: (N, n) [rad/s^2 or m/s^2]."""
+        """Standard deviations of their accelerations: (N, n) [rad/s^2 or m/s^2]."""
         return self._deviations(2)
 
     def of(self, derivative: Array) -> Array:
@@ -72,7 +72,7 @@ class PathErrors:
 def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) -> PathErrors:
     """How far the joints, their rates and accelerations may be off, by the noise of the samples of a path.
 
-    Of a smoothed recording the bars hold what smoothing leaves of the noise and what it takes off the motion.
+    The bars of a smoothed recording hold the noise that is left and the bias of smoothing.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: Arra
 
 
 def _samples(path: ShapePath) -> PathSamples:
-    """Raises WrongObjectError where a path was put through none, or joints answer to each other."""
+    """Samples of a path. Raises WrongObjectError where it was put through none, or a geodesic couples its joints."""
     found = path_samples(path)
     if found.arc is not None:
         raise WrongObjectError(

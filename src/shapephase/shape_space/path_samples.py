@@ -118,7 +118,7 @@ class PathSamples:
         return self.by_samples(self.by_knots(times, by_shape, by_rate))
 
     def by_knots(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
-        """The same by the values at the knots: (k, knots n)."""
+        """Sums over times of derivatives by shapes and rates, by the values at the knots: (k, knots n)."""
         from scipy.sparse import csc_array
 
         basis = self.basis(times)
@@ -146,7 +146,7 @@ class PathSamples:
     def rows_by_knots(self, times: Array) -> Array:
         """Shape, rate and acceleration of a joint at times (N,), by its own values at the knots: (3, N, knots).
 
-        Of a path that no geodesic closes: there joints answer to each other.
+        No geodesic closes the path: that would couple the joints.
         """
         assert self.arc is None
         basis, count = self.basis(times), len(times)
@@ -188,7 +188,7 @@ class PathSamples:
         return by_knots if self.origin is None else self._through(self.origin.by_samples, by_knots)
 
     def bias_by_samples(self, by_knots: Array) -> Array:
-        """The same of derivatives by `bias`, which follows linearly from the samples, too."""
+        """From derivatives by `bias` to those by the samples, from which it follows linearly, too."""
         if self.origin is None:
             return np.zeros_like(by_knots)
         return self._through(self.origin.bias_by_samples, by_knots)
@@ -207,7 +207,7 @@ class PathSamples:
 
 
 def columns_without_samples(path: ShapePath) -> list[int]:
-    """The joints that rest where a reader was told, without a column in the file."""
+    """Joints without a column in the file, which rest."""
     resting = {} if path.record is None else path.record.get("at_rest", {})
     return [column for column, name in enumerate(path.joint_names or ()) if name in resting]
 
@@ -223,7 +223,7 @@ def path_samples(path: ShapePath) -> PathSamples:
             "this path was not put through samples: derivatives by samples are those of ShapePath.spline, "
             "ShapePath.waypoints and of recorded motions; of those that a geodesic closes, not if they were resampled"
         )
-    # A geodesic closes a path that is open: whatever else a path follows from knows the values at its knots.
+    # A geodesic closes a path that is open: every other origin has the values at the knots.
     origin = cast("SampleOrigin | None", arc.opened.origin if arc else path.origin)
     return PathSamples(curve, order, origin, arc)
 
@@ -240,8 +240,10 @@ def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
 
 
 def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
-    """As above, of the C2 cubic spline with slopes s at the knots: on a piece c1 = s and, with the mean slope m,
-    c2 = (3 m - 2 s - s_next)/h, c3 = (s + s_next - 2 m)/h^2."""
+    """Derivatives by the values at the knots of a C2 cubic spline.
+
+    With slopes s at the knots and the mean slope m of a piece, c1 = s, c2 = (3 m - 2 s - s_next)/h, c3 = (s + s_next - 2 m)/h^2.
+    """
     h = widths[:, None]
     found = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
     by_second, by_third = by_coefficients[2] / h, by_coefficients[3] / h**2
@@ -284,7 +286,7 @@ def _by_means(h: Array, by_slopes: Array) -> Array:
             ((near + 2.0 * (near + far)) * far / (near + far), near * near / (near + far)) for near, far in ends
         )
     lower, upper = np.append(after, next_ones[1]), np.append(next_ones[0], before)
-    # Of the transposed equations, below the diagonal is what was above.
+    # In the transposed equations the upper diagonal is the lower one.
     answers = _tridiagonal(upper, diagonal, lower, by_slopes)
     found = np.zeros((pieces, by_slopes.shape[1]))
     found[:-1] += 3.0 * after[:, None] * answers[1:-1]
@@ -296,11 +298,11 @@ def _by_means(h: Array, by_slopes: Array) -> Array:
 
 
 def _by_means_of_loop(h: Array, by_slopes: Array) -> Array:
-    """The same of a periodic spline: (pieces, m) -> (pieces, m)."""
+    """`_by_means` of a periodic spline: (pieces, m) -> (pieces, m)."""
     before = np.roll(h, 1)[:, None]
     after, diagonal = h[:, None], 2.0 * (h + before[:, 0])
-    # The first and the last equation know each other, too: what stands in the corners is taken off as a product of two
-    # vectors, and put back by the answer to one more right side.
+    # The first and the last equation are coupled, too: the corners are taken off as a product of two vectors, and put
+    # back by the solution for one more right side.
     corner = -diagonal[0]
     ends = np.zeros(len(h))
     ends[0], ends[-1] = corner, h[0]

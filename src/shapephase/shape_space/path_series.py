@@ -215,7 +215,7 @@ def _errors(path: ShapePath, times: Array) -> Array:
 
 
 def _differences(path: ShapePath, times: Array, looked: Array) -> Array:
-    """The same at times (M,), of each joint; a quaternion of a ball joint and its negative are one: (M, n)."""
+    """Distance of a table's spline from a path at times (M,); a quaternion and its negative are one: (M, n)."""
     right, _ = path.curve(looked)
     table = path.spline(times, path.curve(times)[0], joint_names=path.joint_names)
     read, _ = table.curve(looked - times[0])

@@ -106,7 +106,7 @@ def _energy(body: Body, shapes: Array, rates: Array) -> Array:
 
 
 def _acceleration(body: Body, shapes: Array, rates: Array) -> Array:
-    """Of the geodesics with these rates: (N, n), (N, n) -> (N, n)."""
+    """Acceleration of the geodesics with these rates: (N, n), (N, n) -> (N, n)."""
     unit = np.eye(body.n_shape)
     there, along = shapes[:, None, :], rates[:, None, :]
     # Gradient of the energy, one coordinate after the other.
@@ -194,7 +194,7 @@ def _gradient_metric(body: Body, shapes: Array) -> Array:
 
 
 def _gradients(body: Body, shapes: Array, rates: Array) -> tuple[Array, Array]:
-    """Of the energy, by shapes and by rates: (..., n) -> (..., n) each."""
+    """Gradients of the energy by shapes and by rates: (..., n) -> (..., n) each."""
     n = shapes.shape[-1]
     found = energy_gradients(body.chain, shapes.reshape(-1, n), rates.reshape(-1, n))
     return found[0].reshape(shapes.shape), found[1].reshape(shapes.shape)

@@ -1,4 +1,4 @@
-"""Joint motions in another unit than radians and metres: what they look like, and the question that is asked then."""
+"""Joint motions that resemble degrees or millimetres, and the warning about them."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool
 
 
 def warn_of_degrees(body: Body | ParticleBody, path: ShapePath) -> None:
-    """Warn where the angles of a path, its columns in the order of the body's joints, look like degrees.
+    """Warn where the angles of a path, its columns in the order of the body's joints, resemble degrees.
 
-    Warns if a joint goes more than half a turn beyond its limits, and in degrees all would stay within theirs. A
-    recording is asked for its unit when it is read, and no more here.
+    Warns if a joint goes more than half a turn beyond its limits, and in degrees all would stay within theirs. The
+    unit of a recording is checked when it is read.
     """
     if path.record is not None or _farthest(path) <= _HALF_TURN:
         return

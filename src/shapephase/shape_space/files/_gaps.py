@@ -82,7 +82,7 @@ class Gaps:
     def turned(self, labels: Sequence[str], turns: Array) -> Array:
         """Rotations (N, 3, 3) of joined columns, in their gaps those of the C2 rotation spline through the others.
 
-        Raises TrajectoryError where a rotation is too large across a gap to know its direction.
+        Raises TrajectoryError where a rotation across a gap is too large for its direction to be known.
         """
         from scipy.spatial.transform import Rotation, RotationSpline
 

@@ -1,4 +1,4 @@
-"""Columns that say where the base is and how it is turned, under the names that programs give them."""
+"""Columns of the place and attitude of the base, under the names that programs give them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ HINT = (  # in messages about columns of the base
 
 
 class _Part(NamedTuple):
-    """What a label says: the kind, what stands before it, and the component as it is written there."""
+    """Parts of a label: the kind, the words before it, and the component as it is written there."""
 
     kind: str
     stem: tuple[str, ...]

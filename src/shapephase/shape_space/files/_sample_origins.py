@@ -21,7 +21,7 @@ class Prepared:
     """Samples, from which turns and drift are taken off, which are smoothed, and through which a spline is put.
 
     samples : (N, n) as recorded [rad or m]
-    smoother : of columns (n,); knows the times of the samples, and whether the spline is periodic
+    smoother : of columns (n,); has the times of the samples, and whether the spline is periodic
     pilot : a smoother of a higher order, by whose motion it is known what the other one takes off; None: unknown
     inside : the samples between whose times the path is, of those that are smoothed
     turns : (n,) whole turns that a loop makes, evenly [rad]
@@ -53,11 +53,11 @@ class Prepared:
 
     @property
     def _kept(self) -> slice:
-        """Of the values that are smoothed, those at knots of the path."""
+        """Places of the knots of the path among the values that are smoothed."""
         return slice(None) if self.smoother.periodic else self.inside
 
     def joined(self, samples: Array) -> Array:
-        """Of recorded samples (N, n), the values that are smoothed: (count, n)."""
+        """Values that are smoothed, from recorded samples (N, n): (count, n)."""
         even = samples - self._share * self.turns
         if self.drift:
             even = even - self._share * (even[-1] - even[0])
@@ -128,7 +128,7 @@ class Prepared:
         even = np.concatenate([first[None], found[1:], last[None]])
         if not self.drift:
             return even
-        # Of a drift, the last sample is the first, and all go back by their share of the gap.
+        # With the drift taken off, the last sample is the first, and all move by their share of the gap.
         even[0], even[-1] = even[0] + even[-1], 0.0
         by_gap = (self._share[:, :, None] * even).sum(axis=0)
         even[0] += by_gap

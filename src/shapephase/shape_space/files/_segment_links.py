@@ -3,7 +3,7 @@
 That turn C is the identity where they are the link's own, or comes from a calibration pose, in which the body stands
 in its zero pose: C = S^T G L with S the segment's turn there, L the link's in axes of the base, and G the turn of the
 base. G is that by which the links' joints lie best on the recorded origins (Kabsch, Acta Crystallographica A 32 (1976)
-922); where these do not tell it, the identity.
+922); where these do not determine it, the identity.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class SegmentChoices:
     """How segments become links, as the caller chose.
 
     names : segment -> link, or None for a segment to be left out
-    calibration : a time, as the file tells it; the name of a pose of the file; "links"; None: as the file says
+    calibration : a time, as the file gives it; the name of a pose of the file; "links"; None: as the file states
     length_tolerance : share by which lengths may differ from the body's
     """
 
@@ -140,7 +140,7 @@ class Links:
     def calibration(self, recording: Recording, choices: SegmentChoices, record: dict[str, Any]) -> Calibration:
         """How the segments lie in their frames; what was decided goes to the record.
 
-        Raises TrajectoryError if the file does not say it, or the body does not stand in its zero pose.
+        Raises TrajectoryError if it is unknown, or the body does not stand in its zero pose.
         """
         at, stands = choices.calibration, dict(self.poses.stands or {})
         own = self.body.file is not None and self.body.file.suffix.lower() == _MODELS.get(

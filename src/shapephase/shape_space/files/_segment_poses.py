@@ -39,7 +39,7 @@ class SegmentMotion:
 
     Attributes
     ----------
-    times : (M,) halfway between samples, as the file tells them [s]
+    times : (M,) halfway between samples, as the file gives them [s]
     of_poses : (M, 3) by the pose of every segment as it was recorded; None without positions [kg m^2/s]
     of_chain : (M, 3) by base and joints [kg m^2/s]
     record : links, calibration, lengths and what hinges leave over, as JSON can hold it

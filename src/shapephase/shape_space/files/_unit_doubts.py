@@ -81,7 +81,7 @@ def check_range(recording: Recording, subject: str, values: Array, unit: str) ->
 
 
 def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> None:
-    """Raise TrajectoryError where the unit of a joint's column is not known, and values look like another one.
+    """Raise TrajectoryError where the unit of a joint's column is not known, and values resemble another one.
 
     That is so for angles like degrees, or lengths like millimetres: in radians or metres they would be far beyond the
     limits and in the other unit within, or a joint without limits would turn too far.
@@ -147,7 +147,7 @@ def warn_of_limits(shapes: Array, body: Body, recording: Recording) -> None:
 
 
 def doubtful_turns(values: Array) -> bool:
-    """Whether angles [rad] of a joint without limits would be taken for degrees where nobody says the unit."""
+    """True where angles [rad] of a joint without limits would be taken for degrees if no unit were stated."""
     return bool(np.ptp(values) > _MANY_TURNS or np.abs(np.diff(values)).max(initial=0.0) > _HALF_TURN)
 
 

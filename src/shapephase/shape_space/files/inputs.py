@@ -184,7 +184,7 @@ def read_table(file: str | os.PathLike[str], *, topic: str | None = None) -> pd.
     Returns
     -------
     DataFrame
-        `attrs` has `units`, column -> unit, as far as a row of units says them, and `format`.
+        `attrs` has `units`, column -> unit, from a row of units, and `format`.
 
     Raises
     ------

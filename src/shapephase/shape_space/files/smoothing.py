@@ -272,7 +272,7 @@ def filtered_attitudes(times: Array, attitudes: Array, cut_off: float) -> Array:
     """Attitudes (N, 3, 3), filtered as rotations.
 
     The mean rate of turn, fixed in space, is taken off, so that a constant one is not changed; the quaternions that
-    are left are filtered, and made unit again. Of a small wobble at the frequency f on a turn whose rate differs from
+    are left are filtered, and made unit again. For a small wobble at the frequency f on a turn whose rate differs from
     the mean by w [rad/s], this leaves the mean of the shares h of the frequencies f - w/(4 pi) and f + w/(4 pi), and
     half of their difference turned by a right angle about the axis of w, both over the share of w/(4 pi).
 

@@ -40,8 +40,8 @@ def write_shape_path(
         rad or m (of its largest value where that is above 1), a spline as it was
     comment : what stands above the table, each of its lines behind `#`; in NPZ, in the provenance
 
-    Labels of a table say a unit, `[s]` or `[SI]` (rad or m), where `read_shape_path` would ask for it: of times more
-    than a second apart, and of joints that turn more than two times.
+    Labels of a table have a unit, `[s]` or `[SI]` (rad or m), where `read_shape_path` needs it: for times more than a
+    second apart, and for joints that turn more than two times.
 
     Raises
     ------

@@ -152,14 +152,14 @@ def reachable(
 
         D_k F_ij = d_k F_ij - A_k x F_ij
 
-    and theirs span the same, as the connection is analytic (Chow): those of order m - 2 say what loops do at order m of
-    their stroke. Both are computed: `rank` is that of the curvature around the shape, `orders` have the derivatives.
-    What whole turns of a joint without end add to that, as of a reaction wheel, is not looked at.
+    and theirs span the same, as the connection is analytic (Chow): those of order m - 2 give the turns by loops at order
+    m of their stroke. Both are computed: `rank` is that of the curvature around the shape, `orders` have the derivatives.
+    What whole turns of a joint without end add to that, as of a reaction wheel, is not examined.
 
     Parameters
     ----------
     shape : (n,) where the loops begin [rad or m]; None: neutral
-    most_orders : the highest order of the stroke that is looked at, 2 to 6
+    most_orders : the highest order of the stroke, 2 to 6
     tolerance : of singular values, relative to the size of the terms that the curvature is a difference of
 
     Raises

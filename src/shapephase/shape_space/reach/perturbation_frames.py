@@ -1,4 +1,4 @@
-"""Frames over a region of shapes in which a body is disturbed least, so that one integral tells its turn best."""
+"""Frames over a region of shapes in which a body is disturbed least, so that one integral predicts its turn best."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def minimum_perturbation(
     """The frame of the body, as a function of its shape, in which motions of the joints disturb it least on the whole.
 
     U(r) makes the mean square of the connection over a region as small as polynomials can. There the connection has no
-    divergence, and one integral of it, exp(-integral of A), tells the turn of a loop better than in the base or in
+    divergence, and one integral of it, exp(-integral of A), predicts the turn of a loop better than in the base or in
     `mean_body_gauge`, which is best near one shape only.
 
     Parameters

@@ -119,8 +119,8 @@ def loops_of_third_order(
 ) -> tuple[AxisLoop, ...]:
     """Figures of eight, c = v cos t + w sin(2 t)/2, that turn the body about axes which the curvature does not reach.
 
-    They enclose no area and turn it by minus pi/4 D_v F(v, w). Of unit v and w those with the largest turn about the
-    axis are found by climbing. What they turn about axes of second order is taken away by small circles there.
+    They enclose no area and turn it by minus pi/4 D_v F(v, w). Unit v and w with the largest turn about the axis
+    are found by climbing. Their turns about axes of second order are cancelled by small circles there.
 
     Examples
     --------

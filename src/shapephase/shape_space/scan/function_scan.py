@@ -1,4 +1,4 @@
-"""What is looked at before it is integrated, functions of time given by a user, and what one look at them found."""
+"""Functions of time given by a user, and the results of scanning them before integration."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Words:
 class ScannedFunction:
     """Columns of time as a user gives them: values, and as many rates; zeros stand for what there is not.
 
-    What a column is off by matters as far as it turns the body. So all columns are looked at times their weights, in
+    What a column is off by matters as far as it turns the body. So all columns are scanned times their weights, in
     rad, as the angles of joints are: a value times its weight is, to first order and at most, the turn by which the
     attitude is off when the value is; a rate times its weight is the rate of that turn [rad/s]. Then one set of
     thresholds serves joints, metres and kg m^2, and does not depend on the units in which a body is described.
@@ -138,7 +138,7 @@ def side_by_side(functions: Sequence[ScannedFunction], subject: str) -> ScannedF
 
 @dataclass(frozen=True, eq=False)
 class FunctionScan:
-    """What one look at a function found.
+    """Result of scanning a function.
 
     Attributes
     ----------
@@ -176,21 +176,21 @@ class FunctionScan:
         return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{found}"
 
     def reversed(self) -> FunctionScan:
-        """Of the path in the opposite order of time."""
+        """Scan of the path backwards in time."""
         found = (self.duration - self.found_breaks)[::-1]
         return replace(self, resolved=self.resolved.reversed(), found_breaks=found)
 
     def stretched(self, factor: float) -> FunctionScan:
-        """Of the path `factor` times as slowly."""
+        """Scan of the path `factor` times as slowly."""
         return replace(self, resolved=self.resolved.stretched(factor), found_breaks=factor * self.found_breaks)
 
     def reordered(self, order: Integers) -> FunctionScan:
-        """Of the path with its joints in another order."""
+        """Scan of the path with its joints in another order."""
         return replace(self, resolved=self.resolved.reordered(order))
 
     @staticmethod
     def of_several(scans: Sequence[FunctionScan], resolved: ResolvedPath, found_breaks: Array) -> FunctionScan:
-        """Of paths one after another."""
+        """Scan of paths one after another."""
         return FunctionScan(
             resolved=resolved,
             found_breaks=found_breaks,
@@ -204,7 +204,7 @@ class FunctionScan:
 class DerivedScan:
     """The scan of a path, changed by one of the methods of `FunctionScan`, or left as it is; found when it is needed.
 
-    path : the one that was looked at, or will be
+    path : the one that was scanned, or will be
     change : the name of the method; None: nothing changes
     arguments : of the method
     """

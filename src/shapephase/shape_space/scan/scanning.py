@@ -1,4 +1,4 @@
-"""What is known only as a function of time, looked at once: resolved to its rounding before it is integrated.
+"""Scan of a function of time: it is resolved to its rounding before it is integrated.
 
 The function is first sampled at some 5,200 unevenly spaced times with no gap above 1/4,000 of the duration. Chebyshev
 series on panels, halved where they disagree with these samples or with their own neighbours, then resolve its columns.
@@ -60,7 +60,7 @@ _NAMED_TIMES = 8  # times that a warning lists
 def scanned(function: ScannedFunction, breaks: Array) -> FunctionScan:
     """Look at a function of which only its values are known.
 
-    breaks : (M,) times between which it is said to be smooth, first and last its ends [s]
+    breaks : (M,) times between which it is declared smooth, first and last its ends [s]
 
     Raises TrajectoryError if what must be continuous jumps, or a rate is not the derivative of its value. Raises
     NoisyPathError if the values carry noise. Raises AccuracyNotReached if it is too rough for some thousands of panels.
@@ -70,7 +70,7 @@ def scanned(function: ScannedFunction, breaks: Array) -> FunctionScan:
 
 
 class _Scan:
-    """One look at a function; all columns are weighted as soon as their weights are known."""
+    """Scan of a function; all columns are weighted as soon as their weights are known."""
 
     def __init__(self, function: ScannedFunction, breaks: Array) -> None:
         self._function, self._breaks = function, breaks
@@ -98,7 +98,7 @@ class _Scan:
         self._samples, values = both[: len(self._times)], both[len(self._times) :].reshape(*nodes.shape, -1)
         self._largest = np.maximum(np.abs(self._samples).max(axis=0, initial=0.0), sizes * self._weights)
         self._reach = np.abs(self._samples[:, :n]).max(axis=0, initial=0.0)
-        # Of a rate that is a derivative, the largest value in the whole time; any other has its own.
+        # A rate that is a derivative counts by the largest value in the whole time; any other has its own.
         of_rates = np.where(self._function.paired, self._largest[:n] / self._duration, self._largest[n:])
         self._inner_sizes = np.concatenate([self._largest[:n], of_rates])
         done: list[Piece] = []
@@ -244,7 +244,7 @@ class _Scan:
         return [Piece(a, b) for a, b in pairwise([piece.left, *sorted(piece.kinks), piece.right])]
 
     def _find_corners(self, panels: ResolvedPanels, starts: Integers) -> None:
-        """Note kinks of values without rates that are at an end of a panel by chance: the slopes there tell."""
+        """Note kinks of values without rates that are at an end of a panel by chance, by the slopes there."""
         alone = ~self._function.paired
         if not alone.any():
             return
@@ -303,7 +303,7 @@ class _Scan:
         return np.median(bends, axis=1) / (0.6745 * np.sqrt(6.0))
 
     def _allowed_noise(self, panels: Panels, noisy: Mask, scatter: Array) -> Array:
-        """Of panels whose series follow noise, where it can be left to a tolerance: (P,) [rad]; else NoisyPathError."""
+        """Noise of panels whose series follow it, where the tolerance covers it: (P,) [rad]; else NoisyPathError."""
         n = self._n
         half = 0.5 * (panels.right - panels.left)
         weights = np.where(np.arange(2 * n) < n, 1.0, half[:, None])

@@ -104,7 +104,7 @@ def parse(data: bytes) -> dict[str, Any]:
 
 
 def _check_sizes(where: Path, data: bytes) -> None:
-    """Raise TrajectoryError where header or parameters promise more than the file has: ezc3d believes them."""
+    """Raise TrajectoryError where header or parameters promise more than the file has: ezc3d relies on them."""
     words = np.frombuffer(data[:_BLOCK], dtype=np.uint8)
     place = (int(words[0]) - 1) * _BLOCK if len(words) == _BLOCK else -1
     if place < 0 or words[1] != _KEY or place + 4 > len(data) or data[place + 3] not in _PROCESSORS:

@@ -208,7 +208,7 @@ def _of_xarray(data: Any) -> Table:
 
 
 def _note_unit(units: dict[str, str], name: str, attributes: Any) -> None:
-    # Of times as climate data have them, the unit stands before the day that they count from.
+    # Climate data write the unit of times before the day that they count from.
     said = str(attributes.get("units", "")).split(" since ")[0]
     unit = unit_of(said)
     if unit is not None:

@@ -251,7 +251,7 @@ def named_columns(
     """A table whose columns have names, where `names` does not number them.
 
     A first column that ascends has the times. Behind it are as many columns as joints, in an order of simulators, or
-    these behind a free joint, or a place and a quaternion x y z w; a warning says so. Columns that `names` numbers keep
+    these behind a free joint, or a place and a quaternion x y z w; with a warning. Columns that `names` numbers keep
     their numbers. Numbers do not show where the scalar part of a free joint's quaternion stands, first (MuJoCo) or last
     (Pinocchio).
 

@@ -27,7 +27,7 @@ def has_header(data: bytes) -> bool:
 def read_opensim(where: Path, data: bytes) -> Table:
     """An OpenSim motion or storage file: header lines up to `endheader`, names, numbers.
 
-    `inDegrees` says whether rotational coordinates are in degrees. In a file of states, `.../<coordinate>/value` is
+    `inDegrees` is the unit of rotational coordinates. In a file of states, `.../<coordinate>/value` is
     the coordinate and `.../<coordinate>/speed` is left out. Where a spreadsheet has saved it, commas are between
     columns.
 

@@ -110,7 +110,7 @@ def body_kinematics(table: Table, kind: str) -> Table:
 def matrix_poses(names: tuple[str, ...], matrices: Array, metre: float | None) -> SegmentPoses:
     """Poses as 4 x 4 matrices (4, 4, k, N); where a segment was not seen, they are no rotations.
 
-    metre : size of the unit of lengths [m]; None: the file does not say it
+    metre : size of the unit of lengths [m]; None: unknown
     """
     turns, origins = matrices[:3, :3].transpose(3, 2, 0, 1).copy(), matrices[:3, 3].transpose(2, 1, 0)
     off = np.abs(so3.transpose(turns) @ turns - np.eye(3)).max(axis=(2, 3))
