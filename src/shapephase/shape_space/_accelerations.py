@@ -104,7 +104,7 @@ def _fourier(curve: Fourier, times: Array) -> Array:
 def _polynomial(curve: PiecewisePolynomial, times: Array) -> Array:
     piece = np.searchsorted(curve.knots[1:-1], times, side="right")
     since = (times - curve.knots[piece])[:, None]
-    found = np.zeros((len(times), curve.coefficients.shape[2]))
+    accelerations = np.zeros((len(times), curve.coefficients.shape[2]))
     for power in range(len(curve.coefficients) - 1, 1, -1):
-        found = found * since + power * (power - 1) * curve.coefficients[power, piece]
-    return found
+        accelerations = accelerations * since + power * (power - 1) * curve.coefficients[power, piece]
+    return accelerations

@@ -18,13 +18,13 @@ _SAME = 1e-9  # difference of two unit quaternions of one rotation
 
 def ball_columns(names: Sequence[str] | None) -> tuple[slice, ...]:
     """Where four names in a row are `joint.x`, `joint.y`, `joint.z` and `joint.w` of one joint."""
-    known, found = list(names or ()), []
+    known, balls = list(names or ()), []
     for first in range(len(known) - len(_PARTS) + 1):
         four = known[first : first + len(_PARTS)]
         joint = four[0].removesuffix(".x")
         if joint and tuple(four) == tuple(f"{joint}.{part}" for part in _PARTS):
-            found.append(slice(first, first + len(_PARTS)))
-    return tuple(found)
+            balls.append(slice(first, first + len(_PARTS)))
+    return tuple(balls)
 
 
 def neighbours_signs(samples: Array, balls: Sequence[slice]) -> Array:

@@ -99,9 +99,9 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordin
     check_object(body, "Body", "body", or_kind="ParticleBody")
     columns, slopes = connection_slopes(body, shape)
     bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
-    found = slopes - np.swapaxes(slopes, -2, -3) - bracket
+    curvatures = slopes - np.swapaxes(slopes, -2, -3) - bracket
     frame = _rate_frame(body, shape, of)
-    return found if frame is None else np.einsum("...ia,...ijk,...jb->...abk", frame, found, frame)
+    return curvatures if frame is None else np.einsum("...ia,...ijk,...jb->...abk", frame, curvatures, frame)
 
 
 def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Array, Array]:

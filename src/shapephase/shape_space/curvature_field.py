@@ -35,7 +35,7 @@ _SHARE = 0.01  # of the tolerance for each ray: the sum over the path then keeps
 
 
 def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
-    """Whether the curvature vanishes, so that small loops of the joints do not turn the body.
+    """True where the curvature vanishes, so that small loops of the joints do not turn the body.
 
     Parameters
     ----------

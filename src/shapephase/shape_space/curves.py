@@ -36,7 +36,7 @@ class Swings(NamedTuple):
     """How fast a curve can change, known before it is sampled.
 
     most : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
-    smooth_loop : whether it also goes smoothly from its end to its start
+    smooth_loop : True if it also goes smoothly from its end to its start
     """
 
     most: float | None = None
@@ -58,16 +58,16 @@ class KeptValues:
     def __call__(self, curve: Curve, times: Array) -> tuple[Array, Array]:
         """Shapes and rates, read-only: (N,) -> (N, n), (N, n)."""
         key = times.tobytes()
-        found = self._known.get(key)
-        if found is None:
+        values = self._known.get(key)
+        if values is None:
             shapes, rates = curve(times)
-            found = read_only(shapes), read_only(rates)
+            values = read_only(shapes), read_only(rates)
             each = _MOST_NUMBERS // _MOST_KEPT
-            if 2 * found[0].size <= each:
+            if 2 * values[0].size <= each:
                 if len(self._known) >= _MOST_KEPT:
                     self._known.clear()
-                self._known[key] = found
-        return found
+                self._known[key] = values
+        return values
 
     def __getstate__(self) -> dict[str, object]:
         """Values are not pickled."""

@@ -82,7 +82,7 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
 
 
 def is_long(fall: FreeFall, times: Array, lengths: float = 1.0) -> bool:
-    """Whether a fall is bent far more than a centre of mass wanders; lengths are so much off."""
+    """True if a fall is bent far more than a centre of mass wanders; lengths are so much off."""
     return fall.gravity / lengths * lasts(times, fall.ends) ** 2 > _LONG
 
 

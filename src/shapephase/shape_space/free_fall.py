@@ -103,8 +103,8 @@ def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None
         longest = falls_along(times, centres, up, gravity)
         downwards = None
     else:
-        found = {axis: falls_along(times, centres, axis, gravity) for axis in UP_AXES}
-        longest, downwards = (_longer([found[axis] for axis in part], times) for part in (UP_AXES[:3], UP_AXES[3:]))
+        falls = {axis: falls_along(times, centres, axis, gravity) for axis in UP_AXES}
+        longest, downwards = (_longer([falls[axis] for axis in part], times) for part in (UP_AXES[:3], UP_AXES[3:]))
     if downwards is not None and (longest is None or lasts(times, downwards.ends) > lasts(times, longest.ends)):
         first, last = times[downwards.first], times[downwards.last]
         raise TrajectoryError(
@@ -135,12 +135,12 @@ def centre_noise(times: Array, centres: Array) -> float:
 
 def falls_along(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
     """The longest fall with one axis up; where it is measured to be another than `gravity`, as it is measured."""
-    found = _fall(times, centres, up, gravity)
-    if found is not None and abs(found.gravity - gravity) > max(_SAME * gravity, found.gravity_bar):
-        as_measured = _fall(times, centres, up, found.gravity) if found.gravity > 0.0 else None
-        if as_measured is not None and lasts(times, as_measured.ends) > lasts(times, found.ends):
+    fall = _fall(times, centres, up, gravity)
+    if fall is not None and abs(fall.gravity - gravity) > max(_SAME * gravity, fall.gravity_bar):
+        as_measured = _fall(times, centres, up, fall.gravity) if fall.gravity > 0.0 else None
+        if as_measured is not None and lasts(times, as_measured.ends) > lasts(times, fall.ends):
             return as_measured
-    return found
+    return fall
 
 
 def _shortest(noise: float, gravity: float) -> float:
@@ -148,8 +148,8 @@ def _shortest(noise: float, gravity: float) -> float:
     return float(np.sqrt(_CLEAR * noise / (0.5 * gravity * _OF_A_PARABOLA)))
 
 
-def _longer(found: list[FreeFall | None], times: Array) -> FreeFall | None:
-    return max((fall for fall in found if fall is not None), key=lambda fall: lasts(times, fall.ends), default=None)
+def _longer(falls: list[FreeFall | None], times: Array) -> FreeFall | None:
+    return max((fall for fall in falls if fall is not None), key=lambda fall: lasts(times, fall.ends), default=None)
 
 
 def _fall(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
@@ -163,11 +163,11 @@ def _fall(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | N
     falls = squares <= noise**2 * (windows.free + _CHANCE * np.sqrt(2.0 * windows.free))
     straight = centres.copy()
     straight[:, axis] += pull * (times - times[0]) ** 2
-    found = _all_ends(times, straight, windows, falls, noise, window, gravity)
-    if not found:
+    stretches = _all_ends(times, straight, windows, falls, noise, window, gravity)
+    if not stretches:
         return None
-    longest = max(found, key=lambda ends: lasts(times, ends))
-    return _described(times, centres, straight, longest, tuple(found), up, noise)
+    longest = max(stretches, key=lambda ends: lasts(times, ends))
+    return _described(times, centres, straight, longest, tuple(stretches), up, noise)
 
 
 def fall_number(times: Array, centres: Array, fall: FreeFall, number: int) -> FreeFall:
@@ -229,16 +229,16 @@ def _all_ends(
     runs = np.flatnonzero(np.diff(np.concatenate([[False], falls, [False]]).astype(int))).reshape(-1, 2)
     best: list[tuple[int, int]] = []
     for first, past in runs.tolist():
-        found = _bounded(
+        stretch = _bounded(
             times, straight, int(windows.starts[first]), int(windows.ends[past - 1]), noise, window, gravity
         )
-        if found is None:
+        if stretch is None:
             continue
-        if best and found[0] <= best[-1][1]:
+        if best and stretch[0] <= best[-1][1]:
             # One flight with a doubtful window in it.
-            best[-1] = max(best[-1], found, key=lambda ends: lasts(times, ends))
+            best[-1] = max(best[-1], stretch, key=lambda ends: lasts(times, ends))
         else:
-            best.append(found)
+            best.append(stretch)
     return best
 
 

@@ -43,12 +43,12 @@ def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
         route = replace(route, breaks=_loop_ends(route), loops=1, scanner=None)
     if follows.is_smooth:
         return route
-    found = crossing_times(follows, route.curve, panel_edges(route))
-    if not len(found):
+    crossings = crossing_times(follows, route.curve, panel_edges(route))
+    if not len(crossings):
         return route
     known = merged(route.smoothness.breaks, _loop_ends(route))
     starts = route.duration / route.loops * np.arange(route.loops)
-    breaks = merged(known, (starts[:, None] + found).ravel())
+    breaks = merged(known, (starts[:, None] + crossings).ravel())
     return replace(route, breaks=breaks, scanner=None)
 
 
@@ -122,7 +122,7 @@ def _zeros(series: Array, value: float) -> Array:
 
 
 def _winds(body: Body, route: ShapePath) -> bool:
-    """Whether a joint that others follow by a curve ends a loop whole turns from its start."""
+    """True if a joint that others follow by a curve ends a loop whole turns from its start."""
     ends, _ = route.curve(np.array([0.0, route.duration]))
     moved = np.abs(ends[1] - ends[0])
     return bool((moved[np.isin(np.array(body.joint_names, dtype=str), body.chain.follows.drivers)] > _WHOLE).any())

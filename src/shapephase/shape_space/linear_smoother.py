@@ -32,10 +32,10 @@ class LinearSmoother:
     spaced samples: 1/(1 + penalty K) is its squared frequency response, and ends are free as those of a spline.
 
     times : (N,) of the samples, ascending from 0 [s]
-    periodic : whether first and last sample are measurements of one value, which then weighs twice
+    periodic : True if first and last sample are measurements of one value, which then weighs twice
     penalties : (n,) of each column [s^(2 order - 1)]; of zero, nothing is smoothed
     order : of the derivative that is penalized
-    digital : whether K is that of the Butterworth filter; without it, that of the spline
+    digital : True if K is that of the Butterworth filter, else it is that of the spline
 
     Notes
     -----
@@ -62,20 +62,20 @@ class LinearSmoother:
 
     def transposed(self, gradients: Array) -> Array:
         """From derivatives by smoothed values to those by the values: (count, m, n) -> (count, m, n)."""
-        found = gradients.copy()
+        columns = gradients.copy()
         for penalty in np.unique(self.penalties[self.penalties > 0.0]):
             own = self.penalties == penalty
             right = gradients[:, :, own].reshape(self.count, -1)
             solved = self._system.solve_linear(float(penalty), right).reshape(self.count, -1, int(own.sum()))
-            found[:, :, own] = self.weights[:, None, None] * solved
-        return found
+            columns[:, :, own] = self.weights[:, None, None] * solved
+        return columns
 
     def degrees_of_freedom(self) -> Array:
         """The trace of the map of each column: (n,)."""
-        found = np.full(len(self.penalties), float(self.count))
+        freedom = np.full(len(self.penalties), float(self.count))
         for penalty in np.unique(self.penalties[self.penalties > 0.0]):
-            found[self.penalties == penalty] = self._system.trace(float(penalty))
-        return found
+            freedom[self.penalties == penalty] = self._system.trace(float(penalty))
+        return freedom
 
     @property
     def weights(self) -> Array:
@@ -315,7 +315,7 @@ def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
     nodes, shares = leggauss(order)
     lengths = np.diff(knots, axis=1)
     values = np.stack([_spline_values(knots, piece, 0.5 * (nodes + 1.0)) for piece in range(order)], axis=1)
-    found: list[tuple[Any, Any, Any]] = []
+    entries_of_gram: list[tuple[Any, Any, Any]] = []
     for shift in range(order):
         before = first if periodic else first[: splines - shift]
         after = (before + shift) % max(splines, 1)
@@ -323,10 +323,10 @@ def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
             0.5 * lengths[before, piece] * (shares * values[before, piece] * values[after, piece - shift]).sum(axis=1)
             for piece in range(shift, order)
         ]
-        found.append((sum(shared), before, after))
+        entries_of_gram.append((sum(shared), before, after))
         if shift:
-            found.append((sum(shared), after, before))
-    entries, rows, columns = (np.concatenate(parts) for parts in zip(*found, strict=True))
+            entries_of_gram.append((sum(shared), after, before))
+    entries, rows, columns = (np.concatenate(parts) for parts in zip(*entries_of_gram, strict=True))
     gram = coo_array((entries, (rows, columns)), shape=(splines, splines)).tocsc()
     scale: Any = diags_array(1.0 / np.sqrt(gram.diagonal()))
     return (differences @ scale).tocsc(), (scale @ gram @ scale).tocsc()

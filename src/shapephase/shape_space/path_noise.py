@@ -110,7 +110,7 @@ def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) 
     rows = max(samples.count * path.n_shape, samples.curve.coefficients[..., 0].size)
     chunks = np.array_split(times, max(1, -(-3 * len(times) * rows // _MOST_NUMBERS)))
     parts = [_errors(samples, part, levels) for part in chunks if len(part)]
-    covariance, bias = (np.concatenate(found) for found in zip(*parts, strict=True))
+    covariance, bias = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return PathErrors(times=times, covariance=covariance, bias=bias)
 
 
@@ -128,21 +128,21 @@ def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: Arra
 
 def _samples(path: ShapePath) -> PathSamples:
     """Samples of a path. Raises WrongObjectError where it was put through none, or a geodesic couples its joints."""
-    found = path_samples(path)
-    if found.arc is not None:
+    samples = path_samples(path)
+    if samples.arc is not None:
         raise WrongObjectError(
             "error bars of rates are not known of a path that a geodesic closes; close it by drift or smooth "
             "(close_by, --close-by)"
         )
-    return found
+    return samples
 
 
 def stated_noise(path: ShapePath) -> Array | None:
     """The noise that a recording was smoothed for, or that a low-pass filter found: (n,) [rad or m]; else None."""
     check_object(path, "ShapePath", "path")
     record = path.record or {}
-    said = record.get("smooth") or (record.get("lowpass") or {}).get("noise")
-    return None if said is None else np.array([said[name] for name in path.joint_names or said])
+    stated = record.get("smooth") or (record.get("lowpass") or {}).get("noise")
+    return None if stated is None else np.array([stated[name] for name in path.joint_names or stated])
 
 
 def _levels(path: ShapePath, joints: ArrayLike | None) -> Array:

@@ -154,20 +154,20 @@ class PathSamples:
         by_coefficients = np.zeros((order, basis.total, 3, count))
         rows = np.stack([basis.powers, basis.slopes, basis.bends])
         by_coefficients[:, basis.pieces, :, np.arange(count)] = np.moveaxis(rows, 1, 0).swapaxes(1, 2)
-        found = self.by_knots_of(by_coefficients.reshape(order, basis.total, 3 * count, 1))
-        return found.reshape(3, count, -1)
+        by_knots = self.by_knots_of(by_coefficients.reshape(order, basis.total, 3 * count, 1))
+        return by_knots.reshape(3, count, -1)
 
     def by_knots_of(self, by_coefficients: Array) -> Array:
         """From derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
         curve, (order, _, count, n_shape) = self._source, by_coefficients.shape
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
         given = by_coefficients[:, : len(curve.knots) - 1].reshape(order, len(curve.knots) - 1, -1)
-        found = rule(np.diff(curve.knots), given, curve.through == "periodic").reshape(-1, count, n_shape)
+        by_knots = rule(np.diff(curve.knots), given, curve.through == "periodic").reshape(-1, count, n_shape)
         if self.arc is not None:
             by_cubics = np.empty_like(by_coefficients[:, len(curve.knots) - 1 :])
             by_cubics[..., self.order] = by_coefficients[:, len(curve.knots) - 1 :]
-            found[[0, -1]] += self.arc.by_ends(by_cubics)[..., self.order]
-        return np.moveaxis(found, 0, 1).reshape(count, -1)
+            by_knots[[0, -1]] += self.arc.by_ends(by_cubics)[..., self.order]
+        return np.moveaxis(by_knots, 0, 1).reshape(count, -1)
 
     def is_closing(self, times: Array) -> Mask:
         """Which times are on a geodesic that closes the path, whose duration follows from the path: (N,)."""
@@ -179,9 +179,9 @@ class PathSamples:
         assert arc is not None
         by_ends, by_shape, by_rate = arc.seconds_by_path()
         opened = PathSamples(self._source, np.arange(len(self.order)), self.origin, None)
-        found = opened.by_knots(arc.opened.breaks, by_shape[:, None], by_rate[:, None]).reshape(-1, len(self.order))
-        found[[0, -1]] += by_ends
-        return (found[:, self.order] / arc.seconds).ravel()
+        by_knots = opened.by_knots(arc.opened.breaks, by_shape[:, None], by_rate[:, None]).reshape(-1, len(self.order))
+        by_knots[[0, -1]] += by_ends
+        return (by_knots[:, self.order] / arc.seconds).ravel()
 
     def by_samples(self, by_knots: Array) -> Array:
         """From derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
@@ -233,21 +233,22 @@ def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
     by_move = sum(
         factor * by_coefficients[power] / widths[:, None] ** power for power, factor in enumerate(_REST_TO_REST, 3)
     )
-    found = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
-    found[:-1] += by_coefficients[0] - by_move
-    found[1:] += by_move
-    return found
+    by_knots = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
+    by_knots[:-1] += by_coefficients[0] - by_move
+    by_knots[1:] += by_move
+    return by_knots
 
 
 def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
     """Derivatives by the values at the knots of a C2 cubic spline.
 
-    With slopes s at the knots and the mean slope m of a piece, c1 = s, c2 = (3 m - 2 s - s_next)/h, c3 = (s + s_next - 2 m)/h^2.
+    With slopes s at the knots and the mean slope m of a piece, c1 = s, c2 = (3 m - 2 s - s_next)/h and
+    c3 = (s + s_next - 2 m)/h^2.
     """
     h = widths[:, None]
-    found = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
+    by_knots = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
     by_second, by_third = by_coefficients[2] / h, by_coefficients[3] / h**2
-    by_slope, by_mean = found.copy(), 3.0 * by_second - 2.0 * by_third
+    by_slope, by_mean = by_knots.copy(), 3.0 * by_second - 2.0 * by_third
     by_slope[:-1] += by_coefficients[1] - 2.0 * by_second + by_third
     by_slope[1:] += by_third - by_second
     if periodic:
@@ -256,12 +257,12 @@ def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
     else:
         by_mean += _by_means(widths, by_slope)
     by_mean /= h
-    found[:-1] += by_coefficients[0] - by_mean
-    found[1:] += by_mean
+    by_knots[:-1] += by_coefficients[0] - by_mean
+    by_knots[1:] += by_mean
     if periodic:
-        found[0] += found[-1]
-        found = found[:-1]
-    return found
+        by_knots[0] += by_knots[-1]
+        by_knots = by_knots[:-1]
+    return by_knots
 
 
 def _by_means(h: Array, by_slopes: Array) -> Array:
@@ -288,13 +289,13 @@ def _by_means(h: Array, by_slopes: Array) -> Array:
     lower, upper = np.append(after, next_ones[1]), np.append(next_ones[0], before)
     # In the transposed equations the upper diagonal is the lower one.
     answers = _tridiagonal(upper, diagonal, lower, by_slopes)
-    found = np.zeros((pieces, by_slopes.shape[1]))
-    found[:-1] += 3.0 * after[:, None] * answers[1:-1]
-    found[1:] += 3.0 * before[:, None] * answers[1:-1]
+    by_means = np.zeros((pieces, by_slopes.shape[1]))
+    by_means[:-1] += 3.0 * after[:, None] * answers[1:-1]
+    by_means[1:] += 3.0 * before[:, None] * answers[1:-1]
     for end, inward, factors in ((0, 1, of_means[0]), (-1, -1, of_means[1])):
-        found[end] += factors[0] * answers[end]
-        found[end + inward] += factors[1] * answers[end]
-    return found
+        by_means[end] += factors[0] * answers[end]
+        by_means[end + inward] += factors[1] * answers[end]
+    return by_means
 
 
 def _by_means_of_loop(h: Array, by_slopes: Array) -> Array:

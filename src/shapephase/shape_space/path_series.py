@@ -79,8 +79,8 @@ def resolved_series(function: Callable[[Array], Array], edges: Array) -> tuple[A
         left, right = left[~fine], right[~fine]
         middle = 0.5 * (left + right)
         left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
-    lefts, rights, found = zip(*done, strict=True)
-    return np.concatenate(lefts), np.concatenate(rights), np.concatenate(found)
+    lefts, rights, series_parts = zip(*done, strict=True)
+    return np.concatenate(lefts), np.concatenate(rights), np.concatenate(series_parts)
 
 
 def joint_extremes(path: ShapePath) -> tuple[Array, Array, Array]:
@@ -187,19 +187,19 @@ def _largest(series: Array, least: Array) -> Array:
     A series is nowhere above its first coefficient and the sizes of the others: panels whose bound is above the largest
     value so far are halved.
     """
-    found = least.copy()
+    largest = least.copy()
     close = _EXTREME * np.maximum(np.abs(series).sum(axis=1).max(axis=0, initial=0.0), np.abs(least))
-    panel, column = np.nonzero(_bounds(series) > found + close)
+    panel, column = np.nonzero(_bounds(series) > largest + close)
     rows = series[panel, :, column]
     halves = [restriction_matrix(series.shape[1], *ends) for ends in ((-1.0, 0.0), (0.0, 1.0))]
     for _ in range(_MOST_HALVINGS):
         if not len(rows):
             break
         rows, column = np.concatenate([rows @ half.T for half in halves]), np.tile(column, 2)
-        np.maximum.at(found, column, rows.sum(axis=1))
-        above = _bounds(rows) > (found + close)[column]
+        np.maximum.at(largest, column, rows.sum(axis=1))
+        above = _bounds(rows) > (largest + close)[column]
         rows, column = rows[above], column[above]
-    return found
+    return largest
 
 
 def _bounds(series: Array) -> Array:

@@ -138,9 +138,9 @@ def _metric(body: Body, shapes: Array) -> Array:
     plus, minus = (
         _energy(body, there, np.broadcast_to(unit[rows] + sign * unit[columns], there.shape)) for sign in (1.0, -1.0)
     )
-    found = np.empty((len(shapes), n, n))
-    found[:, rows, columns] = found[:, columns, rows] = 0.5 * (plus - minus)
-    return found
+    metric = np.empty((len(shapes), n, n))
+    metric[:, rows, columns] = metric[:, columns, rows] = 0.5 * (plus - minus)
+    return metric
 
 
 def changes_by_ends(body: Body, way: ShapeGeodesic) -> Array:
@@ -196,5 +196,5 @@ def _gradient_metric(body: Body, shapes: Array) -> Array:
 def _gradients(body: Body, shapes: Array, rates: Array) -> tuple[Array, Array]:
     """Gradients of the energy by shapes and by rates: (..., n) -> (..., n) each."""
     n = shapes.shape[-1]
-    found = energy_gradients(body.chain, shapes.reshape(-1, n), rates.reshape(-1, n))
-    return found[0].reshape(shapes.shape), found[1].reshape(shapes.shape)
+    gradients = energy_gradients(body.chain, shapes.reshape(-1, n), rates.reshape(-1, n))
+    return gradients[0].reshape(shapes.shape), gradients[1].reshape(shapes.shape)

@@ -123,7 +123,7 @@ class PathSummary:
     joints_beyond_rates : names of the joints that are faster than the rate limits of the body's file
     still_joints : names of the joints that do not move
     gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
-    is_loop : whether it closes
+    is_loop : True if it closes
 
     Examples
     --------

@@ -22,7 +22,7 @@ _LOOKS_OF_A_SWING = 8  # times: a sine is then within 8 % of its largest value
 
 
 def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:
-    """Whether values are far beyond limits, and within them in a unit of this size, in SI units: (N,) [rad or m]."""
+    """True if values are far beyond limits, and within them in a unit of this size, in SI units: (N,) [rad or m]."""
     room = _FAR_BEYOND * (upper - lower)
     lowest, highest = float(values.min()), float(values.max())
     far = lowest < lower - room or highest > upper + room

@@ -62,12 +62,12 @@ def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, st
         part = None if target in own or label(target).name in own else _part(target)
         if part is not None:
             families.setdefault((part.kind, part.stem), {})[part.component] = text
-    found: dict[str, str] = {}
+    names: dict[str, str] = {}
     for (kind, _), texts in families.items():
         components = _components(kind, texts)
         if components is not None:
-            found |= {texts[written]: CANONICAL[kind][part] for written, part in components.items()}
-    return found
+            names |= {texts[written]: CANONICAL[kind][part] for written, part in components.items()}
+    return names
 
 
 def _part(target: str) -> _Part | None:
@@ -95,7 +95,7 @@ def _part(target: str) -> _Part | None:
 
 
 def _is_base(before: Iterable[str], rooted: bool) -> bool:
-    """Whether what stands before a kind may be the base: known words, or the topic of a message."""
+    """True if the words before a kind may be the base: known words, or the topic of a message."""
     words = list(before)
     return set(words) <= _BASE or (rooted and (not words or words[-1] in _BASE))
 

@@ -25,7 +25,7 @@ class Prepared:
     pilot : a smoother of a higher order, by whose motion it is known what the other one takes off; None: unknown
     inside : the samples between whose times the path is, of those that are smoothed
     turns : (n,) whole turns that a loop makes, evenly [rad]
-    drift : whether what is left between the last sample and the first is taken off evenly in time
+    drift : True if the gap between the last sample and the first is taken off evenly in time
     joint_names : n names, or None
     """
 
@@ -69,10 +69,10 @@ class Prepared:
 
     def values(self, samples: Array) -> Array:
         """The values of the spline at its knots: (knots, n)."""
-        found = self.joined(samples)
+        joined = self.joined(samples)
         # About the first, so that what does not move stays to the last digit.
-        smooth = found[0] + self.smoother(found - found[0])
-        return np.where(self.smoothed, smooth, found)[self._kept]
+        smooth = joined[0] + self.smoother(joined - joined[0])
+        return np.where(self.smoothed, smooth, joined)[self._kept]
 
     @property
     def bias(self) -> Array:

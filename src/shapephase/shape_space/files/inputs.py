@@ -1,4 +1,4 @@
-"""Where a motion comes from: the kinds of file by their endings, standard input, tables in memory."""
+"""Sources of motions: the kinds of file by their endings, standard input, tables in memory."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ PACKED = ".gz"
 
 
 class Input(NamedTuple):
-    """What was found, the name of where for people, and the SHA-256 of its bytes, None where it has none."""
+    """A table, the name of its source for people, and the SHA-256 of its bytes, or None."""
 
     table: Table
     name: str
@@ -82,17 +82,15 @@ def read_input(
     order: str | None,
     names: Mapping[str, str | None] | None = None,
 ) -> tuple[Input, float | None]:
-    """The table of a file, of standard input (`-`), or of what is in memory; and the time step, if it is still needed.
+    """The table of a file, of standard input (`-`), or of objects in memory; and the time step, if it is still needed.
 
-    source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or what this
-        function has returned
+    source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or an `Input`
     topic : which part of a bag, a workbook or a `.mat` file; None: the only one
-    timestep : [s], for what has no times
+    timestep : [s], for sources without times
     order : of the joints in arrays without names, or None
     names : of columns, as a caller gives them
 
-    Raises InputFileNotFoundError if there is no such file. Raises UnknownNameError for an unknown ending of the file,
-    or an unknown part. Raises TrajectoryError for faults of the file.
+    Raises InputFileNotFoundError; UnknownNameError for an unknown ending or part; TrajectoryError for faults.
     """
     if topic is not None and not isinstance(topic, str):
         raise ShapeError(f"topic: a name is needed, got {what_came(topic)}")
@@ -100,10 +98,15 @@ def read_input(
         timestep = positive_argument(timestep, "timestep")
     if isinstance(source, Input):
         return source, timestep
+
+    def in_columns(table: Table, name: str, sha256: str | None) -> tuple[Input, float | None]:
+        table = named_columns(table, body, names or {}, order, timestep)
+        return Input(of_numbered_columns(table, body, order), name, sha256), timestep
+
     if is_frame(source):
         _no_topic(topic, "a table in memory")
-        table = of_numbered_columns(named_columns(read_frame(source), body, names or {}, order, timestep), body, order)
-        return Input(table, table.where, None), timestep
+        table = read_frame(source)
+        return in_columns(table, table.where, None)
     if isinstance(source, Mapping | tuple):
         _no_topic(topic, "arrays in memory")
         table, step = arrays_motion(arrays_in_memory(source), "the arrays", body, timestep, order, kind="arrays")
@@ -111,7 +114,11 @@ def read_input(
     check_file_name(source, "file")
     if source == STANDARD_INPUT:
         _no_topic(topic, "standard input")
-        return _standard_input(body, order), timestep
+        where = Path("standard input")
+        data = sys.stdin.buffer.read()
+        table = read_opensim(where, data) if has_header(data) else file_table(read_text(where, data), str(where))
+        table = of_numbered_columns(table, body, order)
+        return Input(table, str(where), hashlib.sha256(data).hexdigest()), timestep
     where = Path(source)
     suffix = Path(where.stem).suffix.lower() if where.suffix.lower() == PACKED else where.suffix.lower()
     if suffix in _BAGS or os.path.isdir(where):
@@ -121,34 +128,28 @@ def read_input(
         return Input(read_bag(where, topic), str(source), digest(where)), None
     if suffix in _OTHERS:
         raise TrajectoryError(f"{where}: {suffix} files are not read: {_OTHERS[suffix]}")
-    if suffix not in (*TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS):
-        kinds = (".csv", ".npz", *TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS, *_BAGS)
-        raise unknown_name(f"ending of the motion file {where}:", where.suffix, dict.fromkeys(kinds))
+    kinds = (*TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS)
+    if suffix not in kinds:
+        raise unknown_name(
+            f"ending of the motion file {where}:", where.suffix, dict.fromkeys((".csv", ".npz", *kinds, *_BAGS))
+        )
     _check_exists(where)
     if topic is not None and suffix not in (*TABLES, *_WITH_PARTS):
         raise TrajectoryError(
             f"{where}: topic={what_came(topic)} is for bags, workbooks and .mat files; this one has no parts"
         )
     data = file_bytes(where)
-    sha256 = hashlib.sha256(data).hexdigest()
+    name, sha256 = str(source), hashlib.sha256(data).hexdigest()
     where, data = unpacked(where, data)
     if suffix in TABLES:
-        table = named_columns(_table(where, data, topic), body, names or {}, order, timestep)
-        return Input(of_numbered_columns(table, body, order), str(source), sha256), timestep
+        return in_columns(_table(where, data, topic), name, sha256)
     if suffix in _ARRAYS:
         table, step = read_arrays(where, data, body, timestep, order)
-        return Input(table, str(source), sha256), step
+        return Input(table, name, sha256), step
     if suffix in _WITH_BODY:
-        return Input(_WITH_BODY[suffix](where, data, body), str(source), sha256), timestep
+        return Input(_WITH_BODY[suffix](where, data, body), name, sha256), timestep
     table = _WITH_PARTS[suffix](where, data, topic) if suffix in _WITH_PARTS else _TEXTS[suffix](where, data)
-    return Input(of_numbered_columns(table, body, order), str(source), sha256), timestep
-
-
-def _standard_input(body: Body, order: str | None) -> Input:
-    where = Path("standard input")
-    data = sys.stdin.buffer.read()
-    table = read_opensim(where, data) if has_header(data) else file_table(read_text(where, data), str(where))
-    return Input(of_numbered_columns(table, body, order), str(where), hashlib.sha256(data).hexdigest())
+    return Input(of_numbered_columns(table, body, order), name, sha256), timestep
 
 
 def _table(where: Path, data: bytes, topic: str | None) -> Table:
@@ -165,9 +166,9 @@ def _check_exists(where: Path) -> None:
         raise no_such_file(where)
 
 
-def _no_topic(topic: str | None, what: str) -> None:
+def _no_topic(topic: str | None, source: str) -> None:
     if topic is not None:
-        raise TrajectoryError(f"topic={what_came(topic)} is for bags, workbooks and .mat files, and this is {what}")
+        raise TrajectoryError(f"topic={what_came(topic)} is for bags, workbooks and .mat files, and this is {source}")
 
 
 def read_table(file: str | os.PathLike[str], *, topic: str | None = None) -> pd.DataFrame:

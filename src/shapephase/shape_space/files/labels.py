@@ -116,8 +116,8 @@ def joint_part(text: str, joints: Collection[str]) -> tuple[str, str] | None:
 
 def _at_the_end(text: str, joints: Collection[str]) -> str | None:
     """The longest joint that a path ends with, or None."""
-    found = [name for name in joints if text == name or text.endswith(("/" + name, "." + name))]
-    return max(found, key=len, default=None)
+    ends = [name for name in joints if text == name or text.endswith(("/" + name, "." + name))]
+    return max(ends, key=len, default=None)
 
 
 def unit_of(text: str) -> str | None:

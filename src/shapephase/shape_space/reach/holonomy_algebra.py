@@ -138,7 +138,7 @@ class Reach:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every rotation can be reached."""
+        """True if every rotation can be reached."""
         return self.rank == 3
 
 
@@ -152,9 +152,9 @@ def reachable(
 
         D_k F_ij = d_k F_ij - A_k x F_ij
 
-    and theirs span the same, as the connection is analytic (Chow): those of order m - 2 give the turns by loops at order
-    m of their stroke. Both are computed: `rank` is that of the curvature around the shape, `orders` have the derivatives.
-    What whole turns of a joint without end add to that, as of a reaction wheel, is not examined.
+    and theirs span the same, as the connection is analytic (Chow): those of order m - 2 give the turns by loops at
+    order m of their stroke. Both are computed: `rank` is that of the curvature around the shape, `orders` have the
+    derivatives. Whole turns of a joint without end, as of a reaction wheel, may add to that and are not examined.
 
     Parameters
     ----------
@@ -251,11 +251,11 @@ class _Field:
         shapes = self.shape + np.outer(_HALF_WIDTH * points, direction * self.strokes)
         field = self.at(shapes)
         turning = np.einsum("pka,k->pa", connection_slopes(self.body, shapes)[0], direction * self.strokes)
-        found = []
+        slopes = []
         for _ in range(count):
             field = np.einsum("pq,q...->p...", matrix, field) - np.cross(turning[:, None, None], field)
-            found.append(field[_NODES // 2])
-        return found
+            slopes.append(field[_NODES // 2])
+        return slopes
 
 
 def _differentiation(angles: Array) -> Array:
@@ -316,7 +316,7 @@ def _orders(field: _Field, rank: int, highest: int, noise: float) -> tuple[Order
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     along = [field.derivatives(ray, highest - 2) for ray in rays] if rank and highest > 3 else []
     spans: list[Array] = []
-    found: list[OrderReach] = []
+    orders: list[OrderReach] = []
     axes = np.zeros((0, 3))
     for order in range(2, highest + 1):
         if order == 2:
@@ -330,14 +330,14 @@ def _orders(field: _Field, rank: int, highest: int, noise: float) -> tuple[Order
                     for b in _basis(spans[order - k - 2], noise)]  # fmt: skip
         spans.append(np.concatenate([own, *(np.array(one)[:, None] for one in brackets)], axis=1))
         axes = _extended(axes, spans[-1], noise)
-        found.append(
+        orders.append(
             OrderReach(
                 order=order, rank=len(axes), axes=axes, singular_values=np.linalg.svd(own, full_matrices=False)[1][:3]
             )
         )
         if len(axes) >= rank:
             break
-    return tuple(found)
+    return tuple(orders)
 
 
 def _basis(span: Array, noise: float) -> Array:
@@ -354,7 +354,7 @@ def _extended(axes: Array, span: Array, noise: float) -> Array:
 
 
 def _ranked_pairs(body: Body | ParticleBody, here: Array, strokes: Array) -> tuple[PairTurn, ...]:
-    found: list[tuple[float, PairTurn]] = []
+    pairs: list[tuple[float, PairTurn]] = []
     for i, j in combinations(range(body.n_shape), 2):
         turn = -here[i, j]
         size = float(np.linalg.norm(turn))
@@ -363,5 +363,5 @@ def _ranked_pairs(body: Body | ParticleBody, here: Array, strokes: Array) -> tup
         product = f"{units[0]}^2" if units[0] == units[1] else " ".join(units)
         joints = body.joint_names[i], body.joint_names[j]
         pair = PairTurn(joints=joints, rate=size / float(strokes[i] * strokes[j]), axis=axis + 0.0, units=product)
-        found.append((size, pair))
-    return tuple(pair for _, pair in sorted(found, key=lambda one: -one[0]))
+        pairs.append((size, pair))
+    return tuple(pair for _, pair in sorted(pairs, key=lambda one: -one[0]))

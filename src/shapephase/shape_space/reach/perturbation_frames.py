@@ -253,5 +253,5 @@ def _correction(values: Array, slopes: Array, columns: Array) -> Array:
     # Rows are points, joints and axes; columns terms and axes.
     rows = slopes[..., None, :, None] * np.eye(3)[:, None, :] + spin[..., :, None, :] * values[:, None, None, :, None]
     matrix = rows.reshape(-1, 3 * values.shape[1])
-    found = np.linalg.lstsq(matrix, -np.swapaxes(columns, -1, -2).reshape(-1), rcond=1e-12)[0]
-    return np.asarray(found, dtype=np.float64).reshape(-1, 3)
+    coefficients = np.linalg.lstsq(matrix, -np.swapaxes(columns, -1, -2).reshape(-1), rcond=1e-12)[0]
+    return np.asarray(coefficients, dtype=np.float64).reshape(-1, 3)

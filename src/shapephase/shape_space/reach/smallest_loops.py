@@ -181,7 +181,7 @@ def _best_eight(tensor: Array) -> tuple[Array, Array]:
     size = len(tensor)
     starts = np.concatenate([np.eye(size), np.random.default_rng(_SEED).normal(size=(_STARTS, size))])
     both = tensor + np.swapaxes(tensor, 0, 1)
-    best, found = -1.0, (starts[0], starts[0])
+    best, directions = -1.0, (starts[0], starts[0])
     for start in starts:
         v, w, last = start / np.linalg.norm(start), starts[0], 0.0
         for _ in range(_CLIMBS):
@@ -200,5 +200,5 @@ def _best_eight(tensor: Array) -> tuple[Array, Array]:
         value = float(np.linalg.norm(np.einsum("k,i,kij->j", v, v, tensor)))
         if value > best:
             across = np.einsum("k,i,kij->j", v, v, tensor)
-            best, found = value, (v, across / value if value > 0.0 else w)
-    return found
+            best, directions = value, (v, across / value if value > 0.0 else w)
+    return directions

@@ -47,7 +47,7 @@ def located_kink(
 
 
 def _is_smooth(at: Callable[[Array], Array], side: tuple[float, float], scale: Array) -> bool:
-    """Whether one short series is the function on a side of a kink."""
+    """True if one short series is the function on a side of a kink."""
     left, right = side
     nodes = nodes_on(np.array([left]), np.array([right]), _CONFIRMED_DEGREE)[0]
     checks = left + (right - left) * _CONFIRMED_AT

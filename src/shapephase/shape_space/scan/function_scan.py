@@ -48,7 +48,7 @@ class ScannedFunction:
     curve : values and rates at times (N,): (N, n), (N, n)
     judge : the weights, and the sizes of the numbers that columns are computed from where these are larger than the
         columns themselves: of them the rounding is
-    paired, angles, may_jump : (n,) whether a rate is the derivative of its value; whether a value may go on at another
+    paired, angles, may_jump : (n,) True if a rate is the derivative of its value; if a value may go on at another
         turn; whether it may jump at a break that was declared
     subject : the function, in messages
     columns, quantities : names of the n values, and of all 2 n columns
@@ -172,13 +172,13 @@ class FunctionScan:
 
     def __str__(self) -> str:
         """How many panels, evaluations and breaks."""
-        found = f", {len(self.found_breaks)} breaks found" if len(self.found_breaks) else ""
-        return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{found}"
+        breaks = f", {len(self.found_breaks)} breaks found" if len(self.found_breaks) else ""
+        return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{breaks}"
 
     def reversed(self) -> FunctionScan:
         """Scan of the path backwards in time."""
-        found = (self.duration - self.found_breaks)[::-1]
-        return replace(self, resolved=self.resolved.reversed(), found_breaks=found)
+        breaks = (self.duration - self.found_breaks)[::-1]
+        return replace(self, resolved=self.resolved.reversed(), found_breaks=breaks)
 
     def stretched(self, factor: float) -> FunctionScan:
         """Scan of the path `factor` times as slowly."""

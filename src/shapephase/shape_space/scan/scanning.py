@@ -119,13 +119,13 @@ class _Scan:
         # The outermost ends of a piece are the breaks themselves.
         edges = np.append(panels.left, self._duration)
         edges[starts] = [piece.left for piece in done]
-        found = np.array(sorted(self._found))
-        kinks = np.array([time for time in found if time not in self._turned])
+        breaks = np.array(sorted(self._found))
+        kinks = np.array([time for time in breaks if time not in self._turned])
         if len(kinks):
             self._warn(kinks)
         return FunctionScan(
             resolved=ResolvedPath(edges[:-1], edges[1:], panels.coefficients, panels.noise, self._duration, defect),
-            found_breaks=found,
+            found_breaks=breaks,
             evaluations=self._evaluations,
             calls=self._calls,
             noise=self._noise,
@@ -169,8 +169,8 @@ class _Scan:
             panels = bad.halves(left_over)
             level += 1
         has_kinks = np.array([bool(piece.kinks) for piece in pieces])
-        found = ResolvedPanels.in_order(done)
-        return found.of(~has_kinks[found.piece])
+        panels_in_order = ResolvedPanels.in_order(done)
+        return panels_in_order.of(~has_kinks[panels_in_order.piece])
 
     def _fit(self, panels: Panels, values: Array | None) -> PanelFit:
         """Series of panels, and how far the path is from them."""
@@ -276,8 +276,8 @@ class _Scan:
         gap -= 2.0 * np.pi * turns
         speeds = np.maximum(np.abs(first), np.abs(second))[:, n:] * function.paired
         jumps = np.abs(gap) > CLOSED * np.maximum(1.0, self._reach) + 2.0 * (after - before)[:, None] * speeds
-        found = np.isin([piece.right for piece in pieces[:-1]], self._found)
-        jumps &= found[:, None] | ~function.may_jump
+        at_kinks = np.isin([piece.right for piece in pieces[:-1]], self._found)
+        jumps &= at_kinks[:, None] | ~function.may_jump
         if jumps.any():
             row, column = (int(i) for i in np.argwhere(jumps)[0])
             weight = self._weights[column]
@@ -287,7 +287,7 @@ class _Scan:
             )
         rate_jumps = np.abs(second - first)[:, n:]
         # A kink is known to a rounding or two of the times: what a value may be off by there counts as noise.
-        panels.noise[starts[1:] - 1] += _KINK_TICKS * self._tick * rate_jumps.max(axis=1, initial=0.0) * found
+        panels.noise[starts[1:] - 1] += _KINK_TICKS * self._tick * rate_jumps.max(axis=1, initial=0.0) * at_kinks
         has_jump = rate_jumps > CLOSED * np.maximum(1.0, self._largest[n:])
         self._turned = {
             piece.right for row, piece in enumerate(pieces[:-1]) if turns[row].any() and not has_jump[row].any()

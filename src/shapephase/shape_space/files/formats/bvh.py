@@ -88,7 +88,7 @@ _LOAD = "load the body from this file"
 
 
 def _begins_at_zero(skeleton: Skeleton, base: int) -> bool:
-    """Whether all angles of the first frame are zero, but for those of nodes above the base."""
+    """True if all angles of the first frame are zero, but for those of nodes above the base."""
     above = skeleton.above(base)[1:]
     columns = [column for number, bone in enumerate(skeleton.bones) if number not in above for _, column in bone.turns]
     return bool(np.all(np.abs(skeleton.frames[:1, columns]) <= _ZERO))

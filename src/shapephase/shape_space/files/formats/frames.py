@@ -209,8 +209,8 @@ def _of_xarray(data: Any) -> Table:
 
 def _note_unit(units: dict[str, str], name: str, attributes: Any) -> None:
     # Climate data write the unit of times before the day that they count from.
-    said = str(attributes.get("units", "")).split(" since ")[0]
-    unit = unit_of(said)
+    stated = str(attributes.get("units", "")).split(" since ")[0]
+    unit = unit_of(stated)
     if unit is not None:
         units[name] = unit
 

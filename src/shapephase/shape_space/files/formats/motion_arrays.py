@@ -211,8 +211,8 @@ def _placed_qpos(arrays: Mapping[str, Any], where: str, body: Body) -> dict[str,
     if nameless_joints(body, values.shape[1], f"{where}: qpos", None).free != FREE_JOINT:
         return None
     places = _array(arrays["body_pos_w"], where, "body_pos_w", (len(values), None, 3))
-    found, _ = placed_joints(body, values[:, FREE_JOINT:], places, values[:, 3:FREE_JOINT], where, None, orders=1)
-    return {"joint_names": np.array(found.names), "nameless": found}
+    joints, _ = placed_joints(body, values[:, FREE_JOINT:], places, values[:, 3:FREE_JOINT], where, None, orders=1)
+    return {"joint_names": np.array(joints.names), "nameless": joints}
 
 
 def _times(arrays: Mapping[str, Any], kind: str, where: str, count: int, timestep: float | None) -> Array:

@@ -20,7 +20,7 @@ _SPREADSHEET = ",;"  # separators that a spreadsheet adds, behind header lines t
 
 
 def has_header(data: bytes) -> bool:
-    """Whether a line closes a header as OpenSim writes it."""
+    """True where a line closes a header of OpenSim."""
     return any(_plain(line).lower() == END for line in data[:_HEADER_BYTES].decode(errors="replace").splitlines())
 
 
@@ -45,19 +45,19 @@ def read_opensim(where: Path, data: bytes) -> Table:
     except TrajectoryError as error:
         raise TrajectoryError(str(error).replace(": row ", ": line ", 1)) from None
     frame.attrs |= {"format": "OpenSim", "row": "line"}
-    found = replace(file_table(frame, str(where)), by_format=True, degrees=_in_degrees(header, where))
-    _check_counts(header, where, len(found.rows), len(frame.columns))
+    table = replace(file_table(frame, str(where)), by_format=True, degrees=_in_degrees(header, where))
+    _check_counts(header, where, len(table.rows), len(frame.columns))
     columns: dict[str, Array] = {}
     faults = {}
-    for name, values in found.columns.items():
+    for name, values in table.columns.items():
         plain = _coordinate(name)
         if plain is None:
             continue
         if plain in columns:
             raise TrajectoryError(f"{where}: two columns are the coordinate {plain}, one is {name!r}; keep one")
         columns[plain] = values
-        faults[plain] = found.faults.get(name, {})
-    return body_kinematics(replace(found, columns=columns, faults=faults, up="y"), header.get("", ""))
+        faults[plain] = table.faults.get(name, {})
+    return body_kinematics(replace(table, columns=columns, faults=faults, up="y"), header.get("", ""))
 
 
 def _plain(line: str) -> str:
@@ -85,22 +85,22 @@ def _in_degrees(header: dict[str, str], where: Path) -> bool | None:
         raise TrajectoryError(
             f"{where}: DataType={header['datatype']}, and joint motions are DataType=double; export the coordinates"
         )
-    said = header.get("indegrees")
-    if said is None:
+    stated = header.get("indegrees")
+    if stated is None:
         return None
-    if said.lower() not in ("yes", "no"):
-        raise TrajectoryError(f"{where}: inDegrees={said!r:.40} in the header; write inDegrees=yes or inDegrees=no")
-    return said.lower() == "yes"
+    if stated.lower() not in ("yes", "no"):
+        raise TrajectoryError(f"{where}: inDegrees={stated!r:.40} in the header; write inDegrees=yes or inDegrees=no")
+    return stated.lower() == "yes"
 
 
 def _check_counts(header: dict[str, str], where: Path, rows: int, columns: int) -> None:
-    for kind, found in (("rows", rows), ("columns", columns)):
-        said = header.get(kind)
-        if said is None:
+    for kind, count in (("rows", rows), ("columns", columns)):
+        stated = header.get(kind)
+        if stated is None:
             continue
-        if not said.isascii() or not said.isdigit() or (said.lstrip("0") or "0") != str(found):
+        if not stated.isascii() or not stated.isdigit() or (stated.lstrip("0") or "0") != str(count):
             raise TrajectoryError(
-                f"{where}: the header says {said:.40} {kind}, the table has {found}; the file is cut off or was "
+                f"{where}: the header says {stated:.40} {kind}, the table has {count}; the file is cut off or was "
                 "edited: write it anew, or correct the header"
             )
 

@@ -31,8 +31,8 @@ def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:
             f"{where}: reading it took more than {_SECONDS} s and was stopped; export it anew"
         ) from None
     if child.returncode:
-        said = "".join(child.stderr.decode(errors="replace").strip().splitlines()[-1:])
-        why = f"the parser crashed on it, signal {-child.returncode}" if child.returncode < 0 else said[:200]
+        message = "".join(child.stderr.decode(errors="replace").strip().splitlines()[-1:])
+        why = f"the parser crashed on it, signal {-child.returncode}" if child.returncode < 0 else message[:200]
         raise TrajectoryError(f"{where}: no {kind} file that can be read ({why}); export it anew")
     with np.load(io.BytesIO(child.stdout)) as arrays:
         return dict(arrays)

@@ -136,12 +136,12 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
     for text in table.columns:
         if names.get(text, text) is None:
             continue
-        for pattern, found in ((_QUATERNION, parts), (_PLACE, places)):
+        for pattern, by_segment in ((_QUATERNION, parts), (_PLACE, places)):
             match = pattern.fullmatch(label(text).name)
             if match is not None:
-                found.setdefault(match["segment"], {})[match["part"]] = text
+                by_segment.setdefault(match["segment"], {})[match["part"]] = text
                 break
-    segments = [segment for segment, found in parts.items() if len(found) == len("xyzw")]
+    segments = [segment for segment, by_segment in parts.items() if len(by_segment) == len("xyzw")]
     links = {*known_links(body, segments), *(names.keys() & set(segments))}
     of_joints = any(label(text).name in body.joint_names for text in table.columns)
     if len(segments) < _FEWEST or (of_joints and len(links) < _FEWEST):

@@ -139,19 +139,19 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 def _delimiter(line: str, where: Path) -> str:
     unquoted = re.sub(r'"[^"]*"', "name", line)
-    found = [mark for mark in _DELIMITERS if mark in unquoted.strip(" ")]
-    if where.suffix.lower() == ".tsv" and found != ["\t"]:
+    marks = [mark for mark in _DELIMITERS if mark in unquoted.strip(" ")]
+    if where.suffix.lower() == ".tsv" and marks != ["\t"]:
         raise TrajectoryError(f"{where}: the columns of a .tsv file are separated by tabs; it begins {line!r:.80}")
-    if len(found) > 1:
-        others = [mark for mark in found if mark != "," and all(map(is_value, split_line(line, mark)))]
+    if len(marks) > 1:
+        others = [mark for mark in marks if mark != "," and all(map(is_value, split_line(line, mark)))]
         if len(others) == 1:
             return others[0]
-        kinds = " and ".join(_DELIMITERS[mark] for mark in found)
+        kinds = " and ".join(_DELIMITERS[mark] for mark in marks)
         raise TrajectoryError(
             f"{where}: the header has {kinds}, so it is unclear which separates the columns; use one of them only"
         )
-    if found:
-        return found[0]
+    if marks:
+        return marks[0]
     return BLANKS if len(unquoted.split()) > 1 else ","
 
 
