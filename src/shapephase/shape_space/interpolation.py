@@ -11,8 +11,10 @@ from ..arguments import check_time_steps, names_argument
 from ..arrays import Array, check_reach, finite_array
 from ..errors import ShapeError, TrajectoryError
 from ..letters import what_came
-from .ball_columns import ball_columns, factors_between, neighbours_signs
 from .curves import CLOSED, Fourier, PiecewisePolynomial
+
+_PARTS = ("x", "y", "z", "w")  # endings of the four names, behind a dot
+_SAME = 1e-9  # difference of two unit quaternions of one rotation
 
 
 def sample_arguments(
@@ -119,3 +121,41 @@ def _spline_coefficients(times: Array, shapes: Array, periodic: bool) -> Array:
     spline = CubicSpline(times, shapes, bc_type="periodic" if periodic else "not-a-knot")
     pieces = np.broadcast_to(spline.c[::-1], (len(spline.c), len(times) - 1, shapes.shape[1]))
     return np.ascontiguousarray(pieces)
+
+
+def ball_columns(names: Sequence[str] | None) -> tuple[slice, ...]:
+    """Where four names in a row are `joint.x`, `joint.y`, `joint.z` and `joint.w` of one joint."""
+    known, balls = list(names or ()), []
+    for first in range(len(known) - len(_PARTS) + 1):
+        four = known[first : first + len(_PARTS)]
+        joint = four[0].removesuffix(".x")
+        if joint and tuple(four) == tuple(f"{joint}.{part}" for part in _PARTS):
+            balls.append(slice(first, first + len(_PARTS)))
+    return tuple(balls)
+
+
+def neighbours_signs(samples: Array, balls: Sequence[slice]) -> Array:
+    """The samples (N, n), quaternions with the sign that is nearer to the one before."""
+    return samples * near_signs(samples, balls) if balls else samples
+
+
+def near_signs(samples: Array, balls: Sequence[slice]) -> Array:
+    """By what samples (N, n) are to be multiplied so that each quaternion is near the one before: (N, n), 1 or -1."""
+    signs = np.ones_like(samples)
+    for ball in balls:
+        four = samples[:, ball]
+        flips = np.where(np.sum(four[1:] * four[:-1], axis=1) < 0.0, -1.0, 1.0)
+        signs[1:, ball] = np.cumprod(flips)[:, None]
+    return signs
+
+
+def factors_between(end: Array, start: Array, balls: Sequence[slice]) -> Array:
+    """By what the columns of `start` are to be multiplied to be those of `end`, where these are the same turn: (n,)."""
+    factors = np.ones(len(end))
+    for ball in balls:
+        length = float(start[ball] @ start[ball])
+        factor = float(end[ball] @ start[ball]) / length if length else 1.0
+        size = float(np.linalg.norm(end[ball]))
+        if factor and np.linalg.norm(end[ball] - factor * start[ball]) <= _SAME * size:
+            factors[ball] = factor
+    return factors

@@ -11,8 +11,8 @@ import numpy as np
 from ..arrays import Array, Integers
 from ..chebyshev import inside, nodes_on, restriction_matrix, values_to_coefficients
 from ..errors import TrajectoryError
-from .ball_columns import ball_columns
 from .curves import CLOSED, polynomial_pieces
+from .interpolation import ball_columns
 
 if TYPE_CHECKING:
     from .shape_path import ShapePath

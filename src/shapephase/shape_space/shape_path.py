@@ -24,7 +24,6 @@ from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError
 from ..integrator.smoothness import Smoothness
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
-from .ball_columns import ball_columns, factors_between
 from .curves import (
     CLOSED,
     Curve,
@@ -43,6 +42,8 @@ from .curves import (
     swings_of,
 )
 from .interpolation import (
+    ball_columns,
+    factors_between,
     fourier_curve,
     joined_names,
     path_joint_names,

@@ -13,7 +13,7 @@ from ...arrays import Array
 from ...body.appearance import Visual
 from ...body.body import Body
 from ...body.couplings.coordinate_map import CurvedJoint
-from ...shape_space.ball_columns import ball_columns, neighbours_signs
+from ...shape_space.interpolation import ball_columns, neighbours_signs
 from .._moving_scene import MovingNode, MovingScene
 
 # Where a slider ends for a joint without a limit [rad or m], and from where on a limit is none.

@@ -12,7 +12,7 @@ from ... import so3
 from ...arrays import Array
 from ...body.body import Body
 from ...errors import TrajectoryError
-from ..ball_columns import ball_columns, neighbours_signs
+from ..interpolation import ball_columns, neighbours_signs
 from ._gaps import Gaps
 from ._unit_doubts import angles_in_rad
 from .labels import Label, label

@@ -14,7 +14,7 @@ from ...arrays import Array, Integers
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
 from ...letters import what_came
-from ..ball_columns import ball_columns
+from ..interpolation import ball_columns
 from ._ball_columns import continued_balls, continued_hinges, with_quaternions
 from ._gaps import Gaps
 from ._pose_columns import HINT, base_names

@@ -16,8 +16,8 @@ from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
-from ..ball_columns import ball_columns, neighbours_signs
 from ..curves import CLOSED, PiecewisePolynomial
+from ..interpolation import ball_columns, neighbours_signs
 from ..linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, LowPass, likeliest, width_of
 from ..shape_path import ShapePath
 from ._sample_origins import Prepared
