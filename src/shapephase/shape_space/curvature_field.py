@@ -81,7 +81,7 @@ def curvature_on_plane(
     second: ArrayLike,
     shape: ArrayLike | None = None,
 ) -> Array:
-    """The curvature F_ij over the plane of two joints.
+    """Curvature F_ij over the plane of two joints.
 
     Parameters
     ----------
@@ -114,7 +114,10 @@ def curvature_on_plane(
     """
     check_object(body, "Body", "body", or_kind="ParticleBody")
     i, j = _two_joints(body, joints)
-    across, along = (_row(values, name) for values, name in ((first, "first"), (second, "second")))
+    across, along = finite_array(first, "first"), finite_array(second, "second")
+    for name, row in (("first", across), ("second", along)):
+        if row.ndim != 1:
+            raise ShapeError(f"{name}: a row of coordinates is needed, got shape {row.shape}")
     shapes = np.empty((len(across), len(along), body.n_shape))
     shapes[:] = body.shape() if shape is None else _one_shape(body, shape, "shape")
     shapes[:, :, i], shapes[:, :, j] = across[:, None], along
@@ -127,7 +130,7 @@ def curvature_on_plane(
 def stokes_holonomy(
     body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9, centre: ArrayLike | None = None
 ) -> Array:
-    """The holonomy of a loop from the curvature inside it, by the non-abelian theorem of Stokes.
+    """Holonomy of a loop from the curvature inside it, by the non-abelian theorem of Stokes.
 
     The loop is spanned by the cone of straight rays from a centre c to its shapes p(t). With T(x, t) the horizontal
     lift along the ray c + x (p(t) - c), from x = 0, the curvature carried to the centre,
@@ -178,8 +181,16 @@ def stokes_holonomy(
         check_smooth(body.chain.follows, "the theorem of Stokes needs")
     route = route_along(body, path)
     check_closed(body, route)
-    _check_no_turns(body, route)
-    cone = _Cone(body, route, _mean_shape(route) if centre is None else _one_shape(body, centre, "centre"), goal)
+    turned = np.flatnonzero(np.abs(route.gap) > CLOSED)
+    if len(turned):
+        joint = int(turned[0])
+        raise OpenPathError(
+            f"joint {body.joint_names[joint]} ends {route.gap[joint] / (2.0 * np.pi):.6g} turns from its start: no "
+            "cone spans such a loop, whose holonomy is not made of curvature alone; use holonomy"
+        )
+    times = route.duration / route.loops * (np.arange(256) + 0.5) / 256
+    tip = route.curve(times)[0].mean(axis=0) if centre is None else _one_shape(body, centre, "centre")
+    cone = _Cone(body, route, tip, goal)
     carried = Sampler(cone.sample, route.smoothness)
     round_loop = stepped_rotation(carried, np.zeros((1, 3)), 0.9 * goal)
     _, (out, back) = cone.rays(np.array([0.0, route.duration]))
@@ -207,7 +218,7 @@ class _Cone:
             raise SingularInertiaError(f"at the centre of the cone: {error}; or choose another centre") from None
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """What the integrator takes for locked inertia and internal momentum: 1 and a(t)."""
+        """Locked inertia and internal momentum for the integrator: 1 and a(t)."""
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)), self.rays(times)[0]
 
     def rays(self, times: Array) -> tuple[Array, Array]:
@@ -220,7 +231,7 @@ class _Cone:
         return densities, lifts
 
     def _refined(self, times: Array, arms: Array, rates: Array) -> tuple[Array, Array]:
-        """On ever more pieces, each ray until it is good."""
+        """Rays on ever more pieces, until each has settled."""
         densities, lifts, _ = self._on_pieces(1, times, arms, rates)
         rough, left = np.arange(len(times)), 0.0
         for pieces in _PIECES[1:]:
@@ -244,7 +255,7 @@ class _Cone:
         )
 
     def _on_pieces(self, pieces: int, times: Array, arms: Array, rates: Array) -> tuple[Array, Array, Array]:
-        """a(t), T(1, t), and the magnitude of what a(t) is the difference of, 12 nodes on each piece of the rays."""
+        """a(t), T(1, t), and the magnitude of the terms of a(t), with 12 nodes on each piece of the rays."""
         nodes, weights, integrals = _collocation()
         along = ((np.arange(pieces)[:, None] + nodes) / pieces).ravel()
         shapes = self._centre + along[:, None] * arms[:, None]
@@ -278,7 +289,7 @@ class _Cone:
 def _curvature_along(
     body: Body | ParticleBody, shapes: Array, first: Array, second: Array, times: Array | None = None
 ) -> tuple[Array, Array, Array]:
-    """F(u, v) for two directions at each shape, A u, and the magnitude of what F is the difference of.
+    """F(u, v) for two directions at each shape, A u, and the magnitude of the terms of F.
 
     (N, n) each -> (N, 3), (N, 3), (N,)
     """
@@ -303,21 +314,6 @@ def _collocation() -> tuple[Array, Array, Array]:
     return 0.5 * (nodes + 1.0), 0.5 * weights, np.asarray(0.5 * integrals, dtype=np.float64)
 
 
-def _mean_shape(route: ShapePath) -> Array:
-    times = route.duration / route.loops * (np.arange(256) + 0.5) / 256
-    return route.curve(times)[0].mean(axis=0)
-
-
-def _check_no_turns(body: Body | ParticleBody, route: ShapePath) -> None:
-    turned = np.flatnonzero(np.abs(route.gap) > CLOSED)
-    if len(turned):
-        joint = int(turned[0])
-        raise OpenPathError(
-            f"joint {body.joint_names[joint]} ends {route.gap[joint] / (2.0 * np.pi):.6g} turns from its start: no "
-            "cone spans such a loop, whose holonomy is not made of curvature alone; use holonomy"
-        )
-
-
 def _random_shapes(body: Body | ParticleBody) -> Array:
     lower, upper = body.joint_limits.T
     open_below, open_above = ~(lower > -_NO_LIMIT), ~(upper < _NO_LIMIT)
@@ -327,7 +323,7 @@ def _random_shapes(body: Body | ParticleBody) -> Array:
 
 
 def _rounding_of_slopes(body: Body | ParticleBody, shapes: Array) -> Array:
-    """What rounding may leave of the curvature: (..., n) -> (..., n, n).
+    """Bound of the rounding of the curvature: (..., n) -> (..., n, n).
 
     A joint motion of kinetic energy T_0 has an angular momentum of at most sqrt(2 T_0 I), I the largest moment, taken
     about the base origin where momenta are summed; rounding is relative to the connection that would give. A slide
@@ -347,18 +343,15 @@ def _rounding_of_slopes(body: Body | ParticleBody, shapes: Array) -> Array:
 def _two_joints(body: Body | ParticleBody, joints: Sequence[str | int]) -> tuple[int, int]:
     if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
         raise ShapeError(f"joints: two joints of {body.name} are needed, got {what_came(joints)}")
-    i, j = (_joint_place(body, joint) for joint in joints)
-    if i == j:
-        raise ShapeError(f"joints: two different joints are needed, got {body.joint_names[i]} twice")
-    return i, j
-
-
-def _joint_place(body: Body | ParticleBody, joint: str | int) -> int:
-    if isinstance(joint, str):
-        return body.joint_index(joint)
-    if isinstance(joint, bool) or not isinstance(joint, int | np.integer) or not 0 <= joint < body.n_shape:
-        raise unknown_name(f"joint of {body.name}", str(joint), body.joint_names)
-    return int(joint)
+    places = []
+    for joint in joints:
+        is_place = isinstance(joint, int | np.integer) and not isinstance(joint, bool) and 0 <= joint < body.n_shape
+        if not is_place and not isinstance(joint, str):
+            raise unknown_name(f"joint of {body.name}", str(joint), body.joint_names)
+        places.append(body.joint_index(joint) if isinstance(joint, str) else int(joint))
+    if places[0] == places[1]:
+        raise ShapeError(f"joints: two different joints are needed, got {body.joint_names[places[0]]} twice")
+    return places[0], places[1]
 
 
 def _one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
@@ -369,10 +362,3 @@ def _one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
             f"got shape {shape.shape}"
         )
     return shape
-
-
-def _row(values: ArrayLike, name: str) -> Array:
-    row = finite_array(values, name)
-    if row.ndim != 1:
-        raise ShapeError(f"{name}: a row of coordinates is needed, got shape {row.shape}")
-    return row
