@@ -74,13 +74,9 @@ class Prepared:
         smooth = joined[0] + self.smoother(joined - joined[0])
         return np.where(self.smoothed, smooth, joined)[self._kept]
 
-    @property
-    def bias(self) -> Array:
-        """What the steps take off the motion itself at the knots: (knots, n), by the pilot."""
-        return self._bias
-
     @cached_property
-    def _bias(self) -> Array:
+    def bias(self) -> Array:
+        """Bias of the steps at the knots, by the pilot: (knots, n)."""
         values = self.joined(self.samples)
         if self.pilot is None or not self.smoothed.any():
             return np.zeros_like(values)[self._kept]
@@ -158,7 +154,7 @@ class Resampled:
 
     @property
     def bias(self) -> Array:
-        """What the steps take off the motion itself at the knots: (knots, n), by the pilot."""
+        """Bias of the steps at the knots, by the pilot: (knots, n)."""
         samples = path_samples(self.inner)
         taken = samples.bias.reshape(-1, self.inner.n_shape)
         periodic = len(taken) < len(samples.curve.knots)

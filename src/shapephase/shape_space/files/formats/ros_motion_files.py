@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +26,7 @@ class _State(NamedTuple):
 
     stamp: int
     recorded: int
-    names: list[str]
+    names: Sequence[str]
     positions: list[float]
 
 
@@ -34,7 +34,7 @@ class _Trajectory(NamedTuple):
     """A JointTrajectory message: its time [ns], joints, and of each point its time (ns, s) and positions."""
 
     stamp: int
-    names: list[str]
+    names: Sequence[str]
     times: list[tuple[int, float]]
     positions: list[list[float]]
 
@@ -114,7 +114,7 @@ def _read_messages(where: Path, topic: str | None) -> Table:
             if connection.digest and connection.digest != digest:
                 raise TrajectoryError(f"{where}: topic {connection.topic}: not the usual definition of {kind}")
         decode = types.deserialize_ros1 if first else types.deserialize_cdr
-        messages = ((time, decode(data, kind)) for _, time, data in reader.messages(chosen))
+        messages: Iterator[tuple[int, Any]] = ((time, decode(data, kind)) for _, time, data in reader.messages(chosen))
         label = f"{'rosbag1' if first else 'rosbag2'} {kind.split('/')[-1]}"
         if kind == _STATE:
             states = [
@@ -194,7 +194,7 @@ def _of_states(messages: list[_State], where: str, label: str) -> Table:
 
 def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) -> Table:
     """One trajectory, or several one after the other by the times of their headers."""
-    joints = trajectories[0].names if trajectories else []
+    joints = list(trajectories[0].names) if trajectories else []
     times: list[tuple[int, float]] = []
     rows: list[list[float]] = []
     for count, trajectory in enumerate(trajectories, start=1):

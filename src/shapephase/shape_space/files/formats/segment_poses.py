@@ -1,4 +1,4 @@
-"""Files with poses of segments, each in axes of its own: tables, OpenSim's BodyKinematics, MVNX of inertial suits."""
+"""Poses of segments, each in axes of its own, in tables, OpenSim's BodyKinematics and MVNX of inertial suits."""
 
 from __future__ import annotations
 
@@ -157,37 +157,22 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
     for text in used:
         if any(cell.strip().lower() not in ("", "nan") for cell in table.faults.get(text, {}).values()):
             table.check_column(text)
-    poses = SegmentPoses(
-        names=tuple(segments),
-        turns=_turned(table, segments, parts),
-        origins=_placed(table, segments, places) if placed else None,
-    )
-    return replace(table, columns={text: each for text, each in table.columns.items() if text not in used}, poses=poses)
-
-
-def _turned(table: Table, segments: list[str], parts: Mapping[str, Mapping[str, str]]) -> Array:
-    """The turns (N, k, 3, 3) of quaternions in columns; NaN where they are empty."""
     numbers = np.stack([[table.columns[parts[name][part]] for name in segments] for part in "xyzw"], axis=-1)
     numbers = numbers.transpose(1, 0, 2)
     lengths = np.linalg.norm(numbers, axis=-1)
-    off = np.argwhere(np.abs(lengths - 1.0) > _OFF_UNIT)
-    if len(off):
-        row, segment = off[0]
+    wrong = np.argwhere(np.abs(lengths - 1.0) > _OFF_UNIT)
+    if len(wrong):
+        row, segment = wrong[0]
         raise TrajectoryError(
             f"{table.where}: {table.row} {table.rows[row]}: the quaternion of {segments[segment]!r} has the length "
             f"{lengths[row, segment]:.6g}, and 1 is needed; correct it, or leave the segment out (--names "
             f"{segments[segment]}=)"
         )
     turns = np.full((*lengths.shape, 3, 3), np.nan)
-    there = np.isfinite(lengths)
-    turns[there] = so3.matrix_from_quat(so3.normalised(numbers[there]))
-    return turns
-
-
-def _placed(table: Table, segments: list[str], places: Mapping[str, Mapping[str, str]]) -> Array:
-    """Origins (N, k, 3) [m] in columns; NaN of segments without them."""
-    origins = np.full((len(table.rows), len(segments), 3), np.nan)
-    for k, segment in enumerate(segments):
+    known = np.isfinite(lengths)
+    turns[known] = so3.matrix_from_quat(so3.normalised(numbers[known]))
+    origins = np.full((len(table.rows), len(segments), 3), np.nan) if placed else None
+    for k, segment in enumerate(segments if origins is not None else ()):
         for axis, text in places.get(segment, {}).items():
             unit = table.units.get(text) or label(text).unit or "m"
             if unit not in LENGTHS and unit != SI:
@@ -196,4 +181,6 @@ def _placed(table: Table, segments: list[str], places: Mapping[str, Mapping[str,
                     f"out with names={{{text!r}: None}} (--names {text}=), or write its unit"
                 )
             origins[:, k, "xyz".index(axis)] = LENGTHS.get(unit, 1.0) * table.columns[text]
-    return origins
+    poses = SegmentPoses(names=tuple(segments), turns=turns, origins=origins)
+    columns = {text: values for text, values in table.columns.items() if text not in used}
+    return replace(table, columns=columns, poses=poses)
