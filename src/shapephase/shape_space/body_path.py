@@ -43,7 +43,7 @@ def users_route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
 
 
 def path_gap(body: Body | ParticleBody, path: ShapePath) -> Array:
-    """Where the path ends, seen from where it begins, whole turns of continuous joints taken off: (n,).
+    """End of the path minus its start, whole turns of continuous joints taken off: (n,).
 
     Ball joints count by quaternions of length one, with the sign of the start.
     """
@@ -104,7 +104,7 @@ class FamilyVariants:
         self.model = path_sampler(family.body, path)
 
     def __len__(self) -> int:
-        """How many they are."""
+        """Number of bodies."""
         return len(self._family)
 
     def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:

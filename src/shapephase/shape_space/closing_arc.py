@@ -39,7 +39,7 @@ class ClosingArc:
 
     @property
     def seconds(self) -> float:
-        """How long the way back takes [s]."""
+        """Duration of the way back [s]."""
         return self.way.length / self.speed
 
     @property
@@ -70,7 +70,7 @@ class ClosingArc:
         return ClosingArc(self.body, opened, shape_geodesic(self.body, last, first + turns)).closed
 
     def by_ends(self, by_cubics: Array) -> Array:
-        """From derivatives by the coefficients of the cubics, (4, PIECES, m, n), to those by the path's first and last
+        """Convert derivatives by the cubics' coefficients (4, PIECES, m, n) to those by the path's first and last
         shape: (2, m, n)."""
         changes = changes_by_ends(self.body, self.way)
         n = changes.shape[1]

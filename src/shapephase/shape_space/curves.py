@@ -33,7 +33,7 @@ class Curve(Protocol):
 
 
 class Swings(NamedTuple):
-    """How fast a curve can change, known before it is sampled.
+    """Bound of the changes of a curve, known before it is sampled.
 
     most : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
     smooth_loop : True if it also goes smoothly from its end to its start
@@ -226,7 +226,7 @@ class Function:
     __repr__ = short_repr
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for a lambda."""
+        """Pickled state. Raises LocalFunctionError for a lambda."""
         check_picklable(self.f, "a path")
         return self.__dict__
 

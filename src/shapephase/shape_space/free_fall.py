@@ -124,7 +124,7 @@ def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None
 
 
 def centre_noise(times: Array, centres: Array) -> float:
-    """By which a coordinate of the centre of mass is known [m].
+    """Noise of a coordinate of the centre of mass [m].
 
     Also of samples that are farther apart: those of a tracker may all be off alike, nearest to each other.
     """
@@ -243,7 +243,7 @@ def _all_ends(
 
 
 def lasts(times: Array, ends: tuple[int, int]) -> float:
-    """From the first to the last of two samples [s]."""
+    """Time from the first to the last of two samples [s]."""
     return float(times[ends[1]] - times[ends[0]])
 
 
@@ -297,7 +297,7 @@ def _windows(times: Array, centres: Array, window: float) -> _Windows:
 
 
 def _off_lines(t: Array, values: Array, inside: Array) -> Array:
-    """What the best straight lines leave of values at some of the times: (W, k, 1), (W, k, c), (W, k, 1)."""
+    """Residuals of the best straight lines through values at some of the times: (W, k, 1), (W, k, c), (W, k, 1)."""
     count = inside.sum(axis=1, keepdims=True)
     t = (t - (inside * t).sum(axis=1, keepdims=True) / count) * inside
     values = (values - (inside * values).sum(axis=1, keepdims=True) / count) * inside

@@ -124,7 +124,7 @@ def _spline_coefficients(times: Array, shapes: Array, periodic: bool) -> Array:
 
 
 def ball_columns(names: Sequence[str] | None) -> tuple[slice, ...]:
-    """Where four names in a row are `joint.x`, `joint.y`, `joint.z` and `joint.w` of one joint."""
+    """Places of four names in a row, `joint.x`, `joint.y`, `joint.z` and `joint.w` of one joint."""
     known, balls = list(names or ()), []
     for first in range(len(known) - len(_PARTS) + 1):
         four = known[first : first + len(_PARTS)]
@@ -140,7 +140,7 @@ def neighbours_signs(samples: Array, balls: Sequence[slice]) -> Array:
 
 
 def near_signs(samples: Array, balls: Sequence[slice]) -> Array:
-    """By what samples (N, n) are to be multiplied so that each quaternion is near the one before: (N, n), 1 or -1."""
+    """Factors of samples (N, n) that bring each quaternion near the one before: (N, n), 1 or -1."""
     signs = np.ones_like(samples)
     for ball in balls:
         four = samples[:, ball]
@@ -150,7 +150,7 @@ def near_signs(samples: Array, balls: Sequence[slice]) -> Array:
 
 
 def factors_between(end: Array, start: Array, balls: Sequence[slice]) -> Array:
-    """By what the columns of `start` are to be multiplied to be those of `end`, where these are the same turn: (n,)."""
+    """Factors of the columns of `start` that give those of `end`, where these are the same turn: (n,)."""
     factors = np.ones(len(end))
     for ball in balls:
         length = float(start[ball] @ start[ball])

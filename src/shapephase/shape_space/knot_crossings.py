@@ -111,7 +111,7 @@ def _crossings(followed: Curve, edges: Array, knots: Array, *, kinked: bool) -> 
 
 
 def _zeros(series: Array, value: float) -> Array:
-    """Where a series has a value, in [-1, 1]."""
+    """Places in [-1, 1] at which a series has a value."""
     sizes = np.abs(series)
     last = np.flatnonzero(sizes > _ROUNDING * sizes.max())[-1]
     shifted = series[: last + 1].copy()

@@ -53,7 +53,7 @@ class LinearSmoother:
 
     @property
     def count(self) -> int:
-        """How many values there are."""
+        """Number of values."""
         return len(self.times) - self.periodic
 
     def __call__(self, values: Array) -> Array:
@@ -61,7 +61,7 @@ class LinearSmoother:
         return self.transposed((self.weights[:, None] * values)[:, None])[:, 0] / self.weights[:, None]
 
     def transposed(self, gradients: Array) -> Array:
-        """From derivatives by smoothed values to those by the values: (count, m, n) -> (count, m, n)."""
+        """Convert derivatives by smoothed values to those by the values: (count, m, n) -> (count, m, n)."""
         columns = gradients.copy()
         for penalty in np.unique(self.penalties[self.penalties > 0.0]):
             own = self.penalties == penalty
@@ -176,7 +176,7 @@ def _widths(count: int) -> Array:
 
 
 def _least(places: Array, values: Array) -> float:
-    """Where the parabola through the least of evenly placed values and its neighbours is least."""
+    """Place of the minimum of the parabola through the least of evenly placed values and its neighbours."""
     best = int(np.argmin(values))
     if best in (0, len(values) - 1):
         return float(places[best])
@@ -251,7 +251,7 @@ class _Roughness:
 
     @cached_property
     def _matrices(self) -> tuple[Any, Any]:
-        """What no penalty changes, and what r multiplies."""
+        """Matrices without the penalty, and multiplied by r."""
         from scipy.sparse import block_array, block_diag, diags_array
 
         fixed = block_diag([diags_array(self.weights), -self._gram])

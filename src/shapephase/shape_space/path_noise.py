@@ -20,7 +20,7 @@ _MOST_NUMBERS = 4_000_000  # in memory at once; more times are taken in parts
 
 @dataclass(frozen=True, eq=False)
 class PathErrors:
-    """How far joints may be off at some times, each by the noise of its own samples.
+    """Error bars of joints at some times, each from the noise of its own samples.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class PathErrors:
 
 
 def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) -> PathErrors:
-    """How far the joints, their rates and accelerations may be off, by the noise of the samples of a path.
+    """Error bars of joints, their rates and accelerations, from the noise of the samples of a path.
 
     The bars of a smoothed recording hold the noise that is left and the bias of smoothing.
 

@@ -18,7 +18,7 @@ _REST_TO_REST = (10.0, -15.0, 6.0)  # quintic of least jerk from 0 to 1: coeffic
 
 
 class SampleOrigin(PathOrigin, Protocol):
-    """How values at the knots of a path follow from recorded samples that were closed, smoothed or resampled."""
+    """Steps from recorded samples, closed, smoothed or resampled, to values at the knots of a path."""
 
     @property
     def samples(self) -> Array:
@@ -27,15 +27,15 @@ class SampleOrigin(PathOrigin, Protocol):
 
     @property
     def bias(self) -> Array:
-        """What smoothing took off the motion, as far as it is known: (knots, n) [rad or m]."""
+        """Known bias of smoothing: (knots, n) [rad or m]."""
         ...
 
     def by_samples(self, by_values: Array, /) -> Array:
-        """From m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        """Convert m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
         ...
 
     def bias_by_samples(self, by_values: Array, /) -> Array:
-        """From m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        """Convert m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
         ...
 
 
@@ -72,7 +72,7 @@ class PathSamples:
 
     @property
     def count(self) -> int:
-        """How many samples there are that may differ: of a periodic path the last is the first, unless both were
+        """Number of samples that may differ: the last of a periodic path is the first, unless both were
         recorded."""
         return self._at_knots if self.origin is None else len(self.origin.samples)
 
@@ -86,7 +86,7 @@ class PathSamples:
 
     @property
     def bias(self) -> Array:
-        """What smoothing took off the motion at the knots, as far as it is known: (knots n,) [rad or m]."""
+        """Known bias of smoothing at the knots: (knots n,) [rad or m]."""
         if self.origin is None:
             return np.zeros(self._at_knots * len(self.order))
         return self.origin.bias[:, self.order].ravel()
@@ -158,7 +158,7 @@ class PathSamples:
         return by_knots.reshape(3, count, -1)
 
     def by_knots_of(self, by_coefficients: Array) -> Array:
-        """From derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
+        """Convert derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
         curve, (order, _, count, n_shape) = self._source, by_coefficients.shape
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
         given = by_coefficients[:, : len(curve.knots) - 1].reshape(order, len(curve.knots) - 1, -1)
@@ -170,7 +170,7 @@ class PathSamples:
         return np.moveaxis(by_knots, 0, 1).reshape(count, -1)
 
     def is_closing(self, times: Array) -> Mask:
-        """Which times are on a geodesic that closes the path, whose duration follows from the path: (N,)."""
+        """True for times on a geodesic that closes the path, whose duration follows from the path: (N,)."""
         return times > self._source.knots[-1] if self.arc is not None else np.zeros(len(times), dtype=bool)
 
     def seconds_by_knots(self) -> Array:
@@ -184,18 +184,18 @@ class PathSamples:
         return (by_knots[:, self.order] / arc.seconds).ravel()
 
     def by_samples(self, by_knots: Array) -> Array:
-        """From derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
+        """Convert derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
         return by_knots if self.origin is None else self._through(self.origin.by_samples, by_knots)
 
     def bias_by_samples(self, by_knots: Array) -> Array:
-        """From derivatives by `bias` to those by the samples, from which it follows linearly, too."""
+        """Convert derivatives by `bias` to those by the samples, from which it follows linearly, too."""
         if self.origin is None:
             return np.zeros_like(by_knots)
         return self._through(self.origin.bias_by_samples, by_knots)
 
     @property
     def rules(self) -> tuple[Callable[[Array], Array], ...]:
-        """From derivatives by the values at the knots to those by the samples: of what noise does to these values, and
+        """Conversions of derivatives by the values at the knots to those by the samples, for noise of these values, and
         to the estimate of their bias."""
         return self.by_samples, self.bias_by_samples
 
@@ -229,7 +229,7 @@ def path_samples(path: ShapePath) -> PathSamples:
 
 
 def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
-    """From derivatives by coefficients (6, pieces, m) to those by values at the knots: (pieces + 1, m)."""
+    """Convert derivatives by coefficients (6, pieces, m) to those by values at the knots: (pieces + 1, m)."""
     by_move = sum(
         factor * by_coefficients[power] / widths[:, None] ** power for power, factor in enumerate(_REST_TO_REST, 3)
     )
@@ -266,7 +266,7 @@ def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
 
 
 def _by_means(h: Array, by_slopes: Array) -> Array:
-    """From derivatives by the slopes at the knots to those by the mean slopes: (pieces + 1, m) -> (pieces, m).
+    """Convert derivatives by the slopes at the knots to those by the mean slopes: (pieces + 1, m) -> (pieces, m).
 
     Between the ends h_after s_before + 2 (h_before + h_after) s + h_before s_after is 3 (h_after m_before + h_before
     m_after); the first two pieces, and the last two, are one cubic, of two pieces one parabola, of one a line.

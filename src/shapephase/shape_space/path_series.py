@@ -207,7 +207,7 @@ def _bounds(series: Array) -> Array:
 
 
 def _errors(path: ShapePath, times: Array) -> Array:
-    """By how much the spline through a table misses a path in each interval, of its largest value: (N - 1,)."""
+    """Largest distance of a table's spline from a path in each interval, relative to its largest value: (N - 1,)."""
     looked = times[:-1, None] + np.diff(times)[:, None] * _PLACES
     off = _differences(path, times, looked.ravel())
     sizes = np.maximum(1.0, np.abs(path.curve(times)[0]).max(axis=0, initial=0.0))

@@ -168,7 +168,7 @@ def changes_by_ends(body: Body, way: ShapeGeodesic) -> Array:
 def _change_of_acceleration(
     body: Body, way: ShapeGeodesic, metric: Array, acceleration: Array, shapes: Array, rates: Array
 ) -> Array:
-    """By changes of shapes and rates at the nodes: (N, n, m) each -> (N, n, m)."""
+    """Change of the acceleration by changes of shapes and rates at the nodes: (N, n, m) each -> (N, n, m)."""
     sides = []
     for step in (_STEP, -_STEP):
         there = way.shapes[:, None] + step * np.swapaxes(shapes, 1, 2)
@@ -180,7 +180,7 @@ def _change_of_acceleration(
 
 
 def _force(body: Body, shapes: Array, rates: Array) -> Array:
-    """What bends geodesics, the gradient of the energy less the rate of g r' at rates that stay: (..., n) each."""
+    """Force on geodesics, the gradient of the energy less the rate of g r' at constant rates: (..., n) each."""
     step = _STEP / float(np.abs(rates).max())
     ahead, behind = (_gradients(body, shapes + sign * step * rates, rates)[1] for sign in (1.0, -1.0))
     return _gradients(body, shapes, rates)[0] - (ahead - behind) / (2.0 * step)

@@ -60,7 +60,7 @@ _WHOLE_TURN = 2.0 * np.pi
 
 
 class PathOrigin(Protocol):
-    """How a path follows from recorded samples that were smoothed, resampled or closed."""
+    """Steps from recorded samples, smoothed, resampled or closed, to a path."""
 
     def path(self, samples: Array, /) -> ShapePath:
         """Return the path that the same steps make of other samples (N, n)."""
@@ -304,7 +304,7 @@ class ShapePath:
         return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner, origin=None)
 
     def then(self, other: ShapePath) -> ShapePath:
-        """This path, and after it another.
+        """Join another path to the end of this one.
 
         A start that differs from this path's end by whole turns of joints is shifted by them, so that the
         shape stays continuous; a quaternion of a ball joint is the same turn with another sign or length.

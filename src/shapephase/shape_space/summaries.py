@@ -45,7 +45,7 @@ class JointSummary:
 
 @dataclass(frozen=True, eq=False)
 class PartSummary:
-    """What moves as one: a link and those that are fixed to it.
+    """Rigid part: a link and those that are fixed to it.
 
     Attributes
     ----------

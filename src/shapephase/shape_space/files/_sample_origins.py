@@ -43,7 +43,7 @@ class Prepared:
 
     @property
     def smoothed(self) -> Mask:
-        """Which joints are smoothed: (n,)."""
+        """True for joints that are smoothed: (n,)."""
         return self.smoother.penalties > 0.0
 
     @cached_property
@@ -116,7 +116,7 @@ class Prepared:
         return whole
 
     def _by_recorded(self, found: Array) -> Array:
-        """From derivatives by `joined` to those by the samples: (count, m, n) -> (N, m, n)."""
+        """Convert derivatives by `joined` to those by the samples: (count, m, n) -> (N, m, n)."""
         if not self.smoother.periodic:
             return found
         last = np.where(self.smoothed, 0.5 * found[0], 0.0)

@@ -355,7 +355,7 @@ class _Conversion:
     def _momentum(
         self, turns: Array, places: Array | None, own: dict[int, tuple[Array, Array]], rows: Integers
     ) -> SegmentMotion:
-        """By the poses themselves and by the chain, of all mass; what no segment shows rests on what it hangs on."""
+        """Momentum by the poses and by the chain; a part without a segment is fixed to the one it hangs on."""
         table = self.recording.table
         assert table.times is not None
         times, masses = table.times[rows], self.chain.masses

@@ -71,7 +71,7 @@ class Closing:
 
     @property
     def record(self) -> dict[str, Any]:
-        """How the cycle was closed, ready for JSON."""
+        """Method and gap of the closing, ready for JSON."""
         gap = dict(zip(self.body.joint_names, self.gap.tolist(), strict=True))
         return {"by": self.by, "gap": gap, "seconds_added": self.seconds_added}
 

@@ -314,7 +314,7 @@ def _names_of_columns(names: Mapping[str, str | None], how: Reading, table: Tabl
 
 
 def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
-    """What was read, ready for JSON."""
+    """Content of the recording and its columns, ready for JSON."""
     table, segments = recording.table, None
     if table.segments is not None and table.times is not None:
         segments = table.segments.within(float(table.times[0]), float(table.times[-1]))

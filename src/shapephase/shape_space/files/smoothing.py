@@ -70,7 +70,7 @@ class Smoothing:
     __post_init__ = lock_arrays
 
     def spline_record(self, joint_names: tuple[str, ...]) -> dict[str, Any]:
-        """What a smoothing spline did, by joint, ready for JSON."""
+        """Penalties and bias of a smoothing spline, by joint, ready for JSON."""
         return {
             "penalty_s5": dict(zip(joint_names, self.penalty.tolist(), strict=True)),
             "degrees_of_freedom": dict(zip(joint_names, self.degrees_of_freedom.tolist(), strict=True)),

@@ -1,4 +1,4 @@
-"""Which rotations loops of the joints reach: the holonomy algebra, from the curvature and its covariant derivatives."""
+"""Rotations that loops of the joints reach: the holonomy algebra, from the curvature and its covariant derivatives."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LIFT_TOLERANCE = 1e-12  # [rad] of the lift that carries a curvature back
 
 @dataclass(frozen=True, eq=False)
 class OrderReach:
-    """What loops small to some order of their stroke turn the body about.
+    """Axes of the turns by loops small to some order of their stroke.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class OrderReach:
 
 @dataclass(frozen=True, eq=False)
 class PairTurn:
-    """What a small loop of two joints turns the body by.
+    """Turn of the body by a small loop of two joints.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ class Reach:
 def reachable(
     body: Body | ParticleBody, shape: ArrayLike | None = None, *, most_orders: int = 5, tolerance: float = 1e-8
 ) -> Reach:
-    """Which rotations loops of the joints reach from a shape, by which smallest loops, and which joints do most.
+    """Find the rotations that loops of the joints reach from a shape, the smallest such loops, and the best joints.
 
     Loops of a body without angular momentum turn it by the group whose algebra the curvature of the connection spans,
     taken at all shapes and carried back (Ambrose and Singer). At one shape its covariant derivatives
@@ -308,7 +308,7 @@ def carried_curvature(body: Body | ParticleBody, start: Array, ends: Array) -> A
 
 
 def _orders(field: _Field, rank: int, highest: int, noise: float) -> tuple[OrderReach, ...]:
-    """What each order adds, until all axes are reached."""
+    """Axes that each order adds, until all are reached."""
     if field.body.n_shape < 2:
         return ()
     random = np.random.default_rng(_SEED)

@@ -73,7 +73,7 @@ class AxisLoop:
         return ShapePath.fourier(self.centre, cosines, sines, length)
 
     def rotation_vector(self, stroke: ArrayLike) -> Array:
-        """What the loop turns the body by, to leading order: (...) -> (..., 3), base axes [rad]."""
+        """Rotation vector of the body by the loop, to leading order: (...) -> (..., 3), base axes [rad]."""
         return self.turn * np.asarray(stroke, dtype=np.float64)[..., None] ** self.order * self.axis
 
 

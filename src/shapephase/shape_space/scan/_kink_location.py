@@ -1,4 +1,4 @@
-"""Where a function of time that is smooth on both sides of a kink has it, to rounding."""
+"""Location of a kink of a function of time that is smooth on both sides of it, to rounding."""
 
 from __future__ import annotations
 

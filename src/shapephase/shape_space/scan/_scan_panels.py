@@ -47,7 +47,7 @@ class PanelFit:
 
 
 class Piece:
-    """What is between two breaks, and the kinks found in it."""
+    """Stretch between two breaks, and the kinks found in it."""
 
     def __init__(self, left: float, right: float) -> None:
         self.left, self.right = left, right

@@ -22,7 +22,7 @@ Judge = Callable[[Array, Array], tuple[Array, Array]]
 
 @dataclass(frozen=True, kw_only=True)
 class Words:
-    """How messages speak of a function.
+    """Terms for messages about a function.
 
     units : of values and of rates
     continuous : why a value cannot jump
@@ -67,7 +67,7 @@ class ScannedFunction:
 
     @property
     def n_values(self) -> int:
-        """How many values there are."""
+        """Number of values."""
         return len(self.columns)
 
 
@@ -157,7 +157,7 @@ class FunctionScan:
 
     @property
     def panels(self) -> int:
-        """How many panels resolve the function to rounding."""
+        """Number of panels that resolve the function to rounding."""
         return len(self.resolved.left)
 
     @property
@@ -171,7 +171,7 @@ class FunctionScan:
         return self.resolved.duration
 
     def __str__(self) -> str:
-        """How many panels, evaluations and breaks."""
+        """Numbers of panels, evaluations and breaks."""
         breaks = f", {len(self.found_breaks)} breaks found" if len(self.found_breaks) else ""
         return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{breaks}"
 

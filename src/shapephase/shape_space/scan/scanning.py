@@ -215,7 +215,7 @@ class _Scan:
         return PanelFit(coefficients, misfit, np.maximum(np.maximum(floor, inner), _NOISE_MARGIN * scatter), noise)
 
     def _floor(self, values: Array, width: Array) -> Array:
-        """What rounding of numbers and of times leaves of the columns on panels: (P, k, 2 n) -> (P, 2 n)."""
+        """Rounding of the columns on panels, by numbers and by times: (P, k, 2 n) -> (P, 2 n)."""
         n = self._n
         largest = np.abs(values).max(axis=1, initial=0.0)
         slopes = np.ptp(values, axis=1) / width[:, None]
@@ -294,7 +294,7 @@ class _Scan:
         }
 
     def _scatter(self, values: Array) -> Array:
-        """How far values scatter over times so near to each other that no function changes: (P, k, 2 n) -> (P, 2 n).
+        """Scatter of values over times so near to each other that no function changes: (P, k, 2 n) -> (P, 2 n).
 
         A function that is merely rough goes straight there; at a single jump most neighbours still do.
         """

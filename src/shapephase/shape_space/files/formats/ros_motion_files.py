@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -113,8 +113,8 @@ def _read_messages(where: Path, topic: str | None) -> Table:
         for connection in chosen:
             if connection.digest and connection.digest != digest:
                 raise TrajectoryError(f"{where}: topic {connection.topic}: not the usual definition of {kind}")
-        decode = types.deserialize_ros1 if first else types.deserialize_cdr
-        messages: Iterator[tuple[int, Any]] = ((time, decode(data, kind)) for _, time, data in reader.messages(chosen))
+        decode: Any = types.deserialize_ros1 if first else types.deserialize_cdr
+        messages = ((time, decode(data, kind)) for _, time, data in reader.messages(chosen))
         label = f"{'rosbag1' if first else 'rosbag2'} {kind.split('/')[-1]}"
         if kind == _STATE:
             states = [

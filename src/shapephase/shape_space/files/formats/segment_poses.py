@@ -171,8 +171,8 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
     turns = np.full((*lengths.shape, 3, 3), np.nan)
     known = np.isfinite(lengths)
     turns[known] = so3.matrix_from_quat(so3.normalised(numbers[known]))
-    origins = np.full((len(table.rows), len(segments), 3), np.nan) if placed else None
-    for k, segment in enumerate(segments if origins is not None else ()):
+    origins = np.full((len(table.rows), len(segments), 3), np.nan)
+    for k, segment in enumerate(segments if placed else ()):
         for axis, text in places.get(segment, {}).items():
             unit = table.units.get(text) or label(text).unit or "m"
             if unit not in LENGTHS and unit != SI:
@@ -181,6 +181,6 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
                     f"out with names={{{text!r}: None}} (--names {text}=), or write its unit"
                 )
             origins[:, k, "xyz".index(axis)] = LENGTHS.get(unit, 1.0) * table.columns[text]
-    poses = SegmentPoses(names=tuple(segments), turns=turns, origins=origins)
+    poses = SegmentPoses(names=tuple(segments), turns=turns, origins=origins if placed else None)
     columns = {text: values for text, values in table.columns.items() if text not in used}
     return replace(table, columns=columns, poses=poses)
