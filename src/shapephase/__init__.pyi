@@ -85,7 +85,8 @@ from .shape_space.connection import (
     mechanical_connection,
 )
 from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
-from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path, write_shape_path
+from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path
+from .shape_space.files.write import write_shape_path
 from .shape_space.many_paths import FinalAttitudes, final_attitudes
 from .shape_space.path_noise import PathErrors, path_errors
 from .shape_space.reach.holonomy_algebra import Reach, reachable

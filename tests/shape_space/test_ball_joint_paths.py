@@ -315,7 +315,7 @@ def test_faults_of_columns_of_ball_joints(body, tmp_path):
     good = ["time", *body.joint_names]
     long = np.column_stack([times, shapes])
     long[3, 1:5] *= 1.3
-    with pytest.raises(TrajectoryError, match=r"row 5.*shoulder has the length 1\.3"):
+    with pytest.raises(TrajectoryError, match=r"row 5.*shoulder has the norm 1\.3"):
         sp.read_shape_path(written(tmp_path, good, long), body)
     with pytest.raises(TrajectoryError, match="quaternion has no unit"):
         sp.read_shape_path(written(tmp_path, ["time", "shoulder.x_deg", *good[2:]], long), body)

@@ -438,14 +438,17 @@ def test_stokes_checks_what_it_is_given():
         stokes_holonomy(cat, path, centre=[0.0, np.nan, 0.0])
 
 
-@pytest.mark.parametrize("tolerance", [0.0, 1e-3, "tight", np.nan, None, [1e-9, 1e-9]])
+@pytest.mark.parametrize("tolerance", [0.0, -1e-9, np.nan, np.inf, "tight", None, [1e-9, 1e-9]])
 def test_a_tolerance_is_a_small_number_above_zero(tolerance):
     cat = sp.load_body("cat_two_halves")
     path = ellipse(cat, ("waist_pitch", "waist_yaw"), (0.5, 0.5))
-    with pytest.raises(ShapeError, match="tolerance"):
-        stokes_holonomy(cat, path, tolerance)
-    with pytest.raises(ShapeError, match="tolerance"):
-        horizontal_lift(cat, path, tolerance)
+    for function in (sp.holonomy, stokes_holonomy, horizontal_lift):
+        for wrong in (tolerance, 1e-3):
+            with pytest.raises(ShapeError, match="tolerance"):
+                function(cat, path, wrong)
+    if tolerance is not None and tolerance != np.inf:
+        with pytest.raises(ShapeError, match="tolerance"):
+            is_flat(cat, tolerance=tolerance)
 
 
 def test_a_ray_too_long_to_resolve_says_so():
@@ -707,12 +710,6 @@ def test_flatness_is_asked_at_the_shapes_given(planar):
         is_flat(planar, [0.0, 0.0, 0.0])
     with pytest.raises(ShapeError, match="one shape or more"):
         is_flat(planar, np.zeros((0, 2)))
-
-
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, np.nan, "tight", [1e-9, 1e-9]])
-def test_a_tolerance_of_flatness_is_a_number_above_zero(tolerance, planar):
-    with pytest.raises(ShapeError, match="tolerance"):
-        is_flat(planar, tolerance=tolerance)
 
 
 # ---- Horizontal lifts -----------------------------------------------------------------------------------------------

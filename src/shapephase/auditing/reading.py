@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ..body.body import Body
 from ..body.joint_orders import WORDS
 from ..errors import ShapeError, TrajectoryError
 from ..shape_space.files.inputs import read_input
+from ..shape_space.files.options import TrajectoryOptions, check_options, show_options
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.files.times import recording_of
 from ._noise import estimated_noise
@@ -25,25 +26,13 @@ _CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")
 """Formats in which people are recorded; they say what is in degrees, and how attitudes are written."""
 
 
+@show_options(TrajectoryOptions)
 def read_trajectory(
     file: str | os.PathLike[str],
     body: Body,
     *,
     step: float | None = None,
-    names: Mapping[str, str | None] | str | os.PathLike[str] | None = None,
-    degrees: bool | None = None,
-    timestep: float | None = None,
-    topic: str | None = None,
-    joint_order: str | None = None,
-    rest_missing: bool = False,
-    ignore_extra: bool = False,
-    fill: float | str | None = None,
-    lowpass: float | None = None,
-    resample: float | None = None,
-    base_order: str | None = None,
-    base_axes: Any = None,
-    calibration: float | str | None = None,
-    length_tolerance: float | None = None,
+    **options: Unpack[TrajectoryOptions],
 ) -> FloatingTrajectory:
     """A trajectory with its base.
 
@@ -77,16 +66,23 @@ def read_trajectory(
     where = Path(file)
     if step is not None:
         step = positive_argument(step, "step")
+    check_options(options, TrajectoryOptions, "read_trajectory")
+    names, joint_order, degrees = options.get("names"), options.get("joint_order"), options.get("degrees")
     if joint_order is not None:
         check_choice(joint_order, "joint_order", WORDS)
     given, timestep = read_input(
-        file, body, topic, timestep, joint_order, names if isinstance(names, Mapping) else None
+        file,
+        body,
+        options.get("topic"),
+        options.get("timestep"),
+        joint_order,
+        names if isinstance(names, Mapping) else None,
     )
     table = given.table
     order = None if table.nameless is None else f"{table.nameless.title}: {', '.join(table.nameless.names)}"
     try:
         whole = table.simulated is not None and set(body.joint_names) <= set(table.columns)
-        plain = fill is None and lowpass is None and resample is None and names is None
+        plain = all(options.get(name) is None for name in ("fill", "lowpass", "resample", "names"))
         if whole and plain and table.simulated is not None and table.base_quat_xyzw is not None:
             times = table.times
             if times is None:
@@ -103,26 +99,15 @@ def read_trajectory(
                 joint_order=order,
                 **rates_by_name(table.simulated.rates),
             )
-        options: dict[str, Any] = {
-            "names": names,
-            "degrees": degrees,
-            "timestep": timestep,
-            "joint_order": joint_order,
-            "rest_missing": rest_missing,
-            "ignore_extra": ignore_extra,
-            "fill": fill,
-            "base_order": base_order,
-            "base_axes": base_axes,
-            "calibration": calibration,
-            "length_tolerance": length_tolerance,
-        }
-        recorded = read_recorded_motion(given, body, lowpass=lowpass, resample=resample, **options)
-        found = _of_recording(recorded, where, step, order, degrees)
-        if lowpass is None:
-            return found
+        options["timestep"], options["topic"] = timestep, None
+        recorded = read_recorded_motion(given, body, **options)
+        trajectory = _of_recording(recorded, where, step, order, degrees)
+        if options.get("lowpass") is None:
+            return trajectory
         # What the filter has taken away is in the recording before it alone.
+        options["lowpass"] = options["resample"] = None
         unfiltered = _of_recording(read_recorded_motion(given, body, **options), where, step, order, degrees)
-        return replace(found, noise=estimated_noise(unfiltered))
+        return replace(trajectory, noise=estimated_noise(unfiltered))
     except (ShapeError, TrajectoryError) as error:
         raise _of_file(where, error) from None
 

@@ -17,7 +17,7 @@ from ..error_bars.recorded_momentum import momentum_from_recording
 from ..errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
 from ..letters import what_came
 from ..reconstruction.reconstruction import reconstruct
-from ..shape_space.ball_columns import ball_columns, near_signs
+from ..shape_space.interpolation import ball_columns, near_signs
 from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
 from ._airborne import AirbornePart, airborne_part

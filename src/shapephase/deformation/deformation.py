@@ -32,8 +32,7 @@ from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler
 from ..letters import what_came
 from ..refinement import least_over
-from ..shape_space.body_path import path_gap, users_route_along
-from ..shape_space.family_variants import FamilyVariants
+from ..shape_space.body_path import FamilyVariants, path_gap, users_route_along
 from ..shape_space.scan.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ._card import deformation_card

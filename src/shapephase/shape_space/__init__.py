@@ -1,6 +1,6 @@
 """The space of shapes: paths through it, the mechanical connection on it, its curvature and holonomy.
 
-`ShapePath` is a motion of the joints; `mechanical_connection` says how the body turns back while they move; `holonomy`
+`ShapePath` is a motion of the joints; `mechanical_connection` is the turn of the body while they move; `holonomy`
 is what is left of that after a loop. `files` reads recorded motions.
 """
 

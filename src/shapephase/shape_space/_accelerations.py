@@ -20,8 +20,7 @@ from .curves import (
     Widened,
 )
 
-# Of the largest coefficient: what a series is resolved to by the scan.
-_ROUNDING = 32.0 * float(np.finfo(float).eps)
+_ROUNDING = 32.0 * float(np.finfo(float).eps)  # relative to the largest coefficient: the scan's resolution
 
 
 def exact_accelerations(curve: Curve, times: Array) -> Array | None:
@@ -33,42 +32,40 @@ def exact_accelerations(curve: Curve, times: Array) -> Array | None:
         return _fourier(curve, times)
     if isinstance(curve, PiecewisePolynomial):
         return _polynomial(curve, times)
-    if isinstance(curve, Reversed):
-        return exact_accelerations(curve.curve, curve.duration - times)
-    if isinstance(curve, Stretched):
-        found = exact_accelerations(curve.curve, np.minimum(times / curve.factor, curve.duration))
-        return None if found is None else found / curve.factor**2
-    if isinstance(curve, Reordered):
-        found = exact_accelerations(curve.curve, times)
-        return None if found is None else found[:, curve.order]
-    if isinstance(curve, Multiplied):
-        found = exact_accelerations(curve.curve, times)
-        return None if found is None else found * curve.factors
-    if isinstance(curve, Widened):
-        inner = exact_accelerations(curve.curve, times)
-        if inner is None:
-            return None
-        found = np.zeros((len(times), curve.n_shape))
-        found[:, curve.columns] = inner
-        return found
-    if isinstance(curve, Repeated):
-        starts = curve.period * np.arange(curve.count)
-        loop = np.searchsorted(starts, times, side="right") - 1
-        return exact_accelerations(curve.curve, np.minimum(times - starts[loop], curve.period))
     if isinstance(curve, Joined):
         late = times >= curve.first_duration
         inside = np.minimum(times[late] - curve.first_duration, curve.second_duration)
         first, second = exact_accelerations(curve.first, times[~late]), exact_accelerations(curve.second, inside)
         if first is None or second is None:
             return None
-        found = np.empty((len(times), len(curve.offset)))
-        found[~late], found[late] = first, second
-        return found
-    return None
+        joined = np.empty((len(times), len(curve.offset)))
+        joined[~late], joined[late] = first, second
+        return joined
+    if not isinstance(curve, Reversed | Stretched | Reordered | Multiplied | Widened | Repeated):
+        return None
+    if isinstance(curve, Reversed):
+        times = curve.duration - times
+    elif isinstance(curve, Stretched):
+        times = np.minimum(times / curve.factor, curve.duration)
+    elif isinstance(curve, Repeated):
+        starts = curve.period * np.arange(curve.count)
+        times = np.minimum(times - starts[np.searchsorted(starts, times, side="right") - 1], curve.period)
+    inner = exact_accelerations(curve.curve, times)
+    if inner is None or isinstance(curve, Reversed | Repeated):
+        return inner
+    if isinstance(curve, Stretched):
+        return inner / curve.factor**2
+    if isinstance(curve, Reordered):
+        return inner[:, curve.order]
+    if isinstance(curve, Multiplied):
+        return inner * curve.factors
+    widened = np.zeros((len(times), curve.n_shape))
+    widened[:, curve.columns] = inner
+    return widened
 
 
 def resolved_accelerations(resolved: ResolvedPath, loops: int, times: Array) -> Array:
-    """The same by the derivative of the series of the rates, of a path in loops from those of the first: (N, n)."""
+    """Accelerations by the derivative of the series of the rates, of all loops by the first one: (N, n)."""
     n_shape, edges = resolved.coefficients.shape[2] // 2, resolved.edges
     rates = PiecewiseChebyshev(edges, _continuous(resolved.coefficients[:, :, n_shape:], edges))
     loop = np.minimum(np.floor(times / resolved.duration), loops - 1)
@@ -107,7 +104,7 @@ def _fourier(curve: Fourier, times: Array) -> Array:
 def _polynomial(curve: PiecewisePolynomial, times: Array) -> Array:
     piece = np.searchsorted(curve.knots[1:-1], times, side="right")
     since = (times - curve.knots[piece])[:, None]
-    found = np.zeros((len(times), curve.coefficients.shape[2]))
+    accelerations = np.zeros((len(times), curve.coefficients.shape[2]))
     for power in range(len(curve.coefficients) - 1, 1, -1):
-        found = found * since + power * (power - 1) * curve.coefficients[power, piece]
-    return found
+        accelerations = accelerations * since + power * (power - 1) * curve.coefficients[power, piece]
+    return accelerations

@@ -1,4 +1,4 @@
-"""The geodesic that closes a recorded path, and how it answers to the path that it closes."""
+"""The geodesic that closes a recorded path, and its derivatives by that path."""
 
 from __future__ import annotations
 
@@ -11,21 +11,17 @@ from numpy.polynomial import polynomial
 from ..arrays import Array
 from ..body.body import Body
 from ..body.momentum_gradients import energy_gradients
-from ._geodesic_changes import changes_by_ends
 from .curves import PiecewisePolynomial
-from .shape_geodesic import ShapeGeodesic, shape_geodesic, shape_speed
+from .shape_geodesic import ShapeGeodesic, changes_by_ends, shape_geodesic, shape_speed
 from .shape_path import ShapePath, interpolated
 
-PIECES = 4
-"""Cubics that a geodesic is written as; each is within some 1e-9 of a geodesic of a tenth of a radian."""
+PIECES = 4  # cubics of a geodesic: each within 1e-9 of a geodesic of 0.1 rad
 
 
 @dataclass(frozen=True, eq=False)
 class ClosingArc:
     """The way back from the end of a path to its start, as fast as the path itself, rms.
 
-    Attributes
-    ----------
     body : in whose metric it is the shortest
     opened : the path
     way : the geodesic, from the last shape to the first
@@ -37,13 +33,13 @@ class ClosingArc:
 
     @cached_property
     def speed(self) -> float:
-        """Of the path, rms [kg^(1/2) m/s]."""
+        """Rms speed of the path [kg^(1/2) m/s]."""
         speeds = shape_speed(self.body, *self.opened.curve(self.opened.breaks))
         return float(np.sqrt(np.mean(speeds**2)))
 
     @property
     def seconds(self) -> float:
-        """How long the way back takes [s]."""
+        """Duration of the way back [s]."""
         return self.way.length / self.speed
 
     @property
@@ -74,7 +70,7 @@ class ClosingArc:
         return ClosingArc(self.body, opened, shape_geodesic(self.body, last, first + turns)).closed
 
     def by_ends(self, by_cubics: Array) -> Array:
-        """From derivatives by the coefficients of the cubics, (4, PIECES, m, n), to those by the path's first and last
+        """Convert derivatives by the cubics' coefficients (4, PIECES, m, n) to those by the path's first and last
         shape: (2, m, n)."""
         changes = changes_by_ends(self.body, self.way)
         n = changes.shape[1]

@@ -22,11 +22,8 @@ from .body_path import check_closed, path_sampler, users_route_along
 from .path_series import evenly_divided, panel_edges
 from .shape_path import CLOSED, ShapePath
 
-# Points of the Gauss rule on a panel: they resolve a curvature that swings a few times there.
-_GAUSS_RULE = np.polynomial.legendre.leggauss(16)
-# Panels on each piece of the path, tried in turn until the integral changes no more; with 64 of them a result that
-# still changes comes from a break that was not declared.
-_PIECES = (2, 4, 8, 16, 32, 64)
+_GAUSS_RULE = np.polynomial.legendre.leggauss(16)  # 16 nodes resolve a few swings on a panel
+_PIECES = (2, 4, 8, 16, 32, 64)  # panels per piece, in turn: a change at 64 means an undeclared break
 
 
 def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordinates") -> Array:
@@ -77,7 +74,7 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordin
 
     A small square of side e in the joints i, j, gone round from i to j, turns the body by exp(-e^2 F_ij).
 
-    Of rates, with e_a the directions in which one of them is 1, it is F(e_a, e_b) = e_a(A_b) - e_b(A_a) - A([e_a, e_b])
+    For rates, e_a the directions in which one of them is 1, it is F(e_a, e_b) = e_a(A_b) - e_b(A_a) - A([e_a, e_b])
     - A_a x A_b: those of a ball joint do not commute, [e_x, e_y] = e_z and so on.
 
     Parameters
@@ -102,9 +99,9 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordin
     check_object(body, "Body", "body", or_kind="ParticleBody")
     columns, slopes = connection_slopes(body, shape)
     bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
-    found = slopes - np.swapaxes(slopes, -2, -3) - bracket
+    curvatures = slopes - np.swapaxes(slopes, -2, -3) - bracket
     frame = _rate_frame(body, shape, of)
-    return found if frame is None else np.einsum("...ia,...ijk,...jb->...abk", frame, found, frame)
+    return curvatures if frame is None else np.einsum("...ia,...ijk,...jb->...abk", frame, curvatures, frame)
 
 
 def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Array, Array]:

@@ -24,30 +24,22 @@ from .connection import connection_slopes
 from .shape_path import CLOSED, ShapePath
 
 _EPS = float(np.finfo(float).eps)
-# Random shapes at which flatness is tried: curvature that vanishes at all of them vanishes.
-_SHAPES = 16
-# Any seed serves; a fixed one gives the same answer each time.
-_SEED = 15
-# No joint of a body is meant to go further; such limits stand for none.
-_NO_LIMIT = 1e3
-# Rounding left no more than this of the curvature of 130 flat bodies.
-_ROUNDING = 16.0 * _EPS
-# Gauss nodes on each piece of a ray: twelve resolve it where the curvature swings about once.
-_NODES = 12
-# Pieces of a ray, tried in turn until the integral changes no more.
-_PIECES = (1, 2, 4, 8, 16, 32, 64)
-# Memory: rays, or pieces of rays, that are computed together.
-_ROWS = 2000
-# Of the tolerance: what the integral along one ray may contribute, so that the sum over the path keeps it.
-_SHARE = 0.01
+_SHAPES = 16  # random shapes: curvature that vanishes at all of them vanishes
+_SEED = 15  # any fixed seed: repeatable results
+_NO_LIMIT = 1e3  # [rad or m] wider limits stand for none
+_ROUNDING = 16.0 * _EPS  # largest rounding of the curvature of 130 flat bodies
+_NODES = 12  # Gauss nodes per piece of a ray: they resolve one swing of the curvature
+_PIECES = (1, 2, 4, 8, 16, 32, 64)  # of a ray, tried until the integral settles
+_ROWS = 2000  # rays, or pieces of rays, computed together: bounds memory
+_SHARE = 0.01  # of the tolerance for each ray: the sum over the path then keeps it
 
 
 def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, tolerance: float = 1e-10) -> bool:
-    """Whether the curvature vanishes, so that small loops of the joints do not turn the body.
+    """True where the curvature vanishes, so that small loops of the joints do not turn the body.
 
     Parameters
     ----------
-    shapes : (..., n) where to look [rad or m]; None: at 16 random shapes, always the same, spread over the joint
+    shapes : (..., n) to be examined [rad or m]; None: 16 random shapes, always the same, spread over the joint
         limits, and over a whole turn (or 2 pi m) where a joint has none
     tolerance : of each F_ij relative to |d_i A_j| + |d_j A_i| + |A_i| |A_j|, the terms that it is the difference of;
         beyond that only what rounding leaves of them is taken for zero: wheels too small to turn the body by a
@@ -89,7 +81,7 @@ def curvature_on_plane(
     second: ArrayLike,
     shape: ArrayLike | None = None,
 ) -> Array:
-    """The curvature F_ij over the plane of two joints.
+    """Curvature F_ij over the plane of two joints.
 
     Parameters
     ----------
@@ -122,7 +114,10 @@ def curvature_on_plane(
     """
     check_object(body, "Body", "body", or_kind="ParticleBody")
     i, j = _two_joints(body, joints)
-    across, along = (_row(values, name) for values, name in ((first, "first"), (second, "second")))
+    across, along = finite_array(first, "first"), finite_array(second, "second")
+    for name, row in (("first", across), ("second", along)):
+        if row.ndim != 1:
+            raise ShapeError(f"{name}: a row of coordinates is needed, got shape {row.shape}")
     shapes = np.empty((len(across), len(along), body.n_shape))
     shapes[:] = body.shape() if shape is None else _one_shape(body, shape, "shape")
     shapes[:, :, i], shapes[:, :, j] = across[:, None], along
@@ -135,7 +130,7 @@ def curvature_on_plane(
 def stokes_holonomy(
     body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9, centre: ArrayLike | None = None
 ) -> Array:
-    """The holonomy of a loop from the curvature inside it, by the non-abelian theorem of Stokes.
+    """Holonomy of a loop from the curvature inside it, by the non-abelian theorem of Stokes.
 
     The loop is spanned by the cone of straight rays from a centre c to its shapes p(t). With T(x, t) the horizontal
     lift along the ray c + x (p(t) - c), from x = 0, the curvature carried to the centre,
@@ -186,8 +181,16 @@ def stokes_holonomy(
         check_smooth(body.chain.follows, "the theorem of Stokes needs")
     route = route_along(body, path)
     check_closed(body, route)
-    _check_no_turns(body, route)
-    cone = _Cone(body, route, _mean_shape(route) if centre is None else _one_shape(body, centre, "centre"), goal)
+    turned = np.flatnonzero(np.abs(route.gap) > CLOSED)
+    if len(turned):
+        joint = int(turned[0])
+        raise OpenPathError(
+            f"joint {body.joint_names[joint]} ends {route.gap[joint] / (2.0 * np.pi):.6g} turns from its start: no "
+            "cone spans such a loop, whose holonomy is not made of curvature alone; use holonomy"
+        )
+    times = route.duration / route.loops * (np.arange(256) + 0.5) / 256
+    tip = route.curve(times)[0].mean(axis=0) if centre is None else _one_shape(body, centre, "centre")
+    cone = _Cone(body, route, tip, goal)
     carried = Sampler(cone.sample, route.smoothness)
     round_loop = stepped_rotation(carried, np.zeros((1, 3)), 0.9 * goal)
     _, (out, back) = cone.rays(np.array([0.0, route.duration]))
@@ -203,8 +206,6 @@ def stokes_holonomy(
 class _Cone:
     """The straight rays from a centre to a loop.
 
-    Attributes
-    ----------
     worst : the largest change left when the pieces of a ray were halved, as a turn of the whole loop [rad]
     """
 
@@ -217,7 +218,7 @@ class _Cone:
             raise SingularInertiaError(f"at the centre of the cone: {error}; or choose another centre") from None
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """What the integrator takes for locked inertia and internal momentum: 1 and a(t)."""
+        """Locked inertia and internal momentum for the integrator: 1 and a(t)."""
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)), self.rays(times)[0]
 
     def rays(self, times: Array) -> tuple[Array, Array]:
@@ -230,7 +231,7 @@ class _Cone:
         return densities, lifts
 
     def _refined(self, times: Array, arms: Array, rates: Array) -> tuple[Array, Array]:
-        """On ever more pieces, each ray until it is good."""
+        """Rays on ever more pieces, until each has settled."""
         densities, lifts, _ = self._on_pieces(1, times, arms, rates)
         rough, left = np.arange(len(times)), 0.0
         for pieces in _PIECES[1:]:
@@ -254,7 +255,7 @@ class _Cone:
         )
 
     def _on_pieces(self, pieces: int, times: Array, arms: Array, rates: Array) -> tuple[Array, Array, Array]:
-        """a(t), T(1, t), and the magnitude of what a(t) is the difference of, 12 nodes on each piece of the rays."""
+        """a(t), T(1, t), and the magnitude of the terms of a(t), with 12 nodes on each piece of the rays."""
         nodes, weights, integrals = _collocation()
         along = ((np.arange(pieces)[:, None] + nodes) / pieces).ravel()
         shapes = self._centre + along[:, None] * arms[:, None]
@@ -288,7 +289,7 @@ class _Cone:
 def _curvature_along(
     body: Body | ParticleBody, shapes: Array, first: Array, second: Array, times: Array | None = None
 ) -> tuple[Array, Array, Array]:
-    """F(u, v) for two directions at each shape, A u, and the magnitude of what F is the difference of.
+    """F(u, v) for two directions at each shape, A u, and the magnitude of the terms of F.
 
     (N, n) each -> (N, 3), (N, 3), (N,)
     """
@@ -313,21 +314,6 @@ def _collocation() -> tuple[Array, Array, Array]:
     return 0.5 * (nodes + 1.0), 0.5 * weights, np.asarray(0.5 * integrals, dtype=np.float64)
 
 
-def _mean_shape(route: ShapePath) -> Array:
-    times = route.duration / route.loops * (np.arange(256) + 0.5) / 256
-    return route.curve(times)[0].mean(axis=0)
-
-
-def _check_no_turns(body: Body | ParticleBody, route: ShapePath) -> None:
-    turned = np.flatnonzero(np.abs(route.gap) > CLOSED)
-    if len(turned):
-        joint = int(turned[0])
-        raise OpenPathError(
-            f"joint {body.joint_names[joint]} ends {route.gap[joint] / (2.0 * np.pi):.6g} turns from its start: no "
-            "cone spans such a loop, whose holonomy is not made of curvature alone; use holonomy"
-        )
-
-
 def _random_shapes(body: Body | ParticleBody) -> Array:
     lower, upper = body.joint_limits.T
     open_below, open_above = ~(lower > -_NO_LIMIT), ~(upper < _NO_LIMIT)
@@ -337,7 +323,7 @@ def _random_shapes(body: Body | ParticleBody) -> Array:
 
 
 def _rounding_of_slopes(body: Body | ParticleBody, shapes: Array) -> Array:
-    """What rounding may leave of the curvature: (..., n) -> (..., n, n).
+    """Bound of the rounding of the curvature: (..., n) -> (..., n, n).
 
     A joint motion of kinetic energy T_0 has an angular momentum of at most sqrt(2 T_0 I), I the largest moment, taken
     about the base origin where momenta are summed; rounding is relative to the connection that would give. A slide
@@ -357,18 +343,15 @@ def _rounding_of_slopes(body: Body | ParticleBody, shapes: Array) -> Array:
 def _two_joints(body: Body | ParticleBody, joints: Sequence[str | int]) -> tuple[int, int]:
     if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
         raise ShapeError(f"joints: two joints of {body.name} are needed, got {what_came(joints)}")
-    i, j = (_joint_place(body, joint) for joint in joints)
-    if i == j:
-        raise ShapeError(f"joints: two different joints are needed, got {body.joint_names[i]} twice")
-    return i, j
-
-
-def _joint_place(body: Body | ParticleBody, joint: str | int) -> int:
-    if isinstance(joint, str):
-        return body.joint_index(joint)
-    if isinstance(joint, bool) or not isinstance(joint, int | np.integer) or not 0 <= joint < body.n_shape:
-        raise unknown_name(f"joint of {body.name}", str(joint), body.joint_names)
-    return int(joint)
+    places = []
+    for joint in joints:
+        is_place = isinstance(joint, int | np.integer) and not isinstance(joint, bool) and 0 <= joint < body.n_shape
+        if not is_place and not isinstance(joint, str):
+            raise unknown_name(f"joint of {body.name}", str(joint), body.joint_names)
+        places.append(body.joint_index(joint) if isinstance(joint, str) else int(joint))
+    if places[0] == places[1]:
+        raise ShapeError(f"joints: two different joints are needed, got {body.joint_names[places[0]]} twice")
+    return places[0], places[1]
 
 
 def _one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
@@ -379,10 +362,3 @@ def _one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
             f"got shape {shape.shape}"
         )
     return shape
-
-
-def _row(values: ArrayLike, name: str) -> Array:
-    row = finite_array(values, name)
-    if row.ndim != 1:
-        raise ShapeError(f"{name}: a row of coordinates is needed, got shape {row.shape}")
-    return row

@@ -16,15 +16,11 @@ from ..arrays import Array, Integers, check_reach, lock_arrays, read_only, real_
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 
-CLOSED = 1e-9
-"""[rad or m]; what ends this near its start is a loop: files are written with ten digits or more."""
+CLOSED = 1e-9  # [rad or m] largest gap of a loop: files are written with ten digits or more
 _WHOLE_TURN = 2.0 * np.pi
-# Of the last break: times nearer to each other than this are one, however a path was stretched or reversed.
-_SAME_TIME = 1e-12
-# Knots of a loop repeated that are still written out.
-_MOST_REPEATED = 100_000
-# Sets of times of which a curve's values are kept, and numbers of all of them: sixteen megabytes.
-_MOST_KEPT = 32
+_SAME_TIME = 1e-12  # relative to the last break: nearer times are one after stretching or reversing
+_MOST_REPEATED = 100_000  # knots of a repeated loop that are written out
+_MOST_KEPT = 32  # sets of times with kept values; with the next number, 16 MB
 _MOST_NUMBERS = 2_000_000
 
 
@@ -37,12 +33,10 @@ class Curve(Protocol):
 
 
 class Swings(NamedTuple):
-    """How fast a curve can change, known before it is sampled.
+    """Bound of the changes of a curve, known before it is sampled.
 
-    Attributes
-    ----------
     most : how often it can swing between two breaks, an upper bound; 0: nothing moves; None: unknown
-    smooth_loop : whether it also goes smoothly from its end to its start
+    smooth_loop : True if it also goes smoothly from its end to its start
     """
 
     most: float | None = None
@@ -56,7 +50,7 @@ def most_swings(counts: Sequence[float | None]) -> float | None:
 
 
 class KeptValues:
-    """What a curve is at sets of times that are asked for again and again; too many, and all are forgotten."""
+    """Values of a curve at sets of times that are used repeatedly; all are dropped when there are too many."""
 
     def __init__(self) -> None:
         self._known: dict[bytes, tuple[Array, Array]] = {}
@@ -64,16 +58,16 @@ class KeptValues:
     def __call__(self, curve: Curve, times: Array) -> tuple[Array, Array]:
         """Shapes and rates, read-only: (N,) -> (N, n), (N, n)."""
         key = times.tobytes()
-        found = self._known.get(key)
-        if found is None:
+        values = self._known.get(key)
+        if values is None:
             shapes, rates = curve(times)
-            found = read_only(shapes), read_only(rates)
+            values = read_only(shapes), read_only(rates)
             each = _MOST_NUMBERS // _MOST_KEPT
-            if 2 * found[0].size <= each:
+            if 2 * values[0].size <= each:
                 if len(self._known) >= _MOST_KEPT:
                     self._known.clear()
-                self._known[key] = found
-        return found
+                self._known[key] = values
+        return values
 
     def __getstate__(self) -> dict[str, object]:
         """Values are not pickled."""
@@ -94,7 +88,7 @@ class Fourier:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         harmonics, weights = self._weights
         phase = times[:, None] * harmonics
         both = np.concatenate([np.cos(phase), np.sin(phase)], axis=1) @ weights
@@ -140,7 +134,7 @@ class PiecewisePolynomial:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         piece = np.searchsorted(self.knots[1:-1], times, side="right")
         since = (times - self.knots[piece])[:, None]
         shapes, rates = np.zeros((2, len(times), self.coefficients.shape[2]))
@@ -153,7 +147,7 @@ class PiecewisePolynomial:
 
 
 def polynomial_pieces(curve: Curve) -> PiecewisePolynomial | None:
-    """The same curve as polynomials between knots; None where it is none."""
+    """Polynomials between knots that are the curve; None for other curves."""
     if isinstance(curve, PiecewisePolynomial):
         return curve
     if isinstance(curve, Joined):
@@ -232,7 +226,7 @@ class Function:
     __repr__ = short_repr
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for a lambda."""
+        """Pickled state. Raises LocalFunctionError for a lambda."""
         check_picklable(self.f, "a path")
         return self.__dict__
 
@@ -241,7 +235,7 @@ class Function:
         return self
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = returned_pair(self.f(times))
         expected_shape = (len(times), self.n_shape)
         for name, part in (("shapes", shapes), ("rates", rates)):
@@ -266,7 +260,7 @@ class Reversed:
     __repr__ = short_repr
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = self.curve(self.duration - times)
         return shapes, -rates
 
@@ -282,7 +276,7 @@ class Stretched:
     __repr__ = short_repr
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = self.curve(np.minimum(times / self.factor, self.duration))
         return shapes, rates / self.factor
 
@@ -299,7 +293,7 @@ class Reordered:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = self.curve(times)
         return shapes[:, self.order], rates[:, self.order]
 
@@ -316,7 +310,7 @@ class Multiplied:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = self.curve(times)
         return shapes * self.factors, rates * self.factors
 
@@ -334,7 +328,7 @@ class Widened:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         shapes, rates = np.zeros((2, len(times), self.n_shape))
         shapes[:, self.columns], rates[:, self.columns] = self.curve(times)
         return shapes, rates
@@ -355,7 +349,7 @@ class Joined:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         late = times >= self.first_duration
         shapes, rates = (np.empty((len(times), len(self.offset))) for _ in range(2))
         shapes[~late], rates[~late] = self.first(times[~late])
@@ -379,7 +373,7 @@ class Repeated:
     __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """As `Curve`."""
+        """Shapes and rates."""
         # Compared with the very numbers that stand in the breaks, so that a time just before one stays in its loop.
         starts = self.period * np.arange(self.count)
         loop = np.searchsorted(starts, times, side="right") - 1

@@ -1,4 +1,4 @@
-"""What a measured fall says about the units of a recording: 9.81 m/s^2 over it, against slips that are usual."""
+"""Errors of units in a recording that a measured fall shows: 9.81 m/s^2 over it, against slips that are usual."""
 
 from __future__ import annotations
 
@@ -12,30 +12,19 @@ from ..arrays import Array
 from ..errors import TrajectoryError, TrajectoryWarning
 from .free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
 
-_LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
-"""[m] Units that are mixed up."""
+_LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}  # [m] units mixed up by mistake
+# [1/s] usual frame rates.
 _RATES = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 200, 240, 250, 300, 400, 480, 500, 1000)
-"""[1/s] Frame rates that are usual."""
-_MOST_TIMES = 10.0
-"""Of the frame rate that is written: slips that show in the fall are by less."""
-_MOST_LENGTHS = 40.0
-"""Of the lengths that are written: slips that show in the fall are by less."""
-_MOST_SAMPLES = 3000
-"""Time: samples among which a fall by another gravity is looked for."""
-_OFF = 0.1
-"""Of gravity: a fall that differs by less may be right."""
-_BARS = 3.0
-"""Standard deviations of the measured fall by which it has to differ, too."""
-_FITS = 0.04
-"""Of gravity: a slip that explains the fall so well is named."""
-_LONG = 0.8
-"""[m] g t^2 of a fall that may be one by another acceleration: ten times its bar by wander, 0.29 s on earth."""
-_SEEN = 6.0
-"""Standard deviations that a fall by another acceleration is from none."""
-_AS_LONG = 0.8
-"""Of the longest fall: among those that last so long, the one nearest to its parabola counts."""
-_PARABOLA = 0.02
-"""[m] rms from a parabola, beyond the noise, of what is no fall at all."""
+_MOST_TIMES = 10.0  # largest error of the frame rate
+_MOST_LENGTHS = 40.0  # largest error of lengths
+_MOST_SAMPLES = 3000  # searched for a fall by another gravity: bounds the time
+_OFF = 0.1  # relative to gravity: a smaller difference may be right
+_BARS = 3.0  # standard deviations by which a fall must differ, too
+_FITS = 0.04  # relative to gravity: a unit error that fits this well is reported
+_LONG = 0.8  # [m] least g t^2 of a fall by another acceleration: ten error bars of wander, 0.29 s on earth
+_SEEN = 6.0  # standard deviations from zero of a fall by another acceleration
+_AS_LONG = 0.8  # of the longest fall: among such long ones, the best parabola is taken
+_PARABOLA = 0.02  # [m] rms off a parabola, beyond the noise, of a motion that is no fall
 
 
 def check_gravity(fall: FreeFall, gravity: float, rate: float, where: str) -> None:
@@ -46,10 +35,7 @@ def check_gravity(fall: FreeFall, gravity: float, rate: float, where: str) -> No
 def check_parabola(times: Array, centres: Array, noise: float, gravity: float, where: str) -> None:
     """Check a stretch that is given in the same way: where it is a parabola, and bent enough for that to be seen.
 
-    Warns
-    -----
-    TrajectoryWarning
-        Where the centre of mass leaves every parabola: no free flight, or a body of another size.
+    Warns where the centre of mass leaves every parabola: no free flight, or a body of another size.
     """
     if len(times) < 4:
         return
@@ -65,7 +51,7 @@ def check_parabola(times: Array, centres: Array, noise: float, gravity: float, w
             TrajectoryWarning,
             stacklevel=6,
         )
-    # What is not bent has no weight, or is too short to tell.
+    # What is not bent has no weight, or is too short to be compared.
     elif size > _BARS * bar:
         _check(size, bar, gravity, 1.0 / float(np.median(np.diff(times))), where)
 
@@ -85,7 +71,7 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
             if found is None:
                 continue
             time = lasts(seen, found.ends) / trial.times
-            # In the lengths of the file, too: whatever moves smoothly bends a little, and looks like a slow fall.
+            # In the lengths of the file, too: whatever moves smoothly bends a little, and resembles a slow fall.
             if is_long(found, seen, trial.lengths) and found.gravity > _SEEN * found.gravity_bar:
                 falls.append((time, found.off / found.gravity, found))
     if not falls:
@@ -96,7 +82,7 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
 
 
 def is_long(fall: FreeFall, times: Array, lengths: float = 1.0) -> bool:
-    """Whether a fall is bent far more than a centre of mass wanders; lengths are so much off."""
+    """True if a fall is bent far more than a centre of mass wanders; lengths are so much off."""
     return fall.gravity / lengths * lasts(times, fall.ends) ** 2 > _LONG
 
 

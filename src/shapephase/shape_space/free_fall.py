@@ -1,7 +1,7 @@
 """The stretch of a recording on which the body falls freely: its centre of mass accelerates as gravity alone makes it.
 
 Less what gravity does, the centre of mass then goes along a straight line. Up is one direction for the whole recording:
-the one that is given, else that axis of the recorder with the longest fall. No axis points down unless that is said:
+the one that is given, else that axis of the recorder with the longest fall. No axis points down unless that is given:
 what accelerates upwards by g pushes off, or lands.
 """
 
@@ -15,34 +15,20 @@ import numpy as np
 from ..arrays import Array, Integers, Mask
 from ..errors import TrajectoryError
 
-GRAVITY = 9.81
-"""[m/s^2] On earth it differs by a quarter of a per cent, which moves nothing by a millimetre within a second."""
-_MODEL = 0.002
-"""[m] A centre of mass that is computed from a body's masses wanders by about this much as the body changes shape."""
-_CLEAR = 5.0
-"""A body at rest leaves this many times the noise on a window: so it is known from one that falls."""
-_OF_A_PARABOLA = 1.0 / (6.0 * np.sqrt(5.0))
-"""Rms of t^2 about its best straight line on a window of length one."""
-_CHANCE = 4.0
-"""Standard deviations by which the mean square of a window may exceed that of the noise."""
-_BAND = 3.0
-"""Standard deviations within which single samples follow the line, at the ends of the fall."""
-_CUT = 2.0
-"""Standard deviations: for so long a contact that accelerates the body by g may last unseen, and that much is cut."""
-_FEWEST = 6
-"""Samples of a window."""
-_APART = 1.0 / 60.0
-"""[s] Between samples of which the noise is that of a recording, too, and by which a body moves little."""
-_WANDER = 0.01
-"""[m] By which the computed centre of mass may sag in the middle of a flight: segments are not rigid, and not known."""
-_SAME = 0.03
-"""Of gravity: a measured fall that differs by less is searched for as it is."""
-UP_AXES = ("x", "y", "z", "-x", "-y", "-z")
-"""Directions that may be up."""
-_AT_ONCE = 1024
-"""Windows: memory."""
-_NORMAL_MEDIAN = 0.6745
-"""The median of the size of a normal number of standard deviation one."""
+GRAVITY = 9.81  # [m/s^2] on earth within 0.25 %: a millimetre in a second
+_MODEL = 0.002  # [m] wander of a centre of mass computed from a body's masses as its shape changes
+_CLEAR = 5.0  # noise levels that a body at rest leaves on a window, in contrast to one that falls
+_OF_A_PARABOLA = 1.0 / (6.0 * np.sqrt(5.0))  # rms of t^2 about its best line on a window of length 1
+_CHANCE = 4.0  # standard deviations of a window's mean square above that of the noise
+_BAND = 3.0  # standard deviations of single samples off the line, at the ends of the fall
+_CUT = 2.0  # standard deviations: a contact with an acceleration of g stays hidden so long, and is cut
+_FEWEST = 6  # samples of a window
+_APART = 1.0 / 60.0  # [s] between samples with a recording's own noise, in which a body moves little
+_WANDER = 0.01  # [m] sag of the computed centre of mass in mid-flight: segments are not rigid, and not known
+_SAME = 0.03  # relative to gravity: a fall that differs by less is searched with it
+UP_AXES = ("x", "y", "z", "-x", "-y", "-z")  # directions that may be up
+_AT_ONCE = 1024  # windows: bounds memory
+_NORMAL_MEDIAN = 0.6745  # median of |x| of a standard normal x
 
 
 @dataclass(frozen=True)
@@ -82,8 +68,6 @@ class FreeFall:
 class _Windows(NamedTuple):
     """Short stretches, and what the best straight lines leave of the centre of mass and of the square of the time.
 
-    Attributes
-    ----------
     starts, ends : (W,) first and last samples
     squares : (W,) of what is left of the centre of mass, summed [m^2]
     mixed : (W, 3) of that times what is left of the square of the time, summed [m s^2]
@@ -105,27 +89,22 @@ class _Windows(NamedTuple):
 def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None, gravity: float = GRAVITY) -> FreeFall:
     """The longest stretch on which a centre of mass falls freely.
 
-    Parameters
-    ----------
     times : (N,) ascending [s]
     centres : (N, 3) of mass, axes of the recorder, one of which is vertical [m]
     where : the file, for messages
     up : the axis that points up, one of UP_AXES; None: x, y or z, whichever has the longest fall
     gravity : [m/s^2]
 
-    Raises
-    ------
-    TrajectoryError
-        If there is none that is long enough to tell it from rest; or, without `up`, if a longer one has an axis that
-        points down.
+    Raises TrajectoryError if there is none that is long enough to differ from rest; or, without `up`, if a longer one
+    has an axis that points down.
     """
     noise = centre_noise(times, centres)
     if up is not None:
         longest = falls_along(times, centres, up, gravity)
         downwards = None
     else:
-        found = {axis: falls_along(times, centres, axis, gravity) for axis in UP_AXES}
-        longest, downwards = (_longer([found[axis] for axis in part], times) for part in (UP_AXES[:3], UP_AXES[3:]))
+        falls = {axis: falls_along(times, centres, axis, gravity) for axis in UP_AXES}
+        longest, downwards = (_longer([falls[axis] for axis in part], times) for part in (UP_AXES[:3], UP_AXES[3:]))
     if downwards is not None and (longest is None or lasts(times, downwards.ends) > lasts(times, longest.ends)):
         first, last = times[downwards.first], times[downwards.last]
         raise TrajectoryError(
@@ -145,7 +124,7 @@ def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None
 
 
 def centre_noise(times: Array, centres: Array) -> float:
-    """By which a coordinate of the centre of mass is known [m].
+    """Noise of a coordinate of the centre of mass [m].
 
     Also of samples that are farther apart: those of a tracker may all be off alike, nearest to each other.
     """
@@ -156,21 +135,21 @@ def centre_noise(times: Array, centres: Array) -> float:
 
 def falls_along(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
     """The longest fall with one axis up; where it is measured to be another than `gravity`, as it is measured."""
-    found = _fall(times, centres, up, gravity)
-    if found is not None and abs(found.gravity - gravity) > max(_SAME * gravity, found.gravity_bar):
-        as_measured = _fall(times, centres, up, found.gravity) if found.gravity > 0.0 else None
-        if as_measured is not None and lasts(times, as_measured.ends) > lasts(times, found.ends):
+    fall = _fall(times, centres, up, gravity)
+    if fall is not None and abs(fall.gravity - gravity) > max(_SAME * gravity, fall.gravity_bar):
+        as_measured = _fall(times, centres, up, fall.gravity) if fall.gravity > 0.0 else None
+        if as_measured is not None and lasts(times, as_measured.ends) > lasts(times, fall.ends):
             return as_measured
-    return found
+    return fall
 
 
 def _shortest(noise: float, gravity: float) -> float:
-    """How long a fall has to be to be told from rest [s]."""
+    """Shortest fall that differs from rest [s]."""
     return float(np.sqrt(_CLEAR * noise / (0.5 * gravity * _OF_A_PARABOLA)))
 
 
-def _longer(found: list[FreeFall | None], times: Array) -> FreeFall | None:
-    return max((fall for fall in found if fall is not None), key=lambda fall: lasts(times, fall.ends), default=None)
+def _longer(falls: list[FreeFall | None], times: Array) -> FreeFall | None:
+    return max((fall for fall in falls if fall is not None), key=lambda fall: lasts(times, fall.ends), default=None)
 
 
 def _fall(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
@@ -184,11 +163,11 @@ def _fall(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | N
     falls = squares <= noise**2 * (windows.free + _CHANCE * np.sqrt(2.0 * windows.free))
     straight = centres.copy()
     straight[:, axis] += pull * (times - times[0]) ** 2
-    found = _all_ends(times, straight, windows, falls, noise, window, gravity)
-    if not found:
+    stretches = _all_ends(times, straight, windows, falls, noise, window, gravity)
+    if not stretches:
         return None
-    longest = max(found, key=lambda ends: lasts(times, ends))
-    return _described(times, centres, straight, longest, tuple(found), up, noise)
+    longest = max(stretches, key=lambda ends: lasts(times, ends))
+    return _described(times, centres, straight, longest, tuple(stretches), up, noise)
 
 
 def fall_number(times: Array, centres: Array, fall: FreeFall, number: int) -> FreeFall:
@@ -232,7 +211,7 @@ def measured_fall(times: Array, centres: Array, noise: float) -> tuple[Array, fl
 
 
 def _white_noise(times: Array, centres: Array) -> float:
-    """Of a coordinate, by how far four neighbours are off every parabola: in the median smooth motion counts little."""
+    """Noise of a coordinate, by the median distance of four neighbours from every parabola: motion counts little."""
     if len(times) < 4:
         return 0.0
     four = np.stack([times[k : len(times) - 3 + k] for k in range(4)], axis=1)
@@ -250,28 +229,28 @@ def _all_ends(
     runs = np.flatnonzero(np.diff(np.concatenate([[False], falls, [False]]).astype(int))).reshape(-1, 2)
     best: list[tuple[int, int]] = []
     for first, past in runs.tolist():
-        found = _bounded(
+        stretch = _bounded(
             times, straight, int(windows.starts[first]), int(windows.ends[past - 1]), noise, window, gravity
         )
-        if found is None:
+        if stretch is None:
             continue
-        if best and found[0] <= best[-1][1]:
+        if best and stretch[0] <= best[-1][1]:
             # One flight with a doubtful window in it.
-            best[-1] = max(best[-1], found, key=lambda ends: lasts(times, ends))
+            best[-1] = max(best[-1], stretch, key=lambda ends: lasts(times, ends))
         else:
-            best.append(found)
+            best.append(stretch)
     return best
 
 
 def lasts(times: Array, ends: tuple[int, int]) -> float:
-    """From the first to the last of two samples [s]."""
+    """Time from the first to the last of two samples [s]."""
     return float(times[ends[1]] - times[ends[0]])
 
 
 def _bounded(
     times: Array, straight: Array, first: int, last: int, noise: float, window: float, gravity: float
 ) -> tuple[int, int] | None:
-    """The same stretch with its ends where the line is left, less what a contact may last unseen."""
+    """The stretch with its ends where the line is left, less the time of a hidden contact."""
     cut = float(np.sqrt(2.0 * _CUT * noise / gravity))
     start = _end_of_line(-times[::-1], straight[::-1], len(times) - 1 - first, noise, window)
     ends = (len(times) - 1 - start, _end_of_line(times, straight, last, noise, window))
@@ -318,7 +297,7 @@ def _windows(times: Array, centres: Array, window: float) -> _Windows:
 
 
 def _off_lines(t: Array, values: Array, inside: Array) -> Array:
-    """What the best straight lines leave of values at some of the times: (W, k, 1), (W, k, c), (W, k, 1)."""
+    """Residuals of the best straight lines through values at some of the times: (W, k, 1), (W, k, c), (W, k, 1)."""
     count = inside.sum(axis=1, keepdims=True)
     t = (t - (inside * t).sum(axis=1, keepdims=True) / count) * inside
     values = (values - (inside * values).sum(axis=1, keepdims=True) / count) * inside

@@ -21,21 +21,15 @@ from .curves import Curve, PiecewisePolynomial
 from .path_series import merged, panel_edges, resolved_series
 from .shape_path import ShapePath
 
-_ROUNDING = 64.0 * np.finfo(float).eps
-"""Of a coordinate's size: what rounding may leave of it where it goes through a knot."""
-_NEARLY_REAL = 1e-6
-"""Imaginary part of a zero, in halves of a panel: of a double zero rounding leaves its root."""
-_WHOLE = 1e-9
-"""[rad or m] by which a loop may end elsewhere and still be one."""
+_ROUNDING = 64.0 * np.finfo(float).eps  # relative to a coordinate's size, where it crosses a knot
+_NEARLY_REAL = 1e-6  # imaginary part in half panels: rounding leaves the root of a double zero
+_WHOLE = 1e-9  # [rad or m] largest gap of a loop
 
 
 def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
     """Return a path, its columns in the order of the body's joints, with breaks where the body's motion is less smooth.
 
-    Raises
-    ------
-    TrajectoryError
-        If a spline goes from a quaternion of a ball joint to one of the other sign.
+    Raises TrajectoryError if a spline goes from a quaternion of a ball joint to one of the other sign.
     """
     if isinstance(body, ParticleBody):
         return route
@@ -49,12 +43,12 @@ def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
         route = replace(route, breaks=_loop_ends(route), loops=1, scanner=None)
     if follows.is_smooth:
         return route
-    found = crossing_times(follows, route.curve, panel_edges(route))
-    if not len(found):
+    crossings = crossing_times(follows, route.curve, panel_edges(route))
+    if not len(crossings):
         return route
     known = merged(route.smoothness.breaks, _loop_ends(route))
     starts = route.duration / route.loops * np.arange(route.loops)
-    breaks = merged(known, (starts[:, None] + found).ravel())
+    breaks = merged(known, (starts[:, None] + crossings).ravel())
     return replace(route, breaks=breaks, scanner=None)
 
 
@@ -78,8 +72,6 @@ def crossing_times(follows: CoordinateMap, curve: Curve, edges: Array) -> Array:
     Where a slope jumps at the knot and the joint is slow, the two times just before and behind: between them rounding
     may take it for on either side.
 
-    Parameters
-    ----------
     edges : (M,) times between which the curve is smooth and swings once at most, as `panel_edges` [s]
     """
     found = np.zeros(0)
@@ -119,7 +111,7 @@ def _crossings(followed: Curve, edges: Array, knots: Array, *, kinked: bool) -> 
 
 
 def _zeros(series: Array, value: float) -> Array:
-    """Where a series has a value, in [-1, 1]."""
+    """Places in [-1, 1] at which a series has a value."""
     sizes = np.abs(series)
     last = np.flatnonzero(sizes > _ROUNDING * sizes.max())[-1]
     shifted = series[: last + 1].copy()
@@ -130,7 +122,7 @@ def _zeros(series: Array, value: float) -> Array:
 
 
 def _winds(body: Body, route: ShapePath) -> bool:
-    """Whether a joint that others follow by a curve ends a loop whole turns from its start."""
+    """True if a joint that others follow by a curve ends a loop whole turns from its start."""
     ends, _ = route.curve(np.array([0.0, route.duration]))
     moved = np.abs(ends[1] - ends[0])
     return bool((moved[np.isin(np.array(body.joint_names, dtype=str), body.chain.follows.drivers)] > _WHOLE).any())

@@ -11,22 +11,14 @@ import numpy as np
 
 from ..arrays import Array, lock_arrays
 
-ORDER = 3
-"""Of the derivative whose square is penalized: quintic splines, whose second derivative is smooth."""
-PILOT_ORDER = 5
-"""Of the smoother that knows the motion's third derivative at the ends, where a quintic spline has none."""
-BUTTERWORTH = 2
-"""Order of a Butterworth filter that is run forwards and backwards."""
-_HALF_POWER = np.sqrt(2.0) - 1.0
-"""At the cut-off, in place of 1 for each pass: both together then give 1/(1 + (sqrt(2) - 1)) = 1/sqrt(2), or -3 dB."""
-_NARROWEST = 10.0**-0.5
-"""Width that is tried, in steps of time: next to nothing is smoothed."""
-_WIDEST = 10.0**2.5
-"""Width that is tried, in steps of time: 300 samples are smoothed, and rounding goes into the bias beyond."""
-_WIDTHS_A_DECADE = 6
-"""Tried; the best of them and its neighbours have the least of a parabola between them."""
-_ROUNDED = 24
-"""Widths in a decade that are used: joints whose width is the same are smoothed together."""
+ORDER = 3  # of the penalized derivative: quintic splines have a smooth second derivative
+PILOT_ORDER = 5  # its spline shows the third derivative at the ends, where a quintic has none
+BUTTERWORTH = 2  # order of the filter, run forwards and backwards
+_HALF_POWER = np.sqrt(2.0) - 1.0  # in place of 1 at the cut-off: both passes give 1/sqrt(2), -3 dB
+_NARROWEST = 10.0**-0.5  # least width tried, in steps of time: next to no smoothing
+_WIDEST = 10.0**2.5  # largest width tried, in steps of time: beyond 300 samples rounding enters the bias
+_WIDTHS_A_DECADE = 6  # tried; a parabola through the best and its neighbours has the optimum
+_ROUNDED = 24  # widths per decade that are used: joints of equal width are smoothed together
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,13 +31,11 @@ class LinearSmoother:
     With `digital`, the values are those of a Butterworth filter of second order run forwards and backwards over evenly
     spaced samples: 1/(1 + penalty K) is its squared frequency response, and ends are free as those of a spline.
 
-    Attributes
-    ----------
     times : (N,) of the samples, ascending from 0 [s]
-    periodic : whether first and last sample are measurements of one value, which then weighs twice
+    periodic : True if first and last sample are measurements of one value, which then weighs twice
     penalties : (n,) of each column [s^(2 order - 1)]; of zero, nothing is smoothed
     order : of the derivative that is penalized
-    digital : whether K is that of the Butterworth filter; without it, that of the spline
+    digital : True if K is that of the Butterworth filter, else it is that of the spline
 
     Notes
     -----
@@ -63,7 +53,7 @@ class LinearSmoother:
 
     @property
     def count(self) -> int:
-        """How many values there are."""
+        """Number of values."""
         return len(self.times) - self.periodic
 
     def __call__(self, values: Array) -> Array:
@@ -71,21 +61,21 @@ class LinearSmoother:
         return self.transposed((self.weights[:, None] * values)[:, None])[:, 0] / self.weights[:, None]
 
     def transposed(self, gradients: Array) -> Array:
-        """From derivatives by smoothed values to those by the values: (count, m, n) -> (count, m, n)."""
-        found = gradients.copy()
+        """Convert derivatives by smoothed values to those by the values: (count, m, n) -> (count, m, n)."""
+        columns = gradients.copy()
         for penalty in np.unique(self.penalties[self.penalties > 0.0]):
             own = self.penalties == penalty
             right = gradients[:, :, own].reshape(self.count, -1)
             solved = self._system.solve_linear(float(penalty), right).reshape(self.count, -1, int(own.sum()))
-            found[:, :, own] = self.weights[:, None, None] * solved
-        return found
+            columns[:, :, own] = self.weights[:, None, None] * solved
+        return columns
 
     def degrees_of_freedom(self) -> Array:
         """The trace of the map of each column: (n,)."""
-        found = np.full(len(self.penalties), float(self.count))
+        freedom = np.full(len(self.penalties), float(self.count))
         for penalty in np.unique(self.penalties[self.penalties > 0.0]):
-            found[self.penalties == penalty] = self._system.trace(float(penalty))
-        return found
+            freedom[self.penalties == penalty] = self._system.trace(float(penalty))
+        return freedom
 
     @property
     def weights(self) -> Array:
@@ -101,8 +91,6 @@ class LinearSmoother:
 class LowPass:
     """A Butterworth filter of second order, run forwards and backwards.
 
-    Attributes
-    ----------
     cut_off : at which both passes together leave 1/sqrt(2) of an amplitude [Hz]
     rate : samples a second [Hz]
 
@@ -145,11 +133,9 @@ def likeliest(
 ) -> LinearSmoother:
     """The smoother of the penalties that are likeliest for samples whose noise is known.
 
-    Of the spline as a random function, whose derivative of the order is white noise of the variance noise^2/penalty:
-    the penalty is the one of the greatest likelihood of what the samples say beyond a polynomial.
+    The spline is taken as a random function, whose derivative of the order is white noise of the variance
+    noise^2/penalty: the penalty has the greatest likelihood of the samples beyond a polynomial.
 
-    Parameters
-    ----------
     values, noise : (count, n), (n,) [rad or m]; a column without noise is left as it is
     groups : columns that have one penalty together
 
@@ -190,7 +176,7 @@ def _widths(count: int) -> Array:
 
 
 def _least(places: Array, values: Array) -> float:
-    """Where the parabola through the least of evenly placed values and its neighbours is least."""
+    """Place of the minimum of the parabola through the least of evenly placed values and its neighbours."""
     best = int(np.argmin(values))
     if best in (0, len(values) - 1):
         return float(places[best])
@@ -227,7 +213,7 @@ class _Roughness:
         """What is penalized at all: all but constants, or polynomials below the order."""
 
     def penalty_of(self, width: float) -> float:
-        """Of a width in steps of time: what swings with it, in radians a step, is halved [s^(2 order - 1)]."""
+        """Penalty of a width in steps of time: a swing with it, in radians a step, is halved [s^(2 order - 1)]."""
         return float(width ** (2 * self._order) * self._unit ** (2 * self._order - 1))
 
     def solve_linear(self, penalty: float, right: Array) -> Array:
@@ -237,7 +223,7 @@ class _Roughness:
         return self._with(self._factor(penalty), right)
 
     def likelihood(self, penalty: float, values: Array) -> tuple[Array, float]:
-        """Of values (count, n): y . W (y - S y) of each (n,), and the logarithm of the determinant of the samples'
+        """Misfits y . W (y - S y) of values (count, n): (n,), and the logarithm of the determinant of the samples'
         covariance in units of the noise, but for what no penalty changes."""
         factor = self._factor(penalty)
         weighted = self.weights[:, None] * values
@@ -246,7 +232,7 @@ class _Roughness:
         return (weighted * off).sum(axis=0), determinant - self.modes * float(np.log(self._scaled(penalty)))
 
     def trace(self, penalty: float) -> float:
-        """Of S = (W + penalty K)^-1 W: count minus the slope of half the determinant's logarithm by log r."""
+        """Trace of S = (W + penalty K)^-1 W: count minus the slope of half the determinant's logarithm by log r."""
         step = 1e-3
         ahead, behind = (
             float(np.log(np.abs(self._factor(penalty * factor).U.diagonal())).sum())
@@ -265,7 +251,7 @@ class _Roughness:
 
     @cached_property
     def _matrices(self) -> tuple[Any, Any]:
-        """What no penalty changes, and what r multiplies."""
+        """Matrices without the penalty, and multiplied by r."""
         from scipy.sparse import block_array, block_diag, diags_array
 
         fixed = block_diag([diags_array(self.weights), -self._gram])
@@ -314,7 +300,7 @@ def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
 
     count = len(times) - periodic
     splines = count if periodic else max(count - order, 0)
-    # Of a loop knots go on, round after round.
+    # The knots of a loop go on, round after round.
     rounds = np.arange(splines + order if periodic else count)
     knots_in_turn = times[:count][rounds % count] + times[-1] * (rounds // count)
     first = np.arange(splines)
@@ -329,7 +315,7 @@ def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
     nodes, shares = leggauss(order)
     lengths = np.diff(knots, axis=1)
     values = np.stack([_spline_values(knots, piece, 0.5 * (nodes + 1.0)) for piece in range(order)], axis=1)
-    found: list[tuple[Any, Any, Any]] = []
+    entries_of_gram: list[tuple[Any, Any, Any]] = []
     for shift in range(order):
         before = first if periodic else first[: splines - shift]
         after = (before + shift) % max(splines, 1)
@@ -337,10 +323,10 @@ def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:
             0.5 * lengths[before, piece] * (shares * values[before, piece] * values[after, piece - shift]).sum(axis=1)
             for piece in range(shift, order)
         ]
-        found.append((sum(shared), before, after))
+        entries_of_gram.append((sum(shared), before, after))
         if shift:
-            found.append((sum(shared), after, before))
-    entries, rows, columns = (np.concatenate(parts) for parts in zip(*found, strict=True))
+            entries_of_gram.append((sum(shared), after, before))
+    entries, rows, columns = (np.concatenate(parts) for parts in zip(*entries_of_gram, strict=True))
     gram = coo_array((entries, (rows, columns)), shape=(splines, splines)).tocsc()
     scale: Any = diags_array(1.0 / np.sqrt(gram.diagonal()))
     return (differences @ scale).tocsc(), (scale @ gram @ scale).tocsc()

@@ -22,7 +22,7 @@ from .shape_path import ShapePath
 
 @dataclass(frozen=True, eq=False)
 class FinalAttitudes:
-    """Where many motions end.
+    """Final attitudes of many motions.
 
     Attributes
     ----------

@@ -15,13 +15,12 @@ from ..letters import what_came
 from .path_samples import PathSamples, columns_without_samples, path_samples
 from .shape_path import ShapePath
 
-_MOST_NUMBERS = 4_000_000
-"""In memory at once; more times are taken one part after the other."""
+_MOST_NUMBERS = 4_000_000  # in memory at once; more times are taken in parts
 
 
 @dataclass(frozen=True, eq=False)
 class PathErrors:
-    """How far joints may be off at some times, each by the noise of its own samples.
+    """Error bars of joints at some times, each from the noise of its own samples.
 
     Attributes
     ----------
@@ -52,12 +51,12 @@ class PathErrors:
 
     @property
     def rate(self) -> Array:
-        """The same of their rates: (N, n) [rad/s or m/s]."""
+        """Standard deviations of their rates: (N, n) [rad/s or m/s]."""
         return self._deviations(1)
 
     @property
     def acceleration(self) -> Array:
-        """The same of their accelerations: (N, n) [rad/s^2 or m/s^2]."""
+        """Standard deviations of their accelerations: (N, n) [rad/s^2 or m/s^2]."""
         return self._deviations(2)
 
     def of(self, derivative: Array) -> Array:
@@ -71,9 +70,9 @@ class PathErrors:
 
 
 def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) -> PathErrors:
-    """How far the joints, their rates and accelerations may be off, by the noise of the samples of a path.
+    """Error bars of joints, their rates and accelerations, from the noise of the samples of a path.
 
-    Of a smoothed recording the bars hold what smoothing leaves of the noise and what it takes off the motion.
+    The bars of a smoothed recording hold the noise that is left and the bias of smoothing.
 
     Parameters
     ----------
@@ -111,7 +110,7 @@ def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) 
     rows = max(samples.count * path.n_shape, samples.curve.coefficients[..., 0].size)
     chunks = np.array_split(times, max(1, -(-3 * len(times) * rows // _MOST_NUMBERS)))
     parts = [_errors(samples, part, levels) for part in chunks if len(part)]
-    covariance, bias = (np.concatenate(found) for found in zip(*parts, strict=True))
+    covariance, bias = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return PathErrors(times=times, covariance=covariance, bias=bias)
 
 
@@ -128,22 +127,22 @@ def summed_errors(path: ShapePath, times: Array, derivative: Array, joints: Arra
 
 
 def _samples(path: ShapePath) -> PathSamples:
-    """Raises WrongObjectError where a path was put through none, or joints answer to each other."""
-    found = path_samples(path)
-    if found.arc is not None:
+    """Samples of a path. Raises WrongObjectError where it was put through none, or a geodesic couples its joints."""
+    samples = path_samples(path)
+    if samples.arc is not None:
         raise WrongObjectError(
             "error bars of rates are not known of a path that a geodesic closes; close it by drift or smooth "
             "(close_by, --close-by)"
         )
-    return found
+    return samples
 
 
 def stated_noise(path: ShapePath) -> Array | None:
     """The noise that a recording was smoothed for, or that a low-pass filter found: (n,) [rad or m]; else None."""
     check_object(path, "ShapePath", "path")
     record = path.record or {}
-    said = record.get("smooth") or (record.get("lowpass") or {}).get("noise")
-    return None if said is None else np.array([said[name] for name in path.joint_names or said])
+    stated = record.get("smooth") or (record.get("lowpass") or {}).get("noise")
+    return None if stated is None else np.array([stated[name] for name in path.joint_names or stated])
 
 
 def _levels(path: ShapePath, joints: ArrayLike | None) -> Array:

@@ -14,12 +14,11 @@ from .closing_arc import ClosingArc
 from .curves import PiecewisePolynomial, Reordered
 from .shape_path import PathOrigin, ShapePath, interpolated
 
-# The quintic of least jerk from 0 to 1: the powers 3, 4, 5 of the share of the time.
-_REST_TO_REST = (10.0, -15.0, 6.0)
+_REST_TO_REST = (10.0, -15.0, 6.0)  # quintic of least jerk from 0 to 1: coefficients of s^3, s^4, s^5
 
 
 class SampleOrigin(PathOrigin, Protocol):
-    """How values at the knots of a path follow from recorded samples that were closed, smoothed or resampled."""
+    """Steps from recorded samples, closed, smoothed or resampled, to values at the knots of a path."""
 
     @property
     def samples(self) -> Array:
@@ -28,23 +27,21 @@ class SampleOrigin(PathOrigin, Protocol):
 
     @property
     def bias(self) -> Array:
-        """What smoothing took off the motion, as far as it is known: (knots, n) [rad or m]."""
+        """Known bias of smoothing: (knots, n) [rad or m]."""
         ...
 
     def by_samples(self, by_values: Array, /) -> Array:
-        """From m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        """Convert m derivatives by the values at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
         ...
 
     def bias_by_samples(self, by_values: Array, /) -> Array:
-        """From m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
+        """Convert m derivatives by the bias at the knots to those by the samples: (knots, m, n) -> (N, m, n)."""
         ...
 
 
 class PathBasis(NamedTuple):
     """A path at N times by the coefficients of its polynomials.
 
-    Attributes
-    ----------
     pieces : (N,) the piece of each time
     powers, slopes, bends : (N, order) derivatives of the shape, of its rate, and of its acceleration, by the
         coefficients of that piece
@@ -62,8 +59,6 @@ class PathBasis(NamedTuple):
 class PathSamples:
     """Samples of a path, its joints in the order of the path's columns.
 
-    Attributes
-    ----------
     curve : the polynomials through the samples, or through what was made of them
     order : (n,) which column of theirs is which of the path's
     origin : how the values at their knots follow from the samples; None: they are the samples
@@ -77,7 +72,7 @@ class PathSamples:
 
     @property
     def count(self) -> int:
-        """How many samples there are that may differ: of a periodic path the last is the first, unless both were
+        """Number of samples that may differ: the last of a periodic path is the first, unless both were
         recorded."""
         return self._at_knots if self.origin is None else len(self.origin.samples)
 
@@ -91,7 +86,7 @@ class PathSamples:
 
     @property
     def bias(self) -> Array:
-        """What smoothing took off the motion at the knots, as far as it is known: (knots n,) [rad or m]."""
+        """Known bias of smoothing at the knots: (knots n,) [rad or m]."""
         if self.origin is None:
             return np.zeros(self._at_knots * len(self.order))
         return self.origin.bias[:, self.order].ravel()
@@ -123,7 +118,7 @@ class PathSamples:
         return self.by_samples(self.by_knots(times, by_shape, by_rate))
 
     def by_knots(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
-        """The same by the values at the knots: (k, knots n)."""
+        """Sums over times of derivatives by shapes and rates, by the values at the knots: (k, knots n)."""
         from scipy.sparse import csc_array
 
         basis = self.basis(times)
@@ -151,7 +146,7 @@ class PathSamples:
     def rows_by_knots(self, times: Array) -> Array:
         """Shape, rate and acceleration of a joint at times (N,), by its own values at the knots: (3, N, knots).
 
-        Of a path that no geodesic closes: there joints answer to each other.
+        No geodesic closes the path: that would couple the joints.
         """
         assert self.arc is None
         basis, count = self.basis(times), len(times)
@@ -159,23 +154,23 @@ class PathSamples:
         by_coefficients = np.zeros((order, basis.total, 3, count))
         rows = np.stack([basis.powers, basis.slopes, basis.bends])
         by_coefficients[:, basis.pieces, :, np.arange(count)] = np.moveaxis(rows, 1, 0).swapaxes(1, 2)
-        found = self.by_knots_of(by_coefficients.reshape(order, basis.total, 3 * count, 1))
-        return found.reshape(3, count, -1)
+        by_knots = self.by_knots_of(by_coefficients.reshape(order, basis.total, 3 * count, 1))
+        return by_knots.reshape(3, count, -1)
 
     def by_knots_of(self, by_coefficients: Array) -> Array:
-        """From derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
+        """Convert derivatives by coefficients, (order, pieces, k, n), to those by values at the knots: (k, knots n)."""
         curve, (order, _, count, n_shape) = self._source, by_coefficients.shape
         rule = _rest_to_rest if curve.through == "rest to rest" else _spline
         given = by_coefficients[:, : len(curve.knots) - 1].reshape(order, len(curve.knots) - 1, -1)
-        found = rule(np.diff(curve.knots), given, curve.through == "periodic").reshape(-1, count, n_shape)
+        by_knots = rule(np.diff(curve.knots), given, curve.through == "periodic").reshape(-1, count, n_shape)
         if self.arc is not None:
             by_cubics = np.empty_like(by_coefficients[:, len(curve.knots) - 1 :])
             by_cubics[..., self.order] = by_coefficients[:, len(curve.knots) - 1 :]
-            found[[0, -1]] += self.arc.by_ends(by_cubics)[..., self.order]
-        return np.moveaxis(found, 0, 1).reshape(count, -1)
+            by_knots[[0, -1]] += self.arc.by_ends(by_cubics)[..., self.order]
+        return np.moveaxis(by_knots, 0, 1).reshape(count, -1)
 
     def is_closing(self, times: Array) -> Mask:
-        """Which times are on a geodesic that closes the path, whose duration follows from the path: (N,)."""
+        """True for times on a geodesic that closes the path, whose duration follows from the path: (N,)."""
         return times > self._source.knots[-1] if self.arc is not None else np.zeros(len(times), dtype=bool)
 
     def seconds_by_knots(self) -> Array:
@@ -184,23 +179,23 @@ class PathSamples:
         assert arc is not None
         by_ends, by_shape, by_rate = arc.seconds_by_path()
         opened = PathSamples(self._source, np.arange(len(self.order)), self.origin, None)
-        found = opened.by_knots(arc.opened.breaks, by_shape[:, None], by_rate[:, None]).reshape(-1, len(self.order))
-        found[[0, -1]] += by_ends
-        return (found[:, self.order] / arc.seconds).ravel()
+        by_knots = opened.by_knots(arc.opened.breaks, by_shape[:, None], by_rate[:, None]).reshape(-1, len(self.order))
+        by_knots[[0, -1]] += by_ends
+        return (by_knots[:, self.order] / arc.seconds).ravel()
 
     def by_samples(self, by_knots: Array) -> Array:
-        """From derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
+        """Convert derivatives by the values at the knots to those by the samples: (k, knots n) -> (k, count n)."""
         return by_knots if self.origin is None else self._through(self.origin.by_samples, by_knots)
 
     def bias_by_samples(self, by_knots: Array) -> Array:
-        """The same of derivatives by `bias`, which follows linearly from the samples, too."""
+        """Convert derivatives by `bias` to those by the samples, from which it follows linearly, too."""
         if self.origin is None:
             return np.zeros_like(by_knots)
         return self._through(self.origin.bias_by_samples, by_knots)
 
     @property
     def rules(self) -> tuple[Callable[[Array], Array], ...]:
-        """From derivatives by the values at the knots to those by the samples: of what noise does to these values, and
+        """Conversions of derivatives by the values at the knots to those by the samples, for noise of these values, and
         to the estimate of their bias."""
         return self.by_samples, self.bias_by_samples
 
@@ -212,7 +207,7 @@ class PathSamples:
 
 
 def columns_without_samples(path: ShapePath) -> list[int]:
-    """The joints that rest where a reader was told, without a column in the file."""
+    """Joints without a column in the file, which rest."""
     resting = {} if path.record is None else path.record.get("at_rest", {})
     return [column for column, name in enumerate(path.joint_names or ()) if name in resting]
 
@@ -228,29 +223,32 @@ def path_samples(path: ShapePath) -> PathSamples:
             "this path was not put through samples: derivatives by samples are those of ShapePath.spline, "
             "ShapePath.waypoints and of recorded motions; of those that a geodesic closes, not if they were resampled"
         )
-    # A geodesic closes a path that is open: whatever else a path follows from knows the values at its knots.
+    # A geodesic closes a path that is open: every other origin has the values at the knots.
     origin = cast("SampleOrigin | None", arc.opened.origin if arc else path.origin)
     return PathSamples(curve, order, origin, arc)
 
 
 def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
-    """From derivatives by coefficients (6, pieces, m) to those by values at the knots: (pieces + 1, m)."""
+    """Convert derivatives by coefficients (6, pieces, m) to those by values at the knots: (pieces + 1, m)."""
     by_move = sum(
         factor * by_coefficients[power] / widths[:, None] ** power for power, factor in enumerate(_REST_TO_REST, 3)
     )
-    found = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
-    found[:-1] += by_coefficients[0] - by_move
-    found[1:] += by_move
-    return found
+    by_knots = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
+    by_knots[:-1] += by_coefficients[0] - by_move
+    by_knots[1:] += by_move
+    return by_knots
 
 
 def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
-    """As above, of the C2 cubic spline with slopes s at the knots: on a piece c1 = s and, with the mean slope m,
-    c2 = (3 m - 2 s - s_next)/h, c3 = (s + s_next - 2 m)/h^2."""
+    """Derivatives by the values at the knots of a C2 cubic spline.
+
+    With slopes s at the knots and the mean slope m of a piece, c1 = s, c2 = (3 m - 2 s - s_next)/h and
+    c3 = (s + s_next - 2 m)/h^2.
+    """
     h = widths[:, None]
-    found = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
+    by_knots = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
     by_second, by_third = by_coefficients[2] / h, by_coefficients[3] / h**2
-    by_slope, by_mean = found.copy(), 3.0 * by_second - 2.0 * by_third
+    by_slope, by_mean = by_knots.copy(), 3.0 * by_second - 2.0 * by_third
     by_slope[:-1] += by_coefficients[1] - 2.0 * by_second + by_third
     by_slope[1:] += by_third - by_second
     if periodic:
@@ -259,16 +257,16 @@ def _spline(widths: Array, by_coefficients: Array, periodic: bool) -> Array:
     else:
         by_mean += _by_means(widths, by_slope)
     by_mean /= h
-    found[:-1] += by_coefficients[0] - by_mean
-    found[1:] += by_mean
+    by_knots[:-1] += by_coefficients[0] - by_mean
+    by_knots[1:] += by_mean
     if periodic:
-        found[0] += found[-1]
-        found = found[:-1]
-    return found
+        by_knots[0] += by_knots[-1]
+        by_knots = by_knots[:-1]
+    return by_knots
 
 
 def _by_means(h: Array, by_slopes: Array) -> Array:
-    """From derivatives by the slopes at the knots to those by the mean slopes: (pieces + 1, m) -> (pieces, m).
+    """Convert derivatives by the slopes at the knots to those by the mean slopes: (pieces + 1, m) -> (pieces, m).
 
     Between the ends h_after s_before + 2 (h_before + h_after) s + h_before s_after is 3 (h_after m_before + h_before
     m_after); the first two pieces, and the last two, are one cubic, of two pieces one parabola, of one a line.
@@ -289,23 +287,23 @@ def _by_means(h: Array, by_slopes: Array) -> Array:
             ((near + 2.0 * (near + far)) * far / (near + far), near * near / (near + far)) for near, far in ends
         )
     lower, upper = np.append(after, next_ones[1]), np.append(next_ones[0], before)
-    # Of the transposed equations, below the diagonal is what was above.
+    # In the transposed equations the upper diagonal is the lower one.
     answers = _tridiagonal(upper, diagonal, lower, by_slopes)
-    found = np.zeros((pieces, by_slopes.shape[1]))
-    found[:-1] += 3.0 * after[:, None] * answers[1:-1]
-    found[1:] += 3.0 * before[:, None] * answers[1:-1]
+    by_means = np.zeros((pieces, by_slopes.shape[1]))
+    by_means[:-1] += 3.0 * after[:, None] * answers[1:-1]
+    by_means[1:] += 3.0 * before[:, None] * answers[1:-1]
     for end, inward, factors in ((0, 1, of_means[0]), (-1, -1, of_means[1])):
-        found[end] += factors[0] * answers[end]
-        found[end + inward] += factors[1] * answers[end]
-    return found
+        by_means[end] += factors[0] * answers[end]
+        by_means[end + inward] += factors[1] * answers[end]
+    return by_means
 
 
 def _by_means_of_loop(h: Array, by_slopes: Array) -> Array:
-    """The same of a periodic spline: (pieces, m) -> (pieces, m)."""
+    """`_by_means` of a periodic spline: (pieces, m) -> (pieces, m)."""
     before = np.roll(h, 1)[:, None]
     after, diagonal = h[:, None], 2.0 * (h + before[:, 0])
-    # The first and the last equation know each other, too: what stands in the corners is taken off as a product of two
-    # vectors, and put back by the answer to one more right side.
+    # The first and the last equation are coupled, too: the corners are taken off as a product of two vectors, and put
+    # back by the solution for one more right side.
     corner = -diagonal[0]
     ends = np.zeros(len(h))
     ends[0], ends[-1] = corner, h[0]

@@ -11,40 +11,26 @@ import numpy as np
 from ..arrays import Array, Integers
 from ..chebyshev import inside, nodes_on, restriction_matrix, values_to_coefficients
 from ..errors import TrajectoryError
-from .ball_columns import ball_columns
 from .curves import CLOSED, polynomial_pieces
+from .interpolation import ball_columns
 
 if TYPE_CHECKING:
     from .shape_path import ShapePath
 
-SAME_TIME = 1e-12
-"""Of the duration: times nearer to each other are one."""
-_DEGREE = 16
-"""Of the series on a panel: five times that of a spline's pieces."""
-_RESOLVED = 1e-13
-"""Of the largest value: the last coefficients of a series that follows the function."""
-_LAST = 3
-"""Coefficients that tell."""
-_NARROWEST = 2.0**-16
-"""Of the whole: narrower panels are not halved; what is rougher is followed no better."""
-_PANELS_AT_ONCE = 512
-"""For some ten megabytes."""
-_EXTREME = 1e-14
-"""Of the largest value: error of an extreme."""
-_MOST_HALVINGS = 60
-"""Of a panel that may hold an extreme; a parabola needs 24."""
-_INTERVALS = 16
-"""Of a table on each panel, at first."""
-_PLACES = np.array([0.25, 0.5, 0.75])
-"""Of an interval, where the spline through a table is compared with the path."""
-_MOST_PARTS = 16
-"""Of an interval in one round: its error is far from the fourth power of its length when that is long."""
-_STEEPEST = 20.0
-"""An interval beside another one: a reader asks for gaps and samples that stand twice where they are 100 times so."""
-_MOST_ROUNDS = 48
-"""Intervals at a kink are halved about thirty times."""
-MOST_ROWS = 1_000_000
-"""Of a table that is made for a path."""
+SAME_TIME = 1e-12  # relative to the duration: nearer times are one
+_DEGREE = 16  # of the series on a panel: five times that of a spline's pieces
+_RESOLVED = 1e-13  # last coefficients of a resolved series, relative to the largest value
+_LAST = 3  # coefficients that show whether a series is resolved
+_NARROWEST = 2.0**-16  # relative to the whole: narrower panels are not halved
+_PANELS_AT_ONCE = 512  # some ten megabytes
+_EXTREME = 1e-14  # error of an extreme, relative to the largest value
+_MOST_HALVINGS = 60  # of a panel that may hold an extreme; a parabola needs 24
+_INTERVALS = 16  # of a table on each panel, at first
+_PLACES = np.array([0.25, 0.5, 0.75])  # in an interval, where a table's spline is compared
+_MOST_PARTS = 16  # of an interval in one round: the error of a long one is not yet of fourth order
+_STEEPEST = 20.0  # ratio of neighbouring intervals: from 100 on a reader reports gaps and doubled samples
+_MOST_ROUNDS = 48  # intervals at a kink are halved about thirty times
+MOST_ROWS = 1_000_000  # of a table made for a path
 
 
 def panel_edges(path: ShapePath, loops: int = 1) -> Array:
@@ -93,8 +79,8 @@ def resolved_series(function: Callable[[Array], Array], edges: Array) -> tuple[A
         left, right = left[~fine], right[~fine]
         middle = 0.5 * (left + right)
         left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
-    lefts, rights, found = zip(*done, strict=True)
-    return np.concatenate(lefts), np.concatenate(rights), np.concatenate(found)
+    lefts, rights, series_parts = zip(*done, strict=True)
+    return np.concatenate(lefts), np.concatenate(rights), np.concatenate(series_parts)
 
 
 def joint_extremes(path: ShapePath) -> tuple[Array, Array, Array]:
@@ -122,10 +108,7 @@ def times_of_fastest(path: ShapePath) -> Array:
 def spline_times(path: ShapePath) -> Array:
     """Times of a table, the cubic spline through which is the path to 1e-9 rad or m, or of its largest value: (N,).
 
-    Raises
-    ------
-    TrajectoryError
-        If that takes more than a million rows.
+    Raises TrajectoryError if that takes more than a million rows.
     """
     pieces = polynomial_pieces(path.curve)
     times = evenly_divided(panel_edges(path, path.loops), _INTERVALS) if pieces is None else pieces.knots
@@ -147,8 +130,6 @@ def spline_times(path: ShapePath) -> Array:
 def spline_error(path: ShapePath, times: Array) -> tuple[Array, Array]:
     """Largest difference between a path and the spline through a table of it, and when: (n,) [rad or m], (n,) [s].
 
-    Parameters
-    ----------
     times : (N,) ascending rows of the table; what is before and after them does not count
     """
     known = evenly_divided(panel_edges(path, path.loops), _INTERVALS)
@@ -206,19 +187,19 @@ def _largest(series: Array, least: Array) -> Array:
     A series is nowhere above its first coefficient and the sizes of the others: panels whose bound is above the largest
     value so far are halved.
     """
-    found = least.copy()
+    largest = least.copy()
     close = _EXTREME * np.maximum(np.abs(series).sum(axis=1).max(axis=0, initial=0.0), np.abs(least))
-    panel, column = np.nonzero(_bounds(series) > found + close)
+    panel, column = np.nonzero(_bounds(series) > largest + close)
     rows = series[panel, :, column]
     halves = [restriction_matrix(series.shape[1], *ends) for ends in ((-1.0, 0.0), (0.0, 1.0))]
     for _ in range(_MOST_HALVINGS):
         if not len(rows):
             break
         rows, column = np.concatenate([rows @ half.T for half in halves]), np.tile(column, 2)
-        np.maximum.at(found, column, rows.sum(axis=1))
-        above = _bounds(rows) > (found + close)[column]
+        np.maximum.at(largest, column, rows.sum(axis=1))
+        above = _bounds(rows) > (largest + close)[column]
         rows, column = rows[above], column[above]
-    return found
+    return largest
 
 
 def _bounds(series: Array) -> Array:
@@ -226,7 +207,7 @@ def _bounds(series: Array) -> Array:
 
 
 def _errors(path: ShapePath, times: Array) -> Array:
-    """By how much the spline through a table misses a path in each interval, of its largest value: (N - 1,)."""
+    """Largest distance of a table's spline from a path in each interval, relative to its largest value: (N - 1,)."""
     looked = times[:-1, None] + np.diff(times)[:, None] * _PLACES
     off = _differences(path, times, looked.ravel())
     sizes = np.maximum(1.0, np.abs(path.curve(times)[0]).max(axis=0, initial=0.0))
@@ -234,7 +215,7 @@ def _errors(path: ShapePath, times: Array) -> Array:
 
 
 def _differences(path: ShapePath, times: Array, looked: Array) -> Array:
-    """The same at times (M,), of each joint; a quaternion of a ball joint and its negative are one: (M, n)."""
+    """Distance of a table's spline from a path at times (M,); a quaternion and its negative are one: (M, n)."""
     right, _ = path.curve(looked)
     table = path.spline(times, path.curve(times)[0], joint_names=path.joint_names)
     read, _ = table.curve(looked - times[0])

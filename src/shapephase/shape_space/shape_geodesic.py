@@ -11,24 +11,19 @@ from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_no_balls
+from ..body.momentum_gradients import energy_gradients
 from ..errors import TrajectoryError
 from .connection import mechanical_connection
 
-_DEGREE = 6
-"""Of the polynomial for the acceleration along the way: between near shapes it is next to constant."""
-_ROUNDS = 40
-"""Of the iteration, which gains a factor of about the distance [rad] in each."""
-_SETTLED = 1e-10
-"""Change of the way, relative to its length, at which the iteration ends."""
-_STEP = 1e-4
-"""Of the central differences [rad or m]: their error is a few 1e-8 of a correction that is small itself."""
+_DEGREE = 6  # of the acceleration's polynomial: between near shapes it is nearly constant
+_ROUNDS = 40  # largest number: each gains a factor of about the distance [rad]
+_SETTLED = 1e-10  # change at which iterations end, of the way relative to its length
+_STEP = 1e-4  # [rad or m] of central differences: error a few 1e-8 of a small correction
 
 
 class ShapeGeodesic(NamedTuple):
     """A geodesic on [0, 1], at constant speed.
 
-    Attributes
-    ----------
     nodes : (N,) from 0 to 1
     shapes : (N, n) there [rad or m]
     rates : (N, n) by the parameter [rad or m]
@@ -57,14 +52,10 @@ def shape_geodesic(body: Body, start: ArrayLike, end: ArrayLike) -> ShapeGeodesi
 
     Its acceleration is g^-1 (grad(r'.g r')/2 - (r'.grad g) r'), integrated twice between the two ends.
 
-    Parameters
-    ----------
     start, end : (n,) [rad or m], a few tenths apart
 
-    Raises
-    ------
-    TrajectoryError
-        If the shapes are so far apart that the approximation does not settle, or joints move nothing.
+    Raises TrajectoryError if the shapes are so far apart that the approximation does not settle, or joints move
+    nothing.
     """
     check_object(body, "Body", "body")
     check_no_balls(body.chain.follows, "geodesics of shapes need")
@@ -115,7 +106,7 @@ def _energy(body: Body, shapes: Array, rates: Array) -> Array:
 
 
 def _acceleration(body: Body, shapes: Array, rates: Array) -> Array:
-    """Of the geodesics with these rates: (N, n), (N, n) -> (N, n)."""
+    """Acceleration of the geodesics with these rates: (N, n), (N, n) -> (N, n)."""
     unit = np.eye(body.n_shape)
     there, along = shapes[:, None, :], rates[:, None, :]
     # Gradient of the energy, one coordinate after the other.
@@ -147,6 +138,63 @@ def _metric(body: Body, shapes: Array) -> Array:
     plus, minus = (
         _energy(body, there, np.broadcast_to(unit[rows] + sign * unit[columns], there.shape)) for sign in (1.0, -1.0)
     )
-    found = np.empty((len(shapes), n, n))
-    found[:, rows, columns] = found[:, columns, rows] = 0.5 * (plus - minus)
-    return found
+    metric = np.empty((len(shapes), n, n))
+    metric[:, rows, columns] = metric[:, columns, rows] = 0.5 * (plus - minus)
+    return metric
+
+
+def changes_by_ends(body: Body, way: ShapeGeodesic) -> Array:
+    """The derivatives of the shapes at the nodes by the start and by the end: (N, n, 2 n)."""
+    n = way.shapes.shape[1]
+    once, twice = integrals(way.nodes)
+    share = way.nodes[:, None, None]
+    unit = np.eye(n)
+    straight = np.concatenate([(1.0 - share) * unit, share * unit], axis=2)
+    slope = np.broadcast_to(np.concatenate([-unit, unit], axis=1), straight.shape)
+    metric = _gradient_metric(body, way.shapes)
+    force = _force(body, way.shapes, way.rates)
+    acceleration = np.asarray(np.linalg.solve(metric, force[..., None])[..., 0], dtype=np.float64)
+    shapes, rates = straight, slope
+    for _ in range(_ROUNDS):
+        bent = _change_of_acceleration(body, way, metric, acceleration, shapes, rates)
+        whole = np.tensordot(twice, bent, 1)
+        before, shapes = shapes, straight - share * whole[-1] + whole
+        rates = slope - whole[-1] + np.tensordot(once, bent, 1)
+        if np.abs(shapes - before).max(initial=0.0) < _SETTLED:
+            break
+    return shapes
+
+
+def _change_of_acceleration(
+    body: Body, way: ShapeGeodesic, metric: Array, acceleration: Array, shapes: Array, rates: Array
+) -> Array:
+    """Change of the acceleration by changes of shapes and rates at the nodes: (N, n, m) each -> (N, n, m)."""
+    sides = []
+    for step in (_STEP, -_STEP):
+        there = way.shapes[:, None] + step * np.swapaxes(shapes, 1, 2)
+        along = way.rates[:, None] + step * np.swapaxes(rates, 1, 2)
+        still = np.broadcast_to(acceleration[:, None], there.shape)
+        sides.append(_force(body, there, along) - _gradients(body, there, still)[1])
+    change = (sides[0] - sides[1]) / (2.0 * _STEP)
+    return np.asarray(np.linalg.solve(metric, np.swapaxes(change, 1, 2)), dtype=np.float64)
+
+
+def _force(body: Body, shapes: Array, rates: Array) -> Array:
+    """Force on geodesics, the gradient of the energy less the rate of g r' at constant rates: (..., n) each."""
+    step = _STEP / float(np.abs(rates).max())
+    ahead, behind = (_gradients(body, shapes + sign * step * rates, rates)[1] for sign in (1.0, -1.0))
+    return _gradients(body, shapes, rates)[0] - (ahead - behind) / (2.0 * step)
+
+
+def _gradient_metric(body: Body, shapes: Array) -> Array:
+    """The matrices g: (N, n) -> (N, n, n)."""
+    n = shapes.shape[1]
+    there = np.broadcast_to(shapes[:, None], (len(shapes), n, n))
+    return _gradients(body, there, np.broadcast_to(np.eye(n), there.shape))[1]
+
+
+def _gradients(body: Body, shapes: Array, rates: Array) -> tuple[Array, Array]:
+    """Gradients of the energy by shapes and by rates: (..., n) -> (..., n) each."""
+    n = shapes.shape[-1]
+    gradients = energy_gradients(body.chain, shapes.reshape(-1, n), rates.reshape(-1, n))
+    return gradients[0].reshape(shapes.shape), gradients[1].reshape(shapes.shape)

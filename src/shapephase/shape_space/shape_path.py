@@ -14,24 +14,20 @@ from ..arguments import (
     breaks_argument,
     check_flag,
     check_function,
-    check_time_steps,
     made_by,
-    names_argument,
     positive_argument,
     times_argument,
 )
-from ..arrays import Array, check_reach, finite_array, lock_arrays, read_only
-from ..display import card_html, card_text
-from ..errors import OpenPathError, ShapeError, TrajectoryError, unknown_name
+from ..arrays import Array, lock_arrays, read_only
+from ..card_pictures import MOST_POINTS, curves_picture
+from ..display import Card, card_html, card_text, numbers
+from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import what_came
 from ._accelerations import exact_accelerations, resolved_accelerations
-from ._card import shape_path_card
-from .ball_columns import ball_columns, factors_between, neighbours_signs
 from .curves import (
     CLOSED,
     Curve,
-    Fourier,
     Function,
     Interpolation,
     Joined,
@@ -46,17 +42,26 @@ from .curves import (
     returned_pair,
     swings_of,
 )
+from .interpolation import (
+    ball_columns,
+    factors_between,
+    fourier_curve,
+    joined_names,
+    path_joint_names,
+    rest_to_rest_curve,
+    same_shape,
+    sample_arguments,
+    spline_curve,
+)
 from .path_series import spline_times
-from .scan._derived_scan import DerivedScan, JoinedScan
-from .scan._rate_check import check_rates
-from .scan.function_scan import FunctionScan, path_function
+from .scan.function_scan import DerivedScan, FunctionScan, JoinedScan, check_rates, path_function
 from .scan.scanning import scanned
 
 _WHOLE_TURN = 2.0 * np.pi
 
 
 class PathOrigin(Protocol):
-    """How a path follows from recorded samples that were smoothed, resampled or closed."""
+    """Steps from recorded samples, smoothed, resampled or closed, to a path."""
 
     def path(self, samples: Array, /) -> ShapePath:
         """Return the path that the same steps make of other samples (N, n)."""
@@ -81,7 +86,7 @@ class ShapePath:
     loops : the path is its first `duration / loops` seconds, this many times
     sha256 : of the file it was read from, whatever was done to it since; None without a file
     record : how it was read and what was done to it then, `RecordedMotion.record`; None without a file
-    scanner : how `scan` is found from the scan of the path that this one was made of; None: by looking at it
+    scanner : derives `scan` from the scan of the path that this one was made of; None: the path itself is scanned
     origin : how it follows from recorded samples; None: these are the values at its knots, or there are none
 
     Examples
@@ -105,7 +110,6 @@ class ShapePath:
 
     __post_init__ = lock_arrays
     __repr__, _repr_html_ = card_text, card_html
-    _card = shape_path_card
 
     @staticmethod
     def fourier(
@@ -116,7 +120,7 @@ class ShapePath:
         *,
         joint_names: Sequence[str] | None = None,
     ) -> ShapePath:
-        """The closed loop r = mean + sum_k a_k cos(2 pi k t/T) + b_k sin(2 pi k t/T), k = 1 ... K.
+        """Closed loop r = mean + sum_k a_k cos(2 pi k t/T) + b_k sin(2 pi k t/T), k = 1 ... K.
 
         Parameters
         ----------
@@ -125,22 +129,13 @@ class ShapePath:
         duration : T [s]
         joint_names : n names, to be matched with a body's by name
         """
-        middle = finite_array(mean, "mean", (None,))
-        a = finite_array(cosines, "cosines", (len(middle), None))
-        b = finite_array(sines, "sines", a.shape)
-        if middle.ndim != 1 or a.ndim != 2 or b.ndim != 2:
-            shapes = f"{middle.shape}, {a.shape} and {b.shape}"
-            raise ShapeError(f"mean (n,), cosines (n, K) and sines (n, K) are needed, got {shapes}")
-        for values, name in ((middle, "mean"), (a, "cosines"), (b, "sines")):
-            check_reach(values, name)
-        period = positive_argument(duration)
-        curve = Fourier(middle.copy(), a.copy(), b.copy(), period)
+        curve = fourier_curve(mean, cosines, sines, positive_argument(duration))
         return ShapePath(
             curve,
-            period,
-            breaks=np.array([0.0, period]),
-            n_shape=len(middle),
-            joint_names=_names(joint_names, len(middle)),
+            curve.period,
+            breaks=np.array([0.0, curve.period]),
+            n_shape=len(curve.mean),
+            joint_names=path_joint_names(joint_names, len(curve.mean)),
             # Harmonics that are all multiples of one number make a shorter loop, repeated.
             loops=max(1, int(np.gcd.reduce(curve.occupied))),
         )
@@ -149,13 +144,13 @@ class ShapePath:
     def spline(
         times: ArrayLike, shapes: ArrayLike, periodic: bool | None = None, *, joint_names: Sequence[str] | None = None
     ) -> ShapePath:
-        """The C2 cubic spline through samples; its knots are its breaks.
+        """C2 cubic spline through samples; its knots are its breaks.
 
         Parameters
         ----------
         times : (N,) ascending [s]; the path starts at 0, so times are shifted
-        shapes : (N, n) [rad or m]; the numbers of ball joints, which names tell, are taken with the sign that is
-            nearer to the sample before: a quaternion and its negative are one turn
+        shapes : (N, n) [rad or m]; quaternions of ball joints, known by their names, get the sign that is nearer to the
+            sample before
         periodic : smooth where the end meets the start; None: when the last sample equals the first to 1e-9.
             Otherwise the ends are not-a-knot.
 
@@ -164,23 +159,9 @@ class ShapePath:
         TrajectoryError
             If times do not ascend, there are fewer than two samples, or a periodic path does not close.
         """
-        t, r, balls = _samples(times, shapes, joint_names)
-        factors = factors_between(r[-1], r[0], balls)
-        closes = _closes(r[-1], r[0] * factors) and len(t) > 2
         check_flag(periodic, "periodic", allow_none=True)
-        if periodic and not closes:
-            joint = int(np.argmax(np.abs(r[-1] - r[0])))
-            raise TrajectoryError(
-                f"a periodic spline needs the last sample to equal the first (and three samples or more); joint number "
-                f"{joint} ends {r[-1, joint] - r[0, joint]:.6g} from its start"
-            )
-        use_period = closes if periodic is None else periodic
-        if use_period and np.any(np.abs(factors - 1.0) > CLOSED):
-            return _piecewise(t, _flipping_coefficients(t, r[:-1], factors), joint_names, "not-a-knot")
-        if use_period:
-            r = np.concatenate([r[:-1], r[:1]])
-        through: Interpolation = "periodic" if use_period else "not-a-knot"
-        return _piecewise(t, _spline_coefficients(t, r, use_period), joint_names, through)
+        t, r, balls = sample_arguments(times, shapes, joint_names)
+        return _piecewise(spline_curve(t, r, balls, periodic), joint_names)
 
     @staticmethod
     def waypoints(times: ArrayLike, shapes: ArrayLike, *, joint_names: Sequence[str] | None = None) -> ShapePath:
@@ -189,14 +170,8 @@ class ShapePath:
         r = r_i + (r_(i+1) - r_i) (10 s^3 - 15 s^4 + 6 s^5), s = (t - t_i)/(t_(i+1) - t_i).
         Parameters and errors as `spline`.
         """
-        t, r, _ = _samples(times, shapes, joint_names)
-        moves = np.diff(r, axis=0)
-        steps = np.diff(t)[:, None]
-        coefficients = np.zeros((6, *moves.shape))
-        for power, factor in ((3, 10.0), (4, -15.0), (5, 6.0)):
-            coefficients[power] = factor * moves / steps**power
-        coefficients[0] = r[:-1]
-        return _piecewise(t, coefficients, joint_names, "rest to rest")
+        t, r, _ = sample_arguments(times, shapes, joint_names)
+        return _piecewise(rest_to_rest_curve(t, r), joint_names)
 
     @staticmethod
     def function(
@@ -206,15 +181,15 @@ class ShapePath:
         *,
         joint_names: Sequence[str] | None = None,
     ) -> ShapePath:
-        """A path given by a function of times (N,) that returns shapes (N, n) and rates (N, n).
+        """Path given by a function of times (N,) that returns shapes (N, n) and rates (N, n).
 
         Parameters
         ----------
         breaks : interior times where a derivative jumps [s]; the function is evaluated just inside them
 
-        Before a body follows it, the path is looked at once, at some 5,500 times (`scan`). Whatever is wider than
-        1/2,000 of the duration is found; what is narrower and leaves the shape as it was has to be declared as a
-        break. Kinks are located and taken as breaks, with a warning.
+        Before a body follows it, the path is sampled once at some 5,500 times (`scan`). Features wider than 1/2,000 of
+        the duration are found; a narrower one that leaves the shape as it was has to be declared as a break. Kinks are
+        located and taken as breaks, with a warning.
 
         Raises
         ------
@@ -228,45 +203,45 @@ class ShapePath:
         if start.ndim != 2 or start.shape[0] != 1:
             raise ShapeError(f"the function must return shapes (N, n) for times (N,); for N = 1 it gave {start.shape}")
         curve = Function(f, start.shape[1])
-        path = ShapePath(curve, period, edges, start.shape[1], _names(joint_names, start.shape[1]))
+        path = ShapePath(curve, period, edges, start.shape[1], path_joint_names(joint_names, start.shape[1]))
         check_rates(curve, edges)
         return path
 
     def shape(self, t: ArrayLike) -> Array:
-        """r(t): times (...) of [0, duration] -> (..., n) [rad or m]. Raises TrajectoryError outside."""
+        """Shapes r(t): times (...) of [0, duration] -> (..., n) [rad or m]. Raises TrajectoryError outside."""
         return self._evaluated(t)[0]
 
     def rate(self, t: ArrayLike) -> Array:
-        """r'(t): times (...) of [0, duration] -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
+        """Rates r'(t): times (...) of [0, duration] -> (..., n) [rad/s or m/s]. Raises TrajectoryError outside."""
         return self._evaluated(t)[1]
 
     def acceleration(self, t: ArrayLike) -> Array:
-        """r''(t): times (...) of [0, duration] -> (..., n) [rad/s^2 or m/s^2]; at a break that of what follows.
+        """Accelerations r''(t): times (...) of [0, duration] -> (..., n) [rad/s^2 or m/s^2]; at a break the later one.
 
-        Exact, but of a path known only as a function: there by its rates as the scan resolved them. Raises
-        TrajectoryError outside, and as `scan`.
+        They are exact, but for functions: there they follow from the rates that the scan resolved. Raises
+        TrajectoryError outside, and the errors of `scan`.
         """
         times = times_argument(t, self.duration)
-        found = exact_accelerations(self.curve, times.ravel())
-        if found is None:
-            found = resolved_accelerations(self._scan.resolved, self.loops, times.ravel())
-        return found.reshape(*times.shape, self.n_shape)
+        accelerations = exact_accelerations(self.curve, times.ravel())
+        if accelerations is None:
+            accelerations = resolved_accelerations(self._scan.resolved, self.loops, times.ravel())
+        return accelerations.reshape(*times.shape, self.n_shape)
 
     def at_samples(self, times: Array) -> tuple[Array, Array]:
-        """What `curve` gives at times at which a body is sampled, read-only: kept for the next momentum or body."""
+        """Shapes and rates at times at which a body is sampled, read-only: kept for the next momentum or body."""
         return self._seen(self.curve, times)
 
     @cached_property
     def swings(self) -> Swings:
-        """How often the path can swing between two breaks, and whether one loop goes on smoothly in the next."""
+        """Largest number of swings between two breaks, and whether one loop goes on smoothly in the next."""
         most, smooth = swings_of(self.curve)
         return Swings(most / self.loops, len(self.breaks) == 2) if smooth and most is not None else Swings(most)
 
     @property
     def smoothness(self) -> Smoothness:
-        """Of whatever depends smoothly on shapes and rates."""
+        """Smoothness of quantities that depend smoothly on shapes and rates."""
         if not self.n_shape:
-            # A rigid body: nothing moves, however many samples say so.
+            # A rigid body.
             return Smoothness(breaks=self.breaks[[0, -1]], oscillations=0.0)
         scan = self.scan
         breaks = self.breaks
@@ -283,10 +258,7 @@ class ShapePath:
 
     @property
     def scan(self) -> FunctionScan | None:
-        """What one look at a path known only as a function found, and what it cost; None for the known kinds.
-
-        Of a path repeated, that of its first loop. Found once, when it is first needed, and kept: paths made of this
-        one do not look again.
+        """Scan of the first loop of a path known only as a function, kept for paths made of it; else None.
 
         Raises
         ------
@@ -298,7 +270,7 @@ class ShapePath:
         Warns
         -----
         UndeclaredBreakWarning
-            Of kinks that were not declared.
+            For kinks that were not declared.
         """
         return self._scan if self.swings.most is None else None
 
@@ -312,19 +284,19 @@ class ShapePath:
 
     @property
     def gap(self) -> Array:
-        """Where the path ends, seen from where it begins: (n,) [rad or m]; zero for a loop."""
+        """End of the path minus its start: (n,) [rad or m]; zero for a loop."""
         ends, _ = self.curve(np.array([0.0, self.duration]))
         return ends[1] - ends[0]
 
     def reversed(self) -> ShapePath:
-        """The same shapes in the opposite order of time."""
+        """The path backwards in time."""
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
         curve = Reversed(self.curve, self.duration)
         return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"), origin=None)
 
     def stretched(self, factor: float) -> ShapePath:
-        """The same shapes, `factor` times as slowly."""
+        """The path `factor` times as slowly."""
         scale = positive_argument(factor, "factor", "a number")
         duration = self.duration * scale
         breaks = self.breaks * scale
@@ -334,7 +306,7 @@ class ShapePath:
         return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner, origin=None)
 
     def then(self, other: ShapePath) -> ShapePath:
-        """This path, and after it another.
+        """Join another path to the end of this one.
 
         A start that differs from this path's end by whole turns of joints is shifted by them, so that the
         shape stays continuous; a quaternion of a ball joint is the same turn with another sign or length.
@@ -344,12 +316,12 @@ class ShapePath:
         TrajectoryError
             If the joints differ, or `other` starts at another shape than the one where this path ends.
         """
-        names = _joined_names(self, other)
+        names = joined_names((self.n_shape, self.joint_names), (other.n_shape, other.joint_names))
         end, start = self.shape(self.duration), other.shape(0.0)
         factors = factors_between(end, start, ball_columns(names))
         start = start * factors
         offset = np.round((end - start) / _WHOLE_TURN) * _WHOLE_TURN
-        if not _closes(end, start + offset):
+        if not same_shape(end, start + offset):
             joint = int(np.argmax(np.abs(end - start - offset)))
             raise TrajectoryError(
                 f"paths do not join: joint {names[joint] if names else joint} ends at {end[joint]:.9g} and the next "
@@ -360,14 +332,8 @@ class ShapePath:
         breaks[-1] = duration
         following = other.curve if np.all(factors == 1.0) else Multiplied(other.curve, factors)
         curve = Joined(self.curve, self.duration, following, other.duration, offset)
-        return ShapePath(
-            curve,
-            duration,
-            breaks,
-            self.n_shape,
-            names,
-            scanner=JoinedScan([self, other]) if following is other.curve else None,
-        )
+        scanner = JoinedScan([self, other]) if following is other.curve else None
+        return ShapePath(curve, duration, breaks, self.n_shape, names, scanner=scanner)
 
     def repeated(self, count: int) -> ShapePath:
         """The loop `count` times in a row.
@@ -375,17 +341,17 @@ class ShapePath:
         Raises
         ------
         OpenPathError
-            If the path does not end where it begins (to whole turns of joints, and signs of quaternions of ball joints,
-            which jump at the ends of loops, where they mean the same turn).
+            If the path does not end where it begins, up to whole turns of joints, and signs of quaternions.
         """
         if not isinstance(count, int | float | np.number) or not np.isfinite(count) or count < 1 or count % 1:
             raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {what_came(count)}")
         (start, end), _ = self.curve(np.array([0.0, self.duration]))
         gap = end - start * factors_between(end, start, ball_columns(self.joint_names))
         turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN
-        if not _closes(gap, turns):
+        if not same_shape(gap, turns):
             joint = int(np.argmax(np.abs(gap - turns)))
-            raise OpenPathError(f"only a loop can be repeated; joint {self._joint(joint)} ends {gap[joint]:.9g} off")
+            name = self.joint_names[joint] if self.joint_names else f"number {joint}"
+            raise OpenPathError(f"only a loop can be repeated; joint {name} ends {gap[joint]:.9g} off")
         starts = self.duration * np.arange(count)
         breaks = np.concatenate([*(start + self.breaks[:-1] for start in starts), [count * self.duration]])
         if self.swings.smooth_loop:
@@ -403,11 +369,9 @@ class ShapePath:
 
     @cached_property
     def sample_times(self) -> Array:
-        """Times of a table that describes the path: (N,) [s].
+        """Times of a table whose cubic spline is the path to 1e-9 rad or m, or of its largest value above 1: (N,) [s].
 
-        The cubic spline through the samples, as a reader of the table makes it, is the path to 1e-9 rad or m (of its
-        largest value where that is above 1): a spline's own knots, some 400 times for each swing of a series, and ever
-        nearer ones towards a kink.
+        These are a spline's own knots, some 400 times for each swing of a series, and ever nearer ones towards a kink.
 
         Raises
         ------
@@ -417,7 +381,7 @@ class ShapePath:
         return read_only(spline_times(self))
 
     def matched(self, joint_names: Sequence[str], owner: str) -> ShapePath:
-        """The same path with its columns in the order of `joint_names`, found by name where the path has names.
+        """The path with its columns in the order of `joint_names`, matched by name where the path has names.
 
         Raises
         ------
@@ -429,11 +393,11 @@ class ShapePath:
         """
         expected = tuple(joint_names)
         if self.joint_names is None:
-            if self.n_shape != len(expected):
-                raise TrajectoryError(
-                    f"the path has {self.n_shape} joints, {owner} has {len(expected)}: {', '.join(expected)}"
-                )
-            return self
+            if self.n_shape == len(expected):
+                return self
+            raise TrajectoryError(
+                f"the path has {self.n_shape} joints, {owner} has {len(expected)}: {', '.join(expected)}"
+            )
         for name in self.joint_names:
             if name not in expected:
                 raise unknown_name(f"joint of {owner}", name, expected)
@@ -446,8 +410,24 @@ class ShapePath:
         curve = Reordered(self.curve, order)
         return replace(self, curve=curve, joint_names=expected, scanner=DerivedScan(self, "reordered", (order,)))
 
-    def _joint(self, column: int) -> str:
-        return self.joint_names[column] if self.joint_names else f"number {column}"
+    def _card(self) -> Card:
+        """Duration, joints that move, widest joint and closure, with a picture of the joints in time."""
+        try:
+            shapes = self.shape(np.linspace(0.0, self.duration, MOST_POINTS))
+        except ShapePhaseError as error:
+            return Card("ShapePath", [("duration", numbers(self.duration, "s")), ("cannot be evaluated", str(error))])
+        spans = np.ptp(shapes, axis=0) if self.n_shape else np.zeros(1)
+        widest = int(np.argmax(spans))
+        name = self.joint_names[widest] if self.joint_names else f"joint {widest}"
+        gap = float(np.max(np.abs(shapes[-1] - shapes[0]), initial=0.0))
+        rows = [
+            ("duration", numbers(self.duration, "s") + (f", {self.loops} loops" if self.loops > 1 else "")),
+            ("joints", f"{self.n_shape}, {np.count_nonzero(spans > 0.0)} of them move"),
+            ("widest", f"{name}, by {spans[widest]:.4g} rad or m"),
+            ("breaks", f"{len(self.breaks)}"),
+            ("closes", "yes" if gap <= CLOSED else f"no, by {gap:.4g} rad or m"),
+        ]
+        return Card("ShapePath", rows, curves_picture(shapes, "joints in time") if self.n_shape else "")
 
     def _evaluated(self, t: ArrayLike) -> tuple[Array, Array]:
         times = times_argument(t, self.duration)
@@ -467,70 +447,6 @@ def interpolated(
     return ShapePath.spline(knots, whole, periodic, joint_names=joint_names)
 
 
-def _piecewise(
-    times: Array, coefficients: Array, joint_names: Sequence[str] | None, through: Interpolation
-) -> ShapePath:
-    n_shape = coefficients.shape[2]
-    curve = PiecewisePolynomial(times, coefficients, through)
-    return ShapePath(curve, float(times[-1]), times, n_shape, _names(joint_names, n_shape))
-
-
-def _spline_coefficients(times: Array, shapes: Array, periodic: bool) -> Array:
-    from scipy.interpolate import CubicSpline
-
-    spline = CubicSpline(times, shapes, bc_type="periodic" if periodic else "not-a-knot")
-    pieces = np.broadcast_to(spline.c[::-1], (len(spline.c), len(times) - 1, shapes.shape[1]))
-    return np.ascontiguousarray(pieces)
-
-
-def _flipping_coefficients(times: Array, shapes: Array, factors: Array) -> Array:
-    """Of the spline whose columns are multiplied by factors from one end to the other, of ball joints -1, and go on as
-    smoothly: the first half of one that is gone through twice."""
-    signs = np.where(factors < 0.0, -1.0, 1.0)
-    twice = np.concatenate([times, times[-1] + times[1:]])
-    coefficients = _spline_coefficients(twice, np.concatenate([shapes, shapes * signs, shapes[:1]]), True)
-    return np.ascontiguousarray(coefficients[:, : len(times) - 1])
-
-
-def _samples(
-    times: ArrayLike, shapes: ArrayLike, joint_names: Sequence[str] | None
-) -> tuple[Array, Array, tuple[slice, ...]]:
-    """Times, shapes, and which columns are ball joints."""
-    t = finite_array(times, "times", (None,), unit="s")
-    r = finite_array(shapes, "shapes", (None, None))
-    if t.ndim != 1 or r.ndim != 2 or len(t) != len(r):
-        raise ShapeError(f"times (N,) and shapes (N, n) are needed, got {t.shape} and {r.shape}")
-    check_reach(r, "shapes")
-    if len(t) < 2:
-        raise TrajectoryError(f"a path needs two samples or more, got {len(t)}")
-    late = np.flatnonzero(np.diff(t) <= 0.0)
-    if len(late):
-        row = int(late[0]) + 1
-        raise TrajectoryError(f"times must ascend: sample {row} at {t[row]:.9g} s follows {t[row - 1]:.9g} s")
-    check_time_steps(t - t[0])
-    balls = ball_columns(_names(joint_names, r.shape[1]))
-    return t - t[0], neighbours_signs(r, balls), balls
-
-
-def _closes(a: Array, b: Array) -> bool:
-    return bool(np.all(np.abs(a - b) <= CLOSED * np.maximum(1.0, np.abs(a))))
-
-
-def _names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[str, ...] | None:
-    if joint_names is None:
-        return None
-    names = names_argument(joint_names, "joint_names", f"{n_shape} names")
-    if len(names) != n_shape or len(set(names)) != len(names):
-        raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {what_came(names)}")
-    return names
-
-
-def _joined_names(first: ShapePath, second: ShapePath) -> tuple[str, ...] | None:
-    if first.n_shape != second.n_shape:
-        raise TrajectoryError(f"paths of {first.n_shape} and {second.n_shape} joints cannot follow each other")
-    named = {path.joint_names for path in (first, second)} - {None}
-    if len(named) > 1:
-        raise TrajectoryError(
-            f"paths with other joints or another order of joints: {first.joint_names} and {second.joint_names}"
-        )
-    return named.pop() if named else None
+def _piecewise(curve: PiecewisePolynomial, joint_names: Sequence[str] | None) -> ShapePath:
+    n_shape = curve.coefficients.shape[2]
+    return ShapePath(curve, float(curve.knots[-1]), curve.knots, n_shape, path_joint_names(joint_names, n_shape))

@@ -1,4 +1,4 @@
-"""What there is to know of a body, and of a joint motion for it, before anything is computed with them."""
+"""Summaries of a body, and of a joint motion for it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _KINDS = {"rad": "revolute", "m": "prismatic", "1": "ball"}
 class JointSummary:
     """One joint: its kind ("revolute", "continuous" or "prismatic"), limits (infinite where there are none), unit.
 
-    Of a ball joint ("ball") it is one of its four numbers.
+    A ball joint ("ball") has four of them, one for each number.
 
     Examples
     --------
@@ -45,7 +45,7 @@ class JointSummary:
 
 @dataclass(frozen=True, eq=False)
 class PartSummary:
-    """What moves as one: a link and those that are fixed to it.
+    """Rigid part: a link and those that are fixed to it.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class PathSummary:
     joints_beyond_rates : names of the joints that are faster than the rate limits of the body's file
     still_joints : names of the joints that do not move
     gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
-    is_loop : whether it closes
+    is_loop : True if it closes
 
     Examples
     --------
@@ -148,7 +148,7 @@ class PathSummary:
 
 
 def body_summary(body: Body) -> BodySummary:
-    """What there is to know of a body at its neutral shape.
+    """Summarise a body at its neutral shape.
 
     Examples
     --------
@@ -192,7 +192,7 @@ def body_summary(body: Body) -> BodySummary:
 
 
 def path_summary(body: Body, path: ShapePath) -> PathSummary:
-    """What there is to know of a joint motion for a body.
+    """Summarise a joint motion for a body.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Joint motions in another unit than radians and metres: what they look like, and the question that is asked then."""
+"""Joint motions that resemble degrees or millimetres, and the warning about them."""
 
 from __future__ import annotations
 
@@ -14,21 +14,15 @@ from .curves import Fourier, PiecewisePolynomial
 from .path_series import evenly_divided, panel_edges
 from .shape_path import ShapePath
 
-DEGREE = np.pi / 180.0
-"""[rad]"""
-_FAR_BEYOND = 0.2
-"""Of the width of a joint's limits: a recording with noise leaves them by less."""
-_HALF_TURN = np.pi
-"""[rad] By less than this beyond its limits a joint may go in radians, where someone tries what limits forbid."""
-_LOOKS = 65
-"""Times of the first loop at which a path is looked at that is known only as a function; multiples of the golden ratio,
-which no swing of it repeats."""
-_LOOKS_OF_A_SWING = 8
-"""At such times a sine is within 8 % of its largest value."""
+DEGREE = np.pi / 180.0  # [rad]
+_FAR_BEYOND = 0.2  # of the width of a joint's limits: noise leaves them by less
+_HALF_TURN = np.pi  # [rad] beyond its limits a joint may go by less, to try forbidden postures
+_LOOKS = 65  # times of the first loop of a function, at multiples of the golden ratio: no swing repeats them
+_LOOKS_OF_A_SWING = 8  # times: a sine is then within 8 % of its largest value
 
 
 def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:
-    """Whether values are far beyond limits, and within them in a unit of this size, in SI units: (N,) [rad or m]."""
+    """True if values are far beyond limits, and within them in a unit of this size, in SI units: (N,) [rad or m]."""
     room = _FAR_BEYOND * (upper - lower)
     lowest, highest = float(values.min()), float(values.max())
     far = lowest < lower - room or highest > upper + room
@@ -36,13 +30,10 @@ def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool
 
 
 def warn_of_degrees(body: Body | ParticleBody, path: ShapePath) -> None:
-    """Warn where the angles of a path, its columns in the order of the body's joints, look like degrees.
+    """Warn where the angles of a path, its columns in the order of the body's joints, resemble degrees.
 
-    Warns
-    -----
-    TrajectoryWarning
-        If a joint goes more than half a turn beyond its limits, and in degrees all would stay within theirs. A
-        recording is asked for its unit when it is read, and no more here.
+    Warns if a joint goes more than half a turn beyond its limits, and in degrees all would stay within theirs. The
+    unit of a recording is checked when it is read.
     """
     if path.record is not None or _farthest(path) <= _HALF_TURN:
         return

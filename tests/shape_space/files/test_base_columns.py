@@ -191,7 +191,7 @@ QUESTIONS = {
         {"degrees": False},
         "'base_roll_deg' is in degrees by its name",
     ),
-    "too far": (RPY, 1e12 * ANGLES, {"degrees": False}, "up to 1e.06 can be represented"),
+    "too far": (RPY, 1e12 * ANGLES, {"degrees": False}, "up to 1e.06 rad or m can be represented"),
     "no number": (RPY, np.where(np.arange(3) == 1, np.nan, ANGLES), {}, "column 'base_pitch' has no number"),
     "an order of a quaternion": (SPELLINGS["q"][0], XYZW, {"base_order": "xyz"}, "base_order is for angles"),
     "no order": (RPY, ANGLES, {"base_order": "zyz"}, "base_order: the three axes"),

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays as drawn
 
 import shapephase as sp
-from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryError, TrajectoryWarning, UnknownNameError
-from shapephase.shape_space.files.read import read_recorded_motion, read_shape_path, write_shape_path
+from shapephase.errors import ShapePhaseError, TrajectoryError, TrajectoryWarning, UnknownNameError
+from shapephase.shape_space.files import read_recorded_motion, read_shape_path, write_shape_path
 from support.independent import mujoco_model
 from support.motion_writers import (
     NANO,
@@ -426,14 +426,6 @@ def test_trajectories_follow_each_other_by_their_headers(tmp_path):
         path = read_shape_path(tmp_path / file, DIVER)
         np.testing.assert_allclose(path.breaks, sample.ns / NANO, atol=1e-15, rtol=0)
         np.testing.assert_allclose(path.shape(path.breaks), sample.in_body_order, atol=1e-14, rtol=0)
-
-
-@pytest.mark.parametrize(("module", "file"), [("rosbags.highlevel", "m.bag"), ("yaml", "m.yaml")])
-def test_without_the_extra_its_name_is_told(tmp_path, monkeypatch, module, file):
-    monkeypatch.setitem(__import__("sys").modules, module, None)
-    (tmp_path / file).write_text("x: 1\n")
-    with pytest.raises(MissingExtraError, match=r"pip install 'shapephase\[ros\]'"):
-        read_shape_path(tmp_path / file, DIVER)
 
 
 # Bytes at random

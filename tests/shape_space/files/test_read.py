@@ -3,6 +3,7 @@
 `ODD_FILES` lists hostile and odd files of every kind with what must become of each.
 """
 
+import inspect
 import json
 import os
 
@@ -251,6 +252,20 @@ def test_options_that_do_not_fit_the_file_are_refused(tmp_path, diver):
     (tmp_path / "m.csv").write_text(csv_text().replace(LEFT, f"{LEFT}_deg"))
     with pytest.raises(TrajectoryError, match="is in degrees by its name, and degrees=False was given"):
         read_recorded_motion(tmp_path / "m.csv", diver, degrees=False)
+
+
+@pytest.mark.parametrize("read", [sp.read_recorded_motion, sp.read_shape_path, sp.read_trajectory])
+def test_help_shows_every_option_and_an_unknown_one_is_named(read, tmp_path, diver):
+    shown = inspect.signature(read).parameters
+    defaults = {name: part.default for name, part in shown.items() if part.kind is part.KEYWORD_ONLY}
+    assert set(defaults.values()) == {None, False}
+    assert {"names", "degrees", "fill", "base_axes"} < set(defaults)
+    assert ("trim" in defaults) == (read is not sp.read_trajectory)
+    assert not any(part.kind is part.VAR_KEYWORD for part in shown.values())
+    (tmp_path / "m.csv").write_text("time\n0\n1\n")
+    for name in set(defaults) - {"step"}:
+        with pytest.raises(TypeError, match=f"'{name}s'.*Did you mean.*{name[:4]}"):
+            read(tmp_path / "m.csv", diver, **{f"{name}s": None})
 
 
 def test_a_table_with_one_row_for_each_joint_is_read_as_one_with_a_column(tmp_path):

@@ -389,10 +389,6 @@ def test_the_same_path_or_a_question(case, tmp_path):
     assert found.path.duration == pytest.approx(truth.duration, rel=1e-14)
 
 
-def test_fifteen_of_the_spellings_and_more_are_read():
-    assert sum(not isinstance(outcome, list) for _, _, _, outcome in SPELLINGS.values()) >= 30
-
-
 @pytest.mark.parametrize("content", [text(TIMES, DEGREES, DEG, ";", comma=True), "mot"])
 def test_standard_input(monkeypatch, tmp_path, content):
     if content == "mot":
@@ -440,14 +436,18 @@ def test_a_wheel_that_turns_far_is_asked_about_and_comes_back_as_it_was_written(
 
 
 @pytest.mark.parametrize(
-    ("module", "file"), [("openpyxl", "m.xlsx"), ("pyarrow.parquet", "m.parquet"), ("h5py", "m.h5"), ("ezc3d", "m.c3d")]
+    ("module", "file", "extra"),
+    [
+        *(("openpyxl", "m.xlsx", "data"), ("pyarrow.parquet", "m.parquet", "data"), ("h5py", "m.h5", "data")),
+        *(("ezc3d", "m.c3d", "data"), ("rosbags.highlevel", "m.bag", "ros"), ("yaml", "m.yaml", "ros")),
+    ],
 )
-def test_without_the_extra_its_name_is_told(tmp_path, monkeypatch, module, file):
+def test_a_missing_extra_is_named(tmp_path, monkeypatch, module, file, extra):
     monkeypatch.setitem(sys.modules, module, None)
     if module in ("ezc3d", "h5py"):
         monkeypatch.setattr("importlib.util.find_spec", lambda _: None)
-    (tmp_path / file).write_bytes(b"x")
-    with pytest.raises(MissingExtraError, match=r"pip install 'shapephase\[data\]'"):
+    (tmp_path / file).write_bytes(b"x: 1\n")
+    with pytest.raises(MissingExtraError, match=rf"pip install 'shapephase\[{extra}\]'"):
         read_recorded_motion(tmp_path / file, BODY)
 
 

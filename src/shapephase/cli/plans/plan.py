@@ -80,7 +80,7 @@ def plan_command(
     """
     from ...body.catalog import load_body
     from ...optimal_control.planning import plan_reorientation
-    from ...shape_space.files.read import write_shape_path
+    from ...shape_space.files.write import write_shape_path
     from ..texts.plan_text import plan_comment, plan_data, plan_lines, plan_purpose
 
     target, settings = goal.goal(), searching.search()

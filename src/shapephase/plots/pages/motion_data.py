@@ -15,7 +15,7 @@ from ...body.body import Body
 from ...body.couplings.coordinate_map import CurvedJoint
 from ...body.link_motions import link_motions
 from ...errors import unknown_name
-from ...shape_space.ball_columns import ball_columns, neighbours_signs
+from ...shape_space.interpolation import ball_columns, neighbours_signs
 from .._moving_scene import MovingNode, MovingScene
 
 _SLIDER_END = math.pi  # [rad or m] for a joint without a limit

@@ -11,14 +11,11 @@ from ... import so3
 from ...arrays import Array, Integers, Mask
 from ...errors import TrajectoryError
 from .labels import seconds
-from .recording import Recording, Table
+from .recording import Recording, Table, listed
 
-_UNRESOLVED = 2.0 * np.pi / 3.0
-"""[rad] A rotation that turns by more across a gap may as well have gone the other way round."""
-_ROUNDING = 1e-9
-"""Share of a length by which sums of time steps may exceed it."""
-_MOST_SHOWN = 4
-"""Columns and gaps that an error lists."""
+_UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] a larger rotation across a gap has an unknown direction
+_ROUNDING = 1e-9  # relative excess of a sum of time steps
+_MOST_SHOWN = 4  # columns and gaps that an error lists
 
 
 def fill_argument(fill: float | str | None) -> float | None:
@@ -32,17 +29,15 @@ def fill_argument(fill: float | str | None) -> float | None:
 class Gaps:
     """Samples that columns of a recording lack, and their bridges.
 
-    Parameters
-    ----------
     recording : whose times the samples have
-    longest : gap that is bridged [s], from the last number before it to the first one after it; None: all are refused
+    longest : gap that is bridged [s], from the last number before it to the first one after it; None: none is
     """
 
     def __init__(self, recording: Recording, longest: float | None) -> None:
         self._recording = recording
         self._longest = longest
         self._missing: dict[str, Mask] = {}
-        self._by: dict[str, str] = {}
+        self._method: dict[str, str] = {}
 
     def held(self, table: Table, label: str) -> Array:
         """A column with the last number before it in each gap, which `bridged` and `turned` then replace.
@@ -51,12 +46,18 @@ class Gaps:
         """
         if label not in self._missing:
             self._missing[label] = table.missing(label)
-        if self._missing[label].all():
+        missing = self._missing[label]
+        if missing.all():
             raise TrajectoryError(
                 f"{table.where}: column {label!r} has no number; leave it out with names={{{label!r}: None}} (--names "
                 f"{label}=), and say where its joint rests (rest, --rest)"
             )
-        return _held(table.columns[label], self._missing[label])
+        if not missing.any():
+            return table.columns[label]
+        source = np.where(missing, 0, np.arange(len(missing)))
+        first = np.flatnonzero(~missing)[0]
+        source[:first] = first
+        return table.columns[label][np.maximum.accumulate(source)]
 
     def joined(self, table: Table, labels: Sequence[str]) -> None:
         """Let columns of one rotation or place have their gaps together."""
@@ -72,40 +73,40 @@ class Gaps:
         missing = self._inside(labels[0])
         if not missing.any():
             return values
-        self._by |= dict.fromkeys(labels, "cubic spline")
-        there = ~self._missing[labels[0]]
-        found, times = values.copy(), self._recording.times
-        found[missing] = CubicSpline(times[there], values[there])(times[missing])
-        return found
+        self._method |= dict.fromkeys(labels, "cubic spline")
+        known, times = ~self._missing[labels[0]], self._recording.times
+        filled = values.copy()
+        filled[missing] = CubicSpline(times[known], values[known])(times[missing])
+        return filled
 
     def turned(self, labels: Sequence[str], turns: Array) -> Array:
         """Rotations (N, 3, 3) of joined columns, in their gaps those of the C2 rotation spline through the others.
 
-        Raises TrajectoryError where a rotation turns too far across a gap to tell which way round.
+        Raises TrajectoryError where a rotation across a gap is too large for its direction to be known.
         """
         from scipy.spatial.transform import Rotation, RotationSpline
 
         missing = self._inside(labels[0])
         if not missing.any():
             return turns
-        self._by |= dict.fromkeys(labels, "rotation spline")
-        there = ~self._missing[labels[0]]
-        found, times, known = turns.copy(), self._recording.times, turns[there]
+        self._method |= dict.fromkeys(labels, "rotation spline")
+        samples, times = np.flatnonzero(~self._missing[labels[0]]), self._recording.times
+        known = turns[samples]
         steps = so3.angle(so3.transpose(known[:-1]) @ known[1:])
-        places = np.flatnonzero(there)
-        wide = np.flatnonzero((np.diff(places) > 1) & (steps > _UNRESOLVED))
+        wide = np.flatnonzero((np.diff(samples) > 1) & (steps > _UNRESOLVED))
         if len(wide):
-            before, after = int(places[wide[0]]), int(places[wide[0] + 1])
+            before, after = int(samples[wide[0]]), int(samples[wide[0] + 1])
             raise TrajectoryError(
-                f"{self._recording.table.where}: {_listed(labels)} turn by {np.degrees(steps[wide[0]]):.3g} deg across "
-                f"the gap {self._span(before, after)}: which way round is unknown; keep a stretch without it (trim, "
-                f"{self._trim_words(before, after)})"
+                f"{self._recording.table.where}: {_columns(labels)} turn by {np.degrees(steps[wide[0]]):.3g} deg "
+                f"across the gap {self._span(before, after)}: which way round is unknown; keep a stretch without it "
+                f"(trim, {self._trim_option(before, after)})"
             )
-        found[missing] = RotationSpline(times[there], Rotation.from_matrix(known))(times[missing]).as_matrix()
-        return found
+        filled = turns.copy()
+        filled[missing] = RotationSpline(times[samples], Rotation.from_matrix(known))(times[missing]).as_matrix()
+        return filled
 
     def settled(self) -> tuple[Integers, dict[str, Any] | None]:
-        """The samples that are left without gaps at the ends, and what was filled and cut, as JSON can hold it.
+        """The samples without gaps at the ends, and what was filled and cut, ready for JSON.
 
         Raises TrajectoryError for gaps that are not to be bridged.
         """
@@ -113,20 +114,20 @@ class Gaps:
         count = len(self._recording.times)
         low = max((first for first, _ in ends.values()), default=0)
         high = min((last for _, last in ends.values()), default=count - 1)
-        runs: dict[tuple[int, int], list[str]] = {}
+        gaps: dict[tuple[int, int], list[str]] = {}
         for label in self._missing:
             edges = np.flatnonzero(np.diff(np.concatenate([[0], self._inside(label).astype(int), [0]])))
             for first, past in edges.reshape(-1, 2).tolist():
                 if past > low and first <= high:
-                    runs.setdefault((first - 1, past), []).append(label)
+                    gaps.setdefault((first - 1, past), []).append(label)
         outer = [
-            (name, [label for label, both in ends.items() if both[which] == at], edge, at)
-            for which, name, edge, at in ((0, "start", 0, low), (1, "end", count - 1, high))
+            (end, [label for label, both in ends.items() if both[which] == at], edge, at)
+            for which, end, edge, at in ((0, "start", 0, low), (1, "end", count - 1, high))
             if at != edge
         ]
-        if not runs and not outer:
+        if not gaps and not outer:
             return np.arange(count), None
-        self._check(runs, outer)
+        self._check(gaps, outer)
         if high - low < 1:
             raise TrajectoryError(
                 f"{self._recording.table.where}: no two samples are left between the gaps at the start and at the end"
@@ -139,37 +140,37 @@ class Gaps:
                 "until": float(clock[after]),
                 "seconds": self._length(before, after),
                 "samples": after - before - 1,
-                "by": self._by[labels[0]],
+                "by": self._method[labels[0]],
             }
-            for (before, after), labels in sorted(runs.items())
+            for (before, after), labels in sorted(gaps.items())
         ]
         cut = [
-            {"columns": labels, "at": name, "samples": abs(at - edge), "from": float(clock[at])}
-            for name, labels, edge, at in outer
+            {"columns": labels, "at": end, "samples": abs(at - edge), "from": float(clock[at])}
+            for end, labels, edge, at in outer
         ]
         return np.arange(low, high + 1), {"filled": filled, "cut": cut}
 
-    def _check(self, runs: dict[tuple[int, int], list[str]], outer: Sequence[tuple[str, list[str], int, int]]) -> None:
+    def _check(self, gaps: dict[tuple[int, int], list[str]], outer: Sequence[tuple[str, list[str], int, int]]) -> None:
         """Raise TrajectoryError for gaps longer than those to be bridged."""
-        lengths = {run: self._length(*run) for run in runs}
+        lengths = {gap: self._length(*gap) for gap in gaps}
         longest = -1.0 if self._longest is None else self._longest * (1.0 + _ROUNDING)
-        refused = sorted(run for run, length in lengths.items() if length > longest)
+        refused = sorted(gap for gap, length in lengths.items() if length > longest)
         where = self._recording.table.where
         if refused:
-            shown = [f"{_listed(runs[run])} {self._span(*run)}" for run in refused[:_MOST_SHOWN]]
+            shown = [f"{_columns(gaps[gap])} {self._span(*gap)}" for gap in refused[:_MOST_SHOWN]]
             more = f"; and {len(refused) - len(shown)} more" if len(refused) > len(shown) else ""
             beyond = "" if self._longest is None else f"; longer than the {self._longest:g} s to be bridged"
             need = f"{np.ceil(1e3 * max(lengths.values()) * (1.0 - _ROUNDING)) / 1e3:g}"
             raise TrajectoryError(
-                f"{where}: no number in {'; '.join(shown)}{more}{beyond}; bridge gaps of that length with "
-                f"fill={need} (--fill {need}s), or keep a stretch without them (trim, {self._trim_words(*refused[0])})"
+                f"{where}: no number in {'; '.join(shown)}{more}{beyond}; bridge gaps of that length with fill={need} "
+                f"(--fill {need}s), or keep a stretch without them (trim, {self._trim_option(*refused[0])})"
             )
         if outer and self._longest is None:
-            name, labels, edge, at = outer[0]
-            rows = self._rows(min(edge, at + 1), max(edge, at - 1))
+            end, labels, edge, at = outer[0]
             raise TrajectoryError(
-                f"{where}: no number in {_listed(labels)} at the {name}, {rows}; cut such ends off with fill=0.1 "
-                "(--fill 0.1s), which also bridges gaps of up to that length"
+                f"{where}: no number in {_columns(labels)} at the {end}, "
+                f"{self._rows(min(edge, at + 1), max(edge, at - 1))}; cut such ends off with fill=0.1 (--fill 0.1s), "
+                "which also bridges gaps of up to that length"
             )
 
     def _inside(self, label: str) -> Mask:
@@ -177,10 +178,10 @@ class Gaps:
         missing = self._missing.get(label)
         if missing is None:
             return np.zeros(len(self._recording.times), dtype=bool)
-        places = np.flatnonzero(~missing)
-        found = missing.copy()
-        found[: places[0]] = found[places[-1] :] = False
-        return found
+        known = np.flatnonzero(~missing)
+        inside = missing.copy()
+        inside[: known[0]] = inside[known[-1] :] = False
+        return inside
 
     def _length(self, before: int, after: int) -> float:
         return float(self._recording.times[after] - self._recording.times[before])
@@ -196,22 +197,12 @@ class Gaps:
             return f"{table.row} {table.rows[first]}"
         return f"{table.row}s {table.rows[first]} to {table.rows[last]}"
 
-    def _trim_words(self, before: int, after: int) -> str:
+    def _trim_option(self, before: int, after: int) -> str:
         """The option that keeps the longer side of a gap."""
         clock = self._recording.clock
         first, last = (0, before) if before >= len(clock) - 1 - after else (after, len(clock) - 1)
         return f"--flight {clock[first]:.9g} {clock[last]:.9g}"
 
 
-def _held(values: Array, missing: Mask) -> Array:
-    if not missing.any():
-        return values
-    there = np.where(missing, 0, np.arange(len(values)))
-    there[: np.flatnonzero(~missing)[0]] = np.flatnonzero(~missing)[0]
-    return values[np.maximum.accumulate(there)]
-
-
-def _listed(labels: Sequence[str]) -> str:
-    shown = ", ".join(repr(label) for label in labels[:_MOST_SHOWN])
-    more = f" and {len(labels) - _MOST_SHOWN} more" if len(labels) > _MOST_SHOWN else ""
-    return f"column{'s' if len(labels) > 1 else ''} {shown}{more}"
+def _columns(labels: Sequence[str]) -> str:
+    return f"column{'s' if len(labels) > 1 else ''} {listed(map(repr, labels), _MOST_SHOWN)}"

@@ -1,4 +1,4 @@
-"""Columns that say where the base is and how it is turned, under the names that programs give them."""
+"""Columns of the place and attitude of the base, under the names that programs give them."""
 
 from __future__ import annotations
 
@@ -22,31 +22,27 @@ _KINDS = {
 }
 _KIND_OF = {word: kind for kind, words in _KINDS.items() for word in words}
 _EULER = {"roll": "roll", "pitch": "pitch", "yaw": "yaw", "heading": "yaw"}
-_BASE = frozenset(
+_BASE = frozenset(  # words before the kind that name no other part of the body
     ("base", "link", "root", "pelvis", "body", "pose", "odom", "odometry", "state", "states", "transform", "field")
 ) | {"free", "floating", "freeflyer"}
-"""Words before the kind that are no other part of the body."""
-_FRAME = re.compile(r"[a-z]{1,2}")
-"""Letters of the frames between a kind and its component, as in `p_RS_R_x` and `sigma_BN_1`."""
+_FRAME = re.compile(r"[a-z]{1,2}")  # frames between a kind and its component, as in `p_RS_R_x`
 _JOINED = re.compile(r"(q|quat|t|p|r|mrp|sigma|rotvec|pos)([wxyz]|\d)")
 _SPLIT = re.compile(r"[/.\s_\[\]()]+")
-CANONICAL = {
+CANONICAL = {  # kind -> component -> name of its column
     QUATERNION: {part: f"base_q{part}" for part in "xyzw"},
     PLACE: {part: f"base_{part}" for part in "xyz"},
     MRP: {part: f"base_mrp_{part}" for part in "123"},
     VECTOR: {part: f"base_rotvec_{part}" for part in "xyz"},
     EULER: {part: f"base_{part}" for part in ("roll", "pitch", "yaw")},
 }
-"""Kind -> component -> the name of its column."""
-HINT = (
+HINT = (  # in messages about columns of the base
     "columns of the base are base_x, base_y, base_z and base_qx, base_qy, base_qz, base_qw or base_roll, base_pitch, "
     "base_yaw or base_mrp_1, base_mrp_2, base_mrp_3"
 )
-"""What a message says of columns of the base."""
 
 
 class _Part(NamedTuple):
-    """What a label says: the kind, what stands before it, and the component as it is written there."""
+    """Parts of a label: the kind, the words before it, and the component as it is written there."""
 
     kind: str
     stem: tuple[str, ...]
@@ -56,27 +52,22 @@ class _Part(NamedTuple):
 def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, str]:
     """Label -> the name of a column of the base, of all labels that complete a quaternion, a place and so on.
 
-    Parameters
-    ----------
     targets : label -> the name that it goes by
     own : names of joints and columns that are known already
 
-    Raises
-    ------
-    TrajectoryError
-        For a quaternion numbered from 1, of which the number of the scalar part is not known.
+    Raises TrajectoryError for a quaternion numbered from 1, of which the number of the scalar part is not known.
     """
     families: dict[tuple[str, tuple[str, ...]], dict[str, str]] = {}
     for text, target in targets.items():
         part = None if target in own or label(target).name in own else _part(target)
         if part is not None:
             families.setdefault((part.kind, part.stem), {})[part.component] = text
-    found: dict[str, str] = {}
+    names: dict[str, str] = {}
     for (kind, _), texts in families.items():
         components = _components(kind, texts)
         if components is not None:
-            found |= {texts[written]: CANONICAL[kind][part] for written, part in components.items()}
-    return found
+            names |= {texts[written]: CANONICAL[kind][part] for written, part in components.items()}
+    return names
 
 
 def _part(target: str) -> _Part | None:
@@ -104,7 +95,7 @@ def _part(target: str) -> _Part | None:
 
 
 def _is_base(before: Iterable[str], rooted: bool) -> bool:
-    """Whether what stands before a kind may be the base: known words, or the topic of a message."""
+    """True if the words before a kind may be the base: known words, or the topic of a message."""
     words = list(before)
     return set(words) <= _BASE or (rooted and (not words or words[-1] in _BASE))
 

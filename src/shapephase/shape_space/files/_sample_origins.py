@@ -20,14 +20,12 @@ from ..shape_path import ShapePath, interpolated
 class Prepared:
     """Samples, from which turns and drift are taken off, which are smoothed, and through which a spline is put.
 
-    Attributes
-    ----------
     samples : (N, n) as recorded [rad or m]
-    smoother : of columns (n,); knows the times of the samples, and whether the spline is periodic
+    smoother : of columns (n,); has the times of the samples, and whether the spline is periodic
     pilot : a smoother of a higher order, by whose motion it is known what the other one takes off; None: unknown
     inside : the samples between whose times the path is, of those that are smoothed
     turns : (n,) whole turns that a loop makes, evenly [rad]
-    drift : whether what is left between the last sample and the first is taken off evenly in time
+    drift : True if the gap between the last sample and the first is taken off evenly in time
     joint_names : n names, or None
     """
 
@@ -45,7 +43,7 @@ class Prepared:
 
     @property
     def smoothed(self) -> Mask:
-        """Which joints are smoothed: (n,)."""
+        """True for joints that are smoothed: (n,)."""
         return self.smoother.penalties > 0.0
 
     @cached_property
@@ -55,11 +53,11 @@ class Prepared:
 
     @property
     def _kept(self) -> slice:
-        """Of the values that are smoothed, those at knots of the path."""
+        """Places of the knots of the path among the values that are smoothed."""
         return slice(None) if self.smoother.periodic else self.inside
 
     def joined(self, samples: Array) -> Array:
-        """Of recorded samples (N, n), the values that are smoothed: (count, n)."""
+        """Values that are smoothed, from recorded samples (N, n): (count, n)."""
         even = samples - self._share * self.turns
         if self.drift:
             even = even - self._share * (even[-1] - even[0])
@@ -71,18 +69,14 @@ class Prepared:
 
     def values(self, samples: Array) -> Array:
         """The values of the spline at its knots: (knots, n)."""
-        found = self.joined(samples)
+        joined = self.joined(samples)
         # About the first, so that what does not move stays to the last digit.
-        smooth = found[0] + self.smoother(found - found[0])
-        return np.where(self.smoothed, smooth, found)[self._kept]
-
-    @property
-    def bias(self) -> Array:
-        """What the steps take off the motion itself at the knots: (knots, n), by the pilot."""
-        return self._bias
+        smooth = joined[0] + self.smoother(joined - joined[0])
+        return np.where(self.smoothed, smooth, joined)[self._kept]
 
     @cached_property
-    def _bias(self) -> Array:
+    def bias(self) -> Array:
+        """Bias of the steps at the knots, by the pilot: (knots, n)."""
         values = self.joined(self.samples)
         if self.pilot is None or not self.smoothed.any():
             return np.zeros_like(values)[self._kept]
@@ -122,7 +116,7 @@ class Prepared:
         return whole
 
     def _by_recorded(self, found: Array) -> Array:
-        """From derivatives by `joined` to those by the samples: (count, m, n) -> (N, m, n)."""
+        """Convert derivatives by `joined` to those by the samples: (count, m, n) -> (N, m, n)."""
         if not self.smoother.periodic:
             return found
         last = np.where(self.smoothed, 0.5 * found[0], 0.0)
@@ -130,7 +124,7 @@ class Prepared:
         even = np.concatenate([first[None], found[1:], last[None]])
         if not self.drift:
             return even
-        # Of a drift, the last sample is the first, and all go back by their share of the gap.
+        # With the drift taken off, the last sample is the first, and all move by their share of the gap.
         even[0], even[-1] = even[0] + even[-1], 0.0
         by_gap = (self._share[:, :, None] * even).sum(axis=0)
         even[0] += by_gap
@@ -142,8 +136,6 @@ class Prepared:
 class Resampled:
     """Values of a path through samples, evenly in time, through which another spline is put.
 
-    Attributes
-    ----------
     inner : the path through samples
     times : (M,) of its values [s]
     count : how many values may differ: of a periodic spline the last is the first
@@ -162,7 +154,7 @@ class Resampled:
 
     @property
     def bias(self) -> Array:
-        """What the steps take off the motion itself at the knots: (knots, n), by the pilot."""
+        """Bias of the steps at the knots, by the pilot: (knots, n)."""
         samples = path_samples(self.inner)
         taken = samples.bias.reshape(-1, self.inner.n_shape)
         periodic = len(taken) < len(samples.curve.knots)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable, Collection
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -9,53 +12,46 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from ... import so3
-from ...arrays import Array
+from ...arrays import Array, Integers
 from ...body.body import Body
-from ...errors import TrajectoryError
+from ...errors import TrajectoryError, TrajectoryWarning
 from ._joint_columns import Matched
 from .labels import IN_A_SECOND
 from .recording import Recording, warn
 from .smoothing import filtered, filtered_attitudes
 from .times import part_of
 
-_APART = 5.0
-"""Times the largest rate of the next second: a body that moves on does not slow down so much from its first step on."""
-_NEXT = 1.0
-"""[s]"""
-_FEWEST = 4
-"""Steps in it: fewer are no recording, of which one expects small steps."""
-_NO_POSE = 0.02
-"""[rad or m] A smaller first step is noise, or a body that moves very little."""
-_DENSER = 1.1
-"""Factor to the usual rate: splines through uneven samples make that many even ones of them."""
-_ROUNDING = 1e-9
-"""Steps of time."""
-_UNRESOLVED = 2.0 * np.pi / 3.0
-"""[rad] From one sample to the next, the short way: turns up to twice as long the other way round show as much."""
+_APART = 5.0  # first rate over the largest of the next second: a moving body does not slow down so much
+_NEXT = 1.0  # [s]
+_FEWEST = 4  # steps in that second: fewer are no recording with small steps
+_NO_POSE = 0.02  # [rad or m] a smaller first step is noise, or a body that hardly moves
+_DENSER = 1.1  # largest even rate over the usual rate of uneven samples
+_ROUNDING = 1e-9  # in steps of time
+_GAP = 5.0  # usual steps: samples farther apart belong to different motions
+_UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] per sample: a turn of twice that, the other way round, gives the same samples
 
 
 def without_first_pose(recording: Recording, motion: Matched, body: Body) -> tuple[Recording, Matched]:
     """The motion without a pose of zero angles that is apart from all others, which exporters put before it.
 
-    Warns
-    -----
-    TrajectoryWarning
-        Where that pose is left out, and where another first sample is as far from the second.
+    Warns where that pose is left out, and where another first sample is as far from the second.
     """
     later = recording.times[1:-1] - recording.times[1] if len(recording.times) > 2 else np.zeros(0)
     count = int(np.count_nonzero(later < _NEXT))
     if count < _FEWEST:
         return recording, motion
-    few = motion.kept(np.arange(count + 2))
+    beginning = motion.kept(np.arange(count + 2))
     lengths = np.diff(recording.times[: count + 2])
-    for what, unit, steps in _steps(few, body):
+    for names, unit, steps in _steps(beginning, body):
         rates = steps.max(axis=1, initial=0.0) / lengths
         if not (rates[0] > _APART * rates[1:].max() and steps[0].max() > _NO_POSE):
             continue
-        name, far = what[int(np.argmax(steps[0]))], float(steps[0].max())
-        far, unit = (float(np.degrees(far)), "deg") if unit == "rad" else (far, unit)
-        often = f"over {_APART:g} times the largest step of the next {_NEXT:g} s"
-        moved = f"{name} goes {far:.3g} {unit} to the next {recording.table.row}, {often}"
+        size = float(steps[0].max())
+        shown = f"{np.degrees(size):.3g} deg" if unit == "rad" else f"{size:.3g} {unit}"
+        moved = (
+            f"{names[int(np.argmax(steps[0]))]} goes {shown} to the next {recording.table.row}, over {_APART:g} times "
+            f"the largest step of the next {_NEXT:g} s"
+        )
         if recording.table.zero_pose:
             warn(f"{recording.place(0)}: left out: all angles are zero, and {moved}: a pose put before the motion")
             samples = np.arange(1, len(recording.times))
@@ -77,13 +73,13 @@ def warn_of_fast_turns(recording: Recording, motion: Matched, body: Body) -> Non
     sample, column = divmod(int(np.argmax(steps)), len(balls))
     if steps[sample, column] < _UNRESOLVED:
         return
-    row, before = recording.table.row, recording.table.rows[sample]
     clock = recording.first + recording.times[sample + 1] * IN_A_SECOND[recording.time_unit]
     others = int(np.count_nonzero(steps >= _UNRESOLVED)) - 1
     warn(
         f"{recording.place(sample + 1)}: {balls[column].name} turns by {np.degrees(steps[sample, column]):.3g} deg "
-        f"from {row} {before}, at {clock:.6g} {recording.time_unit}{f' ({others} more such steps)' if others else ''}: "
-        "samples so far apart do not say which way round; the shorter way is taken"
+        f"from {recording.table.row} {recording.table.rows[sample]}, at {clock:.6g} {recording.time_unit}"
+        f"{f' ({others} more such steps)' if others else ''}: samples so far apart do not say which way round; the "
+        "shorter way is taken"
     )
 
 
@@ -122,27 +118,75 @@ def low_passed(times: Array, motion: Matched, cut_off: float) -> Matched:
 
 
 def _steps(motion: Matched, body: Body) -> list[tuple[list[str], str, Array]]:
-    """Names of what turns and of what slides, and how far each goes from sample to sample: (N - 1, k) [rad or m]."""
+    """Names of turning and of sliding parts, unit, and steps from sample to sample: (N - 1, k) [rad or m]."""
     shapes, base = motion.shapes, motion.base
-    turning: list[tuple[str, Array]] = []
-    sliding: list[tuple[str, Array]] = []
+    steps: dict[str, dict[str, Array]] = {"rad": {}, "m": {}}
     for joint, (name, unit) in enumerate(zip(body.joint_names, body.joint_units, strict=True)):
-        if unit in ("rad", "m"):
-            (turning if unit == "rad" else sliding).append((name, np.abs(np.diff(shapes[:, joint]))))
+        if unit in steps:
+            steps[unit][name] = np.abs(np.diff(shapes[:, joint]))
     for ball in body.chain.follows.balls:
-        turning.append((ball.name, _angles(ball.turns(shapes))))
+        steps["rad"][ball.name] = _angles(ball.turns(shapes))
     if base.attitude is not None:
-        turning.append(("the base", _angles(base.attitude)))
+        steps["rad"]["the base"] = _angles(base.attitude)
     if base.position is not None:
-        sliding.append(("the base", np.linalg.norm(np.diff(base.position, axis=0), axis=1)))
+        steps["m"]["the base"] = np.linalg.norm(np.diff(base.position, axis=0), axis=1)
     return [
-        ([name for name, _ in kind], unit, np.stack([steps for _, steps in kind], axis=1, dtype=np.float64))
-        if kind
-        else ([], unit, np.zeros((len(shapes) - 1, 0)))
-        for kind, unit in ((turning, "rad"), (sliding, "m"))
+        (list(parts), unit, np.array([*parts.values()], dtype=np.float64).reshape(-1, len(shapes) - 1).T)
+        for unit, parts in steps.items()
     ]
 
 
 def _angles(turns: Array) -> Array:
     """Between neighbours: (N, 3, 3) -> (N - 1,) [rad]."""
     return so3.angle(so3.transpose(turns[:-1]) @ turns[1:])
+
+
+def surrounded(
+    kept: Recording,
+    motion: Matched,
+    untrimmed: Callable[[], Recording],
+    match: Callable[[Recording], tuple[Recording, Matched]],
+    fill: float | None,
+) -> tuple[Recording, Matched, slice]:
+    """The samples that are kept with those that the file has before and after them, and which of these are kept.
+
+    kept, motion : the samples that are kept
+    untrimmed : the whole recording, where that can be read
+    match : the joints and the base of a recording
+    fill : the longest gap that is bridged [s], or None
+    """
+    # Faults and doubts of these samples, which the caller left out, are not reported.
+    with suppress(TrajectoryError), warnings.catch_warnings():
+        warnings.simplefilter("ignore", TrajectoryWarning)
+        whole = untrimmed()
+        first = list(whole.table.rows).index(kept.table.rows[0])
+        start, stop = _readable(whole, first, first + len(kept.times), _broken(whole, motion.left_out, fill))
+        part, around = match(part_of(whole, np.arange(start, stop)))
+        begin = list(part.table.rows).index(kept.table.rows[0])
+        return part, around, slice(begin, begin + len(kept.times))
+    return kept, motion, slice(None)
+
+
+def _readable(whole: Recording, first: int, past: int, broken: Integers) -> tuple[int, int]:
+    """Ends of the stretch around some samples that has no gaps and no missing numbers."""
+    steps = np.diff(whole.times)
+    usual = float(np.median(steps[first : past - 1]))
+    apart = np.flatnonzero(steps > _GAP * usual)
+    before = np.concatenate([apart[apart < first] + 1, broken[broken < first] + 1, [0]])
+    after = np.concatenate([apart[apart >= past - 1] + 1, broken[broken >= past], [len(whole.times)]])
+    return int(before.max()), int(after.min())
+
+
+def _broken(whole: Recording, left_out: Collection[str], fill: float | None) -> Integers:
+    """Samples that lack a number in some column, and are not bridged."""
+    table, count = whole.table, len(whole.times)
+    columns = [values for label, values in table.columns.items() if label not in left_out]
+    columns += [values for values in (table.base_quat_xyzw, table.base_position) if values is not None]
+    missing = np.zeros(count + 2, dtype=bool)
+    for values in columns:
+        missing[1:-1] |= ~np.isfinite(values).reshape(count, -1).all(axis=1)
+    edges = np.flatnonzero(np.diff(missing.astype(int))).reshape(-1, 2)
+    for first, past in edges.tolist():
+        if fill is not None and first > 0 and past < count:
+            missing[first + 1 : past + 1] = whole.times[past] - whole.times[first - 1] > fill
+    return np.flatnonzero(missing[1:-1])

@@ -1,9 +1,9 @@
-"""Which link of a body each recorded segment shows, and the turn from the segment's axes to the link's.
+"""Links of a body that recorded segments show, and the turns from the segments' axes to the links'.
 
 That turn C is the identity where they are the link's own, or comes from a calibration pose, in which the body stands
 in its zero pose: C = S^T G L with S the segment's turn there, L the link's in axes of the base, and G the turn of the
 base. G is that by which the links' joints lie best on the recorded origins (Kabsch, Acta Crystallographica A 32 (1976)
-922); where these do not tell it, the identity.
+922); where these do not determine it, the identity.
 """
 
 from __future__ import annotations
@@ -22,20 +22,14 @@ from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
 from .recording import Recording, SegmentPoses, warn
 
-OWN_AXES = "links"
-"""Instead of a calibration pose: segments have the axes of the body's links."""
-SHORT = 0.02
-"""[m] Between joints nearer to each other neither length nor direction is compared; lengths may differ by it."""
+OWN_AXES = "links"  # calibration: segments have the axes of the body's links
+SHORT = 0.02  # [m] tolerance of lengths; shorter ones are not compared
+# [rad] between the ways to the next joint: people are not straight; other arm poses give 90 deg.
 MOST_OFF_WAY = np.radians(20.0)
-"""[rad] From the way between two joints to the body's: people are not straight; arms hanging or held out differ by 90
-degrees."""
-_OTHER_POSE = np.radians(45.0)
-"""[rad] A segment that is turned by more between two calibration poses belongs to two different postures."""
-_FLAT = 1e-4
-"""Share of the largest singular value, below which points are on one line."""
-_THOUSAND = (500.0, 2000.0)
-"""Recorded lengths over the body's, where those are in millimetres."""
-_PARTS = {
+_OTHER_POSE = np.radians(45.0)  # [rad] a larger turn between two calibration poses means two postures
+_FLAT = 1e-4  # relative to the largest singular value: points on one line
+_THOUSAND = (500.0, 2000.0)  # recorded lengths in millimetres, over the body's in metres
+_PARTS = {  # part -> its names in Xsens, Theia and usual models, without the side
     "pelvis": ("pelvis", "hips"),
     "thigh": ("thigh", "upperleg", "upleg", "femur"),
     "shank": ("shank", "lowerleg", "lowleg", "tibia", "calf", "shin"),
@@ -45,23 +39,18 @@ _PARTS = {
     "forearm": ("forearm", "larm", "lowerarm", "lowarm"),
     "hand": ("hand",),
 }
-"""Part -> what Xsens, Theia and usual models call it, without its side."""
 _USUAL = {word: part for part, words in _PARTS.items() for word in words}
 _SIDED = re.compile(r"(?P<before>left|right|[lr](?=_))?_?(?P<part>.+?)_?(?P<behind>left|right|(?<=_)[lr])?")
-_ROOM = ("worldbody", "world", "ground")
-"""What files call the room among the segments."""
-_MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}
-"""Kind of model whose links the segments are -> how its files end."""
+_ROOM = ("worldbody", "world", "ground")  # names of the room among the segments
+_MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}  # kind of model whose links are the segments -> ending of its files
 
 
 @dataclass(frozen=True, kw_only=True)
 class SegmentChoices:
-    """How segments become links, as the caller chose.
+    """How segments become links, checked.
 
-    Attributes
-    ----------
     names : segment -> link, or None for a segment to be left out
-    calibration : a time, as the file tells it; the name of a pose of the file; "links"; None: as the file says
+    calibration : a time, as the file gives it; the name of a pose of the file; "links"; None: as the file states
     length_tolerance : share by which lengths may differ from the body's
     """
 
@@ -70,7 +59,7 @@ class SegmentChoices:
     length_tolerance: float | None = None
 
     def __post_init__(self) -> None:
-        """Check them. Raises ShapeError."""
+        """Raise ShapeError for values of the wrong kind."""
         off, at = self.length_tolerance, self.calibration
         if off is not None and (isinstance(off, bool) or not isinstance(off, int | float) or not 0.0 < off < 1.0):
             raise ShapeError(f"length_tolerance: a share between 0 and 1 is needed, as 0.1, got {what_came(off)}")
@@ -79,7 +68,7 @@ class SegmentChoices:
 
     @property
     def given(self) -> bool:
-        """Whether anything is given that only poses of segments need."""
+        """True if an option is given that only poses of segments need."""
         return self.calibration is not None or self.length_tolerance is not None
 
 
@@ -103,8 +92,6 @@ class Calibration(NamedTuple):
 class Links:
     """Frames of a body's chain that segments show.
 
-    Attributes
-    ----------
     frames : parents before children; the first is the base
     above : place of a frame among them -> that of the nearest one towards the base
     left_out : segments that show no frame
@@ -129,53 +116,52 @@ class Links:
 
     def frame_poses(self, shapes: Array) -> dict[int, tuple[Array, Array]]:
         """Turns (M, 3, 3) and places (M, 3) of all frames with a segment or mass, in axes of the base."""
-        found = {}
+        poses = {}
         first = {frame: link for link, (frame, _) in reversed(list(self.chain.link_frames.items()))}
         for frame in sorted({f.frame for f in self.frames} | {*np.flatnonzero(self.chain.masses).tolist()}):
             pose, inside = self.body.link_pose(shapes, first[frame]), self.chain.link_frames[first[frame]][1]
             turn = pose[:, :3, :3] @ inside[:3, :3].T
-            found[frame] = turn, pose[:, :3, 3] - turn @ inside[:3, 3]
-        return found
+            poses[frame] = turn, pose[:, :3, 3] - turn @ inside[:3, 3]
+        return poses
 
     @property
     def in_millimetres(self) -> bool:
-        """Whether segments are a thousand times as far apart as the links in the body's zero pose."""
+        """True if segments are a thousand times as far apart as the links in the body's zero pose."""
         if self.poses.origins is None or not self.above:
             return False
         rest = self.frame_poses(self.body.shape()[None])
-        pairs = [(self.frames[k], self.frames[above]) for k, above in self.above.items()]
-        own = [np.linalg.norm(rest[f.frame][1] - rest[g.frame][1]) for f, g in pairs]
-        recorded = [self.poses.origins[:, f.segment] - self.poses.origins[:, g.segment] for f, g in pairs]
-        there = [each[np.isfinite(each).all(axis=1)] for each in recorded]
-        sums = sum(float(np.median(np.linalg.norm(each, axis=1))) for each in there if len(each)), sum(own)
-        return bool(_THOUSAND[0] * sums[1] <= sums[0] <= _THOUSAND[1] * sums[1])
+        recorded, own = 0.0, 0.0
+        for k, above in self.above.items():
+            lower, upper = self.frames[k], self.frames[above]
+            own += float(np.linalg.norm(rest[lower.frame][1] - rest[upper.frame][1]))
+            ways = self.poses.origins[:, lower.segment] - self.poses.origins[:, upper.segment]
+            lengths = np.linalg.norm(ways[np.isfinite(ways).all(axis=1)], axis=1)
+            recorded += float(np.median(lengths)) if len(lengths) else 0.0
+        return _THOUSAND[0] * own <= recorded <= _THOUSAND[1] * own
 
     def calibration(self, recording: Recording, choices: SegmentChoices, record: dict[str, Any]) -> Calibration:
-        """How the segments lie in their frames; what was decided goes to the record.
+        """Turns and origins of the segments in their frames; the record gets how they were found.
 
-        Raises
-        ------
-        TrajectoryError
-            If the file does not say it, or the body does not stand in its zero pose.
+        Raises TrajectoryError if they are unknown, or the body does not stand in its zero pose.
         """
-        at, stands = choices.calibration, dict(self.poses.stands or {})
-        own = self.body.file is not None and self.body.file.suffix.lower() == _MODELS.get(
-            self.poses.of_model or "", "-"
-        )
-        if at is None and own:
+        at, stands, file = choices.calibration, dict(self.poses.stands or {}), self.body.file
+        if at is None and file is not None and file.suffix.lower() == _MODELS.get(self.poses.of_model or ""):
             at = OWN_AXES
         if at == OWN_AXES:
             record["calibration"] = "segments have the axes of the links"
             return Calibration(np.stack([f.turn.T for f in self.frames]), self._origins())
-        time = _time_of(at)
+        try:
+            time = None if at is None else float(at)
+        except ValueError:
+            time = None
         if time is not None:
             stands = {f"{time:.9g} {recording.time_unit}": self._at(time, recording)}
-        elif isinstance(at, str) and at not in stands:
-            raise TrajectoryError(
-                f"{self.where}: calibration={at!r:.40}: a time is needed, {OWN_AXES!r}, or a pose of the file, which "
-                f"has {', '.join(stands) or 'none'}; give one of these (--calibration T)"
-            )
         elif isinstance(at, str):
+            if at not in stands:
+                raise TrajectoryError(
+                    f"{self.where}: calibration={at!r:.40}: a time is needed, {OWN_AXES!r}, or a pose of the file, "
+                    f"which has {', '.join(stands) or 'none'}; give one of these (--calibration T)"
+                )
             stands = {at: stands[at]}
         if not stands:
             raise TrajectoryError(
@@ -185,17 +171,17 @@ class Links:
                 f"{self.body.name}"
             )
         fits = {kind: self._fitted(*pose) for kind, pose in stands.items()}
-        kind = min(fits, key=lambda each: fits[each].off)
+        kind = min(fits, key=lambda each: fits[each].error)
         fit = fits[kind]
-        if fit.off > MOST_OFF_WAY:
+        if fit.error > MOST_OFF_WAY:
             raise TrajectoryError(
                 f"{self.where}: the body does not stand in its zero pose at {' or '.join(stands)}: the way "
-                f"{fit.worst} is {np.degrees(fit.off):.0f} deg off, and {np.degrees(MOST_OFF_WAY):.0f} deg are the "
+                f"{fit.worst} is {np.degrees(fit.error):.0f} deg off, and {np.degrees(MOST_OFF_WAY):.0f} deg are the "
                 "most. Give a time at which it does: calibration=T (--calibration T)"
             )
-        for other in (each for each in fits if fits[each].off <= MOST_OFF_WAY):
-            apart = so3.angle(so3.transpose(fits[other].calibration.turns) @ fit.calibration.turns)
-            if apart.max() > _OTHER_POSE:
+        for other, candidate in fits.items():
+            apart = so3.angle(so3.transpose(candidate.calibration.turns) @ fit.calibration.turns)
+            if candidate.error <= MOST_OFF_WAY and apart.max() > _OTHER_POSE:
                 raise TrajectoryError(
                     f"{self.where}: both {kind} and {other} may be the zero pose of {self.body.name}, and "
                     f"{self.frames[int(np.argmax(apart))].link} is turned by {np.degrees(apart.max()):.0f} deg between "
@@ -203,7 +189,7 @@ class Links:
                 )
         axes = "as the joints lie" if fit.by_origins else "the room's, as the joints do not tell them"
         record["calibration"] = f"zero pose at {kind}, axes of the base {axes}"
-        record["calibration_off_deg"] = float(np.degrees(fit.off))
+        record["calibration_off_deg"] = float(np.degrees(fit.error))
         if not fit.by_origins:
             warn(
                 f"{self.where}: at {kind} the base of {self.body.name} is taken to have the axes of the room: the "
@@ -216,9 +202,7 @@ class Links:
         return np.stack([self.chain.centres[f.frame] if self.poses.at_centres else f.place for f in self.frames])
 
     def _at(self, time: float, recording: Recording) -> tuple[Array, Array | None]:
-        table = recording.table
-        clock = table.times if table.clock is None else table.clock
-        assert clock is not None
+        clock = recording.clock
         if not clock[0] <= time <= clock[-1]:
             raise TrajectoryError(
                 f"{self.where}: calibration={time:.9g}: times go from {clock[0]:.9g} to {clock[-1]:.9g} "
@@ -236,11 +220,11 @@ class Links:
         used = [f.segment for f in self.frames]
         rest = self.frame_poses(self.body.shape()[None])
         turned = np.stack([rest[f.frame][0][0] for f in self.frames])
-        inside, base, off, worst, by_origins = self._origins(), np.eye(3), 0.0, "", False
+        inside, base, error, worst, by_origins = self._origins(), np.eye(3), 0.0, "", False
         if origins is not None and self.above:
             ends = origins[used]
             own = np.stack([rest[f.frame][1][0] for f in self.frames]) + so3.apply(turned, inside)
-            # Where the base's own origin lies is up to who wrote the file.
+            # The place of the base's own origin depends on the program.
             free = slice(1 if len(own) > 3 else 0, None)
             left, sizes, right = np.linalg.svd((ends[free] - ends[free].mean(0)).T @ (own[free] - own[free].mean(0)))
             by_origins = len(own[free]) > 2 and bool(sizes[1] > _FLAT * sizes[0])
@@ -253,15 +237,15 @@ class Links:
                 ends = np.vstack([start + base @ own[:1].T[:, 0], ends[1:]])
             for k, above in self.above.items():
                 apart = angle_of_ways(ends[k] - ends[above], base @ (own[k] - own[above]))
-                if apart > off:
-                    off, worst = apart, f"from {self.frames[above].link} to {self.frames[k].link}"
-        return _Fit(off, worst, by_origins, Calibration(so3.transpose(turns[used]) @ base @ turned, inside))
+                if apart > error:
+                    error, worst = apart, f"from {self.frames[above].link} to {self.frames[k].link}"
+        return _Fit(error, worst, by_origins, Calibration(so3.transpose(turns[used]) @ base @ turned, inside))
 
     def _matched(self, names: Mapping[str, str | None]) -> dict[int, Frame]:
         """Frame of the chain -> the segment that shows it, parents before children."""
         links = self.chain.link_frames
         known = known_links(self.body, self.poses.names)
-        found: dict[int, Frame] = {}
+        frames: dict[int, Frame] = {}
         shown: dict[str, str] = {}
         free = []
         for number, segment in enumerate(self.poses.names):
@@ -282,11 +266,11 @@ class Links:
             shown[link] = segment
             frame, pose = links[link]
             # Among several links of one rigid part, that whose axes are the part's.
-            if frame not in found or np.array_equal(pose, np.eye(4)):
-                found[frame] = Frame(frame, number, link, pose[:3, :3], pose[:3, 3])
+            if frame not in frames or np.array_equal(pose, np.eye(4)):
+                frames[frame] = Frame(frame, number, link, pose[:3, :3], pose[:3, 3])
         first = {frame: link for link, (frame, _) in reversed(list(links.items()))}
-        lacking = [first[frame] for frame in [0, *np.flatnonzero(self.chain.masses).tolist()] if frame not in found]
-        if 0 not in found or (lacking and free):
+        lacking = [first[frame] for frame in [0, *np.flatnonzero(self.chain.masses).tolist()] if frame not in frames]
+        if 0 not in frames or (lacking and free):
             segment = free[0] if free else "SEGMENT"
             raise TrajectoryError(
                 f"{self.where}: the file has poses of {len(self.poses.names)} segments, and no segment is known as "
@@ -294,41 +278,34 @@ class Links:
                 f"{', '.join(free) or 'none'}. Say which is which: names={{{segment!r}: {lacking[0]!r}}} (--names "
                 f"{segment}={lacking[0]}), or leave a segment out: --names {segment}="
             )
-        return dict(sorted(found.items()))
+        return dict(sorted(frames.items()))
 
 
 class _Fit(NamedTuple):
-    """A calibration, the largest angle between ways and where, and whether the base is turned by origins."""
+    """A calibration, its largest angle between ways and where, and whether the base is turned by origins."""
 
-    off: float
+    error: float
     worst: str
     by_origins: bool
     calibration: Calibration
 
 
 def known_links(body: Body, segments: Iterable[str]) -> dict[str, str]:
-    """Segment -> link, of those that are known by their names."""
+    """Segment -> link, for segments that are known by their names."""
     links = body.chain.link_frames
     plain = {_plain(link): link for link in links}
     if "base" not in plain:
         plain["base"] = body.link_names[0]
     parts = [_usual(link) for link in links]
     usual = {part: link for part, link in zip(parts, links, strict=True) if parts.count(part) == 1}
-    found = {segment: plain.get(_plain(segment), usual.get(_usual(segment))) for segment in segments}
-    return {segment: link for segment, link in found.items() if link is not None}
+    by_segment = {segment: plain.get(_plain(segment), usual.get(_usual(segment))) for segment in segments}
+    return {segment: link for segment, link in by_segment.items() if link is not None}
 
 
 def angle_of_ways(recorded: Array, own: Array) -> float:
     """The angle between two vectors [rad]; 0 where one is too short to have a direction."""
     sizes = np.linalg.norm(recorded), np.linalg.norm(own)
     return float(so3.angle_between(recorded / sizes[0], own / sizes[1])) if min(sizes) > SHORT else 0.0
-
-
-def _time_of(at: float | str | None) -> float | None:
-    try:
-        return None if at is None else float(at)
-    except ValueError:
-        return None
 
 
 def _plain(name: str) -> str:

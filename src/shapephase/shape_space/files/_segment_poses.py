@@ -1,11 +1,11 @@
-"""Poses of segments, as suits, markerless systems and simulators record them, become base and joints of a body."""
+"""Base and joints of a body from poses of segments, as suits, markerless systems and simulators record them."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,36 +21,28 @@ from .formats.segment_poses import pose_columns
 from .recording import Recording, SegmentPoses, Table
 from .times import recording_of
 
-_LENGTH_TOLERANCE = 0.1
-"""Share by which a distance between joints may differ from the body's: momentum is then off by a fifth."""
-_MOST_OFF_HINGE = np.radians(15.0)
-"""[rad] rms of what hinges leave of a turn; a knee bends by some degrees to the side."""
-_MOST_DRIVERS = 3
-"""Coordinates that one turn can tell."""
-_TRIED = (129, 25, 11)
-"""Values of each of one, two or three coordinates between its limits, of which the nearest turn is searched from."""
-_ROUNDS = 8
-"""Steps of that search, by Gauss and Newton: it doubles its digits, from two on."""
-_STEP = 1e-5
-"""[rad] of its differences."""
-_FEWEST_LINKS = 2
-"""Links of a rigid part whose centre of mass is not that of the recorded one."""
-_ACROSS = 1e-6
-"""Cosine of the angle between hinges at right angles."""
+_LENGTH_TOLERANCE = 0.1  # relative error of a distance between joints: the momentum is then off by a fifth
+_MOST_OFF_HINGE = np.radians(15.0)  # [rad] rms that hinges leave of a turn; a knee bends sideways by some degrees
+_MOST_DRIVERS = 3  # coordinates that one turn determines
+_TRIED = (129, 25, 11)  # starting values of each of one, two or three coordinates, between its limits
+_ROUNDS = 8  # Gauss-Newton steps: digits double from two on
+_STEP = 1e-5  # [rad] of its central differences
+_FEWEST_LINKS = 2  # links of a rigid part with another centre of mass than the recorded segment
+_ACROSS = 1e-6  # cosine of the angle between orthogonal hinges
 
 
 @dataclass(frozen=True, eq=False)
 class SegmentMotion:
-    """The angular momentum about the centre of mass of a body whose segments were recorded, in the recorder's axes.
+    """Angular momentum about the centre of mass of a body whose segments were recorded, in the recorder's axes.
 
-    It is that of the turns and ways from each sample to the next, over the time between them.
+    It follows from the turns and ways from each sample to the next, over the time between them.
 
     Attributes
     ----------
-    times : (M,) halfway between samples, as the file tells them [s]
+    times : (M,) halfway between samples, as the file gives them [s]
     of_poses : (M, 3) by the pose of every segment as it was recorded; None without positions [kg m^2/s]
     of_chain : (M, 3) by base and joints [kg m^2/s]
-    record : links, calibration, lengths and what hinges leave over, as JSON can hold it
+    record : links, calibration, lengths and turns that hinges leave over, ready for JSON
 
     Examples
     --------
@@ -71,16 +63,16 @@ class SegmentMotion:
     __repr__ = short_repr
 
     def within(self, first: float, last: float) -> dict[str, Any]:
-        """The record with means and rms difference of the momentum between two times [s], as JSON can hold it."""
+        """The record with means and rms difference of the momentum between two times [s], ready for JSON."""
         there = (self.times >= first) & (self.times <= last)
-        found = dict(self.record)
+        record = dict(self.record)
         if there.any():
-            found["momentum_of_chain"] = self.of_chain[there].mean(axis=0).tolist()
+            record["momentum_of_chain"] = self.of_chain[there].mean(axis=0).tolist()
             if self.of_poses is not None:
                 off = self.of_poses[there] - self.of_chain[there]
-                found["momentum_of_poses"] = self.of_poses[there].mean(axis=0).tolist()
-                found["momentum_difference_rms"] = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
-        return found
+                record["momentum_of_poses"] = self.of_poses[there].mean(axis=0).tolist()
+                record["momentum_difference_rms"] = float(np.sqrt(np.mean(np.sum(off**2, axis=1))))
+        return record
 
 
 def without_segments(
@@ -88,11 +80,8 @@ def without_segments(
 ) -> tuple[Table, dict[str, str | None]]:
     """The table with joints and base in the place of poses of segments, and the names that are left for its columns.
 
-    Raises
-    ------
-    TrajectoryError
-        If segments and links do not match, axes are not known, or lengths, ways between joints or turns of hinges are
-        none that the body can have.
+    Raises TrajectoryError if segments and links do not match, axes are not known, or lengths, ways between joints or
+    turns of hinges are none that the body can have.
     """
     names = dict(choices.names)
     if table.poses is None:
@@ -106,19 +95,11 @@ def without_segments(
         return table, names
     left = {text: name for text, name in names.items() if text not in table.poses.names}
     with warnings.catch_warnings():
-        # The samples that are kept are warned about later.
+        # Warnings about the samples that are kept follow later.
         warnings.simplefilter("ignore", TrajectoryWarning)
         mapping = {text: name for text, name in left.items() if text in table.columns}
         recording = recording_of(table, body.joint_names, mapping, time_unit, timestep, None)
     return _Conversion(recording, table.poses, body, choices).table(table), left
-
-
-class _Hinge(NamedTuple):
-    """Axis of a hinge at zero, and its angle [rad] by the coordinate q: factor * q + offset."""
-
-    axis: Array
-    factor: float
-    offset: float
 
 
 class _Conversion:
@@ -141,10 +122,10 @@ class _Conversion:
         for k, above in self.links.above.items():
             turn = so3.transpose(turns[:, above]) @ turns[:, k]
             rows = self._rows(frames[k].frame, frames[above].frame)
-            found = self._joints(rows, turn)
-            # What a shank shows of a knee counts more than what a patella does, which only follows it.
-            own = set(found) <= {self.chain.names[row] for row in rows} or any(name.endswith(".w") for name in found)
-            columns = columns | found if own else found | columns
+            joints = self._joints(rows, turn)
+            # A shank determines a knee better than a patella, which only follows it.
+            own = set(joints) <= {self.chain.names[row] for row in rows} or any(name.endswith(".w") for name in joints)
+            columns = columns | joints if own else joints | columns
         whole = np.flatnonzero(np.isfinite(turns).all(axis=(1, 2, 3)))
         if len(whole) < 2:
             raise TrajectoryError(
@@ -189,7 +170,7 @@ class _Conversion:
 
     def _slides(self, shapes: Array, turns: Array, places: Array, whole: Integers) -> dict[str, Array]:
         """Coordinates [m] of joints that slide one segment along another, by the places of both."""
-        found: dict[str, Array] = {}
+        coordinates: dict[str, Array] = {}
         for k, above in self.links.above.items():
             ends = [self.links.frames[each].frame for each in (k, above)]
             rows = [row for row in self._rows(*ends) if not self.chain.axes[row].any()]
@@ -209,8 +190,8 @@ class _Conversion:
             recorded = so3.apply(so3.transpose(turns[:, above]), places[:, k] - places[:, above])[whole]
             values = np.full((len(names), len(turns)), np.nan)
             values[:, whole] = so3.apply(np.asarray(np.linalg.pinv(ways), dtype=np.float64), recorded - start).T
-            found |= dict(zip(names, values, strict=True))
-        return found
+            coordinates |= dict(zip(names, values, strict=True))
+        return coordinates
 
     def _rows(self, frame: int, above: int) -> list[int]:
         """The joints between two frames, those near the upper one first."""
@@ -224,7 +205,7 @@ class _Conversion:
         """Joint columns of some joints in a row: turn (N, 3, 3), axes of the last frame to those of the first."""
         chain = self.chain
         before, balls = np.eye(3), []
-        hinges: dict[str, _Hinge] = {}
+        hinges: dict[str, tuple[Array, float, float]] = {}  # axis at zero; angle = factor * coordinate + offset
         in_balls = {ball.row + k: ball for ball in chain.follows.balls for k in range(len(RATES))}
         curved = {joint.row: joint for joint in chain.follows.curved}
         together: set[str] = set()
@@ -242,7 +223,7 @@ class _Conversion:
                     together |= {*drivers}
                 else:
                     factor = float(chain.matrix[row, self.body.joint_index(drivers[0])])
-                    hinges[drivers[0]] = _Hinge(before @ chain.axes[row], factor, float(chain.offset[row]))
+                    hinges[drivers[0]] = before @ chain.axes[row], factor, float(chain.offset[row])
         if together:
             return self._followed({*together, *hinges}, rows, turn)
         if len(balls) == 1 and not hinges:
@@ -256,9 +237,9 @@ class _Conversion:
             )
         return self._hinges(hinges, turn @ before.T) if hinges else {}
 
-    def _hinges(self, hinges: dict[str, _Hinge], turns: Array) -> dict[str, Array]:
+    def _hinges(self, hinges: dict[str, tuple[Array, float, float]], turns: Array) -> dict[str, Array]:
         """Coordinates of one to three hinges nearest to turns (N, 3, 3), and what they leave over."""
-        axes, named = np.array([hinge.axis for hinge in hinges.values()]), ", ".join(hinges)
+        axes, named = np.array([axis for axis, _, _ in hinges.values()]), ", ".join(hinges)
         if np.abs(np.sum(axes[1:] * axes[:-1], axis=1)).max(initial=0.0) > _ACROSS:
             raise TrajectoryError(
                 f"{self.where}: hinges {named} are not at right angles; give a table of joint angles, or a body with a "
@@ -275,7 +256,7 @@ class _Conversion:
             left = angles[there, 2] if len(axes) == 2 else left
         self._check_left(named, left)
         angles[there] = np.unwrap(angles[there], axis=0)
-        return {name: (angles[:, k] - hinge.offset) / hinge.factor for k, (name, hinge) in enumerate(hinges.items())}
+        return {name: (angles[:, k] - offset) / factor for k, (name, (_, factor, offset)) in enumerate(hinges.items())}
 
     def _followed(self, drivers: set[str], rows: list[int], turns: Array) -> dict[str, Array]:
         """Up to three coordinates that turn a segment together, as of a knee, nearest to turns (N, 3, 3)."""
@@ -307,9 +288,9 @@ class _Conversion:
             rates = np.stack(sides, axis=-1) / (2.0 * _STEP)
             values = values + so3.apply(np.asarray(np.linalg.pinv(rates), dtype=np.float64), off)
         self._check_left(", ".join(own), so3.angle(so3.transpose(turned(values)) @ turns[there]))
-        found = np.full((len(own), len(turns)), np.nan)
-        found[:, there] = values.T
-        return dict(zip(own, found, strict=True))
+        coordinates = np.full((len(own), len(turns)), np.nan)
+        coordinates[:, there] = values.T
+        return dict(zip(own, coordinates, strict=True))
 
     def _check_left(self, named: str, left: Array) -> None:
         """Keep what hinges leave of turns [rad]. Raises TrajectoryError where it is large."""
@@ -374,7 +355,7 @@ class _Conversion:
     def _momentum(
         self, turns: Array, places: Array | None, own: dict[int, tuple[Array, Array]], rows: Integers
     ) -> SegmentMotion:
-        """By the poses themselves and by the chain, of all mass; what no segment shows rests on what it hangs on."""
+        """Momentum by the poses and by the chain; a part without a segment is fixed to the one it hangs on."""
         table = self.recording.table
         assert table.times is not None
         times, masses = table.times[rows], self.chain.masses
@@ -410,7 +391,7 @@ class _Conversion:
 
 def _quaternions(turns: Array) -> Array:
     """(N, 3, 3) -> (N, 4), NaN where there is no turn."""
-    found = np.full((len(turns), 4), np.nan)
+    quaternions = np.full((len(turns), 4), np.nan)
     there = np.isfinite(turns).all(axis=(1, 2))
-    found[there] = so3.quat_from_matrix(turns[there])
-    return found
+    quaternions[there] = so3.quat_from_matrix(turns[there])
+    return quaternions

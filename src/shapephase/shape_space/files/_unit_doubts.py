@@ -1,35 +1,91 @@
-"""Angles and lengths of which nobody has said the unit: where they look like degrees or millimetres, one is asked."""
+"""Units of columns: what labels, files and callers state, and what values without a unit resemble."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import FARTHEST, Array
 from ...body.body import Body
 from ...errors import TrajectoryError
 from ..unit_doubts import looks_like
-from .labels import ANGLES, LENGTHS, NO_UNIT
-from .recording import Recording, warn
+from .labels import ANGLES, LENGTHS, NO_UNIT, SI
+from .recording import Recording, Table, warn
 
-_WHOLE_TURN = 2.0 * np.pi
-_MANY_TURNS = 2.0 * _WHOLE_TURN
-"""Range of a joint without limits [rad] from which on one asks; wheels turn on, but who counts their turns says so."""
-_HALF_TURN = np.pi
-"""From one sample to the next [rad]: a recording that is so coarse tells nothing about the way between."""
-_SLACK = 1e-6
-"""Share of a limit, or of 1 rad or m where that is larger: optimisers and printed digits go beyond by less."""
-_MOST_SHOWN = 8
-"""Joints that a warning lists."""
+_WHOLE_TURN = 2.0 * np.pi  # [rad] larger angles of base and ball joints without a unit are rather in degrees
+_MANY_TURNS = 2.0 * _WHOLE_TURN  # [rad] range of a joint without limits from which its unit must be stated
+_HALF_TURN = np.pi  # [rad] per sample: coarser samples do not determine the way between
+_FAR_BASE = 50.0  # [m] larger distances without a unit are rather in millimetres
+_SLACK = 1e-6  # relative to a limit, at least 1 rad or m: optimisers and printed digits exceed limits by less
+_MOST_SHOWN = 8  # joints that a warning lists
+
+
+def angle_unit(table: Table, text: str, stated: str | None, degrees: bool | None) -> tuple[str, bool]:
+    """Unit of a column of angles, and True where its label, the file or the caller states it. Raises TrajectoryError.
+
+    stated : by the label, or None
+    degrees : as the caller states it, or None
+    """
+    if stated is not None:
+        if degrees is not None and degrees != (stated == "deg"):
+            spelled = "degrees" if stated == "deg" else stated
+            raise TrajectoryError(
+                f"{table.where}: column {text!r} is in {spelled} by its name, and degrees={degrees} was given"
+            )
+        return stated, True
+    if degrees is None and table.degrees is None:
+        raise TrajectoryError(
+            f"{table.where}: the header does not say inDegrees=yes or no; add that, or give degrees=True or False "
+            "(--degrees, --radians)"
+        )
+    in_degrees = table.degrees if degrees is None else degrees
+    return "deg" if in_degrees else "rad", degrees is not None or bool(in_degrees)
+
+
+def angles_in_rad(recording: Recording, text: str, values: Array, stated: str | None, degrees: bool | None) -> Array:
+    """Angles (N,) of the base or a ball joint [rad]. Raises TrajectoryError for other units, and doubtful ones."""
+    table = recording.table
+    if stated not in (None, SI, *ANGLES):
+        raise TrajectoryError(f"{table.where}: column {text!r} is in {stated}; {', '.join(ANGLES)} are possible")
+    unit, _ = angle_unit(table, text, stated, degrees)
+    widest = int(np.argmax(np.abs(values)))
+    if stated is None and degrees is None and not table.by_format and abs(values[widest]) > _WHOLE_TURN:
+        raise TrajectoryError(
+            f"{recording.place(widest)}: column {text!r} is at {values[widest]:.6g} rad, more than a turn: degrees? "
+            f"Name it {text}_deg or give degrees=True (--degrees); for radians, give degrees=False (--radians)"
+        )
+    return values * (1.0 if unit == SI else ANGLES[unit])
+
+
+def lengths_in_m(recording: Recording, text: str, values: Array, stated: str | None) -> Array:
+    """Coordinates (N,) of the base's place [m]. Raises TrajectoryError for other units, and doubtful ones."""
+    table = recording.table
+    if stated not in (None, SI, *LENGTHS):
+        raise TrajectoryError(f"{table.where}: column {text!r} is in {stated}; {', '.join(LENGTHS)} are possible")
+    farthest = int(np.argmax(np.abs(values)))
+    if stated is None and not table.by_format and abs(values[farthest]) > _FAR_BASE:
+        raise TrajectoryError(
+            f"{recording.place(farthest)}: column {text!r}: {values[farthest]:.6g} m from the origin, or millimetres? "
+            f"Write the unit into the header, as `{text} [mm]` or `{text} [m]`"
+        )
+    return values * (1.0 if stated in (None, SI) else LENGTHS[stated])
+
+
+def check_range(recording: Recording, subject: str, values: Array, unit: str) -> None:
+    """Raise TrajectoryError where values (N,) are too large to be represented to full accuracy."""
+    farthest = int(np.argmax(np.abs(values)))
+    if abs(values[farthest]) > FARTHEST:
+        raise TrajectoryError(
+            f"{recording.place(farthest)}: {subject} is at {values[farthest]:.6g} {unit}; up to {FARTHEST:g} {unit} "
+            "can be represented to full accuracy"
+        )
 
 
 def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> None:
-    """Raise TrajectoryError where the unit of a joint's column is not known, and values look like another one.
+    """Raise TrajectoryError where the unit of a joint's column is not known, and values resemble another one.
 
     That is so for angles like degrees, or lengths like millimetres: in radians or metres they would be far beyond the
     limits and in the other unit within, or a joint without limits would turn too far.
 
-    Parameters
-    ----------
     values : (N,) [rad or m], if these are the units
     """
     name, unit, table = body.joint_names[joint], body.joint_units[joint], recording.table
@@ -91,7 +147,7 @@ def warn_of_limits(shapes: Array, body: Body, recording: Recording) -> None:
 
 
 def doubtful_turns(values: Array) -> bool:
-    """Whether angles [rad] of a joint without limits would be taken for degrees where nobody says the unit."""
+    """True where angles [rad] of a joint without limits would be taken for degrees if no unit were stated."""
     return bool(np.ptp(values) > _MANY_TURNS or np.abs(np.diff(values)).max(initial=0.0) > _HALF_TURN)
 
 

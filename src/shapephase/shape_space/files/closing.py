@@ -1,4 +1,4 @@
-"""Recorded cycles whose ends nearly meet, made loops: by a periodic smoother, by the drift, or by a geodesic."""
+"""Loops made of recorded cycles whose ends nearly meet: by a periodic smoother, the drift, or a geodesic."""
 
 from __future__ import annotations
 
@@ -22,14 +22,12 @@ from ..shape_path import ShapePath
 from .labels import amounts
 from .smoothing import Recorded, Smoothing, prepared_path
 
-WAYS = ("smooth", "drift", "geodesic")
-"""A smoother that runs on from the end to the start; the gap taken off evenly in time; a geodesic put at the end."""
-_WHOLE_TURN = 2.0 * np.pi
+WAYS = ("smooth", "drift", "geodesic")  # periodic smoother; gap taken off evenly in time; geodesic at the end
 
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """How a recorded cycle was made a loop.
+    """Loop made of a recorded cycle.
 
     Attributes
     ----------
@@ -59,7 +57,7 @@ class Closing:
 
     @property
     def seconds_added(self) -> float:
-        """Duration of what was put at the end [s]."""
+        """Duration of the geodesic at the end [s]."""
         return self.closed.duration - self.opened.duration
 
     @cached_property
@@ -71,52 +69,51 @@ class Closing:
         ends = [horizontal_lift(self.body, path).end for path in (self.opened, self.closed)]
         return so3.log(so3.transpose(ends[0]) @ ends[1])
 
+    @property
+    def record(self) -> dict[str, Any]:
+        """Method and gap of the closing, ready for JSON."""
+        gap = dict(zip(self.body.joint_names, self.gap.tolist(), strict=True))
+        return {"by": self.by, "gap": gap, "seconds_added": self.seconds_added}
+
 
 def closed_path(
     recorded: Recorded, body: Body, *, within: float | str, by: str | None, penalty: float | None = None
 ) -> tuple[ShapePath, Smoothing, Closing]:
     """The loop of a recorded cycle.
 
-    Parameters
-    ----------
     within : the largest gap that is closed, a number in rad or m, or a text as "3deg" or "3deg,5mm"
     by : one of `WAYS`; None: a periodic smoother where a noise is given, else by the drift
     penalty : of the smoothing, as for `smoothed_path`
 
-    Raises
-    ------
-    UnknownNameError
-        For another way.
-    TrajectoryError
-        If the ends differ by more, or a joint that does not close has no noise to smooth.
+    Raises UnknownNameError for another way; TrajectoryError if the ends differ by more, or a joint that does not close
+    has no noise to smooth.
     """
     check_object(body, "Body", "body")
     way = ("smooth" if recorded.smoothed else "drift") if by is None else by
     if not isinstance(way, str) or way not in WAYS:
         raise unknown_name("way of closing", str(way)[:40], WAYS)
-    first, last = recorded.kept.shapes[[0, -1]]
-    whole = last - first
+    first, last = recorded.around().shapes[[0, -1]]
     for ball in body.chain.follows.balls:
         if last[ball.columns] @ first[ball.columns] < 0.0:
             raise TrajectoryError(
                 f"ball joint {ball.name} ends more than half a turn from its start, as its quaternion went; leave "
                 "close (--close) out"
             )
-    turns = np.where(body.continuous, _WHOLE_TURN * np.round(whole / _WHOLE_TURN), 0.0)
-    gap = whole - turns
+    turns = np.where(body.continuous, 2.0 * np.pi * np.round((last - first) / (2.0 * np.pi)), 0.0)
+    gap = last - first - turns
     _check_gap(gap, amounts(within, "close"), body)
     opened, smoothing = prepared_path(recorded, periodic=False, penalty=penalty)
     if way == "geodesic":
-        closed, closing = _with_geodesic(opened, turns, gap, body)
-        return closed, smoothing, closing
-    if way == "smooth" and recorded.cut_off is None:
-        _check_noise(gap, recorded.noise, body)
-    closed, smoothing = prepared_path(recorded, periodic=True, penalty=penalty, turns=turns, drift=way == "drift")
+        closed = _with_geodesic(opened, turns, body)
+    else:
+        if way == "smooth" and recorded.cut_off is None:
+            _check_noise(gap, recorded.noise, body)
+        closed, smoothing = prepared_path(recorded, periodic=True, penalty=penalty, turns=turns, drift=way == "drift")
     return closed, smoothing, Closing(by=way, gap=gap, opened=opened, closed=closed, body=body)
 
 
 def close_argument(close: Any) -> float | str | None:
-    """How large a gap a caller wants closed; None for none. Raises TrajectoryError."""
+    """The largest gap that is closed; None for none. Raises TrajectoryError."""
     if close is None or close is False:
         return None
     if close is True:
@@ -139,21 +136,18 @@ def _check_gap(gap: Array, within: dict[str, float], body: Body) -> None:
 
 
 def _check_noise(gap: Array, noise: Array, body: Body) -> None:
-    without = (noise == 0.0) & (np.abs(gap) > CLOSED)
-    if without.any():
-        name = body.joint_names[int(np.flatnonzero(without)[0])]
+    open_joints = np.flatnonzero((noise == 0.0) & (np.abs(gap) > CLOSED))
+    if len(open_joints):
         raise TrajectoryError(
-            f"joint {name} does not close, and no noise is given that a smoother could use; give smooth (--smooth), or "
-            "close it by drift or geodesic (close_by, --close-by)"
+            f"joint {body.joint_names[int(open_joints[0])]} does not close, and no noise is given that a smoother "
+            "could use; give smooth (--smooth), or close it by drift or geodesic (close_by, --close-by)"
         )
 
 
-def _with_geodesic(opened: ShapePath, turns: Array, gap: Array, body: Body) -> tuple[ShapePath, Closing]:
+def _with_geodesic(opened: ShapePath, turns: Array, body: Body) -> ShapePath:
     """The open path, and from its end to its start a geodesic, as fast as the path itself, rms."""
     first, last = opened.curve(np.array([0.0, opened.duration]))[0]
     arc = ClosingArc(body, opened, shape_geodesic(body, last, first + turns))
-    # What rounding leaves between the ends is no way that takes time.
-    if np.abs(last - first - turns).max(initial=0.0) <= CLOSED or arc.speed == 0.0:
-        return opened, Closing(by="geodesic", gap=gap, opened=opened, closed=opened, body=body)
-    closed = arc.closed
-    return closed, Closing(by="geodesic", gap=gap, opened=opened, closed=closed, body=body)
+    # A gap of rounding takes no time.
+    still = np.abs(last - first - turns).max(initial=0.0) <= CLOSED or arc.speed == 0.0
+    return opened if still else arc.closed

@@ -1,4 +1,4 @@
-"""The flight within a recording: the stretch between take-off and landing, found or given."""
+"""Flight within a recording: the stretch between take-off and landing, found or given."""
 
 from __future__ import annotations
 
@@ -23,32 +23,26 @@ from .base_columns import ESTIMATE
 from .recording import Recording
 from .times import part_of, samples_within, trim_argument
 
-AUTO = "auto"
-"""Instead of two times: the flight is found by the fall of the centre of mass."""
-ALL = "all"
-"""Instead of two times: the body is free all the time."""
-RECORDED = "recorded"
-"""Instead of two times: where the base is recorded, its fall; without places or a fall all of it; else no flight."""
-ANY_GRAVITY = "any"
-"""Instead of a gravity: units of length and time are not doubted."""
+AUTO = "auto"  # the flight is found by the fall of the centre of mass
+ALL = "all"  # the whole recording is the flight
+RECORDED = "recorded"  # as AUTO where the base is recorded, ALL without places or a fall, else no flight
+ANY_GRAVITY = "any"  # units of length and time are not checked
 _NUMBERED = re.compile(rf"{AUTO}:([1-9]\d{{0,5}})")
-# Entries of rotations that differ by less are rounding of one attitude.
-_STILL = 1e-12
-# Of a flight, to which six numbers are fitted.
-_FEWEST = 3
+_STILL = 1e-12  # rounding of the entries of a constant rotation
+_FEWEST = 3  # samples: a fit has six unknowns
 
 
 @dataclass(frozen=True)
 class Flight:
-    """A stretch of a recording on which the body is free.
+    """Stretch of a recording on which the body is free.
 
     Attributes
     ----------
-    first_time, last_time : as the file tells the time
+    first_time, last_time : as the file gives the time
     by : "auto", "all" or "times": how it was found
     fall : how the centre of mass falls there, where the flight was found by it
-    requested : whether a caller asked for it; else the recorded base has to show that it is one
-    all_times : the first and last times of all flights of the recording, as the file tells them, where it was searched
+    requested : True if the caller requested it; else the recorded base has to show that it is one
+    all_times : the first and last times of all flights of the recording, as the file gives them, where it was searched
 
     Examples
     --------
@@ -67,75 +61,71 @@ class Flight:
 
     @property
     def record(self) -> dict[str, Any]:
-        """The same as JSON can hold it."""
-        found = {"first_time": self.first_time, "last_time": self.last_time, "by": self.by}
+        """Times, method and fall, ready for JSON."""
+        record = {"first_time": self.first_time, "last_time": self.last_time, "by": self.by}
         if self.fall is not None:
-            found |= {"up": self.fall.up, "centre_noise_m": self.fall.noise, "off_parabola_rms_m": self.fall.off}
-            found |= {"gravity_m_s2": self.fall.gravity, "gravity_bar_m_s2": self.fall.gravity_bar}
-            found |= {"all": [list(ends) for ends in self.all_times]}
-        return found
+            record |= {"up": self.fall.up, "centre_noise_m": self.fall.noise, "off_parabola_rms_m": self.fall.off}
+            record |= {"gravity_m_s2": self.fall.gravity, "gravity_bar_m_s2": self.fall.gravity_bar}
+            record |= {"all": [list(ends) for ends in self.all_times]}
+        return record
 
 
 @dataclass(frozen=True)
 class FlightChoices:
-    """How a flight is found in a recording: what a caller has said, checked.
+    """How a flight is found in a recording, checked.
 
-    Attributes
-    ----------
-    said : a word, two times, or None: no flight is asked for
-    number : of the flight in time, from 1 on; None: the longest one
+    request : a word, two times, or None: no flight is requested
     up : the axis that points up, or None for that of the format
-    gravity : [m/s^2]; or None: units are not doubted
+    gravity : [m/s^2]; or None: units are not checked
+    number : of the flight in time, from 1 on; None: the longest one
     """
 
-    said: str | tuple[float, float] | None = None
+    request: str | tuple[float, float] | None = None
     up: str | None = None
     gravity: float | None = GRAVITY
     number: int | None = None
 
 
 def flight_choices(flight: str | Sequence[float] | None, up: str | None, gravity: float | str | None) -> FlightChoices:
-    """A user's flight, axis and gravity. Raises ShapeError, UnknownNameError."""
+    """Flight, axis and gravity, checked. Raises ShapeError, UnknownNameError."""
     if up is not None and (not isinstance(up, str) or up not in UP_AXES):
         raise unknown_name("axis", up, UP_AXES)
-    if gravity is None or isinstance(gravity, str):
-        if gravity not in (None, ANY_GRAVITY):
+    expected: float | None = GRAVITY
+    if isinstance(gravity, str):
+        if gravity != ANY_GRAVITY:
             raise ShapeError(f"gravity: a number of m/s^2, or {ANY_GRAVITY!r}, is needed, got {what_came(gravity)}")
-        pull = GRAVITY if gravity is None else None
-    else:
-        pull = positive_argument(gravity, "gravity", "an acceleration in m/s^2")
+        expected = None
+    elif gravity is not None:
+        expected = positive_argument(gravity, "gravity", "an acceleration in m/s^2")
     numbered = _NUMBERED.fullmatch(flight) if isinstance(flight, str) else None
     if numbered is not None:
-        return FlightChoices(AUTO, up, pull, int(numbered[1]))
+        return FlightChoices(AUTO, up, expected, int(numbered[1]))
     if flight is None or (isinstance(flight, str) and flight in (AUTO, ALL, RECORDED)):
-        return FlightChoices(flight, up, pull)
+        return FlightChoices(flight, up, expected)
     if isinstance(flight, str) or not isinstance(flight, Sequence | np.ndarray) or len(flight) != 2:
         raise ShapeError(
             f"flight: {AUTO!r}, '{AUTO}:2' (the second), {ALL!r}, {RECORDED!r} or two times are needed, got "
             f"{what_came(flight)}"
         )
     first, last = flight
-    return FlightChoices(trim_argument((first, last), "flight"), up, pull)
+    return FlightChoices(trim_argument((first, last), "flight"), up, expected)
 
 
 def turns(attitudes: Array | None) -> bool:
-    """Whether a base was recorded (N, 3, 3) that turns; files of a fixed base have one attitude in every sample."""
+    """True where a base was recorded (N, 3, 3) that turns; files of a fixed base have one attitude in every sample."""
     return attitudes is not None and bool(np.ptp(attitudes, axis=0).max() > _STILL)
 
 
 def in_flight(
     recording: Recording, motion: Matched, body: Body, choices: FlightChoices
 ) -> tuple[Recording, Matched, Flight | None]:
-    """The part of a recording and of its motion that is the flight; all of them where nobody asks for one.
+    """The part of a recording and of its motion that is the flight; all of them where none is requested.
 
-    Raises
-    ------
-    TrajectoryError
-        If, without two times, the attitude of the base was not recorded, or, where the flight is to be found, its
-        position; if none is found, or less than three samples are in it; if it falls otherwise than by gravity.
+    Raises TrajectoryError if the attitude of the base was not recorded, or, where the flight is to be found, its
+    position; if none is found, or it has less than three samples; if it falls otherwise than by gravity.
     """
-    said, where, base = choices.said, recording.table.where, motion.base
-    if said is None or (said == RECORDED and not turns(base.attitude)):
+    request, where, base = choices.request, recording.table.where, motion.base
+    if request is None or (request == RECORDED and not turns(base.attitude)):
         return recording, motion, None
     if base.attitude is None and not isinstance(said, tuple):
         raise TrajectoryError(
@@ -143,19 +133,22 @@ def in_flight(
             "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed. Or give the "
             "momentum instead of a flight: momentum=[0, 0, 0] (--momentum 0 0 0)"
         )
-    fall, flights, by = None, (), "times" if isinstance(said, tuple) else ALL
-    samples = samples_within(recording, said) if isinstance(said, tuple) else np.arange(len(recording.times))
-    centres = None if said == AUTO else _places(motion, body)
-    if said == AUTO or (said == RECORDED and centres is not None):
-        fall = _fall(recording, motion, body, choices)
-        if fall is not None:
-            flights = _clock_of(recording, fall)
-            fall = _chosen(recording, motion, body, fall, flights, choices.number)
-            samples, by = np.arange(fall.first, fall.last + 1), AUTO
+    times, clock, flights, fall = recording.times, recording.clock, (), None
+    samples = np.arange(len(times)) if isinstance(request, str) else samples_within(recording.table, request)
+    centres = None
+    if base.position is not None and (base.record or {}).get("axes") != ESTIMATE:
+        centres = base.position + so3.apply(base.attitude, body.centre_of_mass(motion.shapes))
+    if request == AUTO or (request == RECORDED and centres is not None):
+        fall = _fall(recording, motion, centres, choices)
+        if fall is not None and centres is not None:
+            flights = tuple((float(clock[first]), float(clock[last])) for first, last in fall.all_ends)
+            if choices.number is not None:
+                _check_number(choices.number, flights, recording)
+                fall = fall_number(times, centres, fall, choices.number)
+            samples = np.arange(fall.first, fall.last + 1)
     elif centres is not None and choices.gravity is not None and len(samples) >= _FEWEST:
-        # Three samples are always a parabola.
-        noise = centre_noise(recording.times, centres)
-        check_parabola(recording.times[samples], centres[samples], noise, choices.gravity, where)
+        noise = centre_noise(times, centres)
+        check_parabola(times[samples], centres[samples], noise, choices.gravity, where)
     if len(samples) < _FEWEST:
         raise TrajectoryError(
             f"{where}: {len(samples)} samples are in the flight, three or more are needed; the recording goes from "
@@ -163,60 +156,34 @@ def in_flight(
             "FIRST LAST)"
         )
     part = part_of(recording, samples)
-    return part, motion.kept(samples), Flight(part.first, part.last, by, fall, said != RECORDED, flights)
+    method = AUTO if fall is not None else ALL if isinstance(request, str) else "times"
+    return part, motion.kept(samples), Flight(part.first, part.last, method, fall, request != RECORDED, flights)
 
 
-def _clock_of(recording: Recording, fall: FreeFall) -> tuple[tuple[float, float], ...]:
-    clock = recording.clock
-    return tuple((float(clock[first]), float(clock[last])) for first, last in fall.all_ends)
-
-
-def _chosen(
-    recording: Recording,
-    motion: Matched,
-    body: Body,
-    fall: FreeFall,
-    flights: tuple[tuple[float, float], ...],
-    number: int | None,
-) -> FreeFall:
-    """The flight of that number; the longest where none is asked for."""
-    if number is None:
-        return fall
+def _check_number(number: int, flights: tuple[tuple[float, float], ...], recording: Recording) -> None:
     if number > len(flights):
-        listed = ", ".join(f"{first:.6g} to {last:.6g}" for first, last in flights)
+        known = ", ".join(f"{first:.6g} to {last:.6g}" for first, last in flights)
         raise TrajectoryError(
             f"{recording.table.where}: there is no flight number {number}; there {'are' if len(flights) > 1 else 'is'} "
-            f"{len(flights)}: {listed} {recording.time_unit}; take one of them (--flight auto:{len(flights)})"
+            f"{len(flights)}: {known} {recording.time_unit}; take one of them (--flight auto:{len(flights)})"
         )
-    centres = _places(motion, body)
-    assert centres is not None
-    return fall_number(recording.times, centres, fall, number)
 
 
-def _places(motion: Matched, body: Body) -> Array | None:
-    """Places of the centre of mass, the recorder's axes, where they are known: (N, 3) [m]."""
-    base = motion.base
-    if base.position is None or base.attitude is None or (base.record or {}).get("axes") == ESTIMATE:
-        return None
-    return base.position + so3.apply(base.attitude, body.centre_of_mass(motion.shapes))
-
-
-def _fall(recording: Recording, motion: Matched, body: Body, choices: FlightChoices) -> FreeFall | None:
-    """The fall of a recording; None where there is none and none was asked for."""
+def _fall(recording: Recording, motion: Matched, centres: Array | None, choices: FlightChoices) -> FreeFall | None:
+    """The fall of a recording; None where there is none and none was requested."""
     where, base, gravity = recording.table.where, motion.base, choices.gravity or GRAVITY
-    if base.position is None or base.attitude is None:
+    if base.position is None:
         raise TrajectoryError(
             f"{where}: a flight is found by the fall of the centre of mass, and the position of the base is not "
             "recorded; give its times: flight=(first, last) (--flight FIRST LAST), or flight='all' (--flight all)"
         )
-    centres = _places(motion, body)
     if centres is None:
         raise TrajectoryError(
             f"{where}: where the centre of mass is, is not known before the axes of the base are; give the times of "
             "the flight: flight=(first, last) (--flight FIRST LAST)"
         )
     times, up = recording.times, choices.up or recording.table.up
-    rate, missing, fall = 1.0 / float(np.median(np.diff(times))), None, None
+    missing, fall = None, None
     try:
         fall = free_fall(times, centres, where, up=up, gravity=gravity)
     except TrajectoryError as error:
@@ -227,7 +194,7 @@ def _fall(recording: Recording, motion: Matched, body: Body, choices: FlightChoi
         if slipped is not None and (fall is None or lasts(times, slipped.ends) > 2.0 * lasts(times, fall.ends)):
             fall = slipped
     if fall is not None and choices.gravity is not None:
-        check_gravity(fall, choices.gravity, rate, where)
-    if fall is None and missing is not None and choices.said == AUTO:
+        check_gravity(fall, choices.gravity, 1.0 / float(np.median(np.diff(times))), where)
+    if fall is None and missing is not None and choices.request == AUTO:
         raise missing
     return fall

@@ -1,36 +1,44 @@
-"""Where a motion comes from: the kinds of file by their endings, standard input, tables in memory."""
+"""Sources of motions: the kinds of file by their endings, standard input, tables in memory."""
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import os
 import sys
+import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...arguments import check_file_name, positive_argument
+from ...arguments import check_file_name, check_text, positive_argument
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import no_such_file
 from ...letters import what_came
-from ._numbered_columns import named_columns
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
 from .formats.deepmimic import read_deepmimic
 from .formats.frames import file_table, is_frame, read_frame
-from .formats.hdf5 import read_hdf5
-from .formats.matlab import read_matlab
-from .formats.motion_arrays import arrays_in_memory, arrays_motion, of_numbered_columns, read_arrays
+from .formats.motion_arrays import arrays_in_memory, arrays_motion, named_columns, of_numbered_columns, read_arrays
+from .formats.named_arrays import read_hdf5, read_matlab
 from .formats.opensim import has_header, read_opensim
 from .formats.ros_motion_files import read_bag, read_ros_yaml
 from .formats.segment_poses import read_mvnx
+from .formats.spreadsheets import read_excel, read_feather, read_parquet
 from .formats.text_tables import read_text
 from .recording import Table, digest, file_bytes
-from .tables import PACKED, TABLES, unpacked
 
-STANDARD_INPUT = "-"
-"""Instead of a file's name: a text table, or a motion of OpenSim."""
+if TYPE_CHECKING:
+    import pandas as pd
+
+STANDARD_INPUT = "-"  # file name: a text table or an OpenSim motion
+TABLES: dict[str, Callable[[Path, bytes, str | None], Any]] = {  # ending -> reader of name, bytes and topic
+    **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".log", ".tum"), lambda w, d, part: read_text(w, d, section=part)),
+    **dict.fromkeys((".xlsx", ".xlsm"), read_excel),
+    ".parquet": lambda where, data, _: read_parquet(where, data),
+    ".feather": lambda where, data, _: read_feather(where, data),
+}
 _TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
     ".mot": read_opensim,
     ".sto": read_opensim,
@@ -48,18 +56,18 @@ _WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
 _ARRAYS = (".npz", ".npy")
 _WITH_BODY: dict[str, Callable[[Path, bytes, Body], Table]] = {".bvh": read_bvh}
 _BAGS = (".bag", ".mcap", ".db3")
-# What comes near, and how it becomes a motion of joints.
-_OTHERS = {
+_OTHERS = {  # similar files, and how to turn them into joint motions
     ".trc": INVERSE_KINEMATICS,
     ".mvn": "it is a suit's recording as its own program keeps it; export it there as MVNX, or as BVH",
     ".xls": "Excel's older files are not read; save it as .xlsx or .csv",
     ".ods": "save it as .xlsx or .csv",
     ".numbers": "save it as .xlsx or .csv",
 }
+PACKED = ".gz"
 
 
 class Input(NamedTuple):
-    """What was found, the name of where for people, and the SHA-256 of its bytes, None where it has none."""
+    """A table, the name of its source for people, and the SHA-256 of its bytes, or None."""
 
     table: Table
     name: str
@@ -74,25 +82,15 @@ def read_input(
     order: str | None,
     names: Mapping[str, str | None] | None = None,
 ) -> tuple[Input, float | None]:
-    """The table of a file, of standard input (`-`), or of what is in memory; and the time step, if it is still needed.
+    """The table of a file, of standard input (`-`), or of objects in memory; and the time step, if it is still needed.
 
-    Parameters
-    ----------
-    source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or what this
-        function has returned
+    source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or an `Input`
     topic : which part of a bag, a workbook or a `.mat` file; None: the only one
-    timestep : [s], for what has no times
+    timestep : [s], for sources without times
     order : of the joints in arrays without names, or None
     names : of columns, as a caller gives them
 
-    Raises
-    ------
-    InputFileNotFoundError
-        If there is no such file.
-    UnknownNameError
-        For an unknown ending of the file, or an unknown part.
-    TrajectoryError
-        For faults of the file.
+    Raises InputFileNotFoundError; UnknownNameError for an unknown ending or part; TrajectoryError for faults.
     """
     if topic is not None and not isinstance(topic, str):
         raise ShapeError(f"topic: a name is needed, got {what_came(topic)}")
@@ -100,10 +98,15 @@ def read_input(
         timestep = positive_argument(timestep, "timestep")
     if isinstance(source, Input):
         return source, timestep
+
+    def in_columns(table: Table, name: str, sha256: str | None) -> tuple[Input, float | None]:
+        table = named_columns(table, body, names or {}, order, timestep)
+        return Input(of_numbered_columns(table, body, order), name, sha256), timestep
+
     if is_frame(source):
         _no_topic(topic, "a table in memory")
-        table = of_numbered_columns(named_columns(read_frame(source), body, names or {}, order, timestep), body, order)
-        return Input(table, table.where, None), timestep
+        table = read_frame(source)
+        return in_columns(table, table.where, None)
     if isinstance(source, Mapping | tuple):
         _no_topic(topic, "arrays in memory")
         table, step = arrays_motion(arrays_in_memory(source), "the arrays", body, timestep, order, kind="arrays")
@@ -111,7 +114,11 @@ def read_input(
     check_file_name(source, "file")
     if source == STANDARD_INPUT:
         _no_topic(topic, "standard input")
-        return _standard_input(body, order), timestep
+        where = Path("standard input")
+        data = sys.stdin.buffer.read()
+        table = read_opensim(where, data) if has_header(data) else file_table(read_text(where, data), str(where))
+        table = of_numbered_columns(table, body, order)
+        return Input(table, str(where), hashlib.sha256(data).hexdigest()), timestep
     where = Path(source)
     suffix = Path(where.stem).suffix.lower() if where.suffix.lower() == PACKED else where.suffix.lower()
     if suffix in _BAGS or os.path.isdir(where):
@@ -121,34 +128,28 @@ def read_input(
         return Input(read_bag(where, topic), str(source), digest(where)), None
     if suffix in _OTHERS:
         raise TrajectoryError(f"{where}: {suffix} files are not read: {_OTHERS[suffix]}")
-    if suffix not in (*TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS):
-        kinds = (".csv", ".npz", *TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS, *_BAGS)
-        raise unknown_name(f"ending of the motion file {where}:", where.suffix, dict.fromkeys(kinds))
+    kinds = (*TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS)
+    if suffix not in kinds:
+        raise unknown_name(
+            f"ending of the motion file {where}:", where.suffix, dict.fromkeys((".csv", ".npz", *kinds, *_BAGS))
+        )
     _check_exists(where)
     if topic is not None and suffix not in (*TABLES, *_WITH_PARTS):
         raise TrajectoryError(
             f"{where}: topic={what_came(topic)} is for bags, workbooks and .mat files; this one has no parts"
         )
     data = file_bytes(where)
-    sha256 = hashlib.sha256(data).hexdigest()
+    name, sha256 = str(source), hashlib.sha256(data).hexdigest()
     where, data = unpacked(where, data)
     if suffix in TABLES:
-        table = named_columns(_table(where, data, topic), body, names or {}, order, timestep)
-        return Input(of_numbered_columns(table, body, order), str(source), sha256), timestep
+        return in_columns(_table(where, data, topic), name, sha256)
     if suffix in _ARRAYS:
         table, step = read_arrays(where, data, body, timestep, order)
-        return Input(table, str(source), sha256), step
+        return Input(table, name, sha256), step
     if suffix in _WITH_BODY:
-        return Input(_WITH_BODY[suffix](where, data, body), str(source), sha256), timestep
+        return Input(_WITH_BODY[suffix](where, data, body), name, sha256), timestep
     table = _WITH_PARTS[suffix](where, data, topic) if suffix in _WITH_PARTS else _TEXTS[suffix](where, data)
-    return Input(of_numbered_columns(table, body, order), str(source), sha256), timestep
-
-
-def _standard_input(body: Body, order: str | None) -> Input:
-    where = Path("standard input")
-    data = sys.stdin.buffer.read()
-    table = read_opensim(where, data) if has_header(data) else file_table(read_text(where, data), str(where))
-    return Input(of_numbered_columns(table, body, order), str(where), hashlib.sha256(data).hexdigest())
+    return Input(of_numbered_columns(table, body, order), name, sha256), timestep
 
 
 def _table(where: Path, data: bytes, topic: str | None) -> Table:
@@ -165,6 +166,61 @@ def _check_exists(where: Path) -> None:
         raise no_such_file(where)
 
 
-def _no_topic(topic: str | None, what: str) -> None:
+def _no_topic(topic: str | None, source: str) -> None:
     if topic is not None:
-        raise TrajectoryError(f"topic={what_came(topic)} is for bags, workbooks and .mat files, and this is {what}")
+        raise TrajectoryError(f"topic={what_came(topic)} is for bags, workbooks and .mat files, and this is {source}")
+
+
+def read_table(file: str | os.PathLike[str], *, topic: str | None = None) -> pd.DataFrame:
+    """Read a table of numbers as a frame: text, Excel, Parquet or Feather, by the file's ending, also packed (`.gz`).
+
+    A text may have any separator, decimal commas, comments and a row of units, a header behind `#`, none at all, or
+    the five rows of Vicon Nexus. Columns are labelled as the file labels them, or from 1 where it does not; the index
+    has the numbers of the rows in the file. Entries that are no numbers stay texts, empty ones are NaN.
+
+    Parameters
+    ----------
+    topic : which sheet of a workbook, or section of a file of Nexus
+
+    Returns
+    -------
+    DataFrame
+        `attrs` has `units`, column -> unit, from a row of units, and `format`.
+
+    Raises
+    ------
+    InputFileNotFoundError
+        If there is no such file.
+    TrajectoryError
+        For a row that is longer or shorter than the header, with its number, and for what is no table.
+    UnknownNameError
+        For an unknown ending, or a topic that is not there.
+
+    Examples
+    --------
+    >>> np.savetxt("bend.txt", [[0.0, 0.1], [0.5, 0.2]], header="time knee")
+    >>> sp.shape_space.files.read_table("bend.txt")
+       time  knee
+    2   0.0   0.1
+    3   0.5   0.2
+    """
+    check_file_name(file, "file")
+    if topic is not None:
+        check_text(topic, "topic", "a name")
+    where, data = unpacked(Path(file), file_bytes(Path(file)))
+    suffix = where.suffix.lower()
+    if suffix not in TABLES:
+        raise unknown_name(f"ending of the table {where}:", where.suffix, TABLES)
+    frame = TABLES[suffix](where, data, topic)
+    frame.attrs["file"] = str(file)
+    return frame
+
+
+def unpacked(where: Path, data: bytes) -> tuple[Path, bytes]:
+    """Name and bytes of a file, unpacked where it ends with `.gz`. Raises TrajectoryError."""
+    if where.suffix.lower() != PACKED:
+        return where, data
+    try:
+        return where.with_suffix(""), gzip.decompress(data)
+    except (OSError, EOFError, zlib.error) as error:
+        raise TrajectoryError(f"{where}: cannot be unpacked ({error}); pack it anew, or give it unpacked") from None

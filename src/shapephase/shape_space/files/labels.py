@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection
 from typing import NamedTuple
 
 import numpy as np
 
-from ...errors import ShapeError, TrajectoryError
+from ...errors import TrajectoryError
 from ...letters import what_came
 
 _DEGREE = np.pi / 180.0
-ANGLES = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3}
-"""Units of angles -> their size [rad]."""
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
-"""Units of lengths -> their size [m]."""
-IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}
-"""Units of time -> how many there are in a second: whole milliseconds are divided by it without loss."""
-SI = "SI"
-"""The unit of a column in rad or m, whichever its joint has; `write_shape_path` says so where else one would ask."""
-NO_UNIT = "1"
-"""Of the numbers of a quaternion."""
+ANGLES = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3}  # unit -> size [rad]
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # unit -> size [m]
+IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}  # division keeps whole ms exact
+SI = "SI"  # unit of a column in rad or m, as its joint has it; written by `write_shape_path` where needed
+NO_UNIT = "1"  # of a quaternion's numbers
 _SPELLINGS = {
     "rad": ("rad", "rads", "radian", "radians"),
     "deg": ("deg", "degs", "degree", "degrees", "°"),
@@ -39,40 +34,26 @@ _SPELLINGS = {
 }
 _UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
 _BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))", re.DOTALL)
-# Behind an underscore any unit stands, behind a blank or a point only a word that is no part of a name.
+# Any unit may follow an underscore; only whole words follow a blank or a point.
 _SUFFIXED = re.compile(r"(?P<name>.*[^\s_.])(?P<mark>[\s_.]|(?=°))(?P<unit>[^\W\d_]+|°)", re.DOTALL)
 _WORDS = {"rad", "deg", "ms"}
-_NO_UNITS = ("", "-")
-"""What stands in the brackets of columns without a unit."""
-_OTHER_UNIT = re.compile(
+_NO_UNITS = ("", "-")  # in the brackets of columns without a unit
+_OTHER_UNIT = re.compile(  # units of rates, forces and other quantities beside a posture
     r"(rad|deg|°|m|cm|mm|rev|r)\s*([/ ]\s*(s|min)|s\^?-1|\s*s\^-1)\S*|rpm|n|nm|n\*m|n\.m|a|ma|v|w|°c|degc|pa|bar", re.I
 )
-"""Units of rates, forces and what else is recorded beside a posture."""
 _POSITIONS = ("position", "pos", "angle", "value", "q", "qpos")
-_COMPANIONS = (
+_COMPANIONS = (  # quantities recorded of a joint beside its position
     *("velocity", "vel", "speed", "dq", "qd", "qvel", "qdot", "rate", "acceleration", "acc", "ddq", "qdd"),
     *("effort", "torque", "tau", "force", "current", "temperature", "command", "cmd", "desired", "target", "reference"),
 )
-"""What is recorded of a joint beside its position."""
-_COUNTERS = (
-    "frame",
-    "frames",
-    "framenumber",
-    "subframe",
-    "index",
-    "sample",
-    "samples",
-    "seq",
-    "count",
-    "counter",
-    "row",
+_COUNTERS = (  # columns that count rows, in lower case without marks
+    *("frame", "frames", "framenumber", "subframe", "index", "sample", "samples", "seq", "count", "counter", "row"),
 )
-"""Names of columns that count the rows, in small letters and without marks between words."""
 _QUANTITY = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\W\d_]*|°)")
 
 
 class Label(NamedTuple):
-    """The name of a column without its unit, and the unit; None where none stands there."""
+    """Name of a column without its unit, and the unit, or None."""
 
     name: str
     unit: str | None
@@ -81,7 +62,7 @@ class Label(NamedTuple):
 def label(text: str) -> Label:
     """The parts of a label: `knee [deg]`, `knee (deg)`, `knee_deg`, `knee deg` and `knee°` are the knee in degrees.
 
-    What stands in brackets and is no unit belongs to the name.
+    Text in brackets that is no unit belongs to the name.
     """
     bracketed = _BRACKETED.fullmatch(text)
     if bracketed is not None:
@@ -100,22 +81,22 @@ def label(text: str) -> Label:
 
 
 def other_unit(text: str) -> str | None:
-    """The unit of a rate or a force behind a name in brackets; None where there is none."""
+    """Unit of a rate or a force in brackets behind a name, or None."""
     bracketed = _BRACKETED.fullmatch(text)
     inside = "" if bracketed is None else bracketed["square"] or bracketed["round"] or ""
     return inside if _OTHER_UNIT.fullmatch(inside.strip()) else None
 
 
 def is_counter(text: str) -> bool:
-    """Whether a name is that of a column which counts rows, such as `Sub Frame` or `field.header.seq`."""
+    """True for the name of a column that counts rows, such as `Sub Frame` or `field.header.seq`."""
     return re.sub(r"[\s_#]", "", re.split(r"[./]", text)[-1]).lower() in _COUNTERS
 
 
 def joint_part(text: str, joints: Collection[str]) -> tuple[str, str] | None:
-    """The joint that a longer name ends or begins with, and what of it: "" where that is its position.
+    """The joint that a longer name ends or begins with, and the quantity, "" for its position; None without a joint.
 
     `/joint_states/knee/position`, `knee_pos`, `position.knee` and `/states/knee` are the knee; `knee_velocity` is
-    what is recorded beside it. None: no joint stands there.
+    recorded beside it.
     """
     for word in (*_POSITIONS, *_COMPANIONS):
         small = text.lower()
@@ -135,46 +116,48 @@ def joint_part(text: str, joints: Collection[str]) -> tuple[str, str] | None:
 
 def _at_the_end(text: str, joints: Collection[str]) -> str | None:
     """The longest joint that a path ends with, or None."""
-    found = [name for name in joints if text == name or text.endswith(("/" + name, "." + name))]
-    return max(found, key=len, default=None)
+    ends = [name for name in joints if text == name or text.endswith(("/" + name, "." + name))]
+    return max(ends, key=len, default=None)
 
 
 def unit_of(text: str) -> str | None:
-    """A unit by one of its spellings; None: it is none."""
+    """Unit by one of its spellings, or None."""
     return _UNITS.get(text.strip().lower())
 
 
 def in_square_brackets(text: str) -> str | None:
-    """What stands in square brackets behind a name: a unit, or what was meant as one."""
+    """Text in square brackets behind a name, a unit or meant as one; None without brackets."""
     bracketed = _BRACKETED.fullmatch(text)
     return bracketed["square"] if bracketed is not None else None
 
 
 def time_unit_argument(unit: str | None) -> str | None:
-    """A user's unit of time. Raises TrajectoryError."""
+    """Unit of time by one of its spellings. Raises TrajectoryError."""
     if unit is None:
         return None
-    found = unit_of(unit) if isinstance(unit, str) else None
-    if found not in IN_A_SECOND:
+    known = unit_of(unit) if isinstance(unit, str) else None
+    if known not in IN_A_SECOND:
         raise TrajectoryError(f"time_unit: one of {', '.join(IN_A_SECOND)} is needed, got {what_came(unit)}")
-    return found
+    return known
 
 
 def quantity(value: object, unit: str, what: str) -> float:
-    """A number in the unit of a joint, "rad", "m" or none, or a text such as `30deg` or `5 mm`: in SI units.
+    """A number in the unit of a joint, "rad", "m" or none, or a text such as `30deg` or `5 mm`, in SI units.
 
     Raises TrajectoryError, which begins with `what`.
     """
-    number, said = _number_and_unit(value, what)
+    number, stated = _number_and_unit(value, what)
     sizes = ANGLES if unit == "rad" else LENGTHS
-    if said is not None and unit == NO_UNIT:
-        raise TrajectoryError(f"{what}: {value!r:.40} is in {said}, and a quaternion has no unit")
-    if said is not None and said not in sizes:
+    if stated is None:
+        return number
+    if unit == NO_UNIT:
+        raise TrajectoryError(f"{what}: {value!r:.40} is in {stated}, and a quaternion has no unit")
+    if stated not in sizes:
         kind = "turns" if unit == "rad" else "slides"
         raise TrajectoryError(
-            f"{what}: {value!r:.40} is in {said}, and the joint {kind}; give it in {', '.join(sizes)}"
+            f"{what}: {value!r:.40} is in {stated}, and the joint {kind}; give it in {', '.join(sizes)}"
         )
-    return number * (1.0 if said is None else sizes[said])
+    return number * sizes[stated]
 
 
 def seconds(value: object, what: str) -> float:
@@ -189,74 +172,40 @@ def seconds(value: object, what: str) -> float:
 
 
 def amounts(value: object, what: str) -> dict[str, float]:
-    """How much of an angle, a length, and a quaternion, which has half of its turn: {"rad": ..., "m": ..., "1": ...}.
+    """Amounts of an angle, a length, and a quaternion, which has half of its turn: {"rad": ..., "m": ..., "1": ...}.
 
-    A number is both; a text such as `3deg` or `3deg,5mm` says which, and what it does not name is zero.
+    A number is both angle and length; a text such as `3deg` or `3deg,5mm` names them, and others are zero.
 
     Raises TrajectoryError, which begins with `what`.
     """
-    found: dict[str, float] = {}
+    given: dict[str, float] = {}
     for part in value.split(",") if isinstance(value, str) else [value]:
-        number, said = _number_and_unit(part, what)
+        number, stated = _number_and_unit(part, what)
         if number < 0.0:
             raise TrajectoryError(f"{what}: zero or more is needed, got {what_came(value)}")
-        kinds = ["rad", "m"] if said is None else ["rad" if said in ANGLES else "m"]
-        for kind in kinds:
-            if kind in found:
+        for kind in ["rad", "m"] if stated is None else ["rad" if stated in ANGLES else "m"]:
+            if kind in given:
                 raise TrajectoryError(f"{what}: {value!r:.40} says two amounts of one kind")
-            found[kind] = number * (1.0 if said is None else (ANGLES | LENGTHS)[said])
-    found = {"rad": 0.0, "m": 0.0} | found
-    return found | {NO_UNIT: 0.5 * found["rad"]}
+            given[kind] = number * (1.0 if stated is None else (ANGLES | LENGTHS)[stated])
+    angle = given.get("rad", 0.0)
+    return {"rad": angle, "m": given.get("m", 0.0), NO_UNIT: 0.5 * angle}
 
 
 def _number_and_unit(value: object, what: str) -> tuple[float, str | None]:
+    stated = None
     if isinstance(value, str):
         match = _QUANTITY.fullmatch(value.strip()) if value.isascii() or "°" in value else None
-        said = unit_of(match["unit"]) if match is not None and match["unit"] else None
-        if match is None or (match["unit"] and said not in ANGLES | LENGTHS):
+        stated = unit_of(match["unit"]) if match is not None and match["unit"] else None
+        if match is None or (match["unit"] and stated not in ANGLES | LENGTHS):
             units = ", ".join(ANGLES | LENGTHS)
             raise TrajectoryError(
                 f"{what}: a number is needed, with one of {units} behind it or none; got {what_came(value)}"
             )
-        number = float(match["number"])
-    else:
-        try:
-            number, said = float(value), None  # type: ignore[arg-type]
-        except (TypeError, ValueError):
-            raise TrajectoryError(
-                f"{what}: a number or a text such as '30deg' is needed, got {what_came(value)}"
-            ) from None
+        value = match["number"]
+    try:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise TrajectoryError(f"{what}: a number or a text such as '30deg' is needed, got {what_came(value)}") from None
     if not np.isfinite(number):
         raise TrajectoryError(f"{what}: a finite number is needed, got {what_came(value)}")
-    return number, said
-
-
-def mapping_argument(names: Mapping[str, str | None] | None, labels: Iterable[str]) -> dict[str, str | None]:
-    """A user's mapping with the labels as they stand in the file: the name without its unit will do, too.
-
-    Raises
-    ------
-    ShapeError
-        If it is no mapping of texts.
-    KeyError
-        With the name, if no label has it; TrajectoryError if several do.
-    """
-    if names is None:
-        return {}
-    if not isinstance(names, Mapping):
-        raise ShapeError(f"names: a mapping, name in the file -> joint, is needed, got {type(names).__name__}")
-    there = list(labels)
-    plain: dict[str, list[str]] = {}
-    for text in there:
-        plain.setdefault(label(text).name, []).append(text)
-    found: dict[str, str | None] = {}
-    for old, new in names.items():
-        if not isinstance(old, str) or not (new is None or isinstance(new, str)):
-            raise ShapeError(f"names: texts are needed (None leaves a column out), got {what_came(old)}: {new!r:.40}")
-        candidates = [old] if old in there else plain.get(old, [])
-        if not candidates:
-            raise KeyError(old)
-        if len(candidates) > 1:
-            raise TrajectoryError(f"names: {old!r} may be {' or '.join(map(repr, candidates))}; write it in full")
-        found[candidates[0]] = new
-    return found
+    return number, stated

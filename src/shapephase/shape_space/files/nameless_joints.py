@@ -18,26 +18,19 @@ from ...body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, Join
 from ...body.virtual_base import way_names
 from ...errors import TrajectoryError, TrajectoryWarning
 
-FREE_JOINT = 7
-"""Entries of a free joint: a place and a quaternion."""
-_SAMPLES = 50
-"""Of a motion, at which places of bodies are compared: enough for every joint to have moved."""
-_FITS = 0.01
-"""Of the extent of the body, rms: links that lie farther from where the file has its bodies are others."""
-_ALIKE = 5.0
-"""Times the least distance: orders within it are not told apart by places, which have few digits."""
-_AT_REST = 1e-6
-"""[rad/s] Bodies that turn no faster do not show how they turn."""
-_CONTRADICTS = 0.5
-"""Share of the rates themselves, rms: turns between samples that are off by more are others."""
+FREE_JOINT = 7  # entries of a free joint: a place and a quaternion
+_OFF_UNIT = 1e-3  # allowed error of a quaternion's length
+_SAMPLES = 50  # at which places of bodies are compared: every joint has moved by then
+_FITS = 0.01  # relative to the body's extent, rms: links farther from the file's bodies are others
+_ALIKE = 5.0  # times the least distance: places with few digits do not distinguish such orders
+_AT_REST = 1e-6  # [rad/s] slower bodies do not show how they turn
+_CONTRADICTS = 0.5  # relative to the rates, rms: turns between samples that are off by more are others
 
 
 @dataclass(frozen=True)
 class NamelessJoints:
-    """What the columns of an array are.
+    """Joints of the columns of an array.
 
-    Attributes
-    ----------
     order : the word for their order, one of `WORDS`
     names : of the columns behind the free joint
     free : the number of columns before them, 7 or none
@@ -54,51 +47,43 @@ class NamelessJoints:
 
     @property
     def record(self) -> dict[str, object]:
-        """As JSON holds it."""
+        """Order and names, ready for JSON."""
         return {"order": self.order, "means": self.title, "joints": list(self.names)}
 
 
 def nameless_joints(body: Body, width: int, where: str, order: str | None) -> NamelessJoints:
-    """The joints of an array of so many columns, with a free joint before them or without.
+    """Joints of an array of so many columns, with a free joint before them or without.
 
     order : one of `WORDS`; None: MuJoCo's
 
-    Raises
-    ------
-    TrajectoryError
-        If the body has another number of joints.
-
-    Warns
-    -----
-    TrajectoryWarning
-        Where Isaac's order depends on how its importer sorted the joints of a link.
+    Raises TrajectoryError if the body has another number of joints. Warns where Isaac's order depends on how its
+    importer sorted the joints of a link.
     """
     word = order or MUJOCO
-    found = joint_columns(body, width, word)
-    if found is None:
-        own = _own(body, simulator_order(body, word, body.joint_names))
+    joints = joint_columns(body, width, word)
+    if joints is None:
+        own = _independent(body, simulator_order(body, word, body.joint_names))
         raise TrajectoryError(
             f"{where} has {width} columns; with {len(own)} joints ({', '.join(own)}) it has {len(own) + FREE_JOINT}, "
             f"or {len(own)} without the free joint; joints that follow others may be there, too. Add an array "
             "'joint_names' with the names of the columns"
         )
-    names = found.names
-    other = _own(body, simulator_order(body, ISAAC_BY_NAME, body.joint_names))
-    if word == ISAAC and other != _own(body, names):
+    by_name = _independent(body, simulator_order(body, ISAAC_BY_NAME, body.joint_names))
+    if word == ISAAC and by_name != _independent(body, joints.names):
         warnings.warn(
-            f"{where}: joints of one link are taken as the file of {body.name} lists them: {', '.join(names)}; if the "
-            f"importer sorted them by name, give joint_order={ISAAC_BY_NAME!r} (--joint-order {ISAAC_BY_NAME})",
+            f"{where}: joints of one link are taken as the file of {body.name} lists them: {', '.join(joints.names)}; "
+            f"if the importer sorted them by name, give joint_order={ISAAC_BY_NAME!r} (--joint-order {ISAAC_BY_NAME})",
             TrajectoryWarning,
             stacklevel=2,
         )
-    return found
+    return joints
 
 
 def joint_columns(body: Body, width: int, word: str) -> NamelessJoints | None:
     """Joints of an array of so many columns in an order; None where that is not their number."""
     joints = simulator_order(body, word, body.joint_names)
-    found = {(names, free) for names, free in _columns(body, joints) if width == len(names) + free}
-    return None if len(found) != 1 else NamelessJoints(word, *found.pop())
+    fitting = {(names, free) for names, free in _layouts(body, joints) if width == len(names) + free}
+    return NamelessJoints(word, *fitting.pop()) if len(fitting) == 1 else None
 
 
 def placed_joints(
@@ -114,10 +99,8 @@ def placed_joints(
     spins: Array | None = None,
     times: Array | None = None,
 ) -> tuple[NamelessJoints, int]:
-    """Joints of an array whose bodies' places are known, and the order of the numbers of the base's quaternion.
+    """Joints of an array whose bodies' places are known, and the quaternion order: 0 for w x y z, 1 for x y z w.
 
-    Parameters
-    ----------
     joints : (N, n) without the free joint
     places : (N, b, 3) of the bodies, the base first [m]
     quaternions : (N, 4) of the base
@@ -126,114 +109,104 @@ def placed_joints(
     names : of the columns; None: those of an order
     spins : (N, b, 3) angular velocities of the bodies, world axes [rad/s], where they are known, at `times` (N,) [s]
 
-    Returns
-    -------
-    joints, and 0 for w x y z, 1 for x y z w
-
-    Raises
-    ------
-    TrajectoryError
-        If no order lets the links lie where the bodies are and turn as fast, or several do that say different things.
+    Raises TrajectoryError if no order lets the links lie where the bodies are and turn as fast, or several different
+    ones do.
     """
     if places.ndim != 3 or places.shape[::2] != (len(joints), 3):
         raise TrajectoryError(
             f"{where}: the places of bodies have the shape {places.shape}; ({len(joints)}, bodies, 3) is needed"
         )
-    attitudes = attitudes_of(quaternions, where)[:orders]
+    norms = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    if not np.all(np.abs(norms - 1.0) <= _OFF_UNIT):
+        raise TrajectoryError(f"{where}: the quaternions of the base are not of length 1")
+    unit = quaternions / norms
+    attitudes = [so3.matrix_from_quat(each) for each in (np.roll(unit, -1, axis=-1), unit)][:orders]
     rows = np.unique(np.linspace(0, len(joints) - 1, _SAMPLES).astype(int))
-    apart = places[rows, 1:] - places[rows, :1]
-    seen = [np.einsum("tji,tkj->tki", turned[rows], apart) for turned in attitudes]
-    extent = float(np.sqrt(np.mean(np.sum(apart**2, axis=-1)))) if apart.size else 0.0
+    arms = places[rows, 1:] - places[rows, :1]
+    measured = [np.einsum("tji,tkj->tki", attitude[rows], arms) for attitude in attitudes]
+    extent = _rms_length(arms) if arms.size else 0.0
     tried: list[tuple[float, NamelessJoints, int, tuple[str, ...]]] = []
     for known in (*body.joint_orders, JointOrder(OWN, body.joint_names, ())):
         columns = names or next(
-            (n for n, free in _columns(body, known.joints) if not free and len(n) == joints.shape[1]), None
+            (n for n, free in _layouts(body, known.joints) if not free and len(n) == joints.shape[1]), None
         )
         if columns is None or len(known.links) != places.shape[1] or (order is not None and known.word != order):
             continue
         shapes = _shapes(body, joints[rows], columns)
         first, *others = (body.link_pose(shapes, link)[:, :3, 3] for link in known.links)
-        laid = np.stack([other - first for other in others], axis=1) if others else np.zeros_like(apart)
-        for which, measured in enumerate(seen):
-            off = float(np.sqrt(np.mean(np.sum((laid - measured) ** 2, axis=-1)))) if others else 0.0
-            tried.append((off, NamelessJoints(known.word, columns, 0), which, known.links))
+        computed = np.stack([other - first for other in others], axis=1) if others else np.zeros_like(arms)
+        for quaternion_order, seen in enumerate(measured):
+            error = _rms_length(computed - seen) if others else 0.0
+            tried.append((error, NamelessJoints(known.word, columns, 0), quaternion_order, known.links))
     if not tried:
         raise TrajectoryError(
             f"{where}: {joints.shape[1]} joints and {places.shape[1]} bodies are there, and {body.name} has "
             f"{body.n_shape} joints and {len(body.link_names)} links: the order of the joints cannot be told; add an "
             "array 'joint_names', or give joint_order (--joint-order)"
         )
-    best = min(each[0] for each in tried)
+    best = min(error for error, *_ in tried)
     if best > _FITS * extent:
         raise TrajectoryError(
             f"{where}: in no order of the joints do the links of {body.name} lie where the file has its bodies: at "
             f"best {best:.3g} m from there, rms; is it another robot? Add an array 'joint_names' if it is not"
         )
-    alike = [each for each in tried if each[0] <= _ALIKE * best + 1e-9 * extent]
+    alike = [trial for trial in tried if trial[0] <= _ALIKE * best + 1e-9 * extent]
     if spins is not None and times is not None and np.abs(spins).max() > _AT_REST:
         # Places do not show turns of a link about its own origin.
-        slips = [
-            _slip(body, _shapes(body, joints, found.names), attitudes[which], links, spins, times)
-            for _, found, which, links in alike
+        errors = [
+            _spin_error(body, _shapes(body, joints, trial.names), attitudes[quaternion_order], links, spins, times)
+            for _, trial, quaternion_order, links in alike
         ]
-        if min(slips) > _CONTRADICTS:
+        if min(errors) > _CONTRADICTS:
             raise TrajectoryError(
                 f"{where}: body_ang_vel_w contradicts the attitudes of the bodies in every order of joints and "
                 "quaternions; leave out what is wrong, or add 'joint_names' and base_quat_wxyz with shapes"
             )
-        alike = [each for each, slip in zip(alike, slips, strict=True) if slip <= _ALIKE * min(slips) + 1e-6]
-    _, chosen, which, _ = min(alike, key=lambda each: each[0])
-    meant = _shapes(body, joints, chosen.names)
-    for _, other, way, _ in alike:
-        if not np.array_equal(_shapes(body, joints, other.names), meant):
+        alike = [trial for trial, error in zip(alike, errors, strict=True) if error <= _ALIKE * min(errors) + 1e-6]
+    _, chosen, quaternion_order, _ = min(alike, key=lambda trial: trial[0])
+    shapes = _shapes(body, joints, chosen.names)
+    for _, other, other_quaternion_order, _ in alike:
+        if not np.array_equal(_shapes(body, joints, other.names), shapes):
             raise TrajectoryError(
                 f"{where}: the places of the bodies fit {chosen.title}, and {other.title} as well; give joint_order "
                 f"(--joint-order {chosen.order} or {other.order}), or add an array 'joint_names'"
             )
-        if way != which:
+        if other_quaternion_order != quaternion_order:
             raise TrajectoryError(
                 f"{where}: the places of the bodies fit quaternions w x y z, and x y z w as well; add body_ang_vel_w, "
                 "or store shapes, joint_names and base_quat_wxyz"
             )
-    return chosen, which
+    return chosen, quaternion_order
 
 
-def _slip(body: Body, shapes: Array, base: Array, links: Sequence[str], spins: Array, times: Array) -> float:
-    """How far links turn from how `spins` say that they do, relative to these, rms."""
+def _rms_length(vectors: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=-1))))
+
+
+def _spin_error(body: Body, shapes: Array, base: Array, links: Sequence[str], spins: Array, times: Array) -> float:
+    """Difference between turns of links and `spins`, relative to these, rms."""
     rows = np.unique(np.linspace(0, len(times) - 2, _SAMPLES).astype(int))
-    off, size = 0.0, 0.0
+    error, size = 0.0, 0.0
     for number, link in enumerate(links):
         before, after = (base[k] @ body.link_pose(shapes[k], link)[:, :3, :3] for k in (rows, rows + 1))
         turning = so3.log(after @ so3.transpose(before)) / (times[rows + 1] - times[rows])[:, None]
         between = 0.5 * (spins[rows, number] + spins[rows + 1, number])
-        off += float(np.sum((turning - between) ** 2))
+        error += float(np.sum((turning - between) ** 2))
         size += float(np.sum(between**2))
-    return float(np.sqrt(off / size)) if size else np.inf
+    return float(np.sqrt(error / size)) if size else np.inf
 
 
-def _own(body: Body, names: Sequence[str]) -> tuple[str, ...]:
-    """The independent ones."""
+def _independent(body: Body, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in names if name in body.joint_names)
 
 
-def _columns(body: Body, names: tuple[str, ...]) -> list[tuple[tuple[str, ...], int]]:
-    """What columns may be: all joints or the independent ones, behind a free joint, what moves the base, or none."""
-    way = way_names(body.base_joints)
-    found = [(each, free) for each in dict.fromkeys((names, _own(body, names))) for free in (FREE_JOINT, 0)]
-    if way:
-        found += [((*way, *each), 0) for each in dict.fromkeys((names, _own(body, names)))]
-    return found
+def _layouts(body: Body, names: tuple[str, ...]) -> list[tuple[tuple[str, ...], int]]:
+    """Possible columns: all joints or the independent ones, behind a free joint, the joints of the base, or none."""
+    way, joints = way_names(body.base_joints), dict.fromkeys((names, _independent(body, names)))
+    layouts = [(each, free) for each in joints for free in (FREE_JOINT, 0)]
+    return layouts + ([((*way, *each), 0) for each in joints] if way else [])
 
 
 def _shapes(body: Body, joints: Array, names: tuple[str, ...]) -> Array:
-    """The columns of the independent joints, in the body's order."""
+    """Columns of the independent joints, in the body's order."""
     return joints[:, [names.index(name) for name in body.joint_names]]
-
-
-def attitudes_of(quaternions: Array, where: str) -> tuple[Array, Array]:
-    """Attitudes (N, 3, 3) of quaternions (N, 4), read as w x y z and as x y z w. Raises TrajectoryError."""
-    norms = np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    if not np.all(np.abs(norms - 1.0) <= 1e-3):
-        raise TrajectoryError(f"{where}: the quaternions of the base are not of length 1")
-    unit = quaternions / norms
-    return so3.matrix_from_quat(np.roll(unit, -1, axis=-1)), so3.matrix_from_quat(unit)

@@ -1,10 +1,10 @@
-"""What a motion file holds before its columns have found their joints, and what all kinds of file have in common."""
+"""Content of a motion file before its columns are matched to joints, and checks that all kinds of file share."""
 
 from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -20,17 +20,13 @@ from .nameless_joints import NamelessJoints
 if TYPE_CHECKING:
     from ._segment_poses import SegmentMotion
 
-LONGEST_NAME = 256
-"""Characters of a column's name, as of a joint's name in a body's file."""
-_UNEVEN_STEPS = 100.0
-"""A step this many times longer or shorter than the median is probably a gap, or one sample recorded twice."""
+LONGEST_NAME = 256  # characters of a column's name, as of a joint's name in a body's file
+_UNEVEN_STEPS = 100.0  # over the median step, or under it: a gap, or one sample recorded twice
 
 
 class Rates(NamedTuple):
     """Rates of a whole floating body at N samples.
 
-    Attributes
-    ----------
     base : (N, 3) angular velocity of the base [rad/s]
     joints : (N, n) derivatives of the body's coordinates [rad/s or m/s], of a ball joint those of its quaternion
     base_axes, velocity_axes : "base" or "world", the axes of the velocities of the base
@@ -45,10 +41,8 @@ class Rates(NamedTuple):
 
 
 class Simulated(NamedTuple):
-    """What arrays of a whole floating body say beside its coordinates.
+    """Rates and step in arrays of a whole floating body, beside its coordinates.
 
-    Attributes
-    ----------
     rates : of all samples, where they are stored
     step : of the integrator that made them [s], where it is stored
     """
@@ -59,17 +53,15 @@ class Simulated(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SegmentPoses:
-    """What a reader found: poses of k segments at N times.
+    """Poses of k segments at N times.
 
-    Attributes
-    ----------
     names : of the segments
     turns : (N, k, 3, 3) segment axes to the room's; NaN where they were not recorded
     origins : (N, k, 3) or None [m]
     stands : name of a calibration pose of the file -> turns (k, 3, 3) and origins (k, 3)
-    at_centres : whether origins are centres of mass, else joints
-    of_model : what the segments are links of, by the kind of file: "opensim", "mvnx" or None
-    in_metres : whether the file says the unit of lengths
+    at_centres : True if origins are centres of mass, else they are joints
+    of_model : kind of model whose links the segments are: "opensim", "mvnx" or None
+    in_metres : True if the file states the unit of lengths
     """
 
     names: tuple[str, ...]
@@ -83,33 +75,31 @@ class SegmentPoses:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Table:
-    """What a reader found in a file, under the labels that columns have there.
+    """Columns of a file, under the labels they have there.
 
-    Attributes
-    ----------
     where : the file, for messages
     format : the kind of file, for people
     columns : label -> (N,) as they stand there; NaN where no number does
     rows : (N,) the numbers of the samples in messages
     row : the word for a sample in messages, "row" or "point"
     times : (N,) [s]; None: one of the columns has them
-    clock : (N,) as the file tells the time; None: these times, or that column
-    by_format : whether the kind of file itself says that times are in seconds, and angles in radians or `degrees`
-    degrees : whether turning joints are in degrees; None: the file ought to say so and does not
-    units : label -> unit, where it is said elsewhere than in the label
-    faults : label -> sample -> what stands there and is no number, of the first of them
+    clock : (N,) times as the file gives them; None: these times, or that column
+    by_format : True if the kind of file fixes times in seconds, and angles in radians or `degrees`
+    degrees : True if turning joints are in degrees; None: the file should state it and does not
+    units : label -> unit, where it is stated elsewhere than in the label
+    faults : label -> sample -> entry that is no number, for the first of them
     base_quat_xyzw : (N, 4) as recorded, or None
     base_position : (N, 3) [m] or None
     up : the axis that the kind of file has upwards; None: it has none
-    unread : name -> what it is, of arrays and other entries of the file that are no columns
-    left_out : label -> why it was left out, of columns that say nothing of the motion
-    numbered : whether columns have no names: they are called by their numbers from 1
+    unread : name -> kind, of arrays and other entries of the file that are no columns
+    left_out : label -> why it was left out, of columns without motion
+    numbered : True if columns have no names, but numbers from 1
     nameless : how columns of an array without names became those of joints; None: they have names
-    unnamed : those of them that are matrices, as long as the columns, whose columns have no names
-    zero_pose : whether all angles of the first sample are zero: the pose that exporters put before a motion
-    simulated : what stands beside the coordinates where these are arrays of a whole floating body; None: they are not
+    unnamed : unread matrices as long as the columns, whose columns have no names
+    zero_pose : True if all angles of the first sample are zero: the pose that exporters put before a motion
+    simulated : rates and step of arrays of a whole floating body; None: they are not
     poses : of segments, before these have become joints
-    segments : what was found on the way from segments to joints
+    segments : angular momentum of segments and joints, after that
     """
 
     where: str
@@ -137,51 +127,53 @@ class Table:
     segments: SegmentMotion | None = None
 
     def check_column(self, label: str) -> None:
-        """Raise TrajectoryError for the first entry of a column that is no finite number."""
-        bad = np.flatnonzero(self.missing(label))
-        if len(bad):
-            raise self._no_number(label, int(bad[0]))
+        """Raise TrajectoryError for the first entry of a column that is not a finite number."""
+        missing = np.flatnonzero(self.missing(label))
+        if len(missing):
+            raise self._not_a_number(label, int(missing[0]))
 
     def missing(self, label: str) -> Mask:
-        """Samples without an entry in a column: (N,). Raises TrajectoryError for a word or an infinite number."""
+        """True for samples without an entry: (N,). Raises TrajectoryError for words and infinite numbers."""
         values = self.columns[label]
-        found = np.isnan(values)
-        wrong = list(self.faults.get(label, {}))
-        if wrong or np.isinf(values).any():
-            raise self._no_number(label, min([*wrong, *np.flatnonzero(np.isinf(values)).tolist()]))
-        return found
+        wrong = [*self.faults.get(label, {}), *np.flatnonzero(np.isinf(values)).tolist()]
+        if wrong:
+            raise self._not_a_number(label, min(wrong))
+        return np.isnan(values)
 
-    def _no_number(self, label: str, sample: int) -> TrajectoryError:
+    def _not_a_number(self, label: str, sample: int) -> TrajectoryError:
         text = self.faults.get(label, {}).get(sample, str(self.columns[label][sample]))
-        return no_number(text, f"{self.where}: {self.row} {self.rows[sample]}, column {label!r}")
+        return not_a_number(text, f"{self.where}: {self.row} {self.rows[sample]}, column {label!r}")
 
     def kept(self, samples: Integers) -> Table:
         """Some of the samples, by their places."""
         places = samples.tolist()
         new = {old: k for k, old in enumerate(places)}
         faults = {
-            label: {new[k]: text for k, text in found.items() if k in new} for label, found in self.faults.items()
+            label: {new[k]: text for k, text in entries.items() if k in new} for label, entries in self.faults.items()
         }
-        part = {
+        arrays = {
             name: None if (values := getattr(self, name)) is None else values[samples]
             for name in ("times", "clock", "base_quat_xyzw", "base_position")
         }
-        columns = {label: values[samples] for label, values in self.columns.items()}
-        zero_pose = self.zero_pose and places[:1] == [0]
-        rows = [self.rows[k] for k in places]
-        return replace(self, columns=columns, rows=rows, faults=faults, zero_pose=zero_pose, simulated=None, **part)
+        return replace(
+            self,
+            columns={label: values[samples] for label, values in self.columns.items()},
+            rows=[self.rows[k] for k in places],
+            faults=faults,
+            zero_pose=self.zero_pose and places[:1] == [0],
+            simulated=None,
+            **arrays,
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
     """A table whose times are known.
 
-    Attributes
-    ----------
     table : the columns, without that of the times
     times : (N,) from 0 [s]
-    first, last : of the times kept, as the file tells them
-    time_unit : in which the file tells them
+    first, last : of the times kept, as the file gives them
+    time_unit : in which the file gives them
     """
 
     table: Table
@@ -192,14 +184,34 @@ class Recording:
 
     @property
     def clock(self) -> Array:
-        """Times as the file tells them: (N,)."""
-        found = self.table.times if self.table.clock is None else self.table.clock
-        assert found is not None
-        return found
+        """Times as the file gives them: (N,)."""
+        clock = self.table.times if self.table.clock is None else self.table.clock
+        assert clock is not None
+        return clock
 
     def place(self, index: int) -> str:
         """The file and the sample, for messages."""
         return f"{self.table.where}: {self.table.row} {self.table.rows[index]}"
+
+
+def checked_quaternions(quaternions: Array, recording: Recording, owner: str, tolerance: float) -> Array:
+    """Quaternions x y z w (N, 4) with the length 1. Raises TrajectoryError where one is farther from it."""
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(quaternions, axis=-1)
+    worst = int(np.argmax(np.abs(lengths - 1.0)))
+    if not abs(lengths[worst] - 1.0) <= tolerance:
+        raise TrajectoryError(
+            f"{recording.place(worst)}: the quaternion x y z w of {owner} has the norm {lengths[worst]:.6g}; 1 is "
+            "needed"
+        )
+    return quaternions / lengths[:, None]
+
+
+def listed(names: Iterable[str], most: int) -> str:
+    """Names for a message, at most so many of them."""
+    names = list(names)
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"
 
 
 def warn(message: str) -> None:
@@ -247,30 +259,28 @@ def number(entry: str, place: str) -> float:
     except ValueError:
         value = np.nan
     if not np.isfinite(value):
-        raise no_number(entry, place)
+        raise not_a_number(entry, place)
     return float(value)
 
 
-def no_number(entry: str, place: str) -> TrajectoryError:
-    """The error for what is no finite number."""
+def not_a_number(entry: str, place: str) -> TrajectoryError:
+    """The error for an entry that is not a finite number."""
     text = entry.strip()
     shown = repr(text if len(text) < 40 else text[:40] + "...")
-    return TrajectoryError(f"{place}: {shown} is no finite number{_way_out(text)}")
+    remedy = "write a number, or leave the cell empty where nothing was recorded"
+    if is_blank(text):
+        remedy = "fill the gap or drop the row"
+    elif text.replace(",", "").lstrip("+-").isdigit():
+        remedy = "write it with a decimal point, as the others, and without marks of thousands"
+    return TrajectoryError(f"{place}: {shown} is no finite number; {remedy}")
 
 
 def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> Array:
     """Times checked and shifted to start at 0: (N,) -> (N,) [s].
 
-    Raises
-    ------
-    TrajectoryError
-        If there are fewer than two, they do not ascend, or their differences are not finite.
-
-    Warns
-    -----
-    TrajectoryWarning
-        Where one step is more than a hundred times as long, or as short, as most and as those beside it, or where
-        numbers so far from zero resolve the steps badly.
+    Raises TrajectoryError if there are fewer than two, they do not ascend, or their differences are not finite. Warns
+    where one step is more than a hundred times as long, or as short, as most and as those beside it, or where numbers
+    so far from zero resolve the steps badly.
     """
     if len(times) < 2:
         raise TrajectoryError(f"{where}: two samples or more are needed, got {len(times)}; give a longer motion")
@@ -297,28 +307,20 @@ def times_from_zero(times: Array, where: str, row: str, rows: Sequence[int]) -> 
     # Steps that shrink or grow one by one, as towards a kink, are meant.
     longer = np.maximum(np.append(steps[1:], 0.0), np.append(0.0, steps[:-1]))
     gaps = steps > _UNEVEN_STEPS * np.maximum(usual, longer)
-    twice = _UNEVEN_STEPS * steps < np.minimum(usual, longer)
-    for odd, what in (
+    doubled = _UNEVEN_STEPS * steps < np.minimum(usual, longer)
+    for odd, meaning in (
         (gaps, "a gap in the recording? The path is interpolated across it"),
-        (twice, "the same sample twice? Rates there may be far too large"),
+        (doubled, "the same sample twice? Rates there may be far too large"),
     ):
         if odd.any():
             i = int(np.argmax(np.where(odd, np.abs(np.log(steps / usual)), -1.0)))
             warn(
                 f"{where}: {steps[i]:.6g} s between {row} {rows[i]} and {row} {rows[i + 1]}, where the usual step is "
-                f"{usual:.6g} s: {what}"
+                f"{usual:.6g} s: {meaning}"
             )
     return shifted
 
 
 def is_blank(text: str) -> bool:
-    """Whether an entry says that there is no number."""
+    """True for an entry that stands for a missing number."""
     return text.strip().lower() in ("", "nan", "-nan", ".nan", "na", "n/a", "<na>", "nat", "null", "none", "~")
-
-
-def _way_out(text: str) -> str:
-    if is_blank(text):
-        return "; fill the gap or drop the row"
-    if text.replace(",", "", 1).replace(",", "").lstrip("+-").isdigit():
-        return "; write it with a decimal point, as the others, and without marks of thousands"
-    return "; write a number, or leave the cell empty where nothing was recorded"

@@ -4,44 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_flag, positive_argument
-from ...arrays import Array, Mask, finite_array, lock_arrays
+from ...arrays import FARTHEST, Array, Mask, finite_array, lock_arrays
+from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
 from ...letters import what_came
-from ..ball_columns import ball_columns, neighbours_signs
-from ..curves import CLOSED
+from ..curves import CLOSED, PiecewisePolynomial
+from ..interpolation import ball_columns, neighbours_signs
 from ..linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, LowPass, likeliest, width_of
 from ..shape_path import ShapePath
 from ._sample_origins import Prepared
 from .recording import warn
 
-_FEWEST = 5
-"""Samples; of fewer, what is motion and what is noise cannot be told apart."""
-_WIDEST_GAP = 5.0 * np.sqrt(2.0)
-"""Largest gap of a loop in noise levels: five standard deviations of the difference of two samples."""
-_REACH = 6.0
-"""Widths that are smoothed over: what is farther from a sample counts there by exp(-6/2) of 1/6 of it, or less."""
-_UNEVEN = 1e-3
-"""Share of a step by which steps of evenly spaced samples differ."""
-_SHORTEST = 0.5
-"""Length of an averaged unit quaternion: below, attitudes within the filter's reach are over 120 deg apart."""
-_REACH_OF_FILTER = 0.7
-"""Periods of the cut-off from an end: the weights of an open end are within 4 % of the largest weight inside."""
-_MEMORY_OF_FILTER = 6.0
-"""Periods of the cut-off after which a sample counts by exp(-33)."""
-_EXACT = 1e-9
-"""Noise below this share of the samples' spread counts as none: the samples are interpolated."""
+_FEWEST = 5  # samples: fewer do not separate motion from noise
+_WIDEST_GAP = 5.0 * np.sqrt(2.0)  # noise levels: five standard deviations of the difference of two samples
+_REACH = 6.0  # widths: a sample farther away has a weight of exp(-6/2)/6 or less
+_UNEVEN = 1e-3  # relative spread of even steps
+_SHORTEST = 0.5  # length of an averaged unit quaternion: below, attitudes in reach are over 120 deg apart
+_REACH_OF_FILTER = 0.7  # periods of the cut-off from an end: weights are within 4 % of the largest inside
+_MEMORY_OF_FILTER = 6.0  # periods of the cut-off: a sample's weight is then exp(-33)
+_EXACT = 1e-9  # relative to the samples' spread: less noise is none, and samples are interpolated
+_MOST_SWING = 4.0 * FARTHEST  # [rad or m] between two samples: terms of its cubics are then right to 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothing:
-    """What smoothing did to recorded samples.
+    """Effect of smoothing on recorded samples.
 
     Attributes
     ----------
@@ -74,6 +69,31 @@ class Smoothing:
 
     __post_init__ = lock_arrays
 
+    def spline_record(self, joint_names: tuple[str, ...]) -> dict[str, Any]:
+        """Penalties and bias of a smoothing spline, by joint, ready for JSON."""
+        return {
+            "penalty_s5": dict(zip(joint_names, self.penalty.tolist(), strict=True)),
+            "degrees_of_freedom": dict(zip(joint_names, self.degrees_of_freedom.tolist(), strict=True)),
+            "bias_rms": dict(zip(joint_names, np.sqrt(np.mean(self.bias**2, axis=0)).tolist(), strict=True)),
+            "bias_in_bars": self.bias_in_bars,
+        }
+
+    def filter_record(self, joint_names: tuple[str, ...]) -> dict[str, Any]:
+        """The low-pass filter, the noise it leaves and the motion it takes off, by joint, ready for JSON."""
+        assert self.low_pass is not None
+        assert self.in_band is not None
+        assert self.noise_in_band is not None
+        return {
+            "cut_off_hz": self.low_pass.cut_off,
+            "filter": "Butterworth, second order, forwards and backwards",
+            "rate_hz": self.low_pass.rate,
+            "noise": dict(zip(joint_names, self.noise.tolist(), strict=True)),
+            "twice_the_cut_off_hz": self.low_pass.twice.cut_off,
+            "rms_up_to_twice_the_cut_off": dict(zip(joint_names, self.in_band.tolist(), strict=True)),
+            "of_that_by_noise": dict(zip(joint_names, self.noise_in_band.tolist(), strict=True)),
+            "affected_at_ends_s": list(self.ends),
+        }
+
 
 def smoothed_path(
     times: ArrayLike,
@@ -84,13 +104,13 @@ def smoothed_path(
     *,
     penalty: float | None = None,
 ) -> tuple[ShapePath, Smoothing]:
-    """A C2 cubic spline near samples whose noise is known, and what smoothing did to them.
+    """Fit a C2 cubic spline near samples whose noise is known, and report what smoothing did to them.
 
     Its values at the samples' times are those of a quintic smoothing spline with natural ends, each joint with its own
     penalty. They are linear in the samples, so that error bars go through. A noise of zero is interpolation.
 
-    The penalty is the likeliest one for the noise level. What it takes off the motion, above all at the ends, where
-    the third derivative of such a spline is zero, follows from a spline of degree nine.
+    The penalty is the likeliest one for the noise level. Its bias, above all at the ends, where the third derivative
+    of such a spline is zero, follows from a spline of degree nine.
 
     A periodic spline runs smoothly from its end to its start, and its ends are equal. The first and the last sample
     are then two measurements of one shape: their mean is used, with the weight of both.
@@ -143,15 +163,13 @@ def smoothed_path(
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """Samples of joints and what is known of their noise.
+    """Samples of joints and their noise.
 
-    Attributes
-    ----------
     times, shapes : (N,) ascending [s], (N, n) [rad or m]
     noise : (n,) rms [rad or m]
     joint_names : n names, or None
-    inside : the samples that are kept; those before and after them are there to be smoothed with them
-    cut_off : of the low-pass filter that takes the place of smoothing by the noise [Hz], or None
+    inside : the samples that are kept; those before and after them are smoothed with them
+    cut_off : of the low-pass filter that takes the place of a spline [Hz], or None
     """
 
     times: Array
@@ -163,16 +181,11 @@ class Recorded:
 
     @property
     def smoothed(self) -> bool:
-        """Whether the path is near the samples, and not through them."""
+        """True if the path is near the samples, and not through them."""
         return self.cut_off is not None or bool(self.noise.any())
 
-    @property
-    def kept(self) -> Recorded:
-        """The samples that are kept, alone, from the time 0 on."""
-        return self.around(0)
-
-    def around(self, margin: int) -> Recorded:
-        """With so many samples before and after those that are kept, or as many as there are."""
+    def around(self, margin: int = 0) -> Recorded:
+        """The samples that are kept, with so many before and after them, or as many as there are, from the time 0."""
         first, past, _ = self.inside.indices(len(self.times))
         start = max(first - margin, 0)
         part = slice(start, min(past + margin, len(self.times)))
@@ -182,7 +195,7 @@ class Recorded:
 
     @property
     def meets(self) -> bool:
-        """Whether the last sample is the first, as far as files can say, and another is between them."""
+        """True if the last sample is the first, to the accuracy of files, and another is between them."""
         shapes = self.shapes[self.inside]
         first, last = shapes[0], shapes[-1]
         return len(shapes) > 2 and bool(np.all(np.abs(last - first) <= CLOSED * np.maximum(1.0, np.abs(first))))
@@ -196,31 +209,30 @@ def prepared_path(
     turns: Array | None = None,
     drift: bool = False,
 ) -> tuple[ShapePath, Smoothing]:
-    """The path near recorded samples, as `smoothed_path`.
+    """The path near recorded samples, and what smoothing did; see `smoothed_path`.
 
-    Parameters
-    ----------
     turns : (n,) whole turns that are taken off evenly before, and given back afterwards [rad]
-    drift : whether the gap between last and first sample is taken off evenly
+    drift : True to take off the gap between last and first sample evenly
     """
-    noise, turned = recorded.noise, np.zeros(len(recorded.noise)) if turns is None else turns
+    noise, whole_turns = recorded.noise, np.zeros(len(recorded.noise)) if turns is None else turns
     if recorded.cut_off is not None:
-        return _filtered(recorded, recorded.cut_off, periodic, turned, drift=drift)
+        return _filtered(recorded, recorded.cut_off, periodic, whole_turns, drift=drift)
     given = None if penalty is None else positive_argument(penalty, "smooth_penalty", "a penalty in s^5")
     if given is not None and not noise.any():
         raise TrajectoryError("smooth_penalty: state the noise of the samples too (smooth, --smooth)")
-    alone = recorded.kept
+    kept = recorded.around()
+    steps = _steps(kept, noise > 0.0, periodic, whole_turns, drift=drift)
     if noise.any():
-        if len(alone.times) < _FEWEST:
-            raise TrajectoryError(f"smoothing needs {_FEWEST} samples or more, got {len(alone.times)}")
+        if len(kept.times) < _FEWEST:
+            raise TrajectoryError(f"smoothing needs {_FEWEST} samples or more, got {len(kept.times)}")
         names = recorded.joint_names or tuple(f"number {joint}" for joint in range(len(noise)))
         if periodic and not drift:
-            _check_gap(alone.shapes[-1] - alone.shapes[0] - turned, noise, names)
-        _check_signal(_steps(alone, noise > 0.0, periodic, turned, drift=drift).joined(alone.shapes), noise, names)
-    elif not drift and not turned.any():
-        plain = ShapePath.spline(alone.times, alone.shapes, periodic, joint_names=recorded.joint_names)
-        return plain, _report(alone, _steps(alone, noise > 0.0, periodic, turned, drift=drift), plain)
-    samples, steps = _smoothed(recorded, given, periodic, turned, drift=drift)
+            _check_gap(kept.shapes[-1] - kept.shapes[0] - whole_turns, noise, names)
+        _check_signal(steps.joined(kept.shapes), noise, names)
+    elif not drift and not whole_turns.any():
+        plain = ShapePath.spline(kept.times, kept.shapes, periodic, joint_names=recorded.joint_names)
+        return plain, _report(kept, steps, plain)
+    samples, steps = _smoothed(recorded, given, periodic, whole_turns, drift=drift)
     path = steps.path(samples.shapes)
     return path, _report(samples, steps, path)
 
@@ -245,7 +257,7 @@ def low_pass(times: Array, cut_off: float) -> LowPass:
 
 
 def is_even(times: Array) -> bool:
-    """Whether all steps are equal to a thousandth."""
+    """True if all steps are equal to a thousandth."""
     steps = np.diff(times)
     return bool(np.ptp(steps) <= _UNEVEN * steps.mean())
 
@@ -259,19 +271,19 @@ def filtered(times: Array, values: Array, cut_off: float) -> Array:
 def filtered_attitudes(times: Array, attitudes: Array, cut_off: float) -> Array:
     """Attitudes (N, 3, 3), filtered as rotations.
 
-    The mean rate of turn, fixed in space, is taken off, so that a constant one comes through as it is; the quaternions
-    that are left are filtered, and made unit again. Of a small wobble at the frequency f on a turn whose rate differs
-    from the mean by w [rad/s], this leaves the mean of the shares h of the frequencies f - w/(4 pi) and f + w/(4 pi),
-    and half of their difference turned by a right angle about the axis of w, both over the share of w/(4 pi).
+    The mean rate of turn, fixed in space, is taken off, so that a constant one is not changed; the quaternions that
+    are left are filtered, and made unit again. For a small wobble at the frequency f on a turn whose rate differs from
+    the mean by w [rad/s], this leaves the mean of the shares h of the frequencies f - w/(4 pi) and f + w/(4 pi), and
+    half of their difference turned by a right angle about the axis of w, both over the share of w/(4 pi).
 
     Raises TrajectoryError where turns are too fast for the cut-off.
     """
     steps = so3.log(attitudes[1:] @ so3.transpose(attitudes[:-1]))
-    carried = so3.exp((times - times[0])[:, None] * steps.sum(axis=0) / (times[-1] - times[0]))
-    left = neighbours_signs(so3.quat_from_matrix(so3.transpose(carried) @ attitudes), (slice(0, 4),))
-    found = filtered(times, left, cut_off)
-    _check_lengths(found, cut_off, "the base")
-    return carried @ so3.matrix_from_quat(so3.normalised(found))
+    mean_turn = so3.exp((times - times[0])[:, None] * steps.sum(axis=0) / (times[-1] - times[0]))
+    left = neighbours_signs(so3.quat_from_matrix(so3.transpose(mean_turn) @ attitudes), (slice(0, 4),))
+    smooth = filtered(times, left, cut_off)
+    _check_lengths(smooth, cut_off, "the base")
+    return mean_turn @ so3.matrix_from_quat(so3.normalised(smooth))
 
 
 def _check_lengths(quaternions: Array, cut_off: float, name: str) -> None:
@@ -285,42 +297,41 @@ def _check_lengths(quaternions: Array, cut_off: float, name: str) -> None:
 def _filtered(
     recorded: Recorded, cut_off: float, periodic: bool, turns: Array, *, drift: bool
 ) -> tuple[ShapePath, Smoothing]:
-    """The path of filtered samples; its noise is estimated by what is left above twice the cut-off."""
+    """The path of filtered samples; its noise is estimated by what is above twice the cut-off."""
     rate = (len(recorded.times) - 1) / float(recorded.times[-1])
     samples = recorded.around(0 if periodic else int(np.ceil(_MEMORY_OF_FILTER * rate / cut_off)))
     columns, count = len(recorded.noise), len(samples.times)
-    chosen = low_pass(samples.times, cut_off)
-    smoother, wider = (each.smoother(samples.times, periodic, columns) for each in (chosen, chosen.twice))
-    none = _steps(samples, np.ones(columns, dtype=bool), periodic, turns, drift=drift)
-    steps = replace(none, smoother=smoother, pilot=None)
+    narrow = low_pass(samples.times, cut_off)
+    smoother, wider = (each.smoother(samples.times, periodic, columns) for each in (narrow, narrow.twice))
+    steps = _steps(samples, np.ones(columns, dtype=bool), periodic, turns, drift=drift)
+    steps = replace(steps, smoother=smoother, pilot=None)
     first, *_ = joined = steps.joined(samples.shapes)
     values = joined - first
-    kept, by_wider = smoother(values), wider(values)
+    by_narrow, by_wide = smoother(values), wider(values)
     for ball in ball_columns(recorded.joint_names):
-        _check_lengths((first + kept)[:, ball], cut_off, f"a ball joint (column {ball.start})")
-    shares, more = chosen.responses(count), chosen.twice.responses(count)
-    noise = np.sqrt(((values - by_wider) ** 2).sum(axis=0) / max(((1.0 - more) ** 2).sum(), 1e-300))
+        _check_lengths((first + by_narrow)[:, ball], cut_off, f"a ball joint (column {ball.start})")
+    response, wide_response = narrow.responses(count), narrow.twice.responses(count)
+    noise = np.sqrt(((values - by_wide) ** 2).sum(axis=0) / max(((1.0 - wide_response) ** 2).sum(), 1e-300))
     noise = np.where(noise > _EXACT * _spread(values), noise, 0.0)
     path = steps.path(samples.shapes)
-    report = _report(replace(samples, noise=noise), steps, path)
     inside = samples.times[samples.inside]
     reach = 0.0 if periodic else _REACH_OF_FILTER / cut_off
     return path, replace(
-        report,
-        low_pass=chosen,
-        in_band=np.sqrt(np.mean((by_wider - kept) ** 2, axis=0)),
-        noise_in_band=noise * np.sqrt(((more - shares) ** 2).sum() / count),
+        _report(replace(samples, noise=noise), steps, path),
+        low_pass=narrow,
+        in_band=np.sqrt(np.mean((by_wide - by_narrow) ** 2, axis=0)),
+        noise_in_band=noise * np.sqrt(((wide_response - response) ** 2).sum() / count),
         ends=(max(reach - float(inside[0]), 0.0), max(reach - float(samples.times[-1] - inside[-1]), 0.0)),
     )
 
 
 def _steps(samples: Recorded, smoothed: Mask, periodic: bool, turns: Array, *, drift: bool) -> Prepared:
-    """The steps from samples to a path, their penalties yet to be found."""
-    none = LinearSmoother(samples.times, periodic, np.where(smoothed, np.inf, 0.0))
+    """The steps from samples to a path, without penalties."""
+    smoother = LinearSmoother(samples.times, periodic, np.where(smoothed, np.inf, 0.0))
     return Prepared(
         samples=samples.shapes,
-        smoother=none,
-        pilot=replace(none, order=PILOT_ORDER),
+        smoother=smoother,
+        pilot=replace(smoother, order=PILOT_ORDER),
         inside=samples.inside,
         turns=turns,
         drift=drift,
@@ -331,11 +342,13 @@ def _steps(samples: Recorded, smoothed: Mask, periodic: bool, turns: Array, *, d
 def _smoothed(
     recorded: Recorded, given: float | None, periodic: bool, turns: Array, *, drift: bool
 ) -> tuple[Recorded, Prepared]:
-    """The samples that are smoothed together, and the steps with the smoothers that their noise asks for."""
-    samples = recorded.kept
+    """Samples that are smoothed together, and the steps with the smoothers that follow from their noise."""
+    samples = recorded.around()
     spread = _spread(_steps(samples, recorded.noise > 0.0, periodic, turns, drift=drift).joined(samples.shapes))
     noise = np.where(recorded.noise > _EXACT * spread, recorded.noise, 0.0)
-    groups = _groups(samples.joint_names, len(noise))
+    # The four numbers of a ball joint are smoothed alike.
+    balls = [list(range(ball.start, ball.stop)) for ball in ball_columns(samples.joint_names)]
+    groups = [*balls, *([column] for column in range(len(noise)) if not any(column in ball for ball in balls))]
 
     def smoother(part: Recorded, order: int = ORDER) -> LinearSmoother:
         values = _steps(part, noise > 0.0, periodic, turns, drift=drift).joined(part.shapes)
@@ -351,15 +364,8 @@ def _smoothed(
     return samples, replace(steps, smoother=chosen, pilot=smoother(samples, PILOT_ORDER))
 
 
-def _groups(joint_names: tuple[str, ...] | None, count: int) -> list[list[int]]:
-    """Columns that are smoothed alike: each by itself, the four numbers of a ball joint together."""
-    balls = [list(range(ball.start, ball.stop)) for ball in ball_columns(joint_names)]
-    taken = {column for ball in balls for column in ball}
-    return [*balls, *([column] for column in range(count) if column not in taken)]
-
-
 def _report(samples: Recorded, steps: Prepared, path: ShapePath) -> Smoothing:
-    smoother, kept = steps.smoother, samples.kept
+    smoother, kept = steps.smoother, samples.around()
     noise = np.where(steps.smoothed, samples.noise, 0.0)
     free = smoother.degrees_of_freedom()
     bias = steps.bias
@@ -404,3 +410,21 @@ def _check_signal(shapes: Array, noise: Array, joint_names: Sequence[str]) -> No
 def _spread(samples: Array) -> Array:
     """Rms about the mean, along the first axis; exactly zero where nothing moves."""
     return np.where(np.ptp(samples, axis=0) > 0.0, samples.std(axis=0), 0.0)
+
+
+def check_swings(path: ShapePath, body: Body) -> None:
+    """Raise TrajectoryError where a spline swings so far between samples that rounding moves it off them."""
+    curve = path.curve
+    assert isinstance(curve, PiecewisePolynomial)
+    lengths = np.diff(curve.knots)
+    powers = lengths[:, None] ** np.arange(len(curve.coefficients))
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        swings = np.einsum("kpj,pk->pj", np.abs(curve.coefficients), powers)
+    if swings.size and not swings.max() <= _MOST_SWING:
+        piece, joint = np.unravel_index(int(np.argmax(np.nan_to_num(swings, nan=np.inf))), swings.shape)
+        raise TrajectoryError(
+            f"joint {body.joint_names[joint]}: a smooth path through the samples would swing by some "
+            f"{swings[piece, joint]:.2g} {body.joint_units[joint]} between {curve.knots[piece]:.9g} s and "
+            f"{curve.knots[piece + 1]:.9g} s; is there a gap, or are two samples nearly at one time? Keep what is "
+            "before or after it (trim, --flight), or drop a sample"
+        )

@@ -1,4 +1,4 @@
-"""What motions of the joints alone can turn a free body to, by which loops, and in which frame that is seen best."""
+"""Rotations that motions of the joints alone reach, the loops that do it, and the frame that shows it best."""
 
 from lazy_loader import attach_stub
 

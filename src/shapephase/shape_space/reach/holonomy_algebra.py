@@ -1,4 +1,4 @@
-"""Which rotations loops of the joints reach: the holonomy algebra, from the curvature and its covariant derivatives."""
+"""Rotations that loops of the joints reach: the holonomy algebra, from the curvature and its covariant derivatives."""
 
 from __future__ import annotations
 
@@ -19,29 +19,19 @@ from ..connection import connection_slopes, curvature, horizontal_lift
 from ..shape_path import ShapePath
 from .smallest_loops import AxisLoop, loops_of_second_order, loops_of_third_order
 
-_NODES = 25
-"""Chebyshev points along a ray, odd so that the shape is one of them: they resolve a curvature that swings some six
-times there."""
-_HALF_WIDTH = 0.4
-"""[strokes] of those rays. Rounding of the m-th derivative grows as (25/0.4)^m."""
-_RAYS = 4
-"""Random directions of the higher derivatives. These are polynomials in the direction with values in three dimensions,
-so that three directions in general position span what all span."""
-_FAR_SHAPES = 6
-"""Random shapes to whose curvature the body is carried along straight paths."""
-_LOOKS = (0.25, 0.5, 0.75, 1.0)
-"""Where on those paths."""
-_FAR = 0.6
-"""[strokes] of such a shape from the shape, in each joint, at most."""
-_SEED = 26
-"""Any seed serves; a fixed one gives the same answer each time."""
-_LIFT_TOLERANCE = 1e-12
-"""[rad] of what carries a curvature back."""
+_NODES = 25  # Chebyshev points on a ray, the shape among them: they resolve six swings of the curvature
+_HALF_WIDTH = 0.4  # [strokes] of those rays; rounding of the m-th derivative grows as (25/0.4)^m
+_RAYS = 4  # random directions: derivatives are vectors in three dimensions, which three directions span
+_FAR_SHAPES = 6  # random shapes at the ends of straight paths
+_LOOKS = (0.25, 0.5, 0.75, 1.0)  # places on those paths
+_FAR = 0.6  # [strokes] largest distance of such a shape, in each joint
+_SEED = 26  # any fixed seed: repeatable results
+_LIFT_TOLERANCE = 1e-12  # [rad] of the lift that carries a curvature back
 
 
 @dataclass(frozen=True, eq=False)
 class OrderReach:
-    """What loops small to some order of their stroke turn the body about.
+    """Axes of the turns by loops small to some order of their stroke.
 
     Attributes
     ----------
@@ -68,7 +58,7 @@ class OrderReach:
 
 @dataclass(frozen=True, eq=False)
 class PairTurn:
-    """What a small loop of two joints turns the body by.
+    """Turn of the body by a small loop of two joints.
 
     Attributes
     ----------
@@ -149,28 +139,28 @@ class Reach:
 
     @property
     def is_complete(self) -> bool:
-        """Whether every rotation can be reached."""
+        """True if every rotation can be reached."""
         return self.rank == 3
 
 
 def reachable(
     body: Body | ParticleBody, shape: ArrayLike | None = None, *, most_orders: int = 5, tolerance: float = 1e-8
 ) -> Reach:
-    """Which rotations loops of the joints reach from a shape, by which smallest loops, and which joints do most.
+    """Find the rotations that loops of the joints reach from a shape, the smallest such loops, and the best joints.
 
     Loops of a body without angular momentum turn it by the group whose algebra the curvature of the connection spans,
     taken at all shapes and carried back (Ambrose and Singer). At one shape its covariant derivatives
 
         D_k F_ij = d_k F_ij - A_k x F_ij
 
-    and theirs span the same, as the connection is analytic (Chow): those of order m - 2 say what loops do at order m of
-    their stroke. Both are computed: `rank` is that of the curvature around the shape, `orders` have the derivatives.
-    What whole turns of a joint without end add to that, as of a reaction wheel, is not looked at.
+    and theirs span the same, as the connection is analytic (Chow): those of order m - 2 give the turns by loops at
+    order m of their stroke. Both are computed: `rank` is that of the curvature around the shape, `orders` have the
+    derivatives. Whole turns of a joint without end, as of a reaction wheel, may add to that and are not examined.
 
     Parameters
     ----------
     shape : (n,) where the loops begin [rad or m]; None: neutral
-    most_orders : the highest order of the stroke that is looked at, 2 to 6
+    most_orders : the highest order of the stroke, 2 to 6
     tolerance : of singular values, relative to the size of the terms that the curvature is a difference of
 
     Raises
@@ -234,8 +224,6 @@ def reachable(
 class _Field:
     """The curvature of a body around a shape, in strokes.
 
-    Attributes
-    ----------
     here : (n, n, 3) F_ij at the shape
     slopes : (n, n, n, 3) D_k F_ij there, k first
     magnitude : of the terms that F is the difference of
@@ -264,11 +252,11 @@ class _Field:
         shapes = self.shape + np.outer(_HALF_WIDTH * points, direction * self.strokes)
         field = self.at(shapes)
         turning = np.einsum("pka,k->pa", connection_slopes(self.body, shapes)[0], direction * self.strokes)
-        found = []
+        slopes = []
         for _ in range(count):
             field = np.einsum("pq,q...->p...", matrix, field) - np.cross(turning[:, None, None], field)
-            found.append(field[_NODES // 2])
-        return found
+            slopes.append(field[_NODES // 2])
+        return slopes
 
 
 def _differentiation(angles: Array) -> Array:
@@ -321,7 +309,7 @@ def carried_curvature(body: Body | ParticleBody, start: Array, ends: Array) -> A
 
 
 def _orders(field: _Field, rank: int, highest: int, noise: float) -> tuple[OrderReach, ...]:
-    """What each order adds, until all axes are reached."""
+    """Axes that each order adds, until all are reached."""
     if field.body.n_shape < 2:
         return ()
     random = np.random.default_rng(_SEED)
@@ -329,7 +317,7 @@ def _orders(field: _Field, rank: int, highest: int, noise: float) -> tuple[Order
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     along = [field.derivatives(ray, highest - 2) for ray in rays] if rank and highest > 3 else []
     spans: list[Array] = []
-    found: list[OrderReach] = []
+    orders: list[OrderReach] = []
     axes = np.zeros((0, 3))
     for order in range(2, highest + 1):
         if order == 2:
@@ -343,14 +331,14 @@ def _orders(field: _Field, rank: int, highest: int, noise: float) -> tuple[Order
                     for b in _basis(spans[order - k - 2], noise)]  # fmt: skip
         spans.append(np.concatenate([own, *(np.array(one)[:, None] for one in brackets)], axis=1))
         axes = _extended(axes, spans[-1], noise)
-        found.append(
+        orders.append(
             OrderReach(
                 order=order, rank=len(axes), axes=axes, singular_values=np.linalg.svd(own, full_matrices=False)[1][:3]
             )
         )
         if len(axes) >= rank:
             break
-    return tuple(found)
+    return tuple(orders)
 
 
 def _basis(span: Array, noise: float) -> Array:
@@ -367,7 +355,7 @@ def _extended(axes: Array, span: Array, noise: float) -> Array:
 
 
 def _ranked_pairs(body: Body | ParticleBody, here: Array, strokes: Array) -> tuple[PairTurn, ...]:
-    found: list[tuple[float, PairTurn]] = []
+    pairs: list[tuple[float, PairTurn]] = []
     for i, j in combinations(range(body.n_shape), 2):
         turn = -here[i, j]
         size = float(np.linalg.norm(turn))
@@ -376,5 +364,5 @@ def _ranked_pairs(body: Body | ParticleBody, here: Array, strokes: Array) -> tup
         product = f"{units[0]}^2" if units[0] == units[1] else " ".join(units)
         joints = body.joint_names[i], body.joint_names[j]
         pair = PairTurn(joints=joints, rate=size / float(strokes[i] * strokes[j]), axis=axis + 0.0, units=product)
-        found.append((size, pair))
-    return tuple(pair for _, pair in sorted(found, key=lambda one: -one[0]))
+        pairs.append((size, pair))
+    return tuple(pair for _, pair in sorted(pairs, key=lambda one: -one[0]))

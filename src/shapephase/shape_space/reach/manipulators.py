@@ -13,8 +13,7 @@ from ...body.link_motions import link_motions
 from ...errors import unknown_name
 from ..connection import mechanical_connection
 
-_NULL = 1e-12
-"""Singular values of the momentum matrix, relative to the largest, that are rounding."""
+_NULL = 1e-12  # rounding of singular values, relative to the largest
 
 
 def generalised_jacobian(

@@ -1,4 +1,4 @@
-"""Frames over a region of shapes in which a body is disturbed least, so that one integral tells its turn best."""
+"""Frames over a region of shapes in which a body is disturbed least, so that one integral predicts its turn best."""
 
 from __future__ import annotations
 
@@ -21,20 +21,13 @@ from ..connection import integral, mechanical_connection
 from ..path_series import panel_edges, turn_of_a_loop
 from ..shape_path import ShapePath
 
-_MOST_DEGREE = 6
-"""Of the polynomials; the number of terms grows as the number of joints to this power."""
-_MOST_TERMS = 3000
-"""Of a polynomial; least squares with more take minutes."""
-_POINTS_PER_TERM = 4
-"""Shapes of the region for each term, at which the connection is made small."""
-_LEAST_POINTS = 512
-"""Such shapes at least."""
-_STEPS = 40
-"""Corrections of the frame at most: near the best one each is a hundredth of the last, or less."""
-_SMALL_STEP = 1e-11
-"""[rad] of a correction, which ends them."""
-_TURN_TOLERANCE = 1e-12
-"""Of the integral of the connection's size: where halving the panels of a path changes no more."""
+_MOST_DEGREE = 6  # of the polynomials; the number of terms is about n^degree
+_MOST_TERMS = 3000  # least squares with more take minutes
+_POINTS_PER_TERM = 4  # shapes at which the connection is made small
+_LEAST_POINTS = 512  # such shapes at least
+_STEPS = 40  # largest number of corrections: each is about a hundredth of the last
+_SMALL_STEP = 1e-11  # [rad] of the last correction
+_TURN_TOLERANCE = 1e-12  # change of the integral of the connection's size at which halving ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +129,7 @@ def minimum_perturbation(
     """The frame of the body, as a function of its shape, in which motions of the joints disturb it least on the whole.
 
     U(r) makes the mean square of the connection over a region as small as polynomials can. There the connection has no
-    divergence, and one integral of it, exp(-integral of A), tells the turn of a loop better than in the base or in
+    divergence, and one integral of it, exp(-integral of A), predicts the turn of a loop better than in the base or in
     `mean_body_gauge`, which is best near one shape only.
 
     Parameters
@@ -260,5 +253,5 @@ def _correction(values: Array, slopes: Array, columns: Array) -> Array:
     # Rows are points, joints and axes; columns terms and axes.
     rows = slopes[..., None, :, None] * np.eye(3)[:, None, :] + spin[..., :, None, :] * values[:, None, None, :, None]
     matrix = rows.reshape(-1, 3 * values.shape[1])
-    found = np.linalg.lstsq(matrix, -np.swapaxes(columns, -1, -2).reshape(-1), rcond=1e-12)[0]
-    return np.asarray(found, dtype=np.float64).reshape(-1, 3)
+    coefficients = np.linalg.lstsq(matrix, -np.swapaxes(columns, -1, -2).reshape(-1), rcond=1e-12)[0]
+    return np.asarray(coefficients, dtype=np.float64).reshape(-1, 3)

@@ -19,17 +19,11 @@ from ...arrays import Array, Integers, lock_arrays
 from ...display import short_repr
 from ..shape_path import ShapePath
 
-_STARTS = 24
-"""Random directions from which the best figure of eight is sought; each climb ends at a local best."""
-_CLIMBS = 200
-"""Steps of such a climb at most."""
-_SEED = 3
-"""Any seed serves; a fixed one gives the same answer each time."""
-_SMALL_PLANE = 1e-12
-"""Part of the largest below which a plane of a loop is left out: rounding."""
-_FIRST_CORRECTION = 5
-"""Frequency of the circles that take away what an eight of frequencies 1 and 2 turns about other axes: with these no
-sum of three frequencies of the eight and one circle vanishes."""
+_STARTS = 24  # random directions of the climbs to the best figure of eight: each ends at a local optimum
+_CLIMBS = 200  # largest number of steps of a climb
+_SEED = 3  # any fixed seed: repeatable results
+_SMALL_PLANE = 1e-12  # rounding of a plane of a loop, relative to the largest
+_FIRST_CORRECTION = 5  # of the first correcting circle: no sum of three frequencies among 1, 2 and this vanishes
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +73,7 @@ class AxisLoop:
         return ShapePath.fourier(self.centre, cosines, sines, length)
 
     def rotation_vector(self, stroke: ArrayLike) -> Array:
-        """What the loop turns the body by, to leading order: (...) -> (..., 3), base axes [rad]."""
+        """Rotation vector of the body by the loop, to leading order: (...) -> (..., 3), base axes [rad]."""
         return self.turn * np.asarray(stroke, dtype=np.float64)[..., None] ** self.order * self.axis
 
 
@@ -125,8 +119,8 @@ def loops_of_third_order(
 ) -> tuple[AxisLoop, ...]:
     """Figures of eight, c = v cos t + w sin(2 t)/2, that turn the body about axes which the curvature does not reach.
 
-    They enclose no area and turn it by minus pi/4 D_v F(v, w). Of unit v and w those with the largest turn about the
-    axis are found by climbing. What they turn about axes of second order is taken away by small circles there.
+    They enclose no area and turn it by minus pi/4 D_v F(v, w). Unit v and w with the largest turn about the axis
+    are found by climbing. Their turns about axes of second order are cancelled by small circles there.
 
     Examples
     --------
@@ -187,7 +181,7 @@ def _best_eight(tensor: Array) -> tuple[Array, Array]:
     size = len(tensor)
     starts = np.concatenate([np.eye(size), np.random.default_rng(_SEED).normal(size=(_STARTS, size))])
     both = tensor + np.swapaxes(tensor, 0, 1)
-    best, found = -1.0, (starts[0], starts[0])
+    best, directions = -1.0, (starts[0], starts[0])
     for start in starts:
         v, w, last = start / np.linalg.norm(start), starts[0], 0.0
         for _ in range(_CLIMBS):
@@ -206,5 +200,5 @@ def _best_eight(tensor: Array) -> tuple[Array, Array]:
         value = float(np.linalg.norm(np.einsum("k,i,kij->j", v, v, tensor)))
         if value > best:
             across = np.einsum("k,i,kij->j", v, v, tensor)
-            best, found = value, (v, across / value if value > 0.0 else w)
-    return found
+            best, directions = value, (v, across / value if value > 0.0 else w)
+    return directions

@@ -1,1 +1,1 @@
-"""Functions of time looked at once, before any body is asked: panels, kinks, jumps, and whether rates fit."""
+"""Scans of functions of time, before a body follows them: panels, kinks, jumps, and checks of rates."""

@@ -1,4 +1,4 @@
-"""Where a function of time that is smooth on both sides of a kink has it, to rounding."""
+"""Location of a kink of a function of time that is smooth on both sides of it, to rounding."""
 
 from __future__ import annotations
 
@@ -9,22 +9,14 @@ import numpy as np
 from ...arrays import Array
 from ...chebyshev import nodes_on, values_to_coefficients
 
-# Of the series on each side: continued by half their own length they stay exact on so short a stretch.
-_DEGREE = 4
-# Of a side, in widths of the stretch between them.
-_SIDE = 2.0
-# Times of the stretch in one round.
-_TIMES = 31
-# A value belongs to the side from which it is nearer by this factor.
-_NEARER = 0.1
-# In units of the rounding: values this near to both sides belong to neither. A continued series adds so much to it.
-_ALIKE = 30.0
-# Of the stretch: with less progress in a round the sides are alike.
-_LEAST_PROGRESS = 0.5
-# In units of the rounding of times.
-_NARROW = 4.0
-# Of the series on each side that confirm a kink, and where they are checked.
-_CONFIRMED_DEGREE = 8
+_DEGREE = 4  # of the series on each side: continued by half their length they stay exact
+_SIDE = 2.0  # length of a side, in widths of the stretch between
+_TIMES = 31  # of the stretch in one round
+_NEARER = 0.1  # ratio of distances that assigns a value to a side
+_ALIKE = 30.0  # roundings: values this near to both sides are undecided; continued series add as much
+_LEAST_PROGRESS = 0.5  # of the stretch per round: with less, both sides are alike
+_NARROW = 4.0  # roundings of times
+_CONFIRMED_DEGREE = 8  # of the series that confirm a kink; places where they are checked
 _CONFIRMED_AT = np.array([0.043, 0.331, 0.613, 0.957])
 _MOST_ROUNDS = 20
 
@@ -37,8 +29,6 @@ def located_kink(
 ) -> float | None:
     """The time of the only kink in a short stretch; None where there is none, or something else.
 
-    Parameters
-    ----------
     at : times (N,) -> values (N, c)
     limits : between which the function may be evaluated
     floor : (c,) rounding of the values
@@ -57,7 +47,7 @@ def located_kink(
 
 
 def _is_smooth(at: Callable[[Array], Array], side: tuple[float, float], scale: Array) -> bool:
-    """Whether one short series is the function on a side of a kink."""
+    """True if one short series is the function on a side of a kink."""
     left, right = side
     nodes = nodes_on(np.array([left]), np.array([right]), _CONFIRMED_DEGREE)[0]
     checks = left + (right - left) * _CONFIRMED_AT

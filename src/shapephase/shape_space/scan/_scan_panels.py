@@ -11,14 +11,10 @@ from ...arrays import Array, Integers, Mask
 from ...chebyshev import inside
 from ...integrator.resolved import DEGREE
 
-# Samples of the whole path: with the jitter below no gap is above 1/4,000 of the duration.
-_SAMPLES = 5200
-# Of the distance of two samples: by this much they are moved, so that nothing periodic hides between them.
-_JITTER = 0.28
-# Of a piece between two breaks, however short.
-_LEAST_SAMPLES = 12
-# Of a panel, none of them a node: where it is checked when no samples are left in it.
-CHECKS = np.array([0.0411, 0.2677, 0.5573, 0.8219])
+_SAMPLES = 5200  # of the whole path: with the jitter below no gap is above 1/4,000 of the duration
+_JITTER = 0.28  # of the distance of two samples: nothing periodic hides between them
+_LEAST_SAMPLES = 12  # of a piece between two breaks, however short
+CHECKS = np.array([0.0411, 0.2677, 0.5573, 0.8219])  # places in a panel without samples; none is a node
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +47,7 @@ class PanelFit:
 
 
 class Piece:
-    """What is between two breaks, and the kinks found in it."""
+    """Stretch between two breaks, and the kinks found in it."""
 
     def __init__(self, left: float, right: float) -> None:
         self.left, self.right = left, right

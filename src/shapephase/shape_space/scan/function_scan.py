@@ -1,26 +1,29 @@
-"""What is looked at before it is integrated, functions of time given by a user, and what one look at them found."""
+"""Functions of time given by a user, and the results of scanning them before integration."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...arrays import Array, Integers, Mask
-from ...integrator.resolved import ResolvedPath
+from ...arrays import Array, Integers, Mask, check_finite
+from ...errors import TrajectoryError
+from ...integrator.resolved import ResolvedPath, joined
 from ..curves import Curve
 
+if TYPE_CHECKING:
+    from ..shape_path import ShapePath
+
+# Times (N,), columns (N, 2 n) -> weights (2 n,) [rad per unit of a column], sizes (2 n,) [unit of a column].
 Judge = Callable[[Array, Array], tuple[Array, Array]]
-"""Times (N,), columns (N, 2 n) -> weights (2 n,) [rad per unit of a column], sizes (2 n,) [unit of a column]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Words:
-    """How messages speak of a function.
+    """Terms for messages about a function.
 
-    Attributes
-    ----------
     units : of values and of rates
     continuous : why a value cannot jump
     rate, values, returned : of what is a derivative: its name, what it is the derivative of, what to return
@@ -37,17 +40,15 @@ class Words:
 class ScannedFunction:
     """Columns of time as a user gives them: values, and as many rates; zeros stand for what there is not.
 
-    What a column is off by matters as far as it turns the body. So all columns are looked at times their weights, in
+    What a column is off by matters as far as it turns the body. So all columns are scanned times their weights, in
     rad, as the angles of joints are: a value times its weight is, to first order and at most, the turn by which the
     attitude is off when the value is; a rate times its weight is the rate of that turn [rad/s]. Then one set of
     thresholds serves joints, metres and kg m^2, and does not depend on the units in which a body is described.
 
-    Attributes
-    ----------
     curve : values and rates at times (N,): (N, n), (N, n)
     judge : the weights, and the sizes of the numbers that columns are computed from where these are larger than the
         columns themselves: of them the rounding is
-    paired, angles, may_jump : (n,) whether a rate is the derivative of its value; whether a value may go on at another
+    paired, angles, may_jump : (n,) True if a rate is the derivative of its value; if a value may go on at another
         turn; whether it may jump at a break that was declared
     subject : the function, in messages
     columns, quantities : names of the n values, and of all 2 n columns
@@ -66,7 +67,7 @@ class ScannedFunction:
 
     @property
     def n_values(self) -> int:
-        """How many values there are."""
+        """Number of values."""
         return len(self.columns)
 
 
@@ -137,7 +138,7 @@ def side_by_side(functions: Sequence[ScannedFunction], subject: str) -> ScannedF
 
 @dataclass(frozen=True, eq=False)
 class FunctionScan:
-    """What one look at a function found.
+    """Result of scanning a function.
 
     Attributes
     ----------
@@ -156,7 +157,7 @@ class FunctionScan:
 
     @property
     def panels(self) -> int:
-        """How many panels resolve the function to rounding."""
+        """Number of panels that resolve the function to rounding."""
         return len(self.resolved.left)
 
     @property
@@ -170,26 +171,26 @@ class FunctionScan:
         return self.resolved.duration
 
     def __str__(self) -> str:
-        """How many panels, evaluations and breaks."""
-        found = f", {len(self.found_breaks)} breaks found" if len(self.found_breaks) else ""
-        return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{found}"
+        """Numbers of panels, evaluations and breaks."""
+        breaks = f", {len(self.found_breaks)} breaks found" if len(self.found_breaks) else ""
+        return f"{self.panels} panels from {self.evaluations} evaluations in {self.calls} calls{breaks}"
 
     def reversed(self) -> FunctionScan:
-        """Of the path in the opposite order of time."""
-        found = (self.duration - self.found_breaks)[::-1]
-        return replace(self, resolved=self.resolved.reversed(), found_breaks=found)
+        """Scan of the path backwards in time."""
+        breaks = (self.duration - self.found_breaks)[::-1]
+        return replace(self, resolved=self.resolved.reversed(), found_breaks=breaks)
 
     def stretched(self, factor: float) -> FunctionScan:
-        """Of the path `factor` times as slowly."""
+        """Scan of the path `factor` times as slowly."""
         return replace(self, resolved=self.resolved.stretched(factor), found_breaks=factor * self.found_breaks)
 
     def reordered(self, order: Integers) -> FunctionScan:
-        """Of the path with its joints in another order."""
+        """Scan of the path with its joints in another order."""
         return replace(self, resolved=self.resolved.reordered(order))
 
     @staticmethod
     def of_several(scans: Sequence[FunctionScan], resolved: ResolvedPath, found_breaks: Array) -> FunctionScan:
-        """Of paths one after another."""
+        """Scan of paths one after another."""
         return FunctionScan(
             resolved=resolved,
             found_breaks=found_breaks,
@@ -197,3 +198,68 @@ class FunctionScan:
             calls=sum(scan.calls for scan in scans),
             noise=max(scan.noise for scan in scans),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class DerivedScan:
+    """The scan of a path, changed by one of the methods of `FunctionScan`, or left as it is; found when it is needed.
+
+    path : the one that was scanned, or will be
+    change : the name of the method; None: nothing changes
+    arguments : of the method
+    """
+
+    path: ShapePath
+    change: str | None = None
+    arguments: tuple[Any, ...] = ()
+
+    def __call__(self) -> FunctionScan:
+        """Find it."""
+        scan = self.path._scan
+        return scan if self.change is None else getattr(scan, self.change)(*self.arguments)
+
+
+@dataclass(frozen=True, eq=False)
+class JoinedScan:
+    """The scan of paths one after another, each with all its loops; found when it is needed."""
+
+    paths: Sequence[ShapePath]
+
+    def __call__(self) -> FunctionScan:
+        """Find it."""
+        scans = [path._scan for path in self.paths]
+        whole = [joined([scan.resolved] * path.loops) for scan, path in zip(scans, self.paths, strict=True)]
+        found: list[Array] = []
+        start = 0.0
+        for scan, path in zip(scans, self.paths, strict=True):
+            found += [start + scan.duration * loop + scan.found_breaks for loop in range(path.loops)]
+            start += path.duration
+        return FunctionScan.of_several(scans, joined(whole), np.concatenate(found))
+
+
+def check_rates(curve: Curve, breaks: Array) -> None:
+    """Compare the function's rates with differences of its shapes away from the breaks.
+
+    At two steps: where these disagree with each other, as on the flank of a burst, nothing follows from them.
+    """
+    left, width = breaks[:-1], np.diff(breaks)
+    middle = left + 0.381 * width
+    coarse, _, _ = _differences(curve, middle, 1e-4 * width)
+    slope, rate, spread = _differences(curve, middle, 1e-5 * width)
+    scale = np.abs(rate) + np.maximum(spread, 1e-9) / breaks[-1]
+    wrong = np.abs(slope - rate) > 1e-3 * scale + 10.0 * np.abs(slope - coarse)
+    if wrong.any():
+        where, joint = (int(i) for i in np.argwhere(wrong)[0])
+        raise TrajectoryError(
+            f"the path's function gives the rate {rate[where, joint]:.6g} of joint number {joint} at "
+            f"{middle[where]:.6g} s, but its shapes change at {slope[where, joint]:.6g}; return (shapes, rates)"
+        )
+
+
+def _differences(curve: Curve, middle: Array, step: Array) -> tuple[Array, Array, Array]:
+    """Slopes of the shapes by central differences of order four, rates as given, spread of the shapes."""
+    shapes, rates = curve(np.concatenate([middle + k * step for k in (-2, -1, 0, 1, 2)]))
+    check_finite(shapes, "shapes of the path's function")
+    a, b, _, d, e = shapes.reshape(5, len(middle), -1)
+    slopes = (a - 8 * b + 8 * d - e) / (12 * step[:, None])
+    return slopes, rates.reshape(5, len(middle), -1)[2], np.ptp(shapes, axis=0)

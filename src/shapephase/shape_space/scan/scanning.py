@@ -1,4 +1,4 @@
-"""What is known only as a function of time, looked at once: resolved to its rounding before it is integrated.
+"""Scan of a function of time: it is resolved to its rounding before it is integrated.
 
 The function is first sampled at some 5,200 unevenly spaced times with no gap above 1/4,000 of the duration. Chebyshev
 series on panels, halved where they disagree with these samples or with their own neighbours, then resolve its columns.
@@ -34,77 +34,43 @@ from ._scan_panels import (
 from .function_scan import FunctionScan, ScannedFunction
 
 _EPS = float(np.finfo(float).eps)
-# Panels of the only piece, of each of a few (up to four), and of each of many.
-_FIRST_PANELS = (4, 2, 1)
-# Rounding of a function's values, and of a series through them, in units of the largest.
-_ROUNDING = 32.0 * _EPS
-# Of the largest shape or rate of the path: a function that subtracts numbers as large as these is off by so much.
-_INNER_ROUNDING = 64.0 * _EPS
-# [rad], also of rates times half the width of a panel: steps within the function may be as high, by rounding as
-# of 1,000 + r - 1,000, or from piece to piece of what an integrator gave.
-_INNER_STEPS = 1e-12
-# Of what was left before a panel was halved: series gain digits by it, rounding stays.
-_STUBBORN = 0.2
-# In units of the rounding of the times: what shapes and rates change in that time is not theirs.
-_TIME_ROUNDING = 8.0
-# Of the duration: narrower panels would consist of rounding.
-_LEAST_WIDTH = 1e-13
-# Of the duration: from here on a panel that cannot be resolved is searched for a kink.
-_KINK_WIDTH = 2.0**-12
-# Panels before halving ends, besides 40 for every break: a path that needs more is rough, not merely long.
-_MOST_PANELS = 4000
-# [rad], of rates times half the width of a panel: noise up to this is left to the tolerance; more is refused.
-_MOST_NOISE = 1e-9
-# In units of the rounding of times: how well kinks are located.
-_KINK_TICKS = 2.0
-# Of the scatter between neighbouring times: a series through values that scatter is off by so much.
-_NOISE_MARGIN = 16.0
-# Of a panel: where noise is looked for, which is no node and no half of anything.
-_NOISE_PLACE = 0.4142
-# Of them the scatter is the median, which a single jump does not move.
-_NOISE_TIMES = 10
-# In units of the rounding of times: so near to each other no function changes.
-_NOISE_STEP = 64.0
-# [rad]: an integral of the rates that differs by more from the shapes on a panel is an error of the rates.
-_RATE_DEFECT = 1e-9
-# Of a Chebyshev polynomial at the end of its panel, times half its width.
-_END_SLOPES = np.arange(DEGREE + 1.0) ** 2
-# Of the largest value, in every coefficient of a series.
-_SLOPE_ROUNDING = 4.0 * _EPS
-# Of the last coefficients: what series of so many terms leave out of a slope.
-_SLOPE_MARGIN = 8.0
-# Of the largest slope: two panels that differ by less at their common end are one smooth function.
-_LEAST_CORNER = 1e-8
-# Times named in a warning.
-_NAMED_TIMES = 8
+_FIRST_PANELS = (4, 2, 1)  # of the only piece, of each of up to four, of each of more
+_ROUNDING = 32.0 * _EPS  # of a function's values and of a series through them, relative to the largest
+_INNER_ROUNDING = 64.0 * _EPS  # relative to the path's largest shape or rate, which the function may subtract
+_INNER_STEPS = 1e-12  # [rad] steps within the function, as by 1,000 + r - 1,000 or between an integrator's pieces
+_STUBBORN = 0.2  # share left after halving a panel: a series gains digits, rounding stays
+_TIME_ROUNDING = 8.0  # roundings of the times: changes in that time are not resolved
+_LEAST_WIDTH = 1e-13  # relative to the duration: narrower panels hold only rounding
+_KINK_WIDTH = 2.0**-12  # relative to the duration: narrower unresolved panels are searched for a kink
+_MOST_PANELS = 4000  # and 40 per break: a path that needs more is rough, not merely long
+_MOST_NOISE = 1e-9  # [rad], of rates times half a panel: less is covered by the tolerance, more is refused
+_KINK_TICKS = 2.0  # roundings of times: accuracy of a located kink
+_NOISE_MARGIN = 16.0  # error of a series through scattered values, over their scatter
+_NOISE_PLACE = 0.4142  # place in a panel for the noise test: no node, no half of anything
+_NOISE_TIMES = 10  # their median scatter is not moved by a single jump
+_NOISE_STEP = 64.0  # roundings of times: no function changes in so short a time
+_RATE_DEFECT = 1e-9  # [rad] larger differences between integrated rates and shapes are an error of the rates
+_END_SLOPES = np.arange(DEGREE + 1.0) ** 2  # Chebyshev slopes at a panel's end, times half its width
+_SLOPE_ROUNDING = 4.0 * _EPS  # in every coefficient of a series, relative to the largest value
+_SLOPE_MARGIN = 8.0  # truncation of a slope, over the last coefficients
+_LEAST_CORNER = 1e-8  # relative to the largest slope: a smaller difference at a common end is smooth
+_NAMED_TIMES = 8  # times that a warning lists
 
 
 def scanned(function: ScannedFunction, breaks: Array) -> FunctionScan:
     """Look at a function of which only its values are known.
 
-    Parameters
-    ----------
-    breaks : (M,) times between which it is said to be smooth, first and last its ends [s]
+    breaks : (M,) times between which it is declared smooth, first and last its ends [s]
 
-    Raises
-    ------
-    TrajectoryError
-        If what must be continuous jumps, or a rate is not the derivative of its value.
-    NoisyPathError
-        If the values carry noise.
-    AccuracyNotReached
-        If it is too rough for some thousands of panels.
-
-    Warns
-    -----
-    UndeclaredBreakWarning
-        Of kinks that are not among the breaks.
+    Raises TrajectoryError if what must be continuous jumps, or a rate is not the derivative of its value. Raises
+    NoisyPathError if the values carry noise. Raises AccuracyNotReached if it is too rough for some thousands of panels.
+    Warns of kinks that are not among the breaks.
     """
     return _Scan(function, breaks).result()
 
 
 class _Scan:
-    """One look at a function; all columns are weighted as soon as their weights are known."""
+    """Scan of a function; all columns are weighted as soon as their weights are known."""
 
     def __init__(self, function: ScannedFunction, breaks: Array) -> None:
         self._function, self._breaks = function, breaks
@@ -132,7 +98,7 @@ class _Scan:
         self._samples, values = both[: len(self._times)], both[len(self._times) :].reshape(*nodes.shape, -1)
         self._largest = np.maximum(np.abs(self._samples).max(axis=0, initial=0.0), sizes * self._weights)
         self._reach = np.abs(self._samples[:, :n]).max(axis=0, initial=0.0)
-        # Of a rate that is a derivative, the largest value in the whole time; any other has its own.
+        # A rate that is a derivative counts by the largest value in the whole time; any other has its own.
         of_rates = np.where(self._function.paired, self._largest[:n] / self._duration, self._largest[n:])
         self._inner_sizes = np.concatenate([self._largest[:n], of_rates])
         done: list[Piece] = []
@@ -153,13 +119,13 @@ class _Scan:
         # The outermost ends of a piece are the breaks themselves.
         edges = np.append(panels.left, self._duration)
         edges[starts] = [piece.left for piece in done]
-        found = np.array(sorted(self._found))
-        kinks = np.array([time for time in found if time not in self._turned])
+        breaks = np.array(sorted(self._found))
+        kinks = np.array([time for time in breaks if time not in self._turned])
         if len(kinks):
             self._warn(kinks)
         return FunctionScan(
             resolved=ResolvedPath(edges[:-1], edges[1:], panels.coefficients, panels.noise, self._duration, defect),
-            found_breaks=found,
+            found_breaks=breaks,
             evaluations=self._evaluations,
             calls=self._calls,
             noise=self._noise,
@@ -203,8 +169,8 @@ class _Scan:
             panels = bad.halves(left_over)
             level += 1
         has_kinks = np.array([bool(piece.kinks) for piece in pieces])
-        found = ResolvedPanels.in_order(done)
-        return found.of(~has_kinks[found.piece])
+        panels_in_order = ResolvedPanels.in_order(done)
+        return panels_in_order.of(~has_kinks[panels_in_order.piece])
 
     def _fit(self, panels: Panels, values: Array | None) -> PanelFit:
         """Series of panels, and how far the path is from them."""
@@ -249,7 +215,7 @@ class _Scan:
         return PanelFit(coefficients, misfit, np.maximum(np.maximum(floor, inner), _NOISE_MARGIN * scatter), noise)
 
     def _floor(self, values: Array, width: Array) -> Array:
-        """What rounding of numbers and of times leaves of the columns on panels: (P, k, 2 n) -> (P, 2 n)."""
+        """Rounding of the columns on panels, by numbers and by times: (P, k, 2 n) -> (P, 2 n)."""
         n = self._n
         largest = np.abs(values).max(axis=1, initial=0.0)
         slopes = np.ptp(values, axis=1) / width[:, None]
@@ -278,7 +244,7 @@ class _Scan:
         return [Piece(a, b) for a, b in pairwise([piece.left, *sorted(piece.kinks), piece.right])]
 
     def _find_corners(self, panels: ResolvedPanels, starts: Integers) -> None:
-        """Note kinks of values without rates that are at an end of a panel by chance: the slopes there tell."""
+        """Note kinks of values without rates that are at an end of a panel by chance, by the slopes there."""
         alone = ~self._function.paired
         if not alone.any():
             return
@@ -310,8 +276,8 @@ class _Scan:
         gap -= 2.0 * np.pi * turns
         speeds = np.maximum(np.abs(first), np.abs(second))[:, n:] * function.paired
         jumps = np.abs(gap) > CLOSED * np.maximum(1.0, self._reach) + 2.0 * (after - before)[:, None] * speeds
-        found = np.isin([piece.right for piece in pieces[:-1]], self._found)
-        jumps &= found[:, None] | ~function.may_jump
+        at_kinks = np.isin([piece.right for piece in pieces[:-1]], self._found)
+        jumps &= at_kinks[:, None] | ~function.may_jump
         if jumps.any():
             row, column = (int(i) for i in np.argwhere(jumps)[0])
             weight = self._weights[column]
@@ -321,14 +287,14 @@ class _Scan:
             )
         rate_jumps = np.abs(second - first)[:, n:]
         # A kink is known to a rounding or two of the times: what a value may be off by there counts as noise.
-        panels.noise[starts[1:] - 1] += _KINK_TICKS * self._tick * rate_jumps.max(axis=1, initial=0.0) * found
+        panels.noise[starts[1:] - 1] += _KINK_TICKS * self._tick * rate_jumps.max(axis=1, initial=0.0) * at_kinks
         has_jump = rate_jumps > CLOSED * np.maximum(1.0, self._largest[n:])
         self._turned = {
             piece.right for row, piece in enumerate(pieces[:-1]) if turns[row].any() and not has_jump[row].any()
         }
 
     def _scatter(self, values: Array) -> Array:
-        """How far values scatter over times so near to each other that no function changes: (P, k, 2 n) -> (P, 2 n).
+        """Scatter of values over times so near to each other that no function changes: (P, k, 2 n) -> (P, 2 n).
 
         A function that is merely rough goes straight there; at a single jump most neighbours still do.
         """
@@ -337,7 +303,7 @@ class _Scan:
         return np.median(bends, axis=1) / (0.6745 * np.sqrt(6.0))
 
     def _allowed_noise(self, panels: Panels, noisy: Mask, scatter: Array) -> Array:
-        """Of panels whose series follow noise, where it can be left to a tolerance: (P,) [rad]; else NoisyPathError."""
+        """Noise of panels whose series follow it, where the tolerance covers it: (P,) [rad]; else NoisyPathError."""
         n = self._n
         half = 0.5 * (panels.right - panels.left)
         weights = np.where(np.arange(2 * n) < n, 1.0, half[:, None])

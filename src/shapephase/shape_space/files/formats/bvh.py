@@ -15,12 +15,9 @@ from ....body.formats.bvh_text import Bone, BvhFaultError, Skeleton, bvh_skeleto
 from ....errors import TrajectoryError
 from ..recording import Table
 
-_WHOLE_TURN = 360.0
-"""[degrees] Files wrap angles; a hinge goes on by what is nearest."""
-_ZERO = 1e-5
-"""[degrees] What six decimals and rounding leave of an angle of zero."""
-_OTHER_AXES = 0.5
-"""Cosine of the angle between a bone's offsets in two files, below which its axes are others and not other persons'."""
+_WHOLE_TURN = 360.0  # [deg] files wrap angles; hinges go on to the nearest value
+_ZERO = 1e-5  # [deg] rounding of an angle of zero with six decimals
+_OTHER_AXES = 0.5  # least cosine between a bone's offsets in two files: other persons differ by less than other axes
 
 
 def read_bvh(where: Path, data: bytes, body: Body) -> Table:
@@ -30,10 +27,8 @@ def read_bvh(where: Path, data: bytes, body: Body) -> Table:
     that jumps by more than half a turn from one frame to the next is continued by whole turns. Bones that the base
     hangs on move it.
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with the line; for a body that is not from a BVH file, or from one whose bones have other axes.
+    Raises TrajectoryError for faults, with the line; for a body that is not from a BVH file, or from one whose bones
+    have other axes.
     """
     check_object(body, "Body", "body")
     metre = body.length_unit
@@ -93,7 +88,7 @@ _LOAD = "load the body from this file"
 
 
 def _begins_at_zero(skeleton: Skeleton, base: int) -> bool:
-    """Whether all angles of the first frame are zero, but for those of nodes above the base."""
+    """True if all angles of the first frame are zero, but for those of nodes above the base."""
     above = skeleton.above(base)[1:]
     columns = [column for number, bone in enumerate(skeleton.bones) if number not in above for _, column in bone.turns]
     return bool(np.all(np.abs(skeleton.frames[:1, columns]) <= _ZERO))

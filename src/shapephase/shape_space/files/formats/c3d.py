@@ -18,72 +18,56 @@ from .column_tables import column_table
 from .parser_process import parsed
 from .segment_poses import matrix_poses
 
-INVERSE_KINEMATICS = (
+INVERSE_KINEMATICS = (  # the way from markers to joints
     "positions of markers are no angles of joints; find those by inverse kinematics first (in OpenSim: scale the "
     "model, run the Inverse Kinematics tool with these markers), and give the `.mot` file that it writes"
 )
-"""The way from markers to joints."""
-_BLOCK = 512
-"""Bytes of a block of a C3D file; its header is one."""
-_KEY = 0x50
-"""The second byte of every C3D file, and of its parameters."""
-_PROCESSORS = (84, 85, 86)
-"""How numbers are written: Intel, DEC, MIPS."""
+_BLOCK = 512  # bytes; the header is one block
+_KEY = 0x50  # second byte of every C3D file, and of its parameters
+_PROCESSORS = (84, 85, 86)  # number formats: Intel, DEC, MIPS
 _AXES = "xyz"
 
 
 def read_c3d(where: Path, data: bytes) -> Table:
-    """The angles of a C3D file: of each output `A` of the parameter ANGLES, the columns `A_x`, `A_y` and `A_z`.
+    """Angles of a C3D file, columns `A_x`, `A_y` and `A_z` for each output `A` of the parameter ANGLES.
 
-    Without angles, the poses of segments in its group ROTATION.
+    Without angles, the poses of segments in its group ROTATION, as markerless systems write them. The file is parsed in
+    a process of its own: a damaged one can crash ezc3d.
 
-    The file is parsed in a process of its own: a damaged one can crash ezc3d.
-
-    Raises
-    ------
-    TrajectoryError, MissingExtraError
-        For faults, with the frame; for a file that has markers alone; without ezc3d.
+    Raises TrajectoryError for faults, with the frame, and for markers alone; MissingExtraError without ezc3d.
     """
     if importlib.util.find_spec("ezc3d") is None:
         raise MissingExtraError("C3D files need ezc3d; install it with: pip install 'shapephase[data]'")
     _check_sizes(where, data)
-    found = parsed(where, data, "C3D", __name__)
-    labels, angles = found["labels"].tolist(), set(found["angles"].tolist())
-    values, rate, first = found["points"], float(found["rate"]), int(found["first"])
+    content = parsed(where, data, "C3D", __name__)
+    labels, angles = content["labels"].tolist(), set(content["angles"].tolist())
+    values, matrices, first = content["points"], content["rotations"], int(content["first"])
     places = [(k, label) for k, label in enumerate(labels[: values.shape[1]]) if label in angles]
-    turned = found["segments"].tolist()
-    if not places and not turned:
+    segments = content["segments"].tolist()
+    if not places and not segments:
         raise TrajectoryError(f"{where}: {len(labels)} points and no angles among them: {INVERSE_KINEMATICS}")
-    if turned and not places:
-        rate = float(found["rotation_rate"])
+    rate = float(content["rate"] if places else content["rotation_rate"])
     if not 0.0 < rate < np.inf:
         raise TrajectoryError(f"{where}: the parameter POINT:RATE, samples a second, is {rate:g}")
-    if turned and not places:
-        return _segments(where, turned, found, rate)
-    unit = unit_of(str(found["unit"]))
-    frames = first + np.arange(values.shape[2])
-    columns = [(f"{label}_{axis}", values[row, k]) for k, label in places for row, axis in enumerate(_AXES)]
-    units = {} if unit is None else {name: unit for name, _ in columns}
+    if places:
+        unit = unit_of(str(content["unit"]))
+        frames = first + np.arange(values.shape[2])
+        columns = [(f"{label}_{axis}", values[row, k]) for k, label in places for row, axis in enumerate(_AXES)]
+        units, poses = {} if unit is None else {name: unit for name, _ in columns}, None
+    else:
+        count = min(len(segments), matrices.shape[2])
+        names = tuple(re.sub(r"_?4[xX]4$", "", label) for label in segments[:count])
+        frames = first * matrices.shape[3] // max(int(content["frames"]), 1) + np.arange(matrices.shape[3])
+        metre = LENGTHS.get(unit_of(str(content["length_unit"])) or "")
+        columns, units, poses = [], {}, matrix_poses(names, matrices[:, :, :count], metre)
     table = column_table(
         str(where), "C3D", [("time", frames / rate), *columns], units=units | {"time": "s"}, row="frame"
     )
-    return replace(table, rows=(frames + 1).tolist())
-
-
-def _segments(where: Path, labels: list[str], found: dict[str, Any], rate: float) -> Table:
-    """The poses of segments in the group ROTATION, as markerless systems write them."""
-    matrices = found["rotations"]
-    count = min(len(labels), matrices.shape[2])
-    names = tuple(re.sub(r"_?4[xX]4$", "", label) for label in labels[:count])
-    frames = int(found["first"]) * matrices.shape[3] // max(int(found["frames"]), 1) + np.arange(matrices.shape[3])
-    unit = unit_of(str(found["length_unit"]))
-    poses = matrix_poses(names, matrices[:, :, :count], LENGTHS.get(unit or ""))
-    table = column_table(str(where), "C3D", [("time", frames / rate)], units={"time": "s"}, row="frame")
     return replace(table, rows=(frames + 1).tolist(), poses=poses)
 
 
 def parse(data: bytes) -> dict[str, Any]:
-    """What the process that parses does with the bytes of a file."""
+    """Parse the bytes of a file, in a process of its own."""
     import ezc3d
 
     with tempfile.NamedTemporaryFile(suffix=".c3d") as copy:
@@ -110,7 +94,7 @@ def parse(data: bytes) -> dict[str, Any]:
 
 
 def _check_sizes(where: Path, data: bytes) -> None:
-    """Raise TrajectoryError where header or parameters promise more than the file has: ezc3d believes them."""
+    """Raise TrajectoryError where header or parameters promise more than the file has: ezc3d relies on them."""
     words = np.frombuffer(data[:_BLOCK], dtype=np.uint8)
     place = (int(words[0]) - 1) * _BLOCK if len(words) == _BLOCK else -1
     if place < 0 or words[1] != _KEY or place + 4 > len(data) or data[place + 3] not in _PROCESSORS:
@@ -132,10 +116,10 @@ def _check_sizes(where: Path, data: bytes) -> None:
 
 def _texts(group: Any, name: str) -> list[str]:
     """A parameter of texts, and those that continue it under the same name with a number: at most 255 fit into one."""
-    found: list[str] = []
+    texts: list[str] = []
     for k in range(1, 100):
         key = name if k == 1 else f"{name}{k}"
         if key not in group:
             break
-        found += [str(text).strip() for text in np.ravel(group[key]["value"]).tolist()]
-    return found
+        texts += [str(text).strip() for text in np.ravel(group[key]["value"]).tolist()]
+    return texts

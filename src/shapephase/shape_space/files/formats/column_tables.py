@@ -1,4 +1,4 @@
-"""Columns in memory, of numbers, texts or dates, as a table: what files, data frames and arrays come to."""
+"""Columns in memory, of numbers, texts or dates, as a table."""
 
 from __future__ import annotations
 
@@ -13,10 +13,8 @@ from ....errors import TrajectoryError
 from ..recording import Table, is_blank, number
 from .table_heads import CLOCK, COMMA_NUMBER, DATE, is_value
 
-_MOST_FAULTS = 1000
-"""Entries of a column that are no numbers whose text is kept for messages."""
-_WHOLE = 2**53
-"""Beyond it doubles do not have all whole numbers: times in nanoseconds stay integers until their start is off."""
+_MOST_FAULTS = 1000  # entries of a column whose text is kept for messages
+_WHOLE = 2**53  # largest exact integer of a double: larger times in nanoseconds stay integers
 
 
 def column_table(
@@ -29,34 +27,29 @@ def column_table(
     rows: Sequence[int] | None = None,
     comma: bool = False,
 ) -> Table:
-    """The table of columns that have labels: what is no number is NaN there, and a fault; dates become seconds.
+    """Table of columns with labels: an entry that is no number is NaN and a fault; dates become seconds.
 
-    Parameters
-    ----------
     columns : label and values (N,)
-    units : label -> unit, where it is said beside the label
+    units : label -> unit, where it is stated beside the label
     rows : (N,) the numbers of the samples in messages; None: from 0
-    comma : whether texts have decimal commas
+    comma : True if texts have decimal commas
 
-    Raises
-    ------
-    TrajectoryError
-        For labels that are no texts, empty or doubled, and columns of several lengths.
+    Raises TrajectoryError for labels that are no texts, empty or doubled, and columns of several lengths.
     """
-    found: dict[str, Array] = {}
+    numbers: dict[str, Array] = {}
     faults: dict[str, dict[int, str]] = {}
-    said = dict(units or {})
+    units = dict(units or {})
     for position, (label, values) in enumerate(columns, start=1):
         if not isinstance(label, str):
             raise TrajectoryError(f"{where}: column {position} has the name {label!r:.40}, and a text is needed")
         name = label.strip()
         if not name:
             raise TrajectoryError(f"{where}: column {position} has no name in the header; write one")
-        if name in found:
+        if name in numbers:
             raise TrajectoryError(f"{where}: column {name[:40]} stands twice in the header; give each its own name")
-        found[name], faults[name], is_date = _numbers(values, comma, f"{where}: column {name!r:.60}")
+        numbers[name], faults[name], is_date = _numbers(values, comma, f"{where}: column {name!r:.60}")
         if is_date:
-            said[name] = "s"
+            units[name] = "s"
         mixed = next((k for k, text in faults[name].items() if comma and is_value(text)), None)
         if mixed is not None:
             raise TrajectoryError(
@@ -64,16 +57,16 @@ def column_table(
                 f"{faults[name][mixed]!r:.40} has a decimal point, and other entries have decimal commas; write all in "
                 "one way, without marks between thousands"
             )
-    counts = {len(values) for values in found.values()}
+    counts = {len(values) for values in numbers.values()}
     if len(counts) > 1:
-        listed = ", ".join(f"{name} {len(values)}" for name, values in list(found.items())[:12])
-        raise TrajectoryError(f"{where}: the columns have different lengths: {listed}; give each one number a sample")
+        lengths = ", ".join(f"{name} {len(values)}" for name, values in list(numbers.items())[:12])
+        raise TrajectoryError(f"{where}: the columns have different lengths: {lengths}; give each one number a sample")
     labels = range(max(counts, default=0)) if rows is None else rows
-    return Table(where=where, format=kind, columns=found, rows=labels, row=row, units=said, faults=faults)
+    return Table(where=where, format=kind, columns=numbers, rows=labels, row=row, units=units, faults=faults)
 
 
 def _numbers(values: Any, comma: bool, place: str) -> tuple[Array, dict[int, str], bool]:
-    """Values as numbers, what is none of them, and whether they are dates or durations [s]."""
+    """Values as numbers, entries that are none, and True for dates or durations [s]."""
     if isinstance(values, np.ma.MaskedArray):
         values = np.ma.filled(values.astype(np.float64), np.nan) if values.dtype.kind in "fiu" else values.tolist()
     array = np.asarray(values, dtype=object) if isinstance(values, list) else np.asarray(values)
@@ -90,17 +83,17 @@ def _numbers(values: Any, comma: bool, place: str) -> tuple[Array, dict[int, str
     dates = _dates(entries, place)
     if dates is not None:
         return dates, {}, True
-    found, faults = np.empty(len(entries)), {}
+    numbers, faults = np.empty(len(entries)), {}
     for k, entry in enumerate(entries):
         value = _number(entry, comma)
-        found[k] = np.nan if value is None else value
+        numbers[k] = np.nan if value is None else value
         if value is None and len(faults) < _MOST_FAULTS:
             faults[k] = str(entry)[:60]
-    return found, faults, False
+    return numbers, faults, False
 
 
 def _number(entry: object, comma: bool) -> float | None:
-    """A number, NaN of a gap, None of another text; with decimal commas, one that has a decimal point is another."""
+    """A number, NaN for a gap, None for another text; with decimal commas, a decimal point makes another text."""
     if entry is None or type(entry).__name__ in ("NAType", "NaTType"):
         return np.nan
     if not isinstance(entry, str):
@@ -122,14 +115,14 @@ def _number(entry: object, comma: bool) -> float | None:
 
 
 def _seconds(times: Any) -> Array:
-    """Dates or durations of NumPy as seconds: dates since the first of them."""
+    """Dates since the first of them, or durations of NumPy [s]."""
     since = times - times[0] if times.dtype.kind == "M" and len(times) else times
     durations = since.astype("timedelta64[ns]")
     return np.where(np.isnat(durations), np.nan, durations / np.timedelta64(1, "s"))
 
 
 def _dates(entries: Sequence[Any], place: str) -> Array | None:
-    """Dates, times of a day or durations of Python, or texts of them, as seconds; None where they are other things.
+    """Dates, times of a day or durations of Python, or texts of them [s]; None for other entries.
 
     Raises TrajectoryError for dates of which one cannot be read.
     """
@@ -137,16 +130,19 @@ def _dates(entries: Sequence[Any], place: str) -> Array | None:
     if isinstance(first, str) and (DATE.fullmatch(first.strip()) or CLOCK.fullmatch(first.strip())):
         import pandas as pd
 
-        dated = DATE.fullmatch(first.strip()) is not None
         texts = [str(entry).strip().replace(",", ".") for entry in entries]
         try:
-            made = pd.to_datetime(texts, format="ISO8601", utc=True) if dated else pd.to_timedelta(_full_clock(texts))
+            if DATE.fullmatch(first.strip()):
+                made = pd.to_datetime(texts, format="ISO8601", utc=True)
+            else:
+                # Without hours, 12:30.5 is 12 minutes.
+                made = pd.to_timedelta([text if text.count(":") == 2 else f"00:{text}" for text in texts])
         except (ValueError, OverflowError) as error:
             raise TrajectoryError(
                 f"{place}: {error!s:.120}; write all times as {first.strip()!r:.40}, or in seconds"
             ) from None
         return _seconds(np.asarray(made - made[0]))
-    if not entries or not isinstance(first, datetime.timedelta | datetime.time | datetime.datetime):
+    if not entries:
         return None
     if all(isinstance(entry, datetime.timedelta) for entry in entries):
         return np.array([entry.total_seconds() for entry in entries])
@@ -158,8 +154,3 @@ def _dates(entries: Sequence[Any], place: str) -> Array | None:
         except TypeError:
             return None
     return None
-
-
-def _full_clock(texts: Sequence[str]) -> list[str]:
-    """Times of day with hours: `12:30.5` is 12 minutes."""
-    return [text if text.count(":") == 2 else f"00:{text}" for text in texts]

@@ -11,23 +11,14 @@ from ....arrays import Array
 from ....errors import TrajectoryError
 from ..recording import Table, warn
 
-_JOINTS = (
+_JOINTS = (  # in the order of a frame: four numbers w x y z of a ball joint, one of a hinge
     *(("chest", 4), ("neck", 4), ("right_hip", 4), ("right_knee", 1), ("right_ankle", 4), ("right_shoulder", 4)),
-    *(
-        ("right_elbow", 1),
-        ("left_hip", 4),
-        ("left_knee", 1),
-        ("left_ankle", 4),
-        ("left_shoulder", 4),
-        ("left_elbow", 1),
-    ),
+    *(("right_elbow", 1), ("left_hip", 4), ("left_knee", 1), ("left_ankle", 4), ("left_shoulder", 4)),
+    ("left_elbow", 1),
 )
-"""In the order of a frame: of a spherical joint four numbers, w x y z, of a hinge one."""
-_BASE = 8
-"""Numbers of a frame before them: its duration, the place of the base, its quaternion w x y z."""
+_BASE = 8  # numbers before the joints: duration, place and quaternion w x y z of the base
 _WIDTH = _BASE + sum(count for _, count in _JOINTS)
-_OFF_UNIT = 0.01
-"""Distance from a length of 1: what rounding in a file does not explain."""
+_OFF_UNIT = 0.01  # error of a quaternion's length beyond rounding
 _LEAST_LENGTH = 1e-6
 
 
@@ -38,14 +29,11 @@ def read_deepmimic(where: Path, data: bytes) -> Table:
     joints of these names. Quaternions are made as long as 1, as DeepMimic does it (`cKinTree::PostProcessPose`): its
     own files have some of other lengths.
 
-    Raises
-    ------
-    TrajectoryError
-        For JSON that is no such motion.
+    Raises TrajectoryError for JSON that is no such motion.
     """
     try:
-        said = json.loads(data)
-        frames = np.array(said["Frames"], dtype=np.float64)
+        motion = json.loads(data)
+        frames = np.array(motion["Frames"], dtype=np.float64)
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise TrajectoryError(
             f"{where}: no motion of DeepMimic ({type(error).__name__}: {error!s:.100}); an object with Frames, lists "
@@ -90,10 +78,10 @@ def _with_unit_quaternions(frames: Array, where: Path) -> Array:
             lengths = np.linalg.norm(quaternions, axis=1)
             off = np.abs(lengths - 1.0)
             frame = int(np.argmax(off))
-            said = f"{where}: frame {frame}: the quaternion of {name} has the length {lengths[frame]:.4g}"
+            place = f"{where}: frame {frame}: the quaternion of {name} has the length {lengths[frame]:.4g}"
             if lengths.min() < _LEAST_LENGTH:
-                raise TrajectoryError(f"{said}, and another is zero; leave that frame out")
-            worst = max(worst, (float(off[frame]), said))
+                raise TrajectoryError(f"{place}, and another is zero; leave that frame out")
+            worst = max(worst, (float(off[frame]), place))
             quaternions /= lengths[:, None]
         first += count
     if worst[1]:

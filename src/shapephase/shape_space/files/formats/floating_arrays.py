@@ -1,4 +1,4 @@
-"""Arrays with all coordinates of a floating body, as simulators and optimisers store them, base and joints together."""
+"""Arrays of simulators and optimisers with all coordinates of a floating body, base and joints together."""
 
 from __future__ import annotations
 
@@ -17,12 +17,9 @@ from ....errors import ShapeError, TrajectoryError, unknown_name
 from ..nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
 from ..recording import Rates
 
-_NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot|qdot)[_\[ ]?([0-9]{1,6})\]?")
-"""Labels of a table such as qpos_0, qpos[0] and qpos0."""
-_ROOT = 6
-"""Coordinates of a root that moves freely by three slides and three hinges."""
-_OFF_UNIT = 0.1
-"""A quaternion's length may be off one by so much: an audit has to see what is wrong."""
+_NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot|qdot)[_\[ ]?([0-9]{1,6})\]?")  # qpos_0, qpos[0], qpos0
+_ROOT = 6  # coordinates of a free root: three slides, three hinges
+_OFF_UNIT = 0.1  # allowed error of a quaternion's length: an audit has to see what is wrong
 _NAMES_THAT_SAY_IT = (
     "store arrays under names that say the order: qpos (place, quaternion w x y z, joints), or base_position, "
     "base_quat_xyzw and shapes beside joint_names"
@@ -30,10 +27,8 @@ _NAMES_THAT_SAY_IT = (
 
 
 class FreeJoint(NamedTuple):
-    """How a program lays out the coordinates of a free base, which stand before those of the joints.
+    """Layout of the coordinates of a free base, which stand before those of the joints.
 
-    Attributes
-    ----------
     title : of the program and its array
     quaternion : columns of x, y, z and w
     position : columns of the place
@@ -60,8 +55,6 @@ DRAKE_Q = FreeJoint("Drake q", [1, 2, 3, 0], [4, 5, 6], [0, 1, 2], [3, 4, 5], "w
 class FloatingMotion(NamedTuple):
     """Base and joints of a floating body at N samples.
 
-    Attributes
-    ----------
     title : of the program and its array
     names : of the columns of `joints`
     joints : (N, m) [rad or m]
@@ -85,19 +78,14 @@ class FloatingMotion(NamedTuple):
 
 
 def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: str | None) -> FloatingMotion | None:
-    """Motion in one of the arrays `qpos`, `q` and `Q`; None where there is none of them.
+    """Motion in one of the arrays `qpos`, `q` and `Q`; None without them.
 
-    What a file means by `q` follows from the number of its coordinates, and of Pinocchio's and Drake's order from
-    which columns are a quaternion of length one. Coordinates may stand along either axis.
+    The meaning of `q` follows from the number of its coordinates, and Pinocchio's or Drake's order from the columns
+    that are a quaternion of length one. Coordinates may stand along either axis.
 
-    Parameters
-    ----------
     order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
 
-    Raises
-    ------
-    TrajectoryError, ShapeError
-        For arrays that fit no order, or several.
+    Raises TrajectoryError, ShapeError for arrays that fit no order, or several.
     """
     kind = next((name for name in ("qpos", "q", "Q") if name in arrays), None)
     if kind is None:
@@ -110,31 +98,31 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
     layouts = {"qpos": (MUJOCO_QPOS,), "q": (PINOCCHIO_Q, DRAKE_Q), "Q": ()}[kind]
     root = None if kind == "qpos" else root_width(body, kind)
     fitting: list[tuple[FreeJoint | None, bool]] = []
-    for turned, rows in ((False, values), (True, values.T)):
+    for transposed, rows in ((False, values), (True, values.T)):
         if count not in (None, len(rows)):
             continue
         for layout in layouts:
             free = _free_columns(layout, rows.shape[1], names, body, order)
             if free is not None and (not free or _is_unit(rows[:, layout.quaternion])):
-                fitting.append((layout, turned))
+                fitting.append((layout, transposed))
         if root is not None and rows.shape[1] == root + body.n_shape:
-            fitting.append((None, turned))
+            fitting.append((None, transposed))
     if len(fitting) != 1:
+        times = "" if count is None else f", and there are {count} times"
         raise TrajectoryError(
-            f"{where}: {kind} has shape {values.shape}"
-            + ("" if count is None else f", and there are {count} times")
+            f"{where}: {kind} has shape {values.shape}{times}"
             + _misfit(kind, fitting, names or body.joint_names, None if root is None else root + body.n_shape)
         )
-    ((layout, turned),) = fitting
+    ((layout, transposed),) = fitting
     labels = {"qpos": ("qvel",), "q": ("v",), "Q": ()}[kind] if layout else ("Qdot", "qdot")
     stored = next((arrays[label] for label in labels if label in arrays), None)
     rates = None if stored is None else np.asarray(stored)
-    if turned:
+    if transposed:
         values, rates = values.T, None if rates is None else rates.T
     if layout is None:
         return _of_root(values, rates, where, body, root or 0)
-    found = with_free_joint(layout, values, rates, body, names=names, order=order, labels=(kind, *labels), where=where)
-    return found._replace(nameless=arrays.get("nameless", found.nameless))
+    motion = with_free_joint(layout, values, rates, body, names=names, order=order, labels=(kind, *labels), where=where)
+    return motion._replace(nameless=arrays.get("nameless", motion.nameless))
 
 
 def with_free_joint(
@@ -148,10 +136,8 @@ def with_free_joint(
     labels: Sequence[str],
     where: str,
 ) -> FloatingMotion:
-    """Motion in rows of coordinates: of the free base, where it is there, and of the joints.
+    """Motion in rows of coordinates, those of a free base before those of the joints.
 
-    Parameters
-    ----------
     places : (N, 7 + m), or without a free joint (N, m)
     rates : (N, 6 + k), of a ball joint its angular velocity in axes of the link that it moves; or None
     names : of the columns of the joints; None: those of an order
@@ -171,20 +157,18 @@ def with_free_joint(
     doubled = [name for name in names if list(names).count(name) > 1]
     if doubled:
         raise TrajectoryError(f"{where}: joint_names: {doubled[0]!r} stands {list(names).count(doubled[0])} times")
-    joints = places[:, free:]
-    found = FloatingMotion(layout.title, tuple(names), joints, nameless=nameless)
+    motion = FloatingMotion(layout.title, tuple(names), places[:, free:], nameless=nameless)
     if not free:
-        return found
-    quaternion, position = places[:, layout.quaternion], places[:, layout.position]
-    found = found._replace(quaternion=quaternion, position=position)
+        return motion
+    motion = motion._replace(quaternion=places[:, layout.quaternion], position=places[:, layout.position])
     if rates is None or not set(body.joint_names) <= set(names):
-        return found
+        return motion
     balls = sum(name.endswith(".w") for name in names)
     moving = finite_array(rates, f"{where}: {labels[1]}", (len(places), _ROOT + len(names) - balls))
-    return found._replace(
+    return motion._replace(
         rates=Rates(
             base=moving[:, layout.rate],
-            joints=_derivatives(found, moving[:, _ROOT:], body),
+            joints=_derivatives(motion, moving[:, _ROOT:], body),
             base_axes=layout.rate_axes,
             velocity=moving[:, layout.velocity],
             velocity_axes=layout.velocity_axes,
@@ -197,19 +181,20 @@ def numbered_columns(columns: Mapping[str, Any], where: str) -> dict[str, list[s
 
     Raises TrajectoryError for two labels of one number.
     """
-    found: dict[str, dict[int, str]] = {}
+    by_array: dict[str, dict[int, str]] = {}
     for label in columns:
         match = _NUMBERED.fullmatch(label.strip())
         if match is None:
             continue
-        numbers = found.setdefault(match[1], {})
-        if int(match[2]) in numbers:
-            both = f"{numbers[int(match[2])]!r} and {label!r}"
-            raise TrajectoryError(f"{where}: columns {both} are number {int(match[2])} of {match[1]}; keep one")
-        numbers[int(match[2])] = label
+        numbers = by_array.setdefault(match[1], {})
+        first = numbers.setdefault(int(match[2]), label)
+        if first != label:
+            raise TrajectoryError(
+                f"{where}: columns {first!r} and {label!r} are number {int(match[2])} of {match[1]}; keep one"
+            )
     return {
         name: [numbers[k] for k in range(len(numbers))]
-        for name, numbers in found.items()
+        for name, numbers in by_array.items()
         if sorted(numbers) == list(range(len(numbers)))
     }
 
@@ -235,37 +220,36 @@ def places_of(names: Sequence[str], body: Body) -> list[int]:
 
 
 def _of_root(values: Array, rates: Any, where: str, body: Body, width: int) -> FloatingMotion:
-    """Motion in biorbd's generalised coordinates: those of the root in the order of the body's file, the joints."""
+    """Motion in biorbd's generalised coordinates: of the root in the order of the body's file, then of the joints."""
     if body.ball_joints:
         raise TrajectoryError(
             f"{where}: Q of a model with quaternions is not read ({body.ball_joints[0]} has one); write columns by "
             "name, or q with the quaternion x y z w of each"
         )
-    root, joints = values[:, :width], values[:, width:]
-    names = body.joint_names
+    root, joints, names = values[:, :width], values[:, width:], body.joint_names
     if _is_biomod(body):
         names = tuple(name for name in simulator_order(body, MUJOCO, names) if name in names)
-    found = FloatingMotion("biorbd Q", names, joints)
     if rates is not None:
-        rates = np.asarray(rates)
-        if rates.shape != values.shape:
-            raise ShapeError(f"{where}: Qdot: expected shape {values.shape} as that of Q, got {rates.shape}")
+        if np.shape(rates) != values.shape:
+            raise ShapeError(f"{where}: Qdot: expected shape {values.shape} as that of Q, got {np.shape(rates)}")
         rates = finite_array(rates, f"{where}: Qdot", values.shape)
+    motion = FloatingMotion("biorbd Q", names, joints)
     if body.base_joints:
         way = dict(zip(way_names(body.base_joints), root.T, strict=True))
-        turned, placed = way_poses(body.base_joints, way, len(values))
-        return found._replace(quaternion=so3.quat_from_matrix(turned), position=placed)
+        turns, places = way_poses(body.base_joints, way, len(values))
+        return motion._replace(quaternion=so3.quat_from_matrix(turns), position=places)
     angles, axes = root[:, 3:], "xyz" if body.base_angles is None else body.base_angles[1]
-    found = found._replace(quaternion=so3.quat_from_matrix(so3.matrix_from_euler(angles, axes)), position=root[:, :3])
+    turns = so3.matrix_from_euler(angles, axes)
+    motion = motion._replace(quaternion=so3.quat_from_matrix(turns), position=root[:, :3])
     if rates is None:
-        return found
+        return motion
     base = np.zeros((len(values), 3))
     for k, axis in enumerate(axes):
-        # What was there before is seen from axes that have turned on.
+        # The rate so far is seen from axes that have turned on.
         turn = so3.matrix_from_euler(angles[:, [k]], axis)
         base = so3.apply(so3.transpose(turn), base) + rates[:, 3 + k, None] * np.eye(3)["xyz".index(axis)]
     moving = rates[:, _ROOT:][:, places_of(names, body)]
-    return found._replace(rates=Rates(base, moving, "base", rates[:, :3], "world"))
+    return motion._replace(rates=Rates(base, moving, "base", rates[:, :3], "world"))
 
 
 def _is_biomod(body: Body) -> bool:
@@ -286,21 +270,21 @@ def _free_columns(
 
 def _derivatives(motion: FloatingMotion, rates: Array, body: Body) -> Array:
     """Derivatives of the body's coordinates (N, n) from the rates of all joints in the order of the array."""
-    found: dict[str, Array] = {}
+    derivatives: dict[str, Array] = {}
     column, names = 0, motion.names
-    while len(found) < len(names):
-        name = names[len(found)]
+    while len(derivatives) < len(names):
+        name = names[len(derivatives)]
         joint, dot, part = name.rpartition(".")
-        parts = [f"{joint}.{each}" for each in "xyzw"]
-        if not dot or part not in "xyzw" or not set(parts) <= set(names):
-            found[name] = rates[:, column]
+        quaternion_names = [f"{joint}.{axis}" for axis in "xyzw"]
+        if not dot or part not in "xyzw" or not set(quaternion_names) <= set(names):
+            derivatives[name] = rates[:, column]
             column += 1
             continue
-        quaternion = motion.joints[:, [names.index(each) for each in parts]]
+        quaternion = motion.joints[:, [names.index(each) for each in quaternion_names]]
         turning = np.pad(rates[:, column : column + 3], ((0, 0), (0, 1)))
-        found |= dict(zip(parts, 0.5 * so3.quat_product(quaternion, turning).T, strict=True))
+        derivatives |= dict(zip(quaternion_names, 0.5 * so3.quat_product(quaternion, turning).T, strict=True))
         column += 3
-    return np.stack([found[joint] for joint in body.joint_names], axis=1) if body.n_shape else rates[:, :0]
+    return np.stack([derivatives[joint] for joint in body.joint_names], axis=1) if body.n_shape else rates[:, :0]
 
 
 def _with_angles(values: Array, body: Body) -> Array:
@@ -327,7 +311,7 @@ def _is_unit(quaternions: Array) -> bool:
 def _misfit(
     kind: str, fitting: Sequence[tuple[FreeJoint | None, bool]], names: Sequence[str], rooted: int | None
 ) -> str:
-    """What an error says of an array that fits no order of coordinates, or several."""
+    """End of the message about an array that fits no order of coordinates, or several."""
     titles = list(dict.fromkeys("biorbd's" if layout is None else layout.title for layout, _ in fitting))
     if len(titles) > 1:
         return f": it fits {' and '.join(titles)}; {_NAMES_THAT_SAY_IT}"

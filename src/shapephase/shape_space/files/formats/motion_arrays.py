@@ -16,19 +16,21 @@ from ....files import npy_array, npz_arrays
 from ....letters import what_came
 from ..labels import SI
 from ..nameless_joints import FREE_JOINT, nameless_joints, placed_joints
-from ..recording import Rates, Simulated, Table
+from ..recording import Rates, Simulated, Table, warn
 from .floating_arrays import FloatingMotion, floating_motion, numbered_columns, places_of, root_width
 from .named_arrays import arrays_table
 
 _NPZ = "NPZ"
-_SCALAR_FIRST = [1, 2, 3, 0]
-"""Where the entries x, y, z, w stand in a quaternion that begins with its scalar part."""
-_READ = (
+_SCALAR_FIRST = [1, 2, 3, 0]  # places of x, y, z, w in a quaternion w x y z
+# TUM RGB-D benchmark: pose behind the time, in trajectories of visual odometry
+_TUM = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
+_FREE = ("base_x", "base_y", "base_z", "base_qw", "base_qx", "base_qy", "base_qz")  # MuJoCo's free joint
+_OFF_UNIT = 1e-3
+_READ = (  # arrays with a meaning
     *("time", "timestep", "fps", "shapes", "qpos", "qvel", "q", "v", "qdot", "Q", "Qdot", "joint_names", "provenance"),
     *("joint_pos", "joint_vel", "body_pos_w", "body_quat_w", "body_ang_vel_w"),
     *("base_quat_xyzw", "base_quat_wxyz", "base_position"),
 )
-"""The arrays of a file that have a meaning."""
 
 
 def read_arrays(
@@ -57,28 +59,25 @@ def arrays_motion(
     """Motion in arrays by name, and the time step if it is still needed.
 
     With `qpos`, `q` or `Q` it is a simulator's or an optimiser's (see `floating_motion`), with `joint_pos` Isaac
-    Lab's: the base is the first of `body_pos_w` (N, b, 3) and `body_quat_w` (N, b, 4), and what is not named, the
-    order of joints and that of a quaternion's numbers, is the one in which the links lie at `body_pos_w` and turn as
-    `body_ang_vel_w` says. With `shapes` there are `time` and `joint_names`, too; else vectors by name are the joints.
+    Lab's: the base is the first of `body_pos_w` (N, b, 3) and `body_quat_w` (N, b, 4), and unnamed orders, of joints
+    and of a quaternion's numbers, are those in which the links lie at `body_pos_w` and turn as `body_ang_vel_w`. With
+    `shapes` there are `time` and `joint_names`, too; else vectors by name are the joints.
 
-    Parameters
-    ----------
     timestep : [s], for arrays without times
     order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
     kind : of the source, for people
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with the array and the entry.
+    Raises TrajectoryError for faults, with the array and the entry.
     """
     try:
-        if "shapes" in arrays and {"qpos", "q", "Q"} & set(arrays):
-            both = min({"qpos", "q", "Q"} & set(arrays))
-            raise TrajectoryError(f"{where}: both 'shapes' and {both!r} are there; keep one")
+        both = {"qpos", "q", "Q"} & set(arrays)
+        if "shapes" in arrays and both:
+            raise TrajectoryError(f"{where}: both 'shapes' and {min(both)!r} are there; keep one")
         if "joint_pos" in arrays and not {"shapes", "qpos"} & set(arrays):
             return _isaac_table(arrays, where, body, timestep, order), None
-        if "q" in arrays and "joint_names" in arrays and _is_named_matrix(arrays):
+        # A matrix q with the columns of joint_names and no others, one sample for each time, has names.
+        named_shape = np.size(arrays.get("time", ())), np.size(arrays.get("joint_names", ()))
+        if "q" in arrays and "joint_names" in arrays and np.shape(arrays["q"]) == named_shape:
             arrays = {"shapes" if name == "q" else name: value for name, value in arrays.items()}
         named = _placed_qpos(arrays, where, body) if order is None else None
         motion = floating_motion(arrays if named is None else {**arrays, **named}, where, body, order)
@@ -87,19 +86,21 @@ def arrays_motion(
             return _table(motion, times, where, arrays), None
     except ShapeError as error:
         raise TrajectoryError(str(error)) from None
-    entries = {name: value.tolist() if _is_text(value) else value for name, value in arrays.items()}
+    entries = {
+        name: value.tolist()
+        if isinstance(value, np.ndarray) and value.dtype.kind in "UT" and value.ndim == 1
+        else value
+        for name, value in arrays.items()
+    }
     table = arrays_table(where, kind, entries, None)
-    # Our own files are in radians and metres; what other people have by name may be in degrees.
+    # Our own files are in radians and metres; other people's by name may be in degrees.
     return replace(table, by_format=kind == _NPZ and "shapes" in arrays), timestep
 
 
 def of_numbered_columns(table: Table, body: Body, order: str | None) -> Table:
-    """The table with base and joints instead of columns such as `qpos_0`, `q[1]`; others are as they were.
+    """The table with base and joints in place of columns such as `qpos_0`, `q[1]`.
 
-    Raises
-    ------
-    TrajectoryError, ShapeError
-        If they are no order of coordinates of the body.
+    Raises TrajectoryError, ShapeError if they are no order of coordinates of the body.
     """
     numbered = numbered_columns(table.columns, table.where)
     taken = [label for labels in numbered.values() for label in labels]
@@ -146,7 +147,9 @@ def _table(motion: FloatingMotion, times: Array, where: str, arrays: Mapping[str
         up="z" if motion.title.startswith(("MuJoCo", "Isaac")) else None,
         nameless=motion.nameless,
         simulated=Simulated(motion.rates, None if step is None else float(np.ravel(step)[0])),
-        unread=_unread(arrays),
+        unread={
+            name: f"an array {array.shape} of {array.dtype}" for name, array in arrays.items() if name not in _READ
+        },
     )
 
 
@@ -158,7 +161,14 @@ def _isaac_table(arrays: Mapping[str, Any], where: str, body: Body, timestep: fl
         _array(arrays[name], where, name, (count, None, entries)) if name in arrays else None
         for name, entries in (("body_quat_w", 4), ("body_pos_w", 3), ("body_ang_vel_w", 3))
     )
-    named = None if "joint_names" not in arrays else tuple(_names(arrays["joint_names"], where))
+    named = None
+    if "joint_names" in arrays:
+        stored = arrays["joint_names"]
+        if stored.dtype.kind not in "UT" and stored.size:
+            raise TrajectoryError(f"{where}: joint_names: text is needed, got an array of {stored.dtype}")
+        named = tuple(map(str, np.ravel(stored)))
+        if len(set(named)) != len(named):
+            raise TrajectoryError(f"{where}: a joint name stands twice in {', '.join(named)}")
     if named is not None and len(named) != joints.shape[1]:
         raise TrajectoryError(
             f"{where}: joint_pos has {joints.shape[1]} columns, and joint_names has {len(named)}; mend 'joint_names'"
@@ -201,8 +211,8 @@ def _placed_qpos(arrays: Mapping[str, Any], where: str, body: Body) -> dict[str,
     if nameless_joints(body, values.shape[1], f"{where}: qpos", None).free != FREE_JOINT:
         return None
     places = _array(arrays["body_pos_w"], where, "body_pos_w", (len(values), None, 3))
-    found, _ = placed_joints(body, values[:, FREE_JOINT:], places, values[:, 3:FREE_JOINT], where, None, orders=1)
-    return {"joint_names": np.array(found.names), "nameless": found}
+    joints, _ = placed_joints(body, values[:, FREE_JOINT:], places, values[:, 3:FREE_JOINT], where, None, orders=1)
+    return {"joint_names": np.array(joints.names), "nameless": joints}
 
 
 def _times(arrays: Mapping[str, Any], kind: str, where: str, count: int, timestep: float | None) -> Array:
@@ -226,15 +236,6 @@ def _times(arrays: Mapping[str, Any], kind: str, where: str, count: int, timeste
     return np.arange(count) / number if name == "fps" else np.arange(count) * number
 
 
-def _is_named_matrix(arrays: Mapping[str, Any]) -> bool:
-    """Whether `q` has the columns of `joint_names` and no others, one sample for each time."""
-    return np.shape(arrays["q"]) == (np.size(arrays.get("time", ())), np.size(arrays["joint_names"]))
-
-
-def _unread(arrays: Mapping[str, Any]) -> dict[str, str]:
-    return {name: f"an array {found.shape} of {found.dtype}" for name, found in arrays.items() if name not in _READ}
-
-
 def _array(value: Any, where: str, name: str, trailing: tuple[int | None, ...], unit: str = "") -> Array:
     if np.asarray(value).dtype.kind == "b":
         raise TrajectoryError(f"{where}: {name}: numbers are needed, got an array of true and false")
@@ -244,14 +245,67 @@ def _array(value: Any, where: str, name: str, trailing: tuple[int | None, ...], 
     return array
 
 
-def _is_text(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype.kind in "UT" and value.ndim == 1
+def named_columns(
+    table: Table, body: Body, names: Mapping[str, str | None], order: str | None, timestep: float | None
+) -> Table:
+    """A table whose columns have names, where `names` does not number them.
 
+    A first column that ascends has the times. Behind it are as many columns as joints, in an order of simulators, or
+    these behind a free joint, or a place and a quaternion x y z w; with a warning. Columns that `names` numbers keep
+    their numbers. Numbers do not show where the scalar part of a free joint's quaternion stands, first (MuJoCo) or last
+    (Pinocchio).
 
-def _names(stored: Any, where: str) -> list[str]:
-    if stored.dtype.kind not in "UT" and stored.size:
-        raise TrajectoryError(f"{where}: joint_names: text is needed, got an array of {stored.dtype}")
-    names = [str(name) for name in np.ravel(stored)]
-    if len(set(names)) != len(names):
-        raise TrajectoryError(f"{where}: a joint name stands twice in {', '.join(names)}")
-    return names
+    Raises TrajectoryError if the number of columns fits nothing, or two of these; for a free joint whose quaternion
+    `names` does not number.
+    """
+    numbered = [label for label in table.columns if label in names]
+    if not table.numbered or len(numbered) == len(table.columns):
+        return table
+    values = list(table.columns.values())
+    has_times = timestep is None and len(values[0]) > 1 and bool((np.diff(values[0]) > 0.0).all())
+    first = ("time",) if has_times else ()
+    rest = values[len(first) :]
+    is_pose = len(rest) == FREE_JOINT and bool(
+        (np.abs(np.linalg.norm(np.stack(rest[3:]), axis=0) - 1.0) < _OFF_UNIT).all()
+    )
+    joints = None
+    try:
+        joints = nameless_joints(body, len(rest), f"{table.where}: the table without a header", order)
+    except TrajectoryError as error:
+        if numbered:
+            return table
+        if not is_pose:
+            header = ",".join(body.joint_names[:2])
+            raise TrajectoryError(
+                f"{error}. There are {len(values)} columns and no header: write one, `time,{header}...`, or name the "
+                f"columns by their numbers: --names 1=time 2={next(iter(body.joint_names), 'base_x')} "
+                "(names={'1': 'time', ...})"
+            ) from None
+    if joints is not None and is_pose:
+        raise TrajectoryError(
+            f"{table.where}: {len(values)} columns without a header may be {len(rest)} joints, or a place and a "
+            "quaternion; write a header, or say which: --names 1=time 2=base_x (names=['time', 'base_x', ...])"
+        )
+    meant = _TUM if joints is None else (*_FREE[: joints.free], *joints.names)
+    if joints is not None and joints.free:
+        quaternion = [*table.columns][len(first) + 3 :][:4]
+        if any(label not in names for label in quaternion):
+            last, scalar_first = (
+                " ".join(f"{label}=base_q{part}" for label, part in zip(quaternion, parts))
+                for parts in ("xyzw", "wxyz")
+            )
+            raise TrajectoryError(
+                f"{table.where}: no header, and as many columns as a free base and the joints have; columns "
+                f"{quaternion[0]} to {quaternion[3]} are a quaternion, x y z w or w x y z. Say which: --names {last} "
+                f"or --names {scalar_first} (names={{{quaternion[0]!r}: 'base_qx', ...}})"
+            )
+    labels = [old if old in names else new for old, new in zip(table.columns, (*first, *meant), strict=True)]
+    warn(f"{table.where}: no header; columns are taken for {', '.join(labels)}: a header would say so")
+    return replace(
+        table,
+        columns=dict(zip(labels, values, strict=True)),
+        faults={new: table.faults.get(old, {}) for old, new in zip(table.columns, labels)},
+        units={},
+        numbered=False,
+        nameless=joints,
+    )

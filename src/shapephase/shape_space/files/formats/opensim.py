@@ -12,32 +12,25 @@ from .frames import file_table
 from .segment_poses import body_kinematics
 from .text_tables import BLANKS, read_text, unix_text
 
-END = "endheader"
-"""The line that closes the header."""
-_HEADER_BYTES = 2**16
-"""A header has a dozen lines."""
-# SIMM's older words for what OpenSim calls nRows and nColumns.
+END = "endheader"  # line that closes the header
+_HEADER_BYTES = 2**16  # searched for the header, which has a dozen lines
+# SIMM's older words for OpenSim's nRows and nColumns.
 _COUNTS = {"nrows": "rows", "datarows": "rows", "ncolumns": "columns", "datacolumns": "columns"}
-_SPREADSHEET = ",;"
-"""What a spreadsheet puts between columns, and behind the lines of the header."""
+_SPREADSHEET = ",;"  # separators that a spreadsheet adds, behind header lines too
 
 
 def has_header(data: bytes) -> bool:
-    """Whether a line closes a header as OpenSim writes it."""
+    """True where a line closes a header of OpenSim."""
     return any(_plain(line).lower() == END for line in data[:_HEADER_BYTES].decode(errors="replace").splitlines())
 
 
 def read_opensim(where: Path, data: bytes) -> Table:
-    """An OpenSim motion or storage file: header lines up to `endheader`, names, numbers.
+    """Motion in an OpenSim motion or storage file: header lines up to `endheader`, names, numbers.
 
-    `inDegrees` says whether rotational coordinates are in degrees. In a file of states, `.../<coordinate>/value` is
-    the coordinate and `.../<coordinate>/speed` is left out. Where a spreadsheet has saved it, commas are between
-    columns.
+    `inDegrees` is the unit of rotational coordinates. In a file of states, `.../<coordinate>/value` is the coordinate
+    and `.../<coordinate>/speed` is left out. A spreadsheet puts commas between columns when it saves the file.
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with line and column.
+    Raises TrajectoryError for faults, with line and column.
     """
     text = unix_text(data, where)
     lines = text[:_HEADER_BYTES].decode(errors="replace").split("\n")
@@ -51,19 +44,29 @@ def read_opensim(where: Path, data: bytes) -> Table:
     except TrajectoryError as error:
         raise TrajectoryError(str(error).replace(": row ", ": line ", 1)) from None
     frame.attrs |= {"format": "OpenSim", "row": "line"}
-    found = replace(file_table(frame, str(where)), by_format=True, degrees=_in_degrees(header, where))
-    _check_counts(header, where, len(found.rows), len(frame.columns))
+    in_degrees = header.get("indegrees", "").lower()
+    degrees = {"": None, "yes": True, "no": False}[in_degrees]
+    table = replace(file_table(frame, str(where)), by_format=True, degrees=degrees)
+    for kind, count in (("rows", len(table.rows)), ("columns", len(frame.columns))):
+        stated = header.get(kind, str(count))
+        if not stated.isascii() or not stated.isdigit() or (stated.lstrip("0") or "0") != str(count):
+            raise TrajectoryError(
+                f"{where}: the header says {stated:.40} {kind}, the table has {count}; the file is cut off or was "
+                "edited: write it anew, or correct the header"
+            )
     columns: dict[str, Array] = {}
     faults = {}
-    for name, values in found.columns.items():
-        plain = _coordinate(name)
-        if plain is None:
+    for name, values in table.columns.items():
+        parts = name.split("/")
+        is_state = len(parts) > 2 and parts[-1] in ("value", "speed")
+        if is_state and parts[-1] == "speed":
             continue
-        if plain in columns:
-            raise TrajectoryError(f"{where}: two columns are the coordinate {plain}, one is {name!r}; keep one")
-        columns[plain] = values
-        faults[plain] = found.faults.get(name, {})
-    return body_kinematics(replace(found, columns=columns, faults=faults, up="y"), header.get("", ""))
+        coordinate = parts[-2] if is_state else name
+        if coordinate in columns:
+            raise TrajectoryError(f"{where}: two columns are the coordinate {coordinate}, one is {name!r}; keep one")
+        columns[coordinate] = values
+        faults[coordinate] = table.faults.get(name, {})
+    return body_kinematics(replace(table, columns=columns, faults=faults, up="y"), header.get("", ""))
 
 
 def _plain(line: str) -> str:
@@ -71,49 +74,25 @@ def _plain(line: str) -> str:
 
 
 def _header(lines: list[str], where: Path) -> dict[str, str]:
+    """Entries of the header in lower case, and its first line under the empty name. Raises TrajectoryError."""
     header: dict[str, str] = {}
-    for line, text in enumerate(lines, start=1):
-        header.setdefault("", _plain(text))
-        key, mark, value = _plain(text).partition("=")
+    for line, text in enumerate(map(_plain, lines), start=1):
+        header.setdefault("", text)
+        key, mark, value = text.partition("=")
         if not mark:
-            key, _, value = _plain(text).partition(" ")
+            key, _, value = text.partition(" ")
         key, value = key.strip().lower(), value.strip()
         known = _COUNTS.get(key, key)
         if known in ("rows", "columns", "indegrees", "datatype") and header.setdefault(known, value) != value:
             raise TrajectoryError(
-                f"{where}: line {line}: {_plain(text)!r:.60} contradicts {header[known]!r} further up; keep one"
+                f"{where}: line {line}: {text!r:.60} contradicts {header[known]!r} further up; keep one"
             )
-    return header
-
-
-def _in_degrees(header: dict[str, str], where: Path) -> bool | None:
     if header.get("datatype", "double").lower() != "double":
         raise TrajectoryError(
             f"{where}: DataType={header['datatype']}, and joint motions are DataType=double; export the coordinates"
         )
-    said = header.get("indegrees")
-    if said is None:
-        return None
-    if said.lower() not in ("yes", "no"):
-        raise TrajectoryError(f"{where}: inDegrees={said!r:.40} in the header; write inDegrees=yes or inDegrees=no")
-    return said.lower() == "yes"
-
-
-def _check_counts(header: dict[str, str], where: Path, rows: int, columns: int) -> None:
-    for kind, found in (("rows", rows), ("columns", columns)):
-        said = header.get(kind)
-        if said is None:
-            continue
-        if not said.isascii() or not said.isdigit() or (said.lstrip("0") or "0") != str(found):
-            raise TrajectoryError(
-                f"{where}: the header says {said:.40} {kind}, the table has {found}; the file is cut off or was "
-                "edited: write it anew, or correct the header"
-            )
-
-
-def _coordinate(name: str) -> str | None:
-    """The coordinate of a column, None for a speed: `/jointset/knee/knee_angle/value` is knee_angle."""
-    parts = name.split("/")
-    if len(parts) < 3 or parts[-1] not in ("value", "speed"):
-        return name
-    return parts[-2] if parts[-1] == "value" else None
+    if header.get("indegrees", "no").lower() not in ("yes", "no"):
+        raise TrajectoryError(
+            f"{where}: inDegrees={header['indegrees']!r:.40} in the header; write inDegrees=yes or inDegrees=no"
+        )
+    return header

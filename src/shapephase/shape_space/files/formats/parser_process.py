@@ -14,10 +14,8 @@ import numpy as np
 from ....child_process import limit_this_process, run_alone
 from ....errors import TrajectoryError
 
-_SECONDS = 30
-"""[s] for the imports and the file: the largest take five, and damaged ones may take forever."""
-_MEMORY = 2**30
-"""[bytes] beyond the imports: damaged headers make ezc3d ask for any."""
+_SECONDS = 30  # [s] imports and file: the largest take five, damaged ones forever
+_MEMORY = 2**30  # [bytes] beyond the imports: damaged headers make ezc3d request any amount
 
 
 def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:
@@ -33,8 +31,8 @@ def parsed(where: Path, data: bytes, kind: str, module: str) -> dict[str, Any]:
             f"{where}: reading it took more than {_SECONDS} s and was stopped; export it anew"
         ) from None
     if child.returncode:
-        said = "".join(child.stderr.decode(errors="replace").strip().splitlines()[-1:])
-        why = f"the parser crashed on it, signal {-child.returncode}" if child.returncode < 0 else said[:200]
+        message = "".join(child.stderr.decode(errors="replace").strip().splitlines()[-1:])
+        why = f"the parser crashed on it, signal {-child.returncode}" if child.returncode < 0 else message[:200]
         raise TrajectoryError(f"{where}: no {kind} file that can be read ({why}); export it anew")
     with np.load(io.BytesIO(child.stdout)) as arrays:
         return dict(arrays)

@@ -1,27 +1,24 @@
-"""Joint motions that ROS recorded or commands: trajectories in YAML, states and trajectories in bags."""
+"""Joint motions that ROS recorded or commands: trajectories and states in YAML and in bags."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....arrays import Array
 from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
 from ..recording import Table, check_text, number
-from .strict_yaml import Word, yaml_documents
 
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-_NANO = 10**9
-"""Nanoseconds in a second."""
-# What goals and planners wrap around a trajectory.
-_WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")
-_SECONDS = ("sec", "secs")
-_NANOSECONDS = ("nanosec", "nsecs", "nsec")
+_NANO = 10**9  # nanoseconds in a second
+_LATEST = 1e12  # [s] larger times are none
+_WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")  # keys of goals and planners around a trajectory
+_UNITS = {"sec": _NANO, "secs": _NANO, "nanosec": 1, "nsecs": 1, "nsec": 1}  # parts of a time -> size [ns]
+_MERGE = "<<"  # YAML 1.1 merges the value of this key into its mapping
 
 
 class _State(NamedTuple):
@@ -29,35 +26,37 @@ class _State(NamedTuple):
 
     stamp: int
     recorded: int
-    names: list[str]
+    names: Sequence[str]
     positions: list[float]
 
 
 class _Trajectory(NamedTuple):
-    """A JointTrajectory message: its time [ns], joints, and of each point its time [ns and s] and positions."""
+    """A JointTrajectory message: its time [ns], joints, and of each point its time (ns, s) and positions."""
 
     stamp: int
-    names: list[str]
-    nanoseconds: list[int]
-    seconds: list[float]
+    names: Sequence[str]
+    times: list[tuple[int, float]]
     positions: list[list[float]]
 
 
+class Word(str):
+    """A value as it was written, and its line: `1e-3` is a text in YAML 1.1, `on` is true and 012 is ten."""
+
+    line: int
+
+
 def read_ros_yaml(where: Path, data: bytes) -> Table:
-    """A `JointTrajectory` in YAML, bare or in a goal, or documents of several, or of `JointState` messages.
+    """Motion of a `JointTrajectory` in YAML, bare or in a goal, or documents of several, or of `JointState` messages.
 
     Several trajectories follow each other by their header stamps; states are merged as in a bag.
 
-    Raises
-    ------
-    TrajectoryError, MissingExtraError
-        For faults, with line or point; without PyYAML.
+    Raises TrajectoryError for faults, with line or point; MissingExtraError without PyYAML.
     """
     check_text(data, where)
     documents = [_unwrapped(document) for document in yaml_documents(data.decode("utf-8-sig"), str(where))]
-    states = [_is(document, "name", "position") for document in documents]
+    states = [_has(document, "name", "position") for document in documents]
     if not documents or not all(
-        state or _is(document, "joint_names", "points") for state, document in zip(states, documents, strict=True)
+        state or _has(document, "joint_names", "points") for state, document in zip(states, documents, strict=True)
     ):
         raise TrajectoryError(
             f"{where}: no ROS trajectory; a mapping with `joint_names` and `points` (JointTrajectory), or documents "
@@ -65,28 +64,26 @@ def read_ros_yaml(where: Path, data: bytes) -> Table:
         )
     if any(states) != all(states):
         raise TrajectoryError(f"{where}: JointState and JointTrajectory messages are mixed; keep one kind")
-    if states[0]:
-        messages = [_yaml_state(document, where, k) for k, document in enumerate(documents, start=1)]
-        return _of_states(messages, str(where), "ROS YAML JointState")
-    trajectories = [_yaml_trajectory(document, where) for document in documents]
-    return _of_trajectories(trajectories, str(where), "ROS YAML JointTrajectory")
+    if not states[0]:
+        trajectories = [_yaml_trajectory(document, where) for document in documents]
+        return _of_trajectories(trajectories, str(where), "ROS YAML JointTrajectory")
+    messages = []
+    for count, document in enumerate(documents, start=1):
+        names = _yaml_list(document["name"], f"{where}: message {count}: name", "joint names")
+        positions = _yaml_numbers(document["position"], f"{where}: message {count}", "position", names)
+        messages.append(_State(_yaml_stamp(document, where), 0, names, positions))
+    return _of_states(messages, str(where), "ROS YAML JointState")
 
 
 def read_bag(where: Path, topic: str | None) -> Table:
-    """The states or trajectories of one topic of a rosbag1 file, a rosbag2 folder, an MCAP or a SQLite file.
+    """States or trajectories of one topic of a rosbag1 file, a rosbag2 folder, an MCAP or a SQLite file.
 
-    The time of a state is that of its header, or the time of recording where all headers are without. Messages
-    that carry some of the joints are merged when together they have all of them at each time. Message definitions in
-    the bag are not used: a bag with other definitions of these types is refused.
+    The time of a state is that of its header, or the time of recording where no header has one. Messages that carry
+    some of the joints are merged when together they have all of them at each time. Message definitions in the bag are
+    not used: a bag with other definitions of these types is refused.
 
-    Raises
-    ------
-    InputFileNotFoundError, UnknownNameError
-        If there is no such file, or no such topic.
-    TrajectoryError
-        For more than one topic with motions and none chosen; for faults, with the message.
-    MissingExtraError
-        Without rosbags.
+    Raises InputFileNotFoundError, UnknownNameError for an unknown file or topic; TrajectoryError for more than one
+    topic with motions and none chosen, and for faults, with the message; MissingExtraError without rosbags.
     """
     try:
         import rosbags.highlevel  # noqa: F401
@@ -111,22 +108,34 @@ def _read_messages(where: Path, topic: str | None) -> Table:
     types = get_typestore(Stores.ROS1_NOETIC if first else Stores.ROS2_HUMBLE)
     with Reader1(where) if first else Reader2(where) as reader:
         chosen = _connections(reader.connections, where, topic)
+        kind = chosen[0].msgtype
+        digest = types.generate_msgdef(kind)[1] if first else types.hash_rihs01(kind)
         for connection in chosen:
-            kind = connection.msgtype
-            digest = types.generate_msgdef(kind)[1] if first else types.hash_rihs01(kind)
             if connection.digest and connection.digest != digest:
                 raise TrajectoryError(f"{where}: topic {connection.topic}: not the usual definition of {kind}")
-        decode = types.deserialize_ros1 if first else types.deserialize_cdr
-        kind = chosen[0].msgtype
+        decode: Any = types.deserialize_ros1 if first else types.deserialize_cdr
         messages = ((time, decode(data, kind)) for _, time, data in reader.messages(chosen))
         label = f"{'rosbag1' if first else 'rosbag2'} {kind.split('/')[-1]}"
         if kind == _STATE:
-            return _of_states(list(_bag_states(messages)), str(where), label)
-        return _of_trajectories([_bag_trajectory(message) for _, message in messages], str(where), label)
+            states = [
+                _State(_bag_time(message.header.stamp), recorded, list(message.name), message.position.tolist())
+                for recorded, message in messages
+            ]
+            return _of_states(states, str(where), label)
+        trajectories = [
+            _Trajectory(
+                _bag_time(message.header.stamp),
+                list(message.joint_names),
+                [(_bag_time(point.time_from_start), 0.0) for point in message.points],
+                [point.positions.tolist() for point in message.points],
+            )
+            for _, message in messages
+        ]
+        return _of_trajectories(trajectories, str(where), label)
 
 
 def _connections(connections: Sequence[Any], where: Path, topic: str | None) -> list[Any]:
-    """The connections of the one topic that holds joint motions."""
+    """Connections of the one topic that holds joint motions."""
     motions = [connection for connection in connections if connection.msgtype in (_STATE, _TRAJECTORY)]
     topics = sorted({connection.topic for connection in motions})
     if not topics:
@@ -135,28 +144,12 @@ def _connections(connections: Sequence[Any], where: Path, topic: str | None) -> 
     if topic is not None and topic not in topics:
         raise unknown_name(f"topic with joint motions in {where}", topic, topics)
     if topic is None and len(topics) > 1:
-        listed = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in motions}))
-        raise TrajectoryError(f"{where}: several topics hold joint motions, choose one with topic=: {listed}")
+        several = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for c in motions}))
+        raise TrajectoryError(f"{where}: several topics hold joint motions, choose one with topic=: {several}")
     chosen = [connection for connection in motions if connection.topic == (topic or topics[0])]
     if len({connection.msgtype for connection in chosen}) > 1:
         raise TrajectoryError(f"{where}: topic {chosen[0].topic} holds messages of two types")
     return chosen
-
-
-def _bag_states(messages: Iterator[tuple[int, Any]]) -> Iterator[_State]:
-    for recorded, message in messages:
-        yield _State(_bag_time(message.header.stamp), recorded, list(message.name), message.position.tolist())
-
-
-def _bag_trajectory(message: Any) -> _Trajectory:
-    points = message.points
-    return _Trajectory(
-        _bag_time(message.header.stamp),
-        list(message.joint_names),
-        [_bag_time(point.time_from_start) for point in points],
-        [0.0] * len(points),
-        [point.positions.tolist() for point in points],
-    )
 
 
 def _bag_time(time: Any) -> int:
@@ -173,34 +166,37 @@ def _of_states(messages: list[_State], where: str, label: str) -> Table:
     if messages and not stamped and not any(message.recorded for message in messages):
         raise TrajectoryError(f"{where}: the messages have no times; record them with header stamps")
     joints = list(dict.fromkeys(name for message in messages for name in message.names))
-    rows: dict[int, dict[str, float]] = {}
+    samples: dict[int, dict[str, float]] = {}
     numbers: dict[int, int] = {}
     for count, (stamp, recorded, names, positions) in enumerate(messages, start=1):
         if len(names) != len(positions):
             raise TrajectoryError(f"{where}: message {count}: {len(names)} joints and {len(positions)} positions")
         time = stamp if stamped else recorded
-        row = rows.setdefault(time, {})
+        sample = samples.setdefault(time, {})
         numbers.setdefault(time, count)
         for name, position in zip(names, positions, strict=True):
-            if name in row:
+            if name in sample:
                 raise TrajectoryError(
                     f"{where}: message {count}: joint {name} stands twice at one time; drop one message"
                 )
-            row[name] = position
-    for time, row in rows.items():
-        if len(row) != len(joints):
-            lacking = ", ".join(name for name in joints if name not in row)
+            sample[name] = position
+    for time, sample in samples.items():
+        if len(sample) != len(joints):
+            lacking = ", ".join(name for name in joints if name not in sample)
             raise TrajectoryError(
                 f"{where}: message {numbers[time]}: no {lacking} at this time, and other messages have them; all "
                 "joints are needed at each time: record one topic with all, choose it by topic=, or resample to a table"
             )
-    table = np.array([[row[name] for name in joints] for row in rows.values()]).reshape(len(rows), len(joints))
-    return _table(where, label, list(rows), np.zeros(len(rows)), joints, table, "message", list(numbers.values()))
+    positions = [[sample[name] for name in joints] for sample in samples.values()]
+    times = [(time, 0.0) for time in samples]
+    return _table(where, label, times, joints, positions, "message", list(numbers.values()))
 
 
 def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) -> Table:
     """One trajectory, or several one after the other by the times of their headers."""
-    joints = trajectories[0].names if trajectories else []
+    joints = list(trajectories[0].names) if trajectories else []
+    times: list[tuple[int, float]] = []
+    rows: list[list[float]] = []
     for count, trajectory in enumerate(trajectories, start=1):
         doubled = [name for name, times in Counter(trajectory.names).items() if times > 1]
         if doubled:
@@ -212,36 +208,29 @@ def _of_trajectories(trajectories: list[_Trajectory], where: str, label: str) ->
                 f"{where}: {len(trajectories)} trajectories, and number {count} has no time in its header, so their "
                 "order in time is unknown; keep one trajectory"
             )
+        columns = [trajectory.names.index(name) for name in joints]
         for k, positions in enumerate(trajectory.positions, start=1):
             if len(positions) != len(joints):
                 raise TrajectoryError(f"{where}: point {k}: {len(positions)} positions for {len(joints)} joints")
-    several = len(trajectories) > 1
-    nanoseconds = [t.stamp * several + time for t in trajectories for time in t.nanoseconds]
-    seconds = np.array([time for t in trajectories for time in t.seconds])
-    table = np.empty((len(nanoseconds), len(joints)))
-    first = 0
-    for t in trajectories:
-        place = {name: k for k, name in enumerate(t.names)}
-        part = np.array(t.positions).reshape(len(t.positions), len(joints))
-        table[first : first + len(part)] = part[:, [place[name] for name in joints]]
-        first += len(part)
-    rows = list(range(1, len(nanoseconds) + 1))
-    return _table(where, label, nanoseconds, seconds, joints, table, "point", rows)
+            rows.append([positions[column] for column in columns])
+        start = trajectory.stamp if len(trajectories) > 1 else 0
+        times += [(start + nanoseconds, seconds) for nanoseconds, seconds in trajectory.times]
+    return _table(where, label, times, joints, rows, "point", list(range(1, len(rows) + 1)))
 
 
 def _table(
     where: str,
     label: str,
-    nanoseconds: list[int],
-    seconds: Array,
+    times: list[tuple[int, float]],
     joints: list[str],
-    table: Array,
+    positions: list[list[float]],
     row: str,
     rows: list[int],
 ) -> Table:
-    start = nanoseconds[0] if nanoseconds else 0
+    start = times[0][0] if times else 0
     # Whole nanoseconds are subtracted first: as doubles, those of today's clocks are 200 ns apart.
-    times = np.array([(time - start) / _NANO for time in nanoseconds]) + seconds
+    since_start = np.array([(nanoseconds - start) / _NANO + seconds for nanoseconds, seconds in times])
+    table = np.array(positions, dtype=np.float64).reshape(len(rows), len(joints))
     if not np.isfinite(table).all():
         i, j = (int(k) for k in np.argwhere(~np.isfinite(table))[0])
         raise TrajectoryError(
@@ -253,8 +242,8 @@ def _table(
         columns={name: np.ascontiguousarray(table[:, j]) for j, name in enumerate(joints)},
         rows=rows,
         row=row,
-        times=times,
-        clock=start / _NANO + times,
+        times=since_start,
+        clock=start / _NANO + since_start,
         by_format=True,
     )
 
@@ -267,18 +256,12 @@ def _unwrapped(document: Any) -> Any:
     return document
 
 
-def _is(document: Any, *keys: str) -> bool:
+def _has(document: Any, *keys: str) -> bool:
     return isinstance(document, dict) and all(key in document for key in keys)
 
 
-def _yaml_state(document: dict[str, Any], where: Path, count: int) -> _State:
-    names = _yaml_names(document["name"], f"{where}: message {count}: name")
-    positions = _yaml_numbers(document["position"], f"{where}: message {count}", "position", names)
-    return _State(_yaml_stamp(document, where), 0, names, positions)
-
-
 def _yaml_trajectory(document: dict[str, Any], where: Path) -> _Trajectory:
-    names = _yaml_names(document["joint_names"], f"{where}: joint_names")
+    names = _yaml_list(document["joint_names"], f"{where}: joint_names", "joint names")
     points = document["points"]
     if not isinstance(points, list):
         raise TrajectoryError(f"{where}: points: a list is needed")
@@ -287,56 +270,49 @@ def _yaml_trajectory(document: dict[str, Any], where: Path) -> _Trajectory:
     for count, point in enumerate(points, start=1):
         place = f"{where}: point {count}"
         for key in ("positions", "time_from_start"):
-            if not _is(point, key):
+            if not _has(point, key):
                 raise TrajectoryError(f"{place} has no {key}")
-        times.append(_yaml_time(point["time_from_start"], f"{place}: time_from_start"))
-        if times[-1][0] + _NANO * times[-1][1] < 0.0:
+        nanoseconds, seconds = _yaml_time(point["time_from_start"], f"{place}: time_from_start")
+        if nanoseconds + _NANO * seconds < 0.0:
             raise TrajectoryError(f"{place}: time_from_start is before the start; no trajectory has such times")
+        times.append((nanoseconds, seconds))
         positions.append(_yaml_numbers(point["positions"], place, "positions", names))
-    return _Trajectory(_yaml_stamp(document, where), names, [t[0] for t in times], [t[1] for t in times], positions)
+    return _Trajectory(_yaml_stamp(document, where), names, times, positions)
 
 
-def _yaml_names(value: Any, place: str) -> list[str]:
+def _yaml_list(value: Any, place: str, content: str) -> list[Word]:
     if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
-        raise TrajectoryError(f"{place}: a list of joint names is needed")
+        raise TrajectoryError(f"{place}: a list of {content} is needed")
     return value
 
 
-def _yaml_numbers(value: Any, place: str, key: str, names: list[str]) -> list[float]:
-    if not isinstance(value, list) or not all(isinstance(entry, Word) for entry in value):
-        raise TrajectoryError(f"{place}: {key}: a list of numbers is needed")
-    labels = [*names, *("without a name" for _ in value[len(names) :])]
-    return [
-        number(entry, f"{place} (line {entry.line}), joint {name}")
-        for entry, name in zip(value, labels[: len(value)], strict=True)
-    ]
+def _yaml_numbers(value: Any, place: str, key: str, names: Sequence[str]) -> list[float]:
+    entries = _yaml_list(value, f"{place}: {key}", "numbers")
+    labels = [*names, *["without a name"] * len(entries)]
+    return [number(entry, f"{place} (line {entry.line}), joint {name}") for entry, name in zip(entries, labels)]
 
 
 def _yaml_stamp(document: dict[str, Any], where: Path) -> int:
     header = document.get("header")
     if not isinstance(header, dict) or "stamp" not in header:
         return 0
-    whole, part = _yaml_time(header["stamp"], f"{where}: header stamp")
-    if whole + _NANO * part < 0.0:
+    nanoseconds, seconds = _yaml_time(header["stamp"], f"{where}: header stamp")
+    if nanoseconds + _NANO * seconds < 0.0:
         raise TrajectoryError(f"{where}: header stamp: no clock has a time below zero")
-    return whole + round(part * _NANO)
+    return nanoseconds + round(seconds * _NANO)
 
 
 def _yaml_time(value: Any, place: str) -> tuple[int, float]:
     """Whole nanoseconds, and seconds: {sec, nanosec}, {secs, nsecs} or a number of seconds."""
     if isinstance(value, Word):
-        return 0, _bounded(number(value, place), place)
-    if isinstance(value, dict) and len(value) <= 2 and set(value) <= {*_SECONDS, *_NANOSECONDS}:
-        total = 0
-        for keys, factor in ((_SECONDS, _NANO), (_NANOSECONDS, 1)):
-            parts = [value[key] for key in keys if key in value]
-            if len(parts) > 1:
-                break
-            for part in parts:
-                total += factor * _whole(part, place)
-        else:
-            return total, 0.0
-    raise TrajectoryError(f"{place}: {{sec, nanosec}}, {{secs, nsecs}} or a number of seconds is needed")
+        seconds = number(value, place)
+        if abs(seconds) > _LATEST:
+            raise TrajectoryError(f"{place}: {seconds:g} s is no time")
+        return 0, seconds
+    units = [_UNITS.get(key) for key in value] if isinstance(value, dict) else [None]
+    if None in units or len(set(units)) < len(units):
+        raise TrajectoryError(f"{place}: {{sec, nanosec}}, {{secs, nsecs}} or a number of seconds is needed")
+    return sum(unit * _whole(part, place) for unit, part in zip(units, value.values(), strict=True) if unit), 0.0
 
 
 def _whole(value: Any, place: str) -> int:
@@ -347,7 +323,44 @@ def _whole(value: Any, place: str) -> int:
     return int(text)
 
 
-def _bounded(seconds: float, place: str) -> float:
-    if abs(seconds) > 1e12:
-        raise TrajectoryError(f"{place}: {seconds:g} s is no time")
-    return seconds
+def yaml_documents(text: str, where: str) -> list[Any]:
+    """Documents of a YAML text that are not empty: dictionaries by text, lists, and `Word`s.
+
+    Raises MissingExtraError without PyYAML; TrajectoryError for text that is not YAML, unknown tags, doubled keys and
+    merge keys, with the line.
+    """
+    try:
+        import yaml
+    except ImportError:
+        raise MissingExtraError("YAML files need PyYAML; install it with: pip install 'shapephase[data]'") from None
+
+    # Without resolvers, plain values are texts.
+    safe = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    loader_of_texts: Any = type("_TextLoader", (safe,), {"yaml_implicit_resolvers": {}})
+
+    def as_word(_: Any, node: Any) -> Word:
+        word = Word(node.value)
+        word.line = node.start_mark.line + 1
+        return word
+
+    def as_mapping(loader: Any, node: Any) -> dict[str, Any]:
+        mapping: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            key, fault = loader.construct_object(key_node, deep=True), ""
+            if key == _MERGE:
+                fault = "merge keys (<<) are not read; write the values out"
+            elif not isinstance(key, Word):
+                fault = "a key must be a plain word"
+            elif key in mapping:
+                fault = f"{key!r:.60} stands twice"
+            if fault:
+                raise TrajectoryError(f"{where}: line {key_node.start_mark.line + 1}: {fault}")
+            mapping[key] = loader.construct_object(value_node, deep=True)
+        return mapping
+
+    loader_of_texts.add_constructor("tag:yaml.org,2002:str", as_word)
+    loader_of_texts.add_constructor("tag:yaml.org,2002:map", as_mapping)
+    try:
+        return [document for document in yaml.load_all(text, loader_of_texts) if document not in (None, "")]
+    except (yaml.YAMLError, RecursionError) as error:
+        raise TrajectoryError(f"{where}: no YAML: {' '.join(str(error).split()):.200}; write it anew") from None

@@ -1,4 +1,4 @@
-"""Files with poses of segments, each in axes of its own: tables, OpenSim's BodyKinematics, MVNX of inertial suits."""
+"""Poses of segments, each in axes of its own, in tables, OpenSim's BodyKinematics and MVNX of inertial suits."""
 
 from __future__ import annotations
 
@@ -21,32 +21,20 @@ from ..recording import SegmentPoses, Table
 
 _QUATERNION = re.compile(r"(?P<segment>.+?)(?:_q|_quat_?|\.q|[./]orientation[./])(?P<part>[xyzw])", re.DOTALL)
 _PLACE = re.compile(r"(?P<segment>.+?)(?:_[pt]?|_pos_?|\.p?|[./]position[./])(?P<part>[xyz])", re.DOTALL)
-_TPOSE = "tpose"
-"""Calibration pose of a suit, arms held out."""
-_NPOSE = "npose"
-"""Name of the calibration pose with hanging arms."""
-_ARM = ("UpperArm", "ForeArm", "Hand")
-"""Segments of a suit's arm behind their side, from the shoulder on."""
-_KINEMATICS = ("X", "Y", "Z", "Ox", "Oy", "Oz")
-"""Columns of a body in OpenSim's BodyKinematics, behind its name: centre of mass, and angles about x, y, z as each
-turn before has left them."""
-_OFF_ROTATION = 1e-3
-"""Largest entry of S^T S - 1: files have single precision."""
-_OFF_UNIT = 0.1
-"""A quaternion's length may be off one by so much: what interpolates them leaves that."""
-_FEWEST = 2
-"""Segments of a table: one alone is the base."""
-_WHOLE_BODY = "center_of_mass"
-"""What BodyKinematics has behind the bodies, without angles."""
+_TPOSE = "tpose"  # calibration pose of a suit, arms held out
+_NPOSE = "npose"  # calibration pose with hanging arms
+_ARM = ("UpperArm", "ForeArm", "Hand")  # names behind the side, from the shoulder on
+_KINEMATICS = ("X", "Y", "Z", "Ox", "Oy", "Oz")  # BodyKinematics: centre of mass, intrinsic angles x y z
+_OFF_ROTATION = 1e-3  # largest entry of S^T S - 1: files have single precision
+_OFF_UNIT = 0.1  # allowed error of a quaternion's length, as interpolation leaves it
+_FEWEST = 2  # segments of a table: one alone is the base
+_WHOLE_BODY = "center_of_mass"  # BodyKinematics' last columns, without angles
 
 
 def read_mvnx(where: Path, data: bytes) -> Table:
     """The poses of a suit's segments, and its calibration poses; the room's z axis is up.
 
-    Raises
-    ------
-    TrajectoryError
-        For faults, with the line.
+    Raises TrajectoryError for faults, with the line.
     """
     try:
         suit = read_suit(data)
@@ -95,10 +83,7 @@ def body_kinematics(table: Table, kind: str) -> Table:
 
     kind : first line of the file
 
-    Raises
-    ------
-    TrajectoryError
-        For velocities and accelerations, which have columns of these names, too.
+    Raises TrajectoryError for velocities and accelerations, which have columns of these names, too.
     """
     bodies = [name.removesuffix("_Ox") for name in table.columns if name.endswith("_Ox")]
     labels = {body: [f"{body}_{axis}" for axis in _KINEMATICS] for body in bodies}
@@ -125,7 +110,7 @@ def body_kinematics(table: Table, kind: str) -> Table:
 def matrix_poses(names: tuple[str, ...], matrices: Array, metre: float | None) -> SegmentPoses:
     """Poses as 4 x 4 matrices (4, 4, k, N); where a segment was not seen, they are no rotations.
 
-    metre : size of the unit of lengths [m]; None: the file does not say it
+    metre : size of the unit of lengths [m]; None: unknown
     """
     turns, origins = matrices[:3, :3].transpose(3, 2, 0, 1).copy(), matrices[:3, 3].transpose(2, 1, 0)
     off = np.abs(so3.transpose(turns) @ turns - np.eye(3)).max(axis=(2, 3))
@@ -144,22 +129,19 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
 
     names : label or segment -> joint or link, or None for what is left out
 
-    Raises
-    ------
-    TrajectoryError
-        If places are missing, a quaternion is none, or a unit is none of lengths.
+    Raises TrajectoryError if places are missing, a quaternion is none, or a unit is none of lengths.
     """
     parts: dict[str, dict[str, str]] = {}
     places: dict[str, dict[str, str]] = {}
     for text in table.columns:
         if names.get(text, text) is None:
             continue
-        for pattern, found in ((_QUATERNION, parts), (_PLACE, places)):
+        for pattern, by_segment in ((_QUATERNION, parts), (_PLACE, places)):
             match = pattern.fullmatch(label(text).name)
             if match is not None:
-                found.setdefault(match["segment"], {})[match["part"]] = text
+                by_segment.setdefault(match["segment"], {})[match["part"]] = text
                 break
-    segments = [segment for segment, found in parts.items() if len(found) == len("xyzw")]
+    segments = [segment for segment, by_segment in parts.items() if len(by_segment) == len("xyzw")]
     links = {*known_links(body, segments), *(names.keys() & set(segments))}
     of_joints = any(label(text).name in body.joint_names for text in table.columns)
     if len(segments) < _FEWEST or (of_joints and len(links) < _FEWEST):
@@ -175,37 +157,22 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
     for text in used:
         if any(cell.strip().lower() not in ("", "nan") for cell in table.faults.get(text, {}).values()):
             table.check_column(text)
-    poses = SegmentPoses(
-        names=tuple(segments),
-        turns=_turned(table, segments, parts),
-        origins=_placed(table, segments, places) if placed else None,
-    )
-    return replace(table, columns={text: each for text, each in table.columns.items() if text not in used}, poses=poses)
-
-
-def _turned(table: Table, segments: list[str], parts: Mapping[str, Mapping[str, str]]) -> Array:
-    """The turns (N, k, 3, 3) of quaternions in columns; NaN where they are empty."""
     numbers = np.stack([[table.columns[parts[name][part]] for name in segments] for part in "xyzw"], axis=-1)
     numbers = numbers.transpose(1, 0, 2)
     lengths = np.linalg.norm(numbers, axis=-1)
-    off = np.argwhere(np.abs(lengths - 1.0) > _OFF_UNIT)
-    if len(off):
-        row, segment = off[0]
+    wrong = np.argwhere(np.abs(lengths - 1.0) > _OFF_UNIT)
+    if len(wrong):
+        row, segment = wrong[0]
         raise TrajectoryError(
             f"{table.where}: {table.row} {table.rows[row]}: the quaternion of {segments[segment]!r} has the length "
             f"{lengths[row, segment]:.6g}, and 1 is needed; correct it, or leave the segment out (--names "
             f"{segments[segment]}=)"
         )
     turns = np.full((*lengths.shape, 3, 3), np.nan)
-    there = np.isfinite(lengths)
-    turns[there] = so3.matrix_from_quat(so3.normalised(numbers[there]))
-    return turns
-
-
-def _placed(table: Table, segments: list[str], places: Mapping[str, Mapping[str, str]]) -> Array:
-    """Origins (N, k, 3) [m] in columns; NaN of segments without them."""
+    known = np.isfinite(lengths)
+    turns[known] = so3.matrix_from_quat(so3.normalised(numbers[known]))
     origins = np.full((len(table.rows), len(segments), 3), np.nan)
-    for k, segment in enumerate(segments):
+    for k, segment in enumerate(segments if placed else ()):
         for axis, text in places.get(segment, {}).items():
             unit = table.units.get(text) or label(text).unit or "m"
             if unit not in LENGTHS and unit != SI:
@@ -214,4 +181,6 @@ def _placed(table: Table, segments: list[str], places: Mapping[str, Mapping[str,
                     f"out with names={{{text!r}: None}} (--names {text}=), or write its unit"
                 )
             origins[:, k, "xyz".index(axis)] = LENGTHS.get(unit, 1.0) * table.columns[text]
-    return origins
+    poses = SegmentPoses(names=tuple(segments), turns=turns, origins=origins if placed else None)
+    columns = {text: values for text, values in table.columns.items() if text not in used}
+    return replace(table, columns=columns, poses=poses)

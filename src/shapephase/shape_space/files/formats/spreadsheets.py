@@ -18,16 +18,12 @@ _HEAD_ROWS = 12
 
 
 def read_excel(where: Path, data: bytes, sheet: str | None) -> pd.DataFrame:
-    """A sheet of an Excel workbook: a row of names, and rows of numbers; formulas count as they were last computed.
+    """Frame of a sheet of an Excel workbook: a row of names, and rows of numbers or of formulas' last results.
 
-    Parameters
-    ----------
     sheet : its name; None: the only one that is not empty
 
-    Raises
-    ------
-    TrajectoryError, UnknownNameError, MissingExtraError
-        For faults, with row and column; for a sheet that is not there; without openpyxl.
+    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults, with row and column; for a sheet that is not
+    there; without openpyxl.
     """
     try:
         import openpyxl
@@ -53,14 +49,14 @@ def read_excel(where: Path, data: bytes, sheet: str | None) -> pd.DataFrame:
 
 
 def _cells(sheet: Any) -> list[tuple[int, list[Any]]]:
-    """The rows of a sheet that are not empty, with their numbers, to their last entry."""
+    """Rows of a sheet that are not empty, with their numbers, to their last entry."""
     sheet.reset_dimensions()
-    found = []
+    rows = []
     for label, row in enumerate(sheet.iter_rows(values_only=True), start=1):
         width = max((k + 1 for k, entry in enumerate(row) if entry not in (None, "")), default=0)
         if width:
-            found.append((label, list(row[:width])))
-    return found
+            rows.append((label, list(row[:width])))
+    return rows
 
 
 def _sheet_frame(rows: list[tuple[int, list[Any]]], where: Path) -> pd.DataFrame:
@@ -81,18 +77,15 @@ def _sheet_frame(rows: list[tuple[int, list[Any]]], where: Path) -> pd.DataFrame
 
 
 def read_parquet(where: Path, data: bytes) -> pd.DataFrame:
-    """A Parquet file of numbers and times; the metadata `unit` or `units` of a column says its unit.
+    """Frame of a Parquet file of numbers and times; the metadata `unit` or `units` of a column is its unit.
 
-    Raises
-    ------
-    TrajectoryError, MissingExtraError
-        For faults, with row and column; without pyarrow.
+    Raises TrajectoryError, MissingExtraError for faults, with row and column; without pyarrow.
     """
     return _arrow(where, data, "Parquet")
 
 
 def read_feather(where: Path, data: bytes) -> pd.DataFrame:
-    """A Feather file, as a Parquet file. Raises as `read_parquet`."""
+    """Frame of a Feather file; see `read_parquet`."""
     return _arrow(where, data, "Feather")
 
 
@@ -107,8 +100,8 @@ def _arrow(where: Path, data: bytes, kind: str) -> pd.DataFrame:
         table = read(io.BytesIO(data))
         units: dict[str, str] = {}
         for field in table.schema:
-            said = {key.decode().lower(): text.decode() for key, text in (field.metadata or {}).items()}
-            unit = unit_of(said.get("units", said.get("unit", "")))
+            metadata = {key.decode().lower(): text.decode() for key, text in (field.metadata or {}).items()}
+            unit = unit_of(metadata.get("units", metadata.get("unit", "")))
             if unit is not None:
                 units[field.name.strip()] = unit
         frame = table.to_pandas()

@@ -1,33 +1,34 @@
-"""What stands above the numbers of a table: names of columns, units, comments; or nothing."""
+"""Heads of tables: names of columns, units, comments, or nothing; and the five rows of Vicon Nexus."""
 
 from __future__ import annotations
 
+import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ....errors import TrajectoryError
+from ....errors import TrajectoryError, unknown_name
 from ..labels import unit_of
 
-COMMENT = re.compile(r'\s*"?(#|%|//)\s*')
-"""What a line of comment begins with."""
+COMMENT = re.compile(r'\s*"?(#|%|//)\s*')  # beginning of a comment line
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d.*", re.ASCII)
 CLOCK = re.compile(r"\d{1,3}:\d\d(:\d\d([.,]\d+)?)?", re.ASCII)
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 _NO_UNIT_CELLS = ("[]", "()", "-")
+_KINDS = ("joints", "model outputs", "segments", "trajectories", "devices", "imus")
+_HEAD = 5  # rows of the head: kind, rate, names, axes, units
+_FRAMES = ("Frame", "Sub Frame")
 
 
 class Head(NamedTuple):
-    """What the first rows of a table say.
+    """Content of the first rows of a table.
 
-    Attributes
-    ----------
     names : of the columns; empty where a column has none
     units : name -> unit, of a row of units
     skipped : rows before the first one of numbers
-    numbered : whether no names are there, and columns are called by their numbers from 1
+    numbered : True if there are no names, and columns are called by their numbers from 1
     """
 
     names: tuple[str, ...]
@@ -39,15 +40,10 @@ class Head(NamedTuple):
 def head_of(rows: Sequence[Sequence[str]], comment: Sequence[str] | None, where: str) -> Head:
     """The head of a table by its first rows.
 
-    Parameters
-    ----------
     rows : the first rows that are not empty, comments above them left out
     comment : the entries of the last line of comment above them, which may be the names
 
-    Raises
-    ------
-    TrajectoryError
-        If the first row may be numbers of columns or a sample; for names that stand twice.
+    Raises TrajectoryError if the first row may be numbers of columns or a sample; for names that stand twice.
     """
     first, second = rows[0], rows[1] if len(rows) > 1 else ()
     kinds = [is_value(entry) for entry in first if entry]
@@ -68,12 +64,12 @@ def head_of(rows: Sequence[Sequence[str]], comment: Sequence[str] | None, where:
 
 
 def numbers(count: int) -> tuple[str, ...]:
-    """What columns without names are called."""
+    """Labels of columns without names: their numbers from 1."""
     return tuple(str(k + 1) for k in range(count))
 
 
 def is_value(entry: str) -> bool:
-    """Whether an entry is a number, a date or a time of day, no name."""
+    """True for an entry that is a number, a date or a time of day, no name."""
     return any(kind.fullmatch(entry) for kind in (_NUMBER, COMMA_NUMBER, DATE, CLOCK))
 
 
@@ -87,11 +83,9 @@ def check_names(names: Sequence[str], where: str) -> None:
 
 def unit_row(names: Sequence[str], entries: Sequence[str]) -> dict[str, str] | None:
     """Name -> unit, where a row has nothing but units, and at least one; else None."""
-    said = [(name, entry.strip()) for name, entry in zip(names, entries) if entry.strip()]
-    found = {name: unit_of(entry.strip("[]() ")) for name, entry in said if entry not in _NO_UNIT_CELLS}
-    if not found or None in found.values():
-        return None
-    return {name: unit for name, unit in found.items() if unit is not None}
+    cells = [(name, entry.strip()) for name, entry in zip(names, entries) if entry.strip() not in ("", *_NO_UNIT_CELLS)]
+    units = {name: unit for name, cell in cells if (unit := unit_of(cell.strip("[]() "))) is not None}
+    return units if units and len(units) == len(dict(cells)) else None
 
 
 def _named(names: Sequence[str], skipped: int, rows: Sequence[Sequence[str]], where: str) -> Head:
@@ -101,6 +95,72 @@ def _named(names: Sequence[str], skipped: int, rows: Sequence[Sequence[str]], wh
 
 
 def _counts(row: Sequence[str]) -> bool:
-    """Whether entries are 0, 1, 2 and so on, as pandas numbers columns without names; the first may be empty."""
+    """True for entries 0, 1, 2 and so on, as pandas numbers columns without names; the first may be empty."""
     own = row if row[0] else row[1:]
     return len(own) > 1 and [*own] == [str(k) for k in range(len(own))]
+
+
+class NexusHead(NamedTuple):
+    """Head of a section of a Nexus table.
+
+    names : of the columns, `KneeAngles_x` of the subject's `KneeAngles` and its axis X
+    units : name -> unit
+    rate : frames a second
+    first : the line of the first frame, from 0
+    delimiter : between columns
+    """
+
+    names: tuple[str, ...]
+    units: dict[str, str]
+    rate: float
+    first: int
+    delimiter: str
+
+
+def nexus_head(text: bytes, lines: list[str], start: int, section: str | None, where: str) -> NexusHead | None:
+    """The head of a section, or None for another kind of table.
+
+    Raises TrajectoryError, UnknownNameError: if there are several sections and none is chosen, or it is not there.
+    """
+    delimiter = "\t" if "\t" in "".join(lines[start : start + _HEAD]) else ","
+    if not _begins(lines, start, delimiter):
+        if section is not None:
+            raise TrajectoryError(
+                f"{where}: topic={section!r:.60} is for bags, workbooks, .mat files and tables of several sections; "
+                "leave it out"
+            )
+        return None
+    whole = text.decode().split("\n")
+    sections = {_kind(whole[k], delimiter): k for k in range(len(whole)) if _begins(whole, k, delimiter)}
+    titles = [kind.title() for kind in sections]
+    if section is not None and section.lower() not in sections:
+        raise unknown_name(f"section of {where}", section, titles)
+    if section is None and len(sections) > 1:
+        raise TrajectoryError(
+            f"{where}: several sections, {', '.join(titles)}; choose one with topic={titles[0]!r} (--topic "
+            f"'{titles[0]}')"
+        )
+    place = sections[section.lower()] if section is not None else start
+    rows = [next(csv.reader([whole[place + k]], delimiter=delimiter)) for k in range(_HEAD)]
+    width = max(len(row) for row in rows)
+    titles, axes, units = ([entry.strip() for entry in row] + [""] * (width - len(row)) for row in rows[2:])
+    names: list[str] = []
+    title = ""
+    for above, axis in zip(titles, axes, strict=True):
+        # A name stands above the first of its columns; the subject before a colon is left out.
+        title = above.rpartition(":")[2] if above else title
+        names.append(axis if axis in _FRAMES or not title else f"{title}_{axis.lower()}" if axis else "")
+    check_names(names, where)
+    return NexusHead(tuple(names), unit_row(names, units) or {}, float(rows[1][0]), place + _HEAD, delimiter)
+
+
+def _kind(line: str, delimiter: str) -> str:
+    return line.split(delimiter)[0].strip().strip('"').lower()
+
+
+def _begins(lines: list[str], place: int, delimiter: str) -> bool:
+    """True where a section begins in a line: its kind, a rate below it, and then the names and `Frame`."""
+    if place + _HEAD >= len(lines) or _kind(lines[place], delimiter) not in _KINDS:
+        return False
+    rate = lines[place + 1].split(delimiter)[0].strip().strip('"')
+    return rate.replace(".", "", 1).isdigit() and _FRAMES[0] in lines[place + 3]

@@ -12,40 +12,33 @@ import numpy as np
 
 from ....arrays import Integers
 from ....errors import TrajectoryError
-from .nexus_tables import nexus_head
-from .table_heads import COMMA_NUMBER, COMMENT, head_of, is_value, numbers
+from .table_heads import COMMA_NUMBER, COMMENT, head_of, is_value, nexus_head, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
-BLANKS = " "
-"""The delimiter of columns with any number of blanks between them."""
-_HEAD_BYTES = 2**18
-"""Part of a text that is looked at before it is read."""
+BLANKS = " "  # delimiter: any number of blanks
+_HEAD_BYTES = 2**18  # beginning of a text, from which its layout follows
 _HEAD_ROWS = 12
-_SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)
-"""The first line of a table that a spreadsheet is delimiter its separator by."""
+_SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)  # a spreadsheet's first line that names the separator
 _COMMA_ENTRY = rb"\s*([-+]?\d*,\d+(?:,\d+)*(?:[eE][-+]?\d+)?)\s*"
 _PLAIN = re.compile(rb'(?:^|[;\t\n"])' + _COMMA_ENTRY + rb'(?=[;\t\n"]|$)')
 _QUOTED = re.compile(rb'(?:^|[,\n])\s*"' + _COMMA_ENTRY + rb'"(?=\s*[,\n]|$)')
 _POINT = re.compile(rb"\d\.\d")
 _THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(?:,\d{3})+")
-_GAPS = ["", "nan", "NaN", "NAN", "-nan", "-NaN"]
-"""Entries that are gaps; any other word is a fault."""
+_GAPS = ["", "nan", "NaN", "NAN", "-nan", "-NaN"]  # any other word is a fault
 
 
 class _Layout(NamedTuple):
-    """Where the numbers of a text begin, and how they stand there.
+    """Layout of a text table.
 
-    Attributes
-    ----------
     names : of the columns
     units : name -> unit
     first : the line of the first sample, from 0
     delimiter : between columns
-    rate : frames a second, where the header says it and no column has times
-    numbered : whether no names are there
+    rate : frames a second, where the header states it and no column has times
+    numbered : True if there are no names
     """
 
     names: tuple[str, ...]
@@ -63,18 +56,13 @@ def read_text(
 
     Columns are separated by commas, tabs, semicolons or blanks; decimal points, or all of them commas. A header may
     stand in the first row, behind `#` or `%`, in several rows as Vicon Nexus writes it, or nowhere; a row of units may
-    follow. The frame's `attrs` have what else the header says.
+    follow. The frame's `attrs` have the rest of the header.
 
-    Parameters
-    ----------
     section : which part of a file of Nexus with several of them
     start : lines before the table
     delimiter : between columns; None: by the header
 
-    Raises
-    ------
-    TrajectoryError
-        For a row of another length than the header, with its number; for what is no text.
+    Raises TrajectoryError for a row of another length than the header, with its number; for bytes that are no text.
     """
     text = unix_text(data, where)
     layout = _layout(text, where, section, start, delimiter)
@@ -117,10 +105,10 @@ def _layout(text: bytes, where: Path, section: str | None, start: int, stated: s
     """Names, separator and first line, by the beginning of a text."""
     lines = text[:_HEAD_BYTES].decode(errors="replace").split("\n")
     place, comment = start, None
-    while place < len(lines) and (not lines[place].strip() or COMMENT.match(lines[place]) or place == start):
-        said = _SEPARATOR.fullmatch(lines[place].strip())
-        if said is not None:
-            stated = said[1]
+    while place < len(lines):
+        separator = _SEPARATOR.fullmatch(lines[place].strip()) if place == start else None
+        if separator is not None:
+            stated = separator[1]
         elif COMMENT.match(lines[place]):
             comment = lines[place]
         elif lines[place].strip():
@@ -134,8 +122,8 @@ def _layout(text: bytes, where: Path, section: str | None, start: int, stated: s
         return _Layout(nexus.names, nexus.units, nexus.first, nexus.delimiter, rate=nexus.rate)
     delimiter = stated or _delimiter(lines[place], where)
     rows = [split_line(lines[k], delimiter) for k in shown]
-    said = None if comment is None else split_line(COMMENT.sub("", comment, count=1).rstrip('"'), delimiter)
-    head = head_of(rows, said, str(where))
+    names = None if comment is None else split_line(COMMENT.sub("", comment, count=1).rstrip('"'), delimiter)
+    head = head_of(rows, names, str(where))
     first = shown[head.skipped] if head.skipped < len(shown) else shown[-1] + 1
     return _Layout(head.names, head.units, first, delimiter, numbered=head.numbered)
 
@@ -151,24 +139,24 @@ def split_line(line: str, delimiter: str) -> list[str]:
 
 def _delimiter(line: str, where: Path) -> str:
     unquoted = re.sub(r'"[^"]*"', "name", line)
-    found = [mark for mark in _DELIMITERS if mark in unquoted.strip(" ")]
-    if where.suffix.lower() == ".tsv" and found != ["\t"]:
+    marks = [mark for mark in _DELIMITERS if mark in unquoted.strip(" ")]
+    if where.suffix.lower() == ".tsv" and marks != ["\t"]:
         raise TrajectoryError(f"{where}: the columns of a .tsv file are separated by tabs; it begins {line!r:.80}")
-    if len(found) > 1:
-        others = [mark for mark in found if mark != "," and all(map(is_value, split_line(line, mark)))]
+    if len(marks) > 1:
+        others = [mark for mark in marks if mark != "," and all(map(is_value, split_line(line, mark)))]
         if len(others) == 1:
             return others[0]
-        kinds = " and ".join(_DELIMITERS[mark] for mark in found)
+        kinds = " and ".join(_DELIMITERS[mark] for mark in marks)
         raise TrajectoryError(
             f"{where}: the header has {kinds}, so it is unclear which separates the columns; use one of them only"
         )
-    if found:
-        return found[0]
+    if marks:
+        return marks[0]
     return BLANKS if len(unquoted.split()) > 1 else ","
 
 
 def _has_decimal_commas(body: bytes, layout: _Layout, where: Path) -> bool:
-    """Whether numbers have decimal commas. Raises TrajectoryError where these may as well be marks of thousands."""
+    """True where numbers have decimal commas. Raises TrajectoryError where these may be marks of thousands."""
     if (b'"' if layout.delimiter == "," else b",") not in body:
         return False
     if layout.delimiter == BLANKS:
@@ -177,10 +165,10 @@ def _has_decimal_commas(body: bytes, layout: _Layout, where: Path) -> bool:
     if len(entry.findall(head)) < len(_POINT.findall(head)):
         return False
     doubtful = None
-    for found in entry.finditer(body):
-        if found[1].count(b",") == 1 and not _THOUSANDS.fullmatch(found[1]):
+    for match in entry.finditer(body):
+        if match[1].count(b",") == 1 and not _THOUSANDS.fullmatch(match[1]):
             return True
-        doubtful = doubtful or found
+        doubtful = doubtful or match
     if doubtful is not None:
         row = layout.first + 1 + body.count(b"\n", 0, doubtful.start(1))
         raise TrajectoryError(
@@ -191,83 +179,74 @@ def _has_decimal_commas(body: bytes, layout: _Layout, where: Path) -> bool:
 
 
 def _checked_rows(body: bytes, layout: _Layout, where: Path) -> tuple[tuple[str, ...], Integers]:
-    """The names of all columns, and the numbers of the lines that pandas finds to be rows.
+    """Names of all columns, and numbers of the lines that pandas takes as rows.
 
     Raises TrajectoryError for a row of another length than the header: pandas would fill or shift it.
     """
-    if b'"' in body:
-        counts, lines = _quoted_counts(body, layout.delimiter, where, layout.first)
-    else:
-        counts = _counts(body, layout.delimiter)
-        lines = layout.first + 1 + np.flatnonzero(counts)
-        counts = counts[counts > 0]
-    names, width = layout.names, len(layout.names)
-    if len(counts) and (counts == width + 1).all() and layout.delimiter != BLANKS:
+    delimiter, names, width = layout.delimiter, layout.names, len(layout.names)
+    counts, lines = _quoted_counts(body, layout, where) if b'"' in body else _counts(body, delimiter)
+    lines += layout.first + 1
+    if len(counts) and (counts == width + 1).all() and delimiter != BLANKS:
         last = body.rstrip(b"\n").rsplit(b"\n", 1)[-1].rstrip()
-        if last.endswith(layout.delimiter.encode()):
+        if last.endswith(delimiter.encode()):
             names, width = (*names, ""), width + 1
-    if len(counts) > 1 and (counts == width + 1).all() and _counts_rows(body, layout.delimiter):
-        names, width = ("", *names), width + 1
+    if len(counts) > 1 and (counts == width + 1).all():
+        # Row names of R and the index of pandas, without a name: the first two rows begin with 0 and 1, or 1 and 2.
+        rows = [split_line(line.decode(), delimiter) for line in body.split(b"\n", 4)[:4] if line.strip()]
+        if [row[0].strip('"') for row in rows][:2] in (["0", "1"], ["1", "2"]):
+            names, width = ("", *names), width + 1
     wrong = np.flatnonzero(counts != width)
     if len(wrong):
-        raise _length_error(where, body, layout, int(lines[wrong[0]]), int(counts[wrong[0]]))
+        line, count = int(lines[wrong[0]]), int(counts[wrong[0]])
+        fault = f"{where}: row {line} has {count} entries, the header {len(layout.names)}"
+        entries = body.split(b"\n")[line - layout.first - 1].decode(errors="replace").split(delimiter)
+        if count == 2 * len(layout.names) and all(entry.strip().lstrip("+-").isdigit() for entry in entries):
+            remedy = "decimal commas between commas cannot be told apart, separate the columns by semicolons"
+        else:
+            remedy = "write one entry for each name, and leave a cell empty where nothing was recorded"
+        raise TrajectoryError(f"{fault}; {remedy}")
     return names, lines
 
 
-def _counts_rows(body: bytes, delimiter: str) -> bool:
-    """Whether the first two rows begin with 0 and 1, or 1 and 2: R's row names and pandas' index, without a name."""
-    rows = (split_line(line.decode(), delimiter) for line in body.split(b"\n", 4)[:4] if line.strip())
-    return [row[0].strip('"') for row in rows][:2] in (["0", "1"], ["1", "2"])
-
-
-def _counts(body: bytes, delimiter: str) -> Integers:
-    """Entries of each line, 0 of an empty one."""
-    body = body if body.endswith(b"\n") else body + b"\n"
-    codes = np.frombuffer(body, dtype=np.uint8)
-    ends = np.flatnonzero(codes == ord("\n"))
+def _counts(body: bytes, delimiter: str) -> tuple[Integers, Integers]:
+    """Entries of each row of a text without quotes, and its line from 0."""
+    rows = body.removesuffix(b"\n").split(b"\n")
     if delimiter == BLANKS:
-        blank = (codes == ord(" ")) | (codes == ord("\t")) | (codes == ord("\n"))
-        starts = np.flatnonzero(~blank[1:] & blank[:-1]) + 1
-        starts = np.append(np.arange(int(not blank[0])), starts)
-        return np.diff(np.searchsorted(starts, ends), prepend=0)
-    counts = np.diff(np.searchsorted(np.flatnonzero(codes == ord(delimiter)), ends), prepend=0) + 1
-    lengths = np.diff(ends, prepend=-1) - 1
-    for k in np.flatnonzero((counts == 1) | (counts != counts[0])).tolist():
-        if not body[ends[k] - lengths[k] : ends[k]].strip(b" \t"):
-            counts[k] = 0
-    return counts
+        counts = np.array([len(row.split()) for row in rows], dtype=np.int64)
+    else:
+        mark = delimiter.encode()
+        counts = np.array([row.count(mark) + 1 for row in rows], dtype=np.int64)
+        for k in np.flatnonzero((counts == 1) | (counts != counts[0])).tolist():
+            if not rows[k].strip(b" \t"):
+                counts[k] = 0
+    lines = np.flatnonzero(counts)
+    return counts[lines], lines
 
 
-def _quoted_counts(body: bytes, delimiter: str, where: Path, first: int) -> tuple[Integers, Integers]:
-    """Entries of each row of a text with quotes, in which lines may break, and its line, by Python's reader."""
-    found, lines = [], []
-    reader = csv.reader(
-        io.StringIO(body.decode(), newline=""), delimiter=delimiter, strict=True, skipinitialspace=delimiter == BLANKS
-    )
+def _quoted_counts(body: bytes, layout: _Layout, where: Path) -> tuple[Integers, Integers]:
+    """Entries of each row of a text with quotes, in which lines may break, and its line from 0."""
+    counts, lines = [], []
+    text, mark = io.StringIO(body.decode(), newline=""), layout.delimiter
+    reader = csv.reader(text, delimiter=mark, strict=True, skipinitialspace=mark == BLANKS)
     try:
-        for row in reader:
-            if row:
-                found.append(len(row))
-                lines.append(first + reader.line_num)
+        for entries in reader:
+            if entries:
+                counts.append(len(entries))
+                lines.append(reader.line_num - 1)
     except csv.Error as error:
-        raise TrajectoryError(f"{where}: row {first + reader.line_num}: {error}; close the quotation marks") from None
-    return np.array(found, dtype=np.int64), np.array(lines, dtype=np.int64)
-
-
-def _length_error(where: Path, body: bytes, layout: _Layout, line: int, count: int) -> TrajectoryError:
-    said = f"{where}: row {line} has {count} entries, the header {len(layout.names)}"
-    entries = body.split(b"\n")[line - layout.first - 1].decode(errors="replace").split(layout.delimiter)
-    if count == 2 * len(layout.names) and all(entry.strip().lstrip("+-").isdigit() for entry in entries):
-        return TrajectoryError(
-            f"{said}; decimal commas between commas cannot be told apart, separate the columns by semicolons"
-        )
-    return TrajectoryError(f"{said}; write one entry for each name, and leave a cell empty where nothing was recorded")
+        raise TrajectoryError(
+            f"{where}: row {layout.first + reader.line_num}: {error}; close the quotation marks"
+        ) from None
+    return np.array(counts, dtype=np.int64), np.array(lines, dtype=np.int64)
 
 
 def _parsed(body: bytes, names: tuple[str, ...], delimiter: str, *, comma: bool) -> pd.DataFrame:
     """The columns as pandas reads them, by their labels: numbers where all entries are, else texts."""
     import pandas as pd
 
+    # From 3.1 on, pandas always reads decimals to the nearest double.
+    major, minor = (int(part) for part in pd.__version__.split(".")[:2])
+    exact: dict[str, Any] = {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}
     frame = pd.read_csv(
         io.BytesIO(body),
         sep=r"\s+" if delimiter == BLANKS else delimiter,
@@ -279,15 +258,7 @@ def _parsed(body: bytes, names: tuple[str, ...], delimiter: str, *, comma: bool)
         na_values=_GAPS,
         skipinitialspace=True,
         low_memory=False,
-        **exact_numbers(),
+        **exact,
     )
     frame.columns = list(names)
     return frame
-
-
-def exact_numbers() -> dict[str, Any]:
-    """What has pandas read decimals to the nearest double: from 3.1 on it always does."""
-    import pandas as pd
-
-    major, minor = (int(part) for part in pd.__version__.split(".")[:2])
-    return {} if (major, minor) >= (3, 1) else {"float_precision": "round_trip"}

@@ -1,0 +1,174 @@
+"""Keyword arguments of the functions that read recorded motions, and their check."""
+
+from __future__ import annotations
+
+import inspect
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypedDict, TypeVar
+
+from numpy.typing import ArrayLike
+
+from ...arguments import check_choice, positive_argument
+from ...body.joint_orders import WORDS
+from ...errors import TrajectoryError, WrongObjectError, unknown_name
+from ...letters import what_came
+from ._gaps import fill_argument
+from ._joint_columns import JointChoices
+from ._segment_links import SegmentChoices
+from .base_columns import base_choices
+from .closing import close_argument
+from .flight import FlightChoices, flight_choices
+from .mapping_files import names_argument
+from .times import trim_argument
+
+Read = TypeVar("Read", bound=Callable[..., Any])
+
+
+class TrajectoryOptions(TypedDict, total=False):
+    """Keyword arguments of `read_trajectory`, which `read_recorded_motion` describes."""
+
+    names: Mapping[str, str | None] | Sequence[str] | str | os.PathLike[str] | None
+    degrees: bool | None
+    timestep: float | None
+    topic: str | None
+    joint_order: str | None
+    rest_missing: bool
+    ignore_extra: bool
+    fill: float | str | None
+    lowpass: float | None
+    resample: float | None
+    base_order: str | None
+    base_axes: ArrayLike | str | None
+    calibration: float | str | None
+    length_tolerance: float | None
+
+
+class ReadingOptions(TrajectoryOptions, total=False):
+    """Keyword arguments of `read_recorded_motion` and `read_shape_path`."""
+
+    time_unit: str | None
+    rest: Mapping[str, float | str] | None
+    trim: tuple[float, float] | None
+    smooth: float | str | Mapping[str, float | str] | None
+    smooth_penalty: float | None
+    close: float | str | bool | None
+    close_by: str | None
+    flight: str | Sequence[float] | None
+    up: str | None
+    gravity: float | str | None
+
+
+def show_options(options: type) -> Callable[[Read], Read]:
+    """Decorator: `help` and editors show the keyword arguments of a class of options, with their defaults."""
+
+    def with_signature(function: Read) -> Read:
+        plain = inspect.signature(function)
+        shown = [part for part in plain.parameters.values() if part.kind is not part.VAR_KEYWORD]
+        for name, kind in options.__annotations__.items():
+            # A TypedDict keeps its annotations as forward references.
+            text, default = kind.__forward_arg__, None if "None" in kind.__forward_arg__ else False
+            shown.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=text))
+        function.__signature__ = plain.replace(parameters=shown)  # type: ignore[attr-defined]
+        return function
+
+    return with_signature
+
+
+def check_options(given: Mapping[str, Any], options: type, function: str) -> None:
+    """Raise WrongObjectError, a TypeError, for an unknown keyword argument."""
+    for name in given:
+        if name not in options.__annotations__:
+            raise WrongObjectError(str(unknown_name(f"argument of {function}", name, options.__annotations__)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Reading:
+    """How a recording is read, checked.
+
+    names : column or segment -> joint or link, None to leave it out; None: not given
+    listed : True where names were a list, one for each column
+    joints, segments, flight : how columns become joints and base, segments links, and what a flight is
+    time_unit, timestep, topic, joint_order : as `read_recorded_motion` has them
+    trim : first and last time that are kept, as the file gives them
+    rate, cut_off : of resampling and of the low-pass filter [1/s]
+    smooth, penalty : noise of the samples, and the penalty in place of that which follows from it
+    close : largest gap that is closed; None: none
+    close_by : how it is closed, or None
+    loop : True where ends that meet are joined smoothly
+    """
+
+    names: Mapping[str, str | None] | None
+    listed: bool
+    joints: JointChoices
+    segments: SegmentChoices
+    flight: FlightChoices
+    time_unit: str | None
+    timestep: float | None
+    topic: str | None
+    joint_order: str | None
+    trim: tuple[float, float] | None
+    rate: float | None
+    cut_off: float | None
+    smooth: float | str | Mapping[str, float | str] | None
+    penalty: float | None
+    close: float | str | None
+    close_by: str | None
+    loop: bool
+
+    @classmethod
+    def of(cls, options: ReadingOptions) -> Reading:
+        """Checked options. Raises ShapeError, TrajectoryError, UnknownNameError; WrongObjectError for unknown ones."""
+        check_options(options, ReadingOptions, "read_recorded_motion")
+        given = options.get
+        trim, order = trim_argument(given("trim")), given("joint_order")
+        flight = flight_choices(given("flight"), given("up"), given("gravity"))
+        base = base_choices(given("base_order"), given("base_axes"))
+        close = close_argument(given("close"))
+        if order is not None:
+            check_choice(order, "joint_order", WORDS)
+        resample, lowpass = given("resample"), given("lowpass")
+        rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
+        cut_off = None if lowpass is None else positive_argument(lowpass, "lowpass", "a frequency in Hz")
+        smooth, penalty = given("smooth"), given("smooth_penalty")
+        if cut_off is not None and not (smooth is None and penalty is None):
+            raise TrajectoryError(
+                "lowpass and smooth are two ways to do one thing; leave one of them out (lowpass, --lowpass; smooth, "
+                "--smooth; smooth_penalty, --smooth-penalty)"
+            )
+        if close is None and given("close_by") is not None:
+            raise TrajectoryError(
+                f"close_by={what_came(given('close_by'))}: how large a gap is to be closed? Give close, as 0.05 or "
+                "'3deg'"
+            )
+        names = names_argument(given("names"))
+        return cls(
+            names=names,
+            listed=isinstance(given("names"), list | tuple),
+            joints=JointChoices(
+                names={},
+                base=base,
+                degrees=given("degrees"),
+                rest=given("rest"),
+                rest_missing=given("rest_missing", False),
+                ignore_extra=given("ignore_extra", False),
+                fill=fill_argument(given("fill")),
+            ),
+            segments=SegmentChoices(
+                names=names or {}, calibration=given("calibration"), length_tolerance=given("length_tolerance")
+            ),
+            flight=flight,
+            time_unit=given("time_unit"),
+            timestep=given("timestep"),
+            topic=given("topic"),
+            joint_order=order,
+            trim=trim,
+            rate=rate,
+            cut_off=cut_off,
+            smooth=smooth,
+            penalty=penalty,
+            close=close,
+            close_by=given("close_by"),
+            loop=given("close") is None,
+        )
