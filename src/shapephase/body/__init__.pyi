@@ -1,10 +1,9 @@
 from .appearance import Visual, inertia_box, visuals
-from .body import Body
+from .body import Body, MovingPart
 from .catalog import example_file, example_names, load_body, robot_names, robots_folder
 from .couplings.coupling import Coupling
 from .family import BodyFamily
 from .joint_chain import JointChain
-from .moving_parts import MovingPart
 from .particles.point_masses import ParticleBody, particle_body
 from .plausibility import implausible
 

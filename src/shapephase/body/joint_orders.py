@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ..arguments import check_object
-from .link_tree import Joint, LinkTree
+from .body import Body
+from .link_tree import Joint, JointOrder, LinkTree
 from .virtual_base import joint_coordinates
-
-if TYPE_CHECKING:
-    from .body import Body
 
 MUJOCO = "mujoco"
 ISAAC = "isaac"
@@ -27,22 +23,6 @@ TITLES = {
 }
 _SCALAR_FIRST = (3, 0, 1, 2)
 """Of the coordinates x y z w of a ball joint, which simulators write w x y z."""
-
-
-@dataclass(frozen=True)
-class JointOrder:
-    """An order of all joints of a body, those that follow others among them.
-
-    Attributes
-    ----------
-    word : that asks for it
-    joints : names of coordinates; of a ball joint four, w first
-    links : in the simulator's order of bodies: the base, and behind it what each joint moves, or all links of the file
-    """
-
-    word: str
-    joints: tuple[str, ...]
-    links: tuple[str, ...]
 
 
 def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:

@@ -120,6 +120,22 @@ class LinkTree:
     length_unit: float | None = None
 
 
+@dataclass(frozen=True)
+class JointOrder:
+    """An order of all joints of a body, those that follow others among them.
+
+    Attributes
+    ----------
+    word : that asks for it
+    joints : names of coordinates; of a ball joint four, w first
+    links : in the simulator's order of bodies: the base, and behind it what each joint moves, or all links of the file
+    """
+
+    word: str
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+
+
 def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -> tuple[str, tuple[Joint, ...]]:
     """The root link, and the joints sorted so that parents come before children.
 

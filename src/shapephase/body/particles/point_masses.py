@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_picklable, names_argument
-from ...arrays import Array, check_reach, common_batch, finite_array, lock_arrays
+from ...arrays import Array, finite_array, lock_arrays
 from ...display import short_repr
 from ...errors import ShapeError, WrongObjectError, unknown_name
 from ...letters import what_came
+from ..shape_arguments import ShapeArguments
 from ._casadi_positions import CasadiPositions, is_casadi_function
 
 _Places = Callable[[Array], tuple[ArrayLike, ArrayLike]]
@@ -30,7 +31,7 @@ _NOT_DERIVATIVES = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class ParticleBody:
+class ParticleBody(ShapeArguments):
     """Point masses whose places in a frame are functions of a shape: polygons, n bodies, a hub with a cord.
 
     It stands wherever a `Body` stands for its inertia and momentum alone: `mechanical_connection`, `curvature`,
@@ -68,17 +69,13 @@ class ParticleBody:
 
     __post_init__ = lock_arrays
     __repr__ = short_repr
+    _coordinate = "parameter"
 
     def __getstate__(self) -> dict[str, Any]:
         """What is pickled. Raises LocalFunctionError for places given by a lambda."""
         given = self.places
         check_picklable(given.function if isinstance(given, _Given) else given, "a body of particles")
         return self.__dict__
-
-    @property
-    def n_shape(self) -> int:
-        """The number of parameters."""
-        return len(self.joint_names)
 
     @property
     def mass(self) -> float:
@@ -89,12 +86,6 @@ class ParticleBody:
     def sha256(self) -> None:
         """It comes from no file."""
         return
-
-    def joint_index(self, name: str) -> int:
-        """The place of a parameter in the shape vector. Raises UnknownNameError."""
-        if name not in self.joint_names:
-            raise unknown_name(f"parameter of {self.name}", name, self.joint_names)
-        return self.joint_names.index(name)
 
     def shape(self, joints: Mapping[str, float] | None = None) -> Array:
         """The shape with the named parameters at these values, all others 0: -> (n,). Raises UnknownNameError."""
@@ -118,23 +109,6 @@ class ParticleBody:
         r = self._checked(shape)
         return self._matrix(*self._centred(self._rows(r))).reshape(*r.shape[:-1], 3, self.n_shape)
 
-    def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
-        """L_o = J(r) rate: (..., n), (..., n) -> (..., 3) [kg m^2/s]. As `Body`."""
-        r, v = self._pair(shape, rate)
-        return so3.apply(self.momentum_matrix(r), v)
-
-    def inertia_gradient(self, shape: ArrayLike) -> Array:
-        """dI/dr_k: (..., n) -> (..., n, 3, 3) [kg m^2 per unit]. As `Body`."""
-        return self.angular_map_gradient(shape)[..., :3]
-
-    def momentum_matrix_gradient(self, shape: ArrayLike) -> Array:
-        """dJ/dr_k: (..., n) -> (..., n, 3, n), the first n counts k. As `Body`.
-
-        Its part that is symmetric in both joints needs second derivatives of the places, which are central
-        differences of eighth order where CasADi does not give the places. No curvature depends on that part.
-        """
-        return self.angular_map_gradient(shape)[..., 3:]
-
     def angular_map_gradient(self, shape: ArrayLike) -> Array:
         """d[I, J]/dr_k, both side by side: (..., n) -> (..., n, 3, 3 + n)."""
         r = self._checked(shape)
@@ -154,8 +128,7 @@ class ParticleBody:
 
     def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
         """dI/dr_k w + dJ/dr_k rate: three times (..., n or 3) -> (..., n, 3) [kg m^2/s per unit]. As `Body`."""
-        r, v = self._pair(shape, rate)
-        w = np.broadcast_to(finite_array(base_rate, "base_rate", (3,), unit="rad/s"), (*r.shape[:-1], 3))
+        r, v, w = self._with_base_rate(shape, rate, base_rate)
         return np.einsum("...kab,...b->...ka", self.angular_map_gradient(r), np.concatenate([w, v], axis=-1))
 
     def centre_of_mass(self, shape: ArrayLike) -> Array:
@@ -165,14 +138,11 @@ class ParticleBody:
 
     def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """About the centre of mass, while the frame turns: -> (...) [J]. As `Body`."""
-        r, v = self._pair(shape, rate)
-        omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
-        batch = common_batch(shape=r.shape[:-1], angular_velocity=omega.shape[:-1])
-        r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
+        r, v, omega = self._turning(shape, rate, angular_velocity)
         places, slopes = self._centred(self._rows(r))
         moving = np.einsum("nkma,nk->nma", slopes, self._rows(v))
-        moving += np.cross(np.broadcast_to(omega, (*batch, 3)).reshape(-1, 1, 3), places)
-        return (0.5 * np.einsum("m,nma,nma->n", self.masses, moving, moving)).reshape(batch)
+        moving += np.cross(omega.reshape(-1, 1, 3), places)
+        return (0.5 * np.einsum("m,nma,nma->n", self.masses, moving, moving)).reshape(r.shape[:-1])
 
     def sample(self, shape: Array, rate: Array) -> tuple[Array, Array]:
         """Locked inertia and internal momentum along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3). Unchecked."""
@@ -210,24 +180,6 @@ class ParticleBody:
 
     def _matrix(self, places: Array, slopes: Array) -> Array:
         return np.einsum("m,nkma->nak", self.masses, np.cross(places[:, None], slopes))
-
-    def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
-        array = finite_array(shape, name)
-        if array.ndim == 0 or array.shape[-1] != self.n_shape:
-            raise ShapeError(
-                f"{name}: expected (..., {self.n_shape}), one entry per parameter of {self.name} "
-                f"({', '.join(self.joint_names)}), got shape {array.shape}"
-            )
-        check_reach(array, name)
-        return array
-
-    def _pair(self, shape: ArrayLike, rate: ArrayLike) -> tuple[Array, Array]:
-        r, v = self._checked(shape), self._checked(rate, "rate")
-        batch = common_batch(shape=r.shape[:-1], rate=v.shape[:-1])
-        return np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
-
-    def _rows(self, array: Array) -> Array:
-        return array.reshape(-1, self.n_shape)
 
 
 def particle_body(
