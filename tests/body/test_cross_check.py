@@ -285,7 +285,7 @@ def test_what_pinocchio_loses_without_a_word_is_seen(load_urdf, monkeypatch):
             assert old in tree.text
             return replace(tree, text=tree.text.replace(old, new))
 
-        monkeypatch.setattr(catalog, "urdf_tree", spoiling)
+        monkeypatch.setattr(loading, "urdf_tree", spoiling)
         with pytest.raises(ShapePhaseError, match=r"body\.urdf:1: the body made from this file"):
             load_urdf(text)
 

@@ -448,5 +448,5 @@ def test_a_body_that_is_not_the_engines_is_not_handed_out(tmp_path, monkeypatch)
         return subprocess.CompletedProcess([], 0, json.dumps(said).encode(), b"")
 
     monkeypatch.setattr(asking, "run_alone", turned)
-    with pytest.raises(ModelFileError, match="the engine has another momentum at a random shape"):
+    with pytest.raises(ModelFileError, match="another momentum than the engine"):
         loaded(tmp_path, ACROBAT)

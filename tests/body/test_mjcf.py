@@ -527,7 +527,7 @@ def test_numbers_that_are_not_mujoco_s_are_not_handed_out(load_mjcf, monkeypatch
             return subprocess.CompletedProcess([], 0, json.dumps(said).encode(), b"")
 
         monkeypatch.setattr(asking, "run_alone", changed)
-        with pytest.raises(ModelFileError, match=f"the engine has another {what} at a random shape"):
+        with pytest.raises(ModelFileError, match=f"another {what} than the engine"):
             load_mjcf(GOOD_MJCF)
 
 

@@ -36,7 +36,7 @@ def explore_command(
     """
     import webbrowser
 
-    from ..body.catalog import load_body
+    from ..body.loading import load_body
     from ..files import write_whole
     from ..plotting.explorer import explore_html
     from ..plotting.viewer import LiveView

@@ -9,7 +9,8 @@ from .progress import steps
 
 def robots_command(*, printing: PrintOptions = AS_TEXT) -> Outcome:  # noqa: ARG001
     """List the bodies and motions that come with the library."""
-    from ..body.catalog import example_names, load_body, robot_names
+    from ..body.catalog import example_names, robot_names
+    from ..body.loading import load_body
     from ..examples.scenarios import MOTIONS
 
     bodies = {name: load_body(name) for name in robot_names()}

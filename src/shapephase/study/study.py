@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_function, number_argument, tolerance_argument, vector_argument
 from ..arrays import Array, Integers
-from ..body.catalog import load_body, loading_options
+from ..body.loading import load_body, loading_options
 from ..deformation.frames import gauge_link
 from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError, WrongObjectError

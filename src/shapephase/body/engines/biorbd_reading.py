@@ -9,7 +9,6 @@ from __future__ import annotations
 import difflib
 import re
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,16 @@ import biorbd
 import numpy as np
 
 from ...arrays import Array
-from .chain import Chain, UnusableModelError, ball_names, check_name, locked_inertia
+from ..couplings.ball_joints import coordinate_names
+from .chain import (
+    EXACT,
+    FRAME_ERRORS,
+    Chain,
+    UnusableModelError,
+    check_name,
+    inertia_and_momentum,
+    rates_by_differences,
+)
 
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
 _WORDS = (
@@ -45,19 +53,11 @@ _DROPPED = ("meshfile", "meshcolor", "meshscale", "meshrt")
 """A model whose mesh is missing is refused, and meshes have no part in how a body turns."""
 _QUATERNION = "_Quat"
 """Behind the name of a segment, that of its ball joint; biorbd calls its numbers so, with X, Y, Z, and Z again."""
-_STEP = 0.01
-"""[s] of the differences that give the rates of segments with quaternions: the eighth power is near rounding."""
-_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-"""Of the differences over so many steps to both sides (Fornberg 1988)."""
 _COARSE = 1e-9
 """Share of the largest terms by which a momentum by differences may be off: short quaternions turn fast."""
 _NO_ROOT = ("root", "base")
 _MASSLESS = 1e-7
 """[kg]; biorbd gives a segment without mass 1e-8 kg."""
-_EXACT = 1e-12
-"""Share of the largest terms by which the engine's numbers may differ from ours."""
-_FRAMES = 10.0
-"""Times what frames lack of being orthonormal: biorbd computes with them as they are."""
 
 
 def chain_of(path: str, root_body: str | None = None) -> Chain:
@@ -102,7 +102,7 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
             continue
         lack = max(lack, missing)
         chain.add_joints(parent, name, above @ frame[:3, 3], turn, _axes(segment, name), line)
-    if lack > _EXACT:
+    if lack > EXACT:
         notes.append(f"frames are orthonormal to {lack:.1g} only: the nearest rotations are taken")
     _add_poses(chain, model, segments, base, lack)
     return chain
@@ -361,12 +361,12 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
     still[model.nbQ() - model.nbQuat() :] = 1.0
     round_ones = [k for k in range(model.nbSegment()) if model.segment(k).isRotationAQuaternion()]
     scalars = {model.segment(k).name().to_string(): len(still) - len(round_ones) + n for n, k in enumerate(round_ones)}
-    tolerance = _EXACT + _FRAMES * lack
+    tolerance = EXACT + FRAME_ERRORS * lack
 
     def coordinates(shape: dict[str, float]) -> Array:
         q = still.copy()
         for joint in {name.rpartition(".")[0] for name in shape if name.rpartition(".")[0].endswith(_QUATERNION)}:
-            four = np.array([shape[part] for part in ball_names(joint)])
+            four = np.array([shape[part] for part in coordinate_names(joint)])
             segment, first = joint.removesuffix(_QUATERNION), names.index(f"{joint}X")
             four /= np.sqrt(four @ four)
             q[first : first + 3], q[scalars[segment]] = four[:3], four[3]
@@ -375,51 +375,33 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
                 q[names.index(name)] = value
         return q
 
-    def poses(shape: dict[str, float]) -> Array:
-        there = biorbd.GeneralizedCoordinates(coordinates(shape))
-        return np.array([frame.to_array() for frame in model.allGlobalJCS(there)])
-
     numbers = list(segments.values())
     traits = [model.segment(k).characteristics() for k in numbers]
     masses = np.array([part.mass() for part in traits])
     offsets = np.array([part.CoM().to_array() for part in traits])
     tensors = np.array([part.inertia().to_array() for part in traits])
+
+    def frames(shape: dict[str, float]) -> Array:
+        there = biorbd.GeneralizedCoordinates(coordinates(shape))
+        return np.array([frame.to_array() for frame in model.allGlobalJCS(there)])
+
+    def poses(shape: dict[str, float]) -> tuple[Array, Array]:
+        own = frames(shape)[numbers]
+        return own[:, :3, 3] + (own[:, :3, :3] @ offsets[:, :, None])[:, :, 0], own[:, :3, :3]
+
     for shape, rate in chain.random_shapes():
         there, v = biorbd.GeneralizedCoordinates(coordinates(shape)), np.zeros(model.nbQdot())
         for name in names[: len(v)]:
             v[names.index(name)] = rate.get(name, 0.0)
-        moves = biorbd.GeneralizedVelocity(v)
-        frames = poses(shape)
-        root, frames = frames[segments[base], :3, :3], frames[numbers]
-        turns = frames[:, :3, :3]
-        centres = frames[:, :3, 3] + (turns @ offsets[:, :, None])[:, :, 0]
-        turned = turns @ tensors @ np.swapaxes(turns, 1, 2)
-        inertia = locked_inertia(masses, centres, turned)
-        # Part by part: not all segments need belong to the body.
-        speeds = np.array([speed.to_array() for speed in model.CoMdotBySegment(there, moves, True)])[numbers]
-        omega = np.array([model.segmentAngularVelocity(there, moves, k, False).to_array() for k in numbers])
-        coarse = tolerance
+        velocities = biorbd.GeneralizedVelocity(v)
+        root, coarse = frames(shape)[segments[base], :3, :3], tolerance
         if any(name.endswith(f"{_QUATERNION}.w") for name in shape):
             # biorbd leaves the rates of quaternions out.
-            speeds, omega, coarse = *_by_differences(poses, shape, rate, numbers, offsets), max(tolerance, _COARSE)
-        apart = centres - masses @ centres / masses.sum()
-        momentum = masses @ np.cross(apart, speeds) + (turned @ omega[:, :, None])[:, :, 0].sum(axis=0)
+            speeds, omega = rates_by_differences(poses, shape, rate)
+            coarse = max(tolerance, _COARSE)
+        else:
+            # Part by part: not all segments need belong to the body.
+            speeds = np.array([s.to_array() for s in model.CoMdotBySegment(there, velocities, True)])[numbers]
+            omega = np.array([model.segmentAngularVelocity(there, velocities, k, False).to_array() for k in numbers])
+        inertia, momentum = inertia_and_momentum(masses, tensors, *poses(shape), speeds, omega)
         chain.add_pose(shape, rate, root.T @ inertia @ root, root.T @ momentum, (tolerance, coarse))
-
-
-def _by_differences(
-    poses: Callable[[dict[str, float]], Array],
-    shape: dict[str, float],
-    rate: dict[str, float],
-    numbers: list[int],
-    offsets: Array,
-) -> tuple[Array, Array]:
-    """Velocities of the centres and angular velocities of segments, from where they are a little earlier and later."""
-    slopes = np.zeros((len(numbers), 4, 4))
-    for steps, weight in _WEIGHTS:
-        for side in (1.0, -1.0):
-            moved = {name: value + side * steps * _STEP * rate[name] for name, value in shape.items()}
-            slopes += side * weight / _STEP * poses(moved)[numbers]
-    spins = slopes[:, :3, :3] @ np.swapaxes(poses(shape)[numbers, :3, :3], 1, 2)
-    omega = 0.5 * np.stack([spins[:, i, j] - spins[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=1)
-    return slopes[:, :3, 3] + (slopes[:, :3, :3] @ offsets[:, :, None])[:, :, 0], omega

@@ -16,8 +16,11 @@ import mujoco
 import numpy as np
 
 from ...arrays import Array
+from ..couplings.ball_joints import BallJoint, coordinate_names
+from ..couplings.coupling import Coupling
+from ..couplings.functions import polynomial
 from ..link_tree import MOST_LINKS, MOST_MASS
-from .chain import Chain, UnusableModelError, ball_names, ball_state, check_name, locked_inertia
+from .chain import EXACT, FRAME_ERRORS, Chain, UnusableModelError, check_name, locked_inertia
 from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, listed, rotation
 
 _COUPLED = int(mujoco.mjtEq.mjEQ_JOINT)
@@ -28,10 +31,6 @@ _BY_JOINT = int(mujoco.mjtWrap.mjWRAP_JOINT)
 _BY_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
 """Of what tendons are led over, that which says to which body it belongs."""
 _OF_SITES = int(mujoco.mjtObj.mjOBJ_SITE)
-_EXACT = 1e-12
-"""Share of the largest terms by which MuJoCo's numbers may differ from ours."""
-_FRAMES = 10.0
-"""Times what quaternions and axes lack of length one."""
 _MOST_LENGTH = 1e6
 """[m] of places: farther away, differences are lost."""
 
@@ -71,11 +70,9 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
             _add_joints(moved, compiled, body)
     chain.base_joints = moved.joints if moved.moving() else []
     for joint, rule in rules.items():
-        terms = [
-            (compiled.joint_name(leader), np.zeros(0), np.array([rule.about]), np.array(rule.powers)[:, None])
-            for leader in rule.leaders
-        ]
-        chain.couple(compiled.joint_name(joint), rule.start, terms)
+        function = polynomial(np.array(rule.powers or [0.0]), rule.about)
+        terms = tuple((compiled.joint_name(leader), function) for leader in rule.leaders)
+        chain.couplings[compiled.joint_name(joint)] = Coupling(rule.start, terms)
     chain.notes += _ignored(compiled, own)
     if compiled.model.body_subtreemass[base] > 0.0:
         _add_poses(chain, compiled, bodies, rules)
@@ -144,8 +141,7 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         below = child if last else f"{child}\0{name}"
         if not last:
             # Between two joints of a body lie axes that are no link.
-            chain.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
-            chain.frames.append(below)
+            chain.add_frame(below)
         after = -anchor if last else np.zeros(3)
         chain.add_joint(name, kind, parent, below, place, turn, axis, limits, after, line)
         parent, place, turn = below, np.zeros(3), np.eye(3)
@@ -306,7 +302,7 @@ def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[
     names = {joint: compiled.joint_name(joint) for body in bodies[1:] for joint in compiled.joints_of(body)}
     quaternions = np.concatenate([model.body_quat[bodies], model.body_iquat[bodies]])
     lengths = np.concatenate([np.linalg.norm(quaternions, axis=1), np.linalg.norm(model.jnt_axis, axis=1)])
-    tolerance = _EXACT + _FRAMES * float(np.abs(lengths - 1.0).max())
+    tolerance = EXACT + FRAME_ERRORS * float(np.abs(lengths - 1.0).max())
     # Near the origin nothing is lost by where the file puts the body.
     above = base
     while above:
@@ -321,9 +317,10 @@ def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[
         own = {joint: (shape[name], rate[name]) for joint, name in names.items() if name in shape}
         for joint, name in names.items():
             if model.jnt_type[joint] == BALL:
-                four = [np.array([one[part] for part in ball_names(name)]) for one in (shape, rate)]
-                where, first = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-                data.qpos[where : where + 4], data.qvel[first : first + 3] = ball_state(*four)
+                ball, where, first = BallJoint(name, 0, 0), int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+                four = [np.array([[values[part] for part in coordinate_names(name)]]) for values in (shape, rate)]
+                data.qpos[where : where + 4] = np.roll(ball.quaternions(four[0])[0], 1)
+                data.qvel[first : first + 3] = ball.rates(*four)[0]
                 continue
             value, speed = _coordinate(joint, rules, own)
             data.qpos[model.jnt_qposadr[joint]], data.qvel[model.jnt_dofadr[joint]] = value, speed

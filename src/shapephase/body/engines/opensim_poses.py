@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array
-from .chain import Chain, locked_inertia
+from .chain import Chain, inertia_and_momentum
 from .opensim_numbers import engine, loaded, pose_of, refused, tensor_of, value_and_slope, vector_of
-
-_EXACT = 1e-12
-"""Share of the largest terms by which the engine's numbers may differ from ours."""
 
 
 def add_poses(
@@ -50,11 +47,8 @@ def add_poses(
         turn, _ = pose_of(root.getTransformInGround(state))
         turns = np.array([pose_of(part.getTransformInGround(state))[0] for part in parts])
         centres, speeds, omega = np.swapaxes([_moving(part, state) for part in parts], 0, 1)
-        turned = turns @ tensors @ np.swapaxes(turns, 1, 2)
-        apart = centres - masses @ centres / masses.sum()
-        momentum = masses @ np.cross(apart, speeds) + (turned @ omega[:, :, None])[:, :, 0].sum(axis=0)
-        inertia = turn.T @ locked_inertia(masses, centres, turned) @ turn
-        chain.add_pose(shape, rate, inertia, turn.T @ momentum, (_EXACT, _EXACT))
+        inertia, momentum = inertia_and_momentum(masses, tensors, centres, turns, speeds, omega)
+        chain.add_pose(shape, rate, turn.T @ inertia @ turn, turn.T @ momentum)
 
 
 def _moving(part: Any, state: Any) -> tuple[Array, Array, Array]:

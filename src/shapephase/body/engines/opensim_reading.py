@@ -14,7 +14,9 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import ShapeError
+from ..couplings.coupling import Coupling
 from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
+from ..link_tree import Joint
 from .chain import Chain, UnusableModelError, check_name
 from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, tensor_of, value_and_slope, vector_of
 from .opensim_poses import add_poses
@@ -39,20 +41,13 @@ _KNOWN = {
 """Of OpenSim's joints their axes in order, and which coordinate each has."""
 
 
-class _Rule(NamedTuple):
-    """start + the sum of functions of one coordinate each."""
-
-    start: float
-    terms: tuple[tuple[str, JointFunction], ...]
-
-
 class _Axis(NamedTuple):
     """One axis of a joint; `name` is for a joint that follows coordinates."""
 
     name: str
     kind: str
     direction: Array
-    rule: _Rule
+    rule: Coupling
 
 
 class _Coordinate(NamedTuple):
@@ -61,7 +56,7 @@ class _Coordinate(NamedTuple):
     kind: str
     limits: tuple[float, float]
     locked: float | None
-    rule: _Rule | None
+    rule: Coupling | None
 
 
 def chain_of(path: str, root_body: str | None = None) -> Chain:
@@ -99,7 +94,7 @@ class _Reading:
             if joint is not self._base:
                 self._add_joint(joint, axes[joint.getName()], carriers)
         for name, coordinate in self._coordinates.items():
-            if coordinate.rule is not None and any(name == joint["name"] for joint in self._chain.joints):
+            if coordinate.rule is not None and any(name == joint.name for joint in self._chain.joints):
                 self._couple(name, coordinate.rule)
         self._chain.base_angles = self._base_angles()
         if self._chain.base_angles is None:
@@ -180,7 +175,7 @@ class _Reading:
             turned += place[0]
         return (names, turned) if len(set(names)) == len(set(turned)) == len(names) else None
 
-    def _way(self) -> list[dict[str, Any]]:
+    def _way(self) -> list[Joint]:
         """The joints that move the base, as in a plane; none where one of its axes is a curve of a coordinate."""
         try:
             axes = self._own_axes(self._base)
@@ -223,7 +218,7 @@ class _Reading:
             self._check_circle(name, couplers)
         return found
 
-    def _check_circle(self, name: str, couplers: dict[str, _Rule]) -> None:
+    def _check_circle(self, name: str, couplers: dict[str, Coupling]) -> None:
         """Raise UnusableModelError where a coordinate follows itself in the end."""
         reached, ahead = set(), {name}
         while ahead:
@@ -232,7 +227,7 @@ class _Reading:
         if name in reached:
             raise self._fault(f"coordinate {name!r} follows itself, by way of others; remove a coupler", name)
 
-    def _couplers(self) -> dict[str, _Rule]:
+    def _couplers(self) -> dict[str, Coupling]:
         """How coordinates follow others."""
         found = {}
         constraints = self._model.getConstraintSet()
@@ -259,7 +254,7 @@ class _Reading:
             found = [self._custom_axis(name, transform.getTransformAxis(k), k) for k in (3, 4, 5, 0, 1, 2)]
         elif kind in _KNOWN:
             found = [
-                _Axis(f"{name}_{k}", moves, axis, _Rule(0.0, ((joint.get_coordinates(place).getName(), _SAME),)))
+                _Axis(f"{name}_{k}", moves, axis, Coupling(0.0, ((joint.get_coordinates(place).getName(), _SAME),)))
                 for k, (moves, axis, place) in enumerate(_KNOWN[kind])
             ]
         else:
@@ -279,10 +274,10 @@ class _Reading:
         names = axis.getCoordinateNames()
         drivers = [names.getValue(place) for place in range(names.size())]
         label = f"{joint}_{axis.getName() or number}"
-        rule = _Rule(0.0, ()) if not axis.hasFunction() else self._rule(axis.getFunction(), drivers, joint)
+        rule = Coupling(0.0, ()) if not axis.hasFunction() else self._rule(axis.getFunction(), drivers, joint)
         return _Axis(label, _SLIDE if number > 2 else _TURN, vector_of(axis.getAxis()), rule)
 
-    def _unlocked(self, rule: _Rule) -> _Rule:
+    def _unlocked(self, rule: Coupling) -> Coupling:
         """With the values of locked coordinates."""
         start, kept = rule.start, []
         for driver, function in rule.terms:
@@ -291,27 +286,27 @@ class _Reading:
                 kept.append((driver, function))
             else:
                 start += float(function(np.array(locked)).value)
-        return _Rule(start, tuple(kept))
+        return Coupling(start, tuple(kept))
 
-    def _rule(self, function: Any, drivers: list[str], owner: str) -> _Rule:
+    def _rule(self, function: Any, drivers: list[str], owner: str) -> Coupling:
         """A function of OpenSim as functions of one coordinate each."""
         kind = function.getConcreteClassName()
         if kind == "MultiplierFunction":
             multiplier = engine().MultiplierFunction.safeDownCast(function)
             inner, factor = self._rule(multiplier.getFunction(), drivers, owner), multiplier.getScale()
-            return _Rule(factor * inner.start, tuple((name, one.scaled(factor)) for name, one in inner.terms))
+            return inner.scaled(factor)
         if kind == "Constant":
-            return _Rule(engine().Constant.safeDownCast(function).getValue(), ())
+            return Coupling(engine().Constant.safeDownCast(function).getValue(), ())
         if kind == "LinearFunction":
             numbers = numbers_of(engine().LinearFunction.safeDownCast(function).getCoefficients())
             if len(numbers) != len(drivers) + 1:
                 raise self._fault(f"{owner!r}: {len(numbers)} coefficients for {len(drivers)} coordinates", owner)
             slopes = zip(drivers, numbers, strict=False)
-            return _Rule(numbers[-1], tuple((name, polynomial(np.array([0.0, slope]))) for name, slope in slopes))
+            return Coupling(numbers[-1], tuple((name, polynomial(np.array([0.0, slope]))) for name, slope in slopes))
         if len(drivers) != 1:
             raise self._fault(f"{owner!r}: a {kind} of one coordinate is supported, not of {len(drivers)}", owner)
         try:
-            return _Rule(0.0, ((drivers[0], self._single(function, kind, owner)),))
+            return Coupling(0.0, ((drivers[0], self._single(function, kind, owner)),))
         except ShapeError as error:
             raise self._fault(f"{owner!r}: its {kind}: {error}", owner) from None
 
@@ -371,7 +366,7 @@ class _Reading:
             if carriers.get(driver) == axis.name:
                 function = rule.terms[0][1]
                 name, sign = driver, _sign(function)
-                rule = _Rule(rule.start + float(function(np.zeros(())).value), ())
+                rule = Coupling(rule.start + float(function(np.zeros(())).value), ())
             if not rule.terms:
                 # Along the same axis, so that it does not matter which comes first.
                 pose = _after(pose, *_moved(axis.kind, direction, rule.start))
@@ -387,16 +382,13 @@ class _Reading:
         self._chain.add_joints(above, child, place, turn, [])
 
     def _step(self, above: str, below: str, pose: tuple[Array, Array], name: str, kind: str, axis: Array) -> None:
-        self._chain.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
-        self._chain.frames.append(below)
+        self._chain.add_frame(below)
         known = self._coordinates.get(name)
         limits = (-np.inf, np.inf) if known is None else known.limits
         self._chain.add_joints(above, below, pose[1], pose[0], [(name, kind, axis, list(limits))])
 
-    def _couple(self, name: str, rule: _Rule) -> None:
-        plain = self._unlocked(rule)
-        terms = [(driver, one.knots, one.centres, one.coefficients) for driver, one in plain.terms]
-        self._chain.couple(name, plain.start, terms)
+    def _couple(self, name: str, rule: Coupling) -> None:
+        self._chain.couplings[name] = self._unlocked(rule)
 
 
 _SAME = polynomial(np.array([0.0, 1.0]))

@@ -11,6 +11,7 @@ import io
 import math
 import re
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ import yaml
 import yeadon
 
 from ...arrays import Array
-from .chain import Chain, UnusableModelError, locked_inertia
+from .chain import EXACT, Chain, UnusableModelError, inertia_and_momentum, rates_by_differences
 
 _X = np.array([1.0, 0.0, 0.0])
 """To the left, as the package has it; it turns forwards and back."""
@@ -41,12 +42,6 @@ _JOINTS = {
     "K2": ("K1", (("K1K2flexion", _X),)),
 }
 """Of each segment the one it hangs on, and the package's names of the turns between them, in their order."""
-_STEP = 0.02
-"""[rad] of the differences that give rates: the eighth power is at rounding."""
-_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-"""Of the differences over so many steps to both sides (Fornberg 1988)."""
-_EXACT = 1e-12
-"""Share of the largest terms that rounding leaves of an inertia."""
 _BY_DIFFERENCES = 1e-11
 """The same of a momentum by differences."""
 _TYPO = 2.0
@@ -80,7 +75,7 @@ def chain_of(path: str) -> Chain:
         axes = [(name, "revolute", axis, list(limits[name])) for name, axis in turns]
         chain.add_joints(_link(parent), _link(part), place, turn, axes)
     for shape, rate in chain.random_shapes():
-        chain.add_pose(shape, rate, *_seen(human, shape, rate), (_EXACT, _BY_DIFFERENCES))
+        chain.add_pose(shape, rate, *_seen(human, shape, rate), (EXACT, _BY_DIFFERENCES))
     return chain
 
 
@@ -164,19 +159,5 @@ def _seen(human: Any, shape: dict[str, float], rate: dict[str, float]) -> tuple[
     """Locked inertia and internal momentum from the package's poses, the pelvis at rest."""
     masses = np.array([part.mass for part in human.segments])
     tensors = np.array([part.rel_inertia for part in human.segments])
-    centres, turns = _placed(human, shape)
-    speeds, slopes = np.zeros_like(centres), np.zeros_like(turns)
-    for steps, weight in _WEIGHTS:
-        for side in (1.0, -1.0):
-            moved = {name: value + side * steps * _STEP * rate[name] for name, value in shape.items()}
-            there, turned = _placed(human, moved)
-            speeds += side * weight / _STEP * there
-            slopes += side * weight / _STEP * turned
-    spins = slopes @ np.swapaxes(turns, 1, 2)
-    omega = 0.5 * np.stack(
-        [spins[:, 2, 1] - spins[:, 1, 2], spins[:, 0, 2] - spins[:, 2, 0], spins[:, 1, 0] - spins[:, 0, 1]], axis=1
-    )
-    tensors = turns @ tensors @ np.swapaxes(turns, 1, 2)
-    apart = centres - masses @ centres / masses.sum()
-    momentum = (masses[:, None] * np.cross(apart, speeds)).sum(axis=0) + np.einsum("nij,nj->i", tensors, omega)
-    return locked_inertia(masses, centres, tensors), momentum
+    moving = rates_by_differences(partial(_placed, human), shape, rate)
+    return inertia_and_momentum(masses, tensors, *_placed(human, shape), *moving)

@@ -166,7 +166,7 @@ def plan_command(
     out
         Write the joint motion to this CSV file; without it none is written. For example `--out plan.csv`.
     """
-    from ...body.catalog import load_body
+    from ...body.loading import load_body
     from ...optimal_control.plan_options import Search
     from ...optimal_control.planning import plan_reorientation
     from ...phases.phases import split

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array
-from ...body.appearance import Visual
+from ...body.drawing.visual import Visual
 from ...body.body import Body
 from ...body.couplings.coordinate_map import CurvedJoint
 from ...shape_space.ball_columns import ball_columns, neighbours_signs
