@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.body import Coupling, catalog
+from shapephase.body import Coupling, catalog, loading
 from shapephase.body._cross_check import check_against_file, inertia_and_momentum
 from shapephase.body.formats.urdf import urdf_tree
 from shapephase.body.formats.xml_text import xml_tree

@@ -14,6 +14,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import ModelFileError, UnphysicalInertiaError, unknown_name
 from .couplings.coupling import Coupling
+from .formats.xml_text import listed
 
 MOST_LINKS = 2000
 """Links of a body, most of them fixed to others."""
@@ -156,7 +157,7 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
             if link not in links:
                 raise ModelFileError(
                     f"{joint.where}: joint {joint.name!r}: its {end} link {link!r} does not exist; there is "
-                    f"{_listed(get_close_matches(link, links, 5, 0.4) or list(links)[:5])}"
+                    f"{listed(get_close_matches(link, links, 5, 0.4) or list(links)[:5])}"
                 )
         if joint.child in above:
             other = above[joint.child]
@@ -170,7 +171,7 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
     if len(roots) > 1:
         raise ModelFileError(
             f"{links[roots[1]].where}: link {roots[1]!r}: {len(roots)} links have no parent, one is allowed: "
-            f"{_listed(roots)}; join them with joints"
+            f"{listed(roots)}; join them with joints"
         )
     sorted_joints: list[Joint] = []
     level, depth, reached = roots, 0, set(roots)
@@ -188,7 +189,7 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
     lost = [name for name in links if name not in reached]
     if lost:
         raise ModelFileError(
-            f"{links[lost[0]].where}: link {lost[0]!r}: links that form a closed chain: {_listed(lost)}; "
+            f"{links[lost[0]].where}: link {lost[0]!r}: links that form a closed chain: {listed(lost)}; "
             "remove one of their joints"
         )
     return roots[0], tuple(sorted_joints)
@@ -223,7 +224,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     if negative.any() and on_unphysical == "error":
         first = int(np.argmax(negative))
         others = [label.format(links[i].name) for i in np.flatnonzero(negative)[1:]]
-        also = f" (also {_listed(others)})" if others else ""
+        also = f" (also {listed(others)})" if others else ""
         raise UnphysicalInertiaError(
             f"{links[first].where}: {label.format(links[first].name)} has principal moments {moments[first]} "
             f"kg m^2, one of them negative{also}; correct the file, or load it with on_unphysical='warn' "
@@ -247,7 +248,7 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     for which, text in kinds:
         if which.any():
             bad = [links[i] for i in np.flatnonzero(which)]
-            found.append(f"{bad[0].where}: {_listed([label.format(link.name) for link in bad])}: {text}")
+            found.append(f"{bad[0].where}: {listed([label.format(link.name) for link in bad])}: {text}")
     return found
 
 
@@ -287,7 +288,7 @@ def hollow_warnings(
             f"{share:.3g} of the whole body's: no distribution of mass has that; give it its mass, or none of both, or "
             "load it with on_unphysical='warn' (--on-unphysical warn)"
         )
-    named = _listed([f"{label.format(link.name)} ({moment:.3g} kg m^2)" for _, moment, link in found])
+    named = listed([f"{label.format(link.name)} ({moment:.3g} kg m^2)" for _, moment, link in found])
     return [
         f"{found[0][2].where}: {named}: moments of inertia without mass, up to {share:.2g} of the whole body's: no "
         "distribution of mass has them; they count as the file has them"
@@ -305,7 +306,7 @@ def massless_warning(tree: LinkTree) -> list[str]:
     if not idle:
         return []
     where = tree.links[idle[0]].where
-    named = _listed([f"link {name!r}" for name in idle])
+    named = listed([f"link {name!r}" for name in idle])
     return [f"{where}: {named}: moved by a joint, but without mass, and nothing with mass is attached to it"]
 
 
@@ -322,10 +323,5 @@ def grouped(notes: Iterable[tuple[str, str, str, str]]) -> tuple[str, ...]:
         first = places[0][0]
         # Later ones by their line alone, where a line is known.
         names = [name if where == first else f"{name} (line {where.rpartition(':')[2]})" for where, name in places]
-        sentences.append(f"{first}: {kind}{'s' * (len(names) > 1)} {_listed(names)}: {said}")
+        sentences.append(f"{first}: {kind}{'s' * (len(names) > 1)} {listed(names)}: {said}")
     return tuple(sentences)
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(names[:50])
-    return shown if len(names) <= 50 else f"{shown} and {len(names) - 50} more"

@@ -174,6 +174,12 @@ def quoted(text: str | None) -> str:
     return text if len(text) <= _MOST_QUOTED else text[:_MOST_QUOTED] + "..."
 
 
+def listed(names: Sequence[str], most: int = 50) -> str:
+    """Names for a message, the first of many."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
+
+
 def name_of(node: Node, name: str = "name") -> str:
     """A name attribute of an element, printable. Raises ModelFileError."""
     value = node.get(name)
