@@ -10,8 +10,7 @@ import pinocchio as pin
 from ..arrays import Array
 from .couplings.joint_map import JointMap
 
-# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
-_BASE = 6
+_BASE = 6  # velocities of the free-flyer, first in Pinocchio's order: three of translation, three of rotation
 
 
 def full_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:

@@ -76,17 +76,11 @@ def inertia_and_momentum(
 ) -> tuple[Array, Array, float, float]:
     """Locked inertia and internal momentum from the definitions, link by link.
 
-    Parameters
-    ----------
     shape, rate : coordinates and rates of the independent joints by name [rad or m], [rad/s or m/s]
 
-    Returns
-    -------
     inertia, momentum : (3, 3) [kg m^2], (3,) [kg m^2/s] about the centre of mass, axes of the root link
     extent, motion : the size of the terms they are sums of, seen from the root link; rounding is a share of it
 
-    Notes
-    -----
     Source: theory.md A3, A7.
     """
     names = list(tree.links)

@@ -15,11 +15,9 @@ from ..arrays import Array
 from ..errors import ModelFileError
 from .link_tree import Link, LinkTree, inertia_warnings
 
-# Name of the joint that lets the base move: no file is likely to have one of this name.
-_ROOT = "shapephase_free_flyer"
-BALL = "JointModelSpherical"
-"""Pinocchio's name of a ball joint: a unit quaternion, and the angular velocity in axes of the child."""
-# What stands for joints whose own coordinates would not do.
+_ROOT = "shapephase_free_flyer"  # name of the joint that lets the base move: unlikely in a file
+BALL = "JointModelSpherical"  # Pinocchio's ball joint: a unit quaternion, and rates in axes of the child
+# What to use for joints whose own coordinates would not do.
 _INSTEAD = {
     "JointModelSphericalZYX": "its first and last axis can fall together; use the other",
     "JointModelPlanar": "its slides turn with it; use two prismatic joints and a revolute one behind them",
@@ -31,10 +29,7 @@ _INSTEAD = {
 def model_of(tree: LinkTree, where: str) -> pin.Model:
     """A model with a free-flyer from a checked tree: by Pinocchio's parser from a URDF's text, else joint by joint.
 
-    Raises
-    ------
-    ModelFileError
-        If Pinocchio cannot build a model from it.
+    Raises ModelFileError if Pinocchio cannot build a model from it.
     """
     root = _ROOT
     taken = {*tree.links, *(joint.name for joint in tree.joints)}
@@ -53,12 +48,8 @@ def checked_model(source: Any, on_unphysical: str) -> tuple[pin.Model, list[Link
 
     A link named after the joint is added to whatever a joint moves without a link of its own, so that it has a pose.
 
-    Raises
-    ------
-    ModelFileError
-        If it is no model, its root joint is no free-flyer, or nothing has mass.
-    UnphysicalInertiaError
-        See `inertia_warnings`.
+    Raises ModelFileError if it is no model, its root joint is no free-flyer, or nothing has mass;
+    UnphysicalInertiaError like `inertia_warnings`.
     """
     if not isinstance(source, pin.Model):
         raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(source).__name__}")

@@ -24,8 +24,7 @@ from .link_tree import LEAST_MASS, MOST_MASS, NEGATIVE, ROUNDING, TRIANGLE
 if TYPE_CHECKING:
     from .body import Body
 
-# Numbers of regressors at once: some hundred MB.
-_AT_ONCE = 10_000_000
+_AT_ONCE = 10_000_000  # numbers of regressors in one pass: some hundred MB
 _OF_A_LINK = 150
 
 
@@ -111,8 +110,7 @@ class BodyFamily(Sequence["Body"]):
         return read_only(rows)
 
 
-# Entries of a tensor that mirror each other may differ by this much, relative to the largest: printed digits.
-_ASYMMETRY = 1e-9
+_ASYMMETRY = 1e-9  # of the largest entry, between mirrored ones: printed digits
 _UNITS = {"masses": "kg", "centres": "m", "inertias": "kg m^2"}
 _ITEMS: dict[str, tuple[int, ...]] = {"masses": (), "centres": (3,), "inertias": (3, 3)}
 
@@ -120,8 +118,6 @@ _ITEMS: dict[str, tuple[int, ...]] = {"masses": (), "centres": (3,), "inertias":
 class Inertias(NamedTuple):
     """Of all frames of a chain, in their axes; the leading axis, if there is one, counts bodies.
 
-    Attributes
-    ----------
     masses : (..., k + 1) [kg]
     centres : (..., k + 1, 3) [m]
     tensors : (..., k + 1, 3, 3) about the centres [kg m^2]
@@ -143,8 +139,6 @@ def given_inertias(
 ) -> Inertias:
     """A body's inertias with those that are given in the place of its own.
 
-    Parameters
-    ----------
     parts : names of the links of each moving part
     given : "masses", "centres" and "inertias", each as `Body.with_inertias` takes them
     """

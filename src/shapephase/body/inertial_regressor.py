@@ -33,8 +33,6 @@ class InertialRegressor:
     At the body that they were made for, the first moment of mass vanishes: there the first six and the next three rows
     are the exact derivatives of I and of L_o by the parameters.
 
-    Attributes
-    ----------
     matrices : (N, 15, 10 links)
     centres : (links, 3) the centres of mass that parameters are about, axes of each link [m]
     """
@@ -45,13 +43,9 @@ class InertialRegressor:
     def inertia_and_momentum(self, masses: Array, centres: Array, inertias: Array) -> tuple[Array, Array]:
         """I and L_o of bodies with the same joints, about the centre of mass of each, axes of the base.
 
-        Parameters
-        ----------
         masses, centres, inertias : (V, links), (V, links, 3), (V, links, 3, 3); the latter about these centres
 
-        Returns
-        -------
-        (V, N, 3, 3) [kg m^2], (V, N, 3) [kg m^2/s]
+        Returns (V, N, 3, 3) [kg m^2], (V, N, 3) [kg m^2/s]
         """
         given = parameters(masses, centres, inertias, self.centres)
         count = len(self.matrices)
@@ -92,8 +86,6 @@ def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving:
 
     The same derivatives as those of the regressor, at the body itself, without its matrices.
 
-    Parameters
-    ----------
     rows : (N, k, 3)
     spins : (N, 3)
     moving : whether the links move as seen from the base; else the sums are of row . dI spin

@@ -12,8 +12,7 @@ from ..arrays import Array
 from .body import Body
 from .couplings.coordinate_map import check_smooth
 
-# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
-_BASE = 6
+_BASE = 6  # velocities of the free-flyer, which come first in Pinocchio's order
 
 
 def falling_efforts(
@@ -24,19 +23,13 @@ def falling_efforts(
     The centre of mass falls freely: gravity moves all links alike, and loads no joint. The effort of a joint that
     follows another adds to the effort of that one by the work it does.
 
-    Parameters
-    ----------
     shapes, rates, accelerations : (N, n), unchecked
     spins, spin_rates : (N, 3) angular velocity of the base and its rate, base axes [rad/s], [rad/s^2]
 
-    Returns
-    -------
     efforts : (N, n) [N m or N]
     wrenches : (N, 6) force on the base and torque about its origin, base axes, that the motion would need from
         outside, which is none for a free body [N], [N m]
 
-    Notes
-    -----
     Source: Featherstone 2008, Rigid Body Dynamics Algorithms, section 5.3.
     """
     check_object(body, "Body", "body")
@@ -71,13 +64,9 @@ def floating_states(
     The base's position is the origin, its attitude the identity. The first six velocities are linear and angular, base
     axes, and their accelerations the derivatives of these six numbers.
 
-    Parameters
-    ----------
     shapes, rates, accelerations, spins, spin_rates : as for `falling_efforts`
 
-    Returns
-    -------
-    (N, nq), (N, nv), (N, nv)
+    Returns (N, nq), (N, nv), (N, nv)
     """
     check_object(body, "Body", "body")
     model, data, joints = body._model, body._data(), body._joints

@@ -14,25 +14,20 @@ from ..display import short_repr
 from ._model_tree import moving_joints
 from .couplings.coordinate_map import CoordinateMap
 
-# Pinocchio's number of the free-flyer: joint 0 is the universe.
-_BASE = 1
+_BASE = 1  # Pinocchio's number of the free-flyer: joint 0 is the universe
 
 
 NUMBERS = 22
 """In the row of a frame: its turn at rest in the parent's axes (9, row by row), its place there (3) [m]; then of what
 moves with it the mass [kg], the centre of mass (3) [m] and the inertia about that (xx yy zz yz xz xy) [kg m^2]."""
-GEOMETRY = 12
-"""How many of them do not depend on masses; they come first."""
-_PARALLEL = 1e-14
-"""Sine of the angle between a screw's axis and its slide: all that rounding leaves."""
+GEOMETRY = 12  # numbers that do not depend on masses; they come first
+_PARALLEL = 1e-14  # sine between a screw's axis and its slide: all that rounding leaves
 
 
 @dataclass(frozen=True, eq=False)
 class LinkRows:
     """Frame 0 is the base; joint k turns and slides frame k + 1 along its own z axis, by its coordinate q.
 
-    Attributes
-    ----------
     parents : (k,) number of the frame that each hangs on
     turning : (k,) 1 where a joint turns by q, 0 where it only slides
     leads : (k,) by how much it slides, in units of q: 1, 0, or the lead of a screw [m/rad]

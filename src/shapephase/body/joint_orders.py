@@ -13,16 +13,14 @@ MUJOCO = "mujoco"
 ISAAC = "isaac"
 ISAAC_BY_NAME = "isaac-by-name"
 OWN = "body"
-WORDS = (MUJOCO, ISAAC, ISAAC_BY_NAME, OWN)
-"""What a caller may ask for."""
+WORDS = (MUJOCO, ISAAC, ISAAC_BY_NAME, OWN)  # choices of callers
 TITLES = {
     MUJOCO: "the order in which MuJoCo compiles the body's file",
     ISAAC: "breadth first, joints of one link as the file lists them",
     ISAAC_BY_NAME: "breadth first, joints of one link by their names",
     OWN: "the order of the body",
 }
-_SCALAR_FIRST = (3, 0, 1, 2)
-"""Of the coordinates x y z w of a ball joint, which simulators write w x y z."""
+_SCALAR_FIRST = (3, 0, 1, 2)  # simulators write w x y z
 
 
 def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:

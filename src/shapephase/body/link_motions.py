@@ -15,8 +15,6 @@ from .joint_chain import JointChain
 class LinkMotions:
     """What moves with each of the k + 1 frames of a chain, at N shapes, in axes of the base.
 
-    Attributes
-    ----------
     turns : (N, k + 1, 3, 3) orientations
     places, speeds : (N, k + 1, 3) of the centres of mass, from the centre of mass of all, which moves [m], [m/s]
     spins : (N, k + 1, 3) angular velocities [rad/s]

@@ -16,38 +16,24 @@ from ..errors import ModelFileError, UnphysicalInertiaError, unknown_name
 from .couplings.coupling import Coupling
 from .formats.xml_text import listed
 
-MOST_LINKS = 2000
-"""Links of a body, most of them fixed to others."""
-MOST_JOINTS = 200
-"""Moving joints: Pinocchio's work space grows with their cube, 0.3 GB for 200 of them."""
-MOST_DEPTH = 200
-"""Links from the root: parsers that recurse end with the stack, at 229 in a thread of 512 KiB."""
-LEAST_MASS = 1e-15
-"""[kg]; below the rounding of 1 kg, Pinocchio's sums of inertias are wrong without any message."""
-MOST_MASS = 1e30
-"""[kg], and [kg m^2] for moments: their squares are still finite numbers."""
-TRIANGLE = 1e-3
-"""Share of the largest moment by which it may exceed the sum of the others: files round their moments."""
-NEGATIVE = 1e-6
-"""Share of the largest moment by which another may be below zero: what a file with six digits has of a thin body."""
-ROUNDING = 1e-12
-"""Share of the largest moment of the whole body that rounding may leave of a vanishing one."""
-_LEAST_RADIUS = 1e-4
-"""Radius of gyration [m]; a smaller one suggests moments in other units than kg m^2."""
-_MOST_RADIUS = 10.0
-"""Radius of gyration [m]; a larger one suggests lengths in millimetres."""
-_HOLLOW = 0.01
-"""Share of the body's inertia about an axis that a link without mass may have: some files give dummies a little."""
-_HEAVY = 1e5
-"""Mass of a link [kg]; a larger one suggests grams."""
+MOST_LINKS = 2000  # most of them fixed to others
+MOST_JOINTS = 200  # moving: Pinocchio's work space grows with their cube, 0.3 GB for 200
+MOST_DEPTH = 200  # links from the root: recursive parsers overflow a stack of 512 KiB at 229
+LEAST_MASS = 1e-15  # [kg] Pinocchio's sums of inertias are silently wrong below the rounding of 1 kg
+MOST_MASS = 1e30  # [kg], and [kg m^2] for moments: their squares are still finite
+TRIANGLE = 1e-3  # of the largest moment, above the sum of the others: files round their moments
+NEGATIVE = 1e-6  # of the largest moment, below zero: six digits of a thin body
+ROUNDING = 1e-12  # of the body's largest moment: what rounding leaves of zero
+_LEAST_RADIUS = 1e-4  # [m] of gyration: below, moments are probably not in kg m^2
+_MOST_RADIUS = 10.0  # [m] of gyration: above, lengths are probably in millimetres
+_HOLLOW = 0.01  # of the body's inertia about an axis, in links without mass: some files give dummies a little
+_HEAVY = 1e5  # [kg] of a link: above, masses are probably in grams
 
 
 @dataclass(frozen=True)
 class Link:
     """One link.
 
-    Attributes
-    ----------
     name, where : its name, and "file:line"
     mass : [kg]
     centre : (3,) centre of mass in link axes [m]
@@ -65,8 +51,6 @@ class Link:
 class Joint:
     """One joint: the child's axes are the parent's, moved by (place, turn), then by the joint, then by `after`.
 
-    Attributes
-    ----------
     kind : "revolute", "continuous", "prismatic", "ball" or "fixed"; on the way to a base also "floating" or "planar"
     place, turn : (3,) [m], (3, 3) the joint's axes in those of the parent
     axis : (3,) in the joint's axes, of any length; of a ball joint it means nothing
@@ -92,8 +76,6 @@ class Joint:
 class LinkTree:
     """All links and joints of a body, parents before children.
 
-    Attributes
-    ----------
     name : of the robot
     links : by name, the root first
     joints : in the order in which they were found on the way down from the root
@@ -125,8 +107,6 @@ class LinkTree:
 class JointOrder:
     """An order of all joints of a body, those that follow others among them.
 
-    Attributes
-    ----------
     word : that asks for it
     joints : names of coordinates; of a ball joint four, w first
     links : in the simulator's order of bodies: the base, and behind it what each joint moves, or all links of the file
@@ -140,10 +120,8 @@ class JointOrder:
 def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -> tuple[str, tuple[Joint, ...]]:
     """The root link, and the joints sorted so that parents come before children.
 
-    Raises
-    ------
-    ModelFileError
-        If there is not one root, a link has two parents or none of the tree, or there are too many or too deep.
+    Raises ModelFileError if there is not one root, a link has two parents or none of the tree, or there are too many or
+    too deep.
     """
     joints = tuple(joints)
     moving = sum(joint.kind != "fixed" for joint in joints)
@@ -202,10 +180,8 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     that suggests wrong units. What rounding leaves of an inertia, judged against the largest of the whole body, is
     no fault. `label` is how messages name a link.
 
-    Raises
-    ------
-    UnphysicalInertiaError
-        For what is not finite, a negative mass, or (unless `on_unphysical` is "warn") a negative moment.
+    Raises UnphysicalInertiaError for what is not finite, a negative mass, or (unless `on_unphysical` is "warn") a
+    negative moment.
     """
     if not isinstance(on_unphysical, str) or on_unphysical not in ("error", "warn"):
         raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
@@ -257,15 +233,11 @@ def hollow_warnings(
 ) -> list[str]:
     """The links without mass that have moments of inertia, as one message.
 
-    Parameters
-    ----------
     turns : (N, 3, 3) axes of the links to those of the base, in the neutral shape
     inertia : (3, 3) of the whole body there, base axes [kg m^2]
 
-    Raises
-    ------
-    UnphysicalInertiaError
-        If one has more than 1 % of the body's inertia about any axis (unless `on_unphysical` is "warn").
+    Raises UnphysicalInertiaError if one has more than 1 % of the body's inertia about any axis (unless `on_unphysical`
+    is "warn").
     """
     links = list(links)
     moments, axes = np.linalg.eigh(inertia)

@@ -25,16 +25,12 @@ def by_shape_and_rate(
     adds z x h - (z x o) x q + J y - p x (z x v_o + y x o), where y is the velocity of z; a unit of slide along s adds
     s x q + p x y, where y is that of s.
 
-    Parameters
-    ----------
     links : of the chain at N shapes and rates
     shapes, rates : (N, n)
     spins : (N, S, 3) w, several for each shape
     rows : (N, S, r, 3)
 
-    Returns
-    -------
-    (N, S r, n) each, by shapes and by rates
+    Returns (N, S r, n) each, by shapes and by rates
     """
     sums, at = (
         _carried(chain, _link_sums(chain, links)),
@@ -65,13 +61,9 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     unit of turn adds y . (h - o x q) - q . (z x v_o), of its rate z . (h - o x q); a unit of slide q . y, of its rate
     q . s.
 
-    Parameters
-    ----------
     shapes, rates : (N, n)
 
-    Returns
-    -------
-    (N, n) each [J per unit of joint], [J s per unit of joint]
+    Returns (N, n) each [J per unit of joint], [J s per unit of joint]
     """
     links = link_motions(chain, shapes, rates)
     each = _link_sums(chain, links)
@@ -105,8 +97,6 @@ def by_independent(
 class _Sums:
     """Over what hangs on each joint, about the centre of mass of all, the base at rest; components first.
 
-    Attributes
-    ----------
     moment, drift : (3, N, k) of mass times place, and times velocity
     inertia : (6, N, k) xx yy zz yz xz xy
     momentum : (3, N, k) angular
@@ -122,8 +112,6 @@ class _Sums:
 class _Axes:
     """Of the joints, in axes of the base and about the centre of mass of all; components first, (3, N, k).
 
-    Attributes
-    ----------
     axes, slides : unit vectors, zero of a joint that does not turn, or does not slide
     origins, speeds : a point of each axis, and its velocity as part of what the joint hangs on
     spins : angular velocity of what turns with the joint

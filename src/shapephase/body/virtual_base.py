@@ -18,18 +18,15 @@ from .couplings.ball_joints import coordinate_names
 from .couplings.coupling import Coupling
 from .link_tree import Joint, Link
 
-ANYWHERE = "floating"
+ANYWHERE = "floating"  # joints that only a base has
 IN_A_PLANE = "planar"
-"""Kinds of joints that only a base has."""
+# MuJoCo's names of a planar joint's parts
 _PARTS = (("_TX", "prismatic", 0), ("_TY", "prismatic", 1), ("_RZ", "revolute", 2))
-"""What MuJoCo makes of a planar joint: names after its own, kinds, and axes about a z that is the joint's axis."""
 
 
 class FreeBase(NamedTuple):
     """The link that floats.
 
-    Attributes
-    ----------
     link : its name
     way : the joints from the root of the file to it, those that move nothing among them; none: it is the root
     joints : those of the body, parents before children
@@ -51,17 +48,12 @@ def free_base(
 ) -> FreeBase:
     """The link that floats: the root, or the first with mass behind joints that follow each other from a massless one.
 
-    Parameters
-    ----------
     first : the root
     joints : parents before children
     root : "free": a single joint, as arms that are bolted down have it, goes, too
 
-    Raises
-    ------
-    ModelFileError
-        For a single joint without `root`, for joints that follow those of the base, or are followed by them, and for
-        floating and planar joints elsewhere.
+    Raises ModelFileError for a single joint without `root`, for joints that follow those of the base, or are followed
+    by them, and for floating and planar joints elsewhere.
     """
     below: dict[str, list[Joint]] = {}
     for joint in joints:
@@ -140,14 +132,10 @@ def joint_coordinates(joint: Joint) -> tuple[str, ...]:
 def way_poses(way: Sequence[Joint], values: Mapping[str, Array], count: int) -> tuple[Array, Array]:
     """Attitude and place of a base in the axes of the file's root.
 
-    Parameters
-    ----------
     values : (N,) by coordinate [rad or m]; one that is missing is zero
     count : N
 
-    Returns
-    -------
-    (N, 3, 3), (N, 3) [m]
+    Returns (N, 3, 3), (N, 3) [m]
     """
     turned, placed = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     for joint in way:

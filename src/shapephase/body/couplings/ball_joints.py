@@ -18,17 +18,13 @@ from ... import so3
 from ...arrays import Array
 from ...errors import ShapeError
 
-COORDINATES = ("x", "y", "z", "w")
-"""What follows the name of a ball joint in the names of its four numbers."""
-RATES = ("wx", "wy", "wz")
-"""The same of its rates."""
+COORDINATES = ("x", "y", "z", "w")  # endings of the names of a ball joint's four numbers
+RATES = ("wx", "wy", "wz")  # endings of the names of its rates
 
 
 class BallJoint(NamedTuple):
     """Where a ball joint stands.
 
-    Attributes
-    ----------
     name : of the joint
     row : of the first of its three rates among those of all joints
     column : of the first of its four numbers in the shape
@@ -56,10 +52,7 @@ class BallJoint(NamedTuple):
     def quaternions(self, shapes: Array) -> Array:
         """Of length one: (N, n) -> (N, 4).
 
-        Raises
-        ------
-        ShapeError
-            If the four numbers are all zero.
+        Raises ShapeError if the four numbers are all zero.
         """
         numbers = shapes[:, self.columns]
         lengths = np.sqrt((numbers * numbers).sum(axis=1))

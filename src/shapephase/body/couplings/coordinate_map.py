@@ -21,8 +21,6 @@ from .functions import JointFunction
 class CurvedJoint(NamedTuple):
     """A joint whose coordinate is `start` plus functions of those of other joints; known by their places.
 
-    Attributes
-    ----------
     row : its place among all joints
     start : [rad or m]
     terms : place of the joint that is followed, and the function
@@ -39,8 +37,6 @@ class CoordinateMap:
 
     A ball joint stands for three hinges behind a turn that differs from shape to shape, so that they are at zero.
 
-    Attributes
-    ----------
     names : (k,) of all joints, of a ball joint those of its rates
     independent : (n,) of those that follow no other, of a ball joint those of its four numbers
     matrix, offset : (k, n), (k,) of the joints that depend on the shape by matrix @ shape + offset; other rows are zero
@@ -164,10 +160,8 @@ def coordinate_map(
 ) -> CoordinateMap:
     """The map of joints of which some follow others, and some are ball joints.
 
-    Raises
-    ------
-    ModelFileError
-        If joints follow each other in a circle, or one that is not among them; if a ball joint takes part.
+    Raises ModelFileError if joints follow each other in a circle, or one that is not among them; if a ball joint takes
+    part.
     """
     for name, coupling in couplings.items():
         for ball in {name, *coupling.drivers} & set(balls):

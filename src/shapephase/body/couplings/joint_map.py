@@ -13,12 +13,9 @@ from .ball_joints import COORDINATES, RATES
 from .coordinate_map import coordinate_map
 from .coupling import Coupling
 
-# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
-_BASE = 6
-# Rates of a ball joint.
-_BALL = 3
-# [rad/s, m/s, N m or N]; what is stated above stands for no limit.
-_NO_LIMIT = 1e30
+_BASE = 6  # velocities of the free-flyer, which come first in Pinocchio's order
+_BALL = 3  # rates of a ball joint
+_NO_LIMIT = 1e30  # [rad/s, m/s, N m or N] a larger stated limit means none
 
 
 class JointMap:
@@ -27,8 +24,6 @@ class JointMap:
     Pinocchio's rates of a ball joint are the angular velocity in axes of the child, as ours; its coordinates a unit
     quaternion.
 
-    Attributes
-    ----------
     follows : the coordinates of all joints from those of the independent ones
     names : tuple of the independent joints
     continuous : (n,) True for a joint that turns without end, and that no other follows by a curve

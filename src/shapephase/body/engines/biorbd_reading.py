@@ -28,36 +28,30 @@ from .chain import (
 )
 
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
+# Words of a segment in lower case, by biorbd 1.12.
 _WORDS = (
     *("parent", "rt", "rtinmatrix", "translations", "rotations", "ranges", "rangesq", "rangesqdot", "rangesqddot"),
     *("jointdampings", "mass", "com", "centerofmass", "inertia", "inertiamatrix", "inertia_xxyyzz"),
     *("mesh", "meshfile", "meshcolor", "meshscale", "meshrt", "meshrtinmatrix", "patch"),
     *("externalforceindex", "forceplate"),
 )
-"""That a segment may have, in lower case, as biorbd 1.12 knows them."""
+# Numbers of values after a word: biorbd ignores further ones, and the last letters of `1,5`.
 _COUNTS = {
     **dict.fromkeys(("parent", "translations", "rotations", "rtinmatrix", "mass"), 1),
     **dict.fromkeys(("com", "centerofmass", "inertia_xxyyzz"), 3),
     **dict.fromkeys(("inertia", "inertiamatrix"), 9),
 }
-"""How many values follow a word; biorbd passes over those beyond, and over the last letters of `1,5`."""
-_FRAME = 16
-"""Values of a frame as a matrix; otherwise three angles, the order of their axes, and three coordinates."""
-_ONCE = (*_COUNTS, "rt", "rangesq")
-"""Words of which a second one takes the place of the first; meshes have many points."""
+_FRAME = 16  # values of a frame as a matrix; otherwise three angles, the order of their axes, three coordinates
+_ONCE = (*_COUNTS, "rt", "rangesq")  # a second one would replace the first; meshes have many points
 _OF_NUMBERS = ("rt", "rangesq", "mass", "com", "centerofmass", "inertia", "inertiamatrix", "inertia_xxyyzz")
 _OPERAND = r"(\$\w+|[Pp][Ii]|(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?(nan|NaN|inf|Infinity))"
+# What biorbd reads correctly: `5E-1` is 5 - 1 for it, `2^3` is 2, `5d1` is 5, and functions crash it.
 _VALUE = re.compile(rf"[+-]?(\(+[+-]?)?{_OPERAND}\)*([-+*/]\(*{_OPERAND}\)*)*", re.ASCII)
-"""What biorbd reads right: `5E-1` is 5 - 1 for it, `2^3` is 2, `5d1` is 5, and functions crash it."""
-_DROPPED = ("meshfile", "meshcolor", "meshscale", "meshrt")
-"""A model whose mesh is missing is refused, and meshes have no part in how a body turns."""
-_QUATERNION = "_Quat"
-"""Behind the name of a segment, that of its ball joint; biorbd calls its numbers so, with X, Y, Z, and Z again."""
-_COARSE = 1e-9
-"""Share of the largest terms by which a momentum by differences may be off: short quaternions turn fast."""
+_DROPPED = ("meshfile", "meshcolor", "meshscale", "meshrt")  # biorbd refuses missing meshes, which do not affect turns
+_QUATERNION = "_Quat"  # ending of a ball joint after its segment's name; biorbd's numbers have X, Y, Z and Z behind it
+_COARSE = 1e-9  # share of the largest terms in a momentum by differences: short quaternions turn fast
 _NO_ROOT = ("root", "base")
-_MASSLESS = 1e-7
-"""[kg]; biorbd gives a segment without mass 1e-8 kg."""
+_MASSLESS = 1e-7  # [kg] biorbd gives a segment without mass 1e-8 kg
 
 
 def chain_of(path: str, root_body: str | None = None) -> Chain:

@@ -38,8 +38,6 @@ class UnusableModelError(Exception):
 class Chain:
     """Links and joints on the way down from the root; `where` of each is its line alone.
 
-    Attributes
-    ----------
     frames : names of links that are mere steps between the axes of one joint and the next
     notes : what is left out of the file: a sentence, or kind, name and text of many alike
     poses : the engine's numbers at random shapes, the arguments of `add_pose`

@@ -11,27 +11,21 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ..formats.xml_text import listed
 from .chain import UnusableModelError
 
 _CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-_FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-"""Faces of the tetrahedron that stands for a mesh, each by three corners."""
-_EDGES = ((0.01, 0.01, 0.01), (0.3, 0.2, 0.1))
-"""[m] Two tetrahedra: a body whose mass or inertia they share in has it from the mesh."""
+_FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # of the tetrahedron that replaces a mesh
+_EDGES = ((0.01, 0.01, 0.01), (0.3, 0.2, 0.1))  # [m] two tetrahedra: masses that differ come from the mesh
 _OF_MASS = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 _KINDS = {"meshes": "mesh", "textures": "texture", "hfields": "height field", "skins": "skin"}
-_MOST_NAMED = 20
 
 
 def compiled_without(written: mujoco.MjSpec) -> tuple[Any, frozenset[int], list[str]]:
     """The model of a specification, numbers of geoms whose shape is not known, and notes on what is left out.
 
-    Raises
-    ------
-    UnusableModelError
-        If a body has mass or inertia from a mesh that cannot be read.
-    ValueError
-        For what else MuJoCo does not accept.
+    Raises UnusableModelError if a body has mass or inertia from a mesh that cannot be read; ValueError for what else
+    MuJoCo does not accept.
     """
     left: dict[str, tuple[str, str]] = {}
     meshes: list[Any] = []
@@ -59,8 +53,11 @@ def compiled_without(written: mujoco.MjSpec) -> tuple[Any, frozenset[int], list[
     if not left:
         return model, shapeless, []
     names = [f"{what} ({file})" for what, (_, file) in left.items()]
-    shown = ", ".join(names[:_MOST_NAMED]) + (f" and {len(names) - _MOST_NAMED} more" * (len(names) > _MOST_NAMED))
-    return model, shapeless, [f"not found or not readable, and left out, as no mass comes from them: {shown}"]
+    return (
+        model,
+        shapeless,
+        [f"not found or not readable, and left out, as no mass comes from them: {listed(names, 20)}"],
+    )
 
 
 def _asset_of(written: mujoco.MjSpec, said: str, left: dict[str, tuple[str, str]]) -> tuple[str, Any]:

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from ...arrays import Array
-from ..formats.xml_text import xml_tree
+from ..formats.xml_text import listed, xml_tree
 from ..virtual_base import way_words
 from .chain import UnusableModelError
 from .mujoco_assets import compiled_without
@@ -27,30 +27,24 @@ FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 """Kinds of joints; the fourth is a hinge."""
+# Attributes of elements whose other attributes MuJoCo ignores in silence.
 _PASSED_OVER = {
     "frame": ("name", "childclass", "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
     "replicate": ("count", "sep", "offset", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
 }
-"""The attributes of elements whose other attributes MuJoCo passes over in silence."""
+# Attributes that masses and places depend on; MuJoCo replaces NaN by its default.
 _NUMBERS = {
     *("mass", "density", "diaginertia", "fullinertia", "size", "fromto", "axis", "range", "ref", "polycoef"),
     *("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
 }
-"""Attributes from which masses and places follow; MuJoCo takes its default where one is NaN."""
-_MEMORY = 64 * 2**20
-"""[bytes] for what MuJoCo computes with, the squares of two thousand coordinates."""
-_MOST_SAID = 20
-"""Names that a message lists."""
-_TAG_LINES = 3
-"""Lines over which the tag of an element may run before its name."""
+_MEMORY = 64 * 2**20  # [bytes] of MuJoCo's work space: the squares of two thousand coordinates
+_TAG_LINES = 3  # lines from an element's tag to its name
 
 
 @dataclass(frozen=True)
 class Compiled:
     """A model, the names that its bodies have as links, and their lines where the file itself has them.
 
-    Attributes
-    ----------
     shapeless : geoms whose mesh could not be read
     notes : what is left out
     """
@@ -173,7 +167,8 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
     else:
         near = difflib.get_close_matches(root_body, names[1:], 1) or names[1:]
         raise UnusableModelError(
-            f"<worldbody>: root_body: no body is named {root_body[:60]!r}; there is {listed(near)}", compiled.line(0)
+            f"<worldbody>: root_body: no body is named {root_body[:60]!r}; there is {listed([*map(repr, near)], 20)}",
+            compiled.line(0),
         )
     base = way[-1]
     if model.body_mocapid[base] >= 0:
@@ -184,7 +179,7 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
     above = int(model.body_parentid[way[0]])
     if above and joints and root is None:
         raise UnusableModelError(
-            f"body {names[base]!r}: {listed([compiled.joint_name(joint) for joint in joints])} between "
+            f"body {names[base]!r}: {listed([repr(compiled.joint_name(joint)) for joint in joints], 20)} between "
             f'{names[above]!r} and the body that floats; a free body has none: root="free" (--root free) removes it',
             compiled.line(base),
         )
@@ -241,22 +236,16 @@ def _only_tree(compiled: Compiled, notes: list[str]) -> int:
     moving = [body for body in tops if any(len(compiled.joints_of(part)) for part in compiled.below(body))]
     trees = moving or tops
     if len(trees) > 1:
-        found = [names[body] for body in trees]
+        found = [repr(names[body]) for body in trees]
         raise UnusableModelError(
-            f"body {found[1]!r}: {len(trees)} bodies in the world, one is a free body: {listed(found)}; say which one "
-            f"by root_body={found[0]!r} (--root-body {found[0]})",
+            f"body {found[1]}: {len(trees)} bodies in the world, one is a free body: {listed(found, 20)}; choose one "
+            f"by root_body={found[0]} (--root-body {names[trees[0]]})",
             compiled.line(trees[1]),
         )
-    left = [names[body] for body in tops if body != trees[0] and model.body_subtreemass[body] > 0.0]
+    left = [repr(names[body]) for body in tops if body != trees[0] and model.body_subtreemass[body] > 0.0]
     if left:
-        notes.append(f"what stands still in the world is left out: {listed(left)}")
+        notes.append(f"what stands still in the world is left out: {listed(left, 20)}")
     return trees[0]
-
-
-def listed(names: list[str]) -> str:
-    """Names for a message, the first of many."""
-    shown = ", ".join(map(repr, names[:_MOST_SAID]))
-    return shown if len(names) <= _MOST_SAID else f"{shown} and {len(names) - _MOST_SAID} more"
 
 
 def rotation(quaternion: Array) -> Array:

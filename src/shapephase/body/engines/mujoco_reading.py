@@ -19,20 +19,18 @@ from ...arrays import Array
 from ..couplings.ball_joints import BallJoint, coordinate_names
 from ..couplings.coupling import Coupling
 from ..couplings.functions import polynomial
+from ..formats.xml_text import listed
 from ..link_tree import MOST_LINKS, MOST_MASS
 from .chain import EXACT, FRAME_ERRORS, Chain, UnusableModelError, check_name, locked_inertia
-from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, listed, rotation
+from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, rotation
 
 _COUPLED = int(mujoco.mjtEq.mjEQ_JOINT)
 _CONNECT = int(mujoco.mjtEq.mjEQ_CONNECT)
 _WELD = int(mujoco.mjtEq.mjEQ_WELD)
-"""Kinds of equalities."""
 _BY_JOINT = int(mujoco.mjtWrap.mjWRAP_JOINT)
-_BY_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
-"""Of what tendons are led over, that which says to which body it belongs."""
+_BY_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)  # of a tendon's path, what belongs to a body
 _OF_SITES = int(mujoco.mjtObj.mjOBJ_SITE)
-_MOST_LENGTH = 1e6
-"""[m] of places: farther away, differences are lost."""
+_MOST_LENGTH = 1e6  # [m] of places: differences of larger ones lose their digits
 
 
 class Rule(NamedTuple):
@@ -268,14 +266,14 @@ def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, st
             notes.append(("equality", f"{named} of {pair}", "ignored, the body is free"))
     tendons = [tendon for tendon in range(model.ntendon) if _led_over(model, tendon) & own]
     if tendons:
-        named = listed([model.tendon(tendon).name or str(tendon) for tendon in tendons])
+        named = listed([repr(model.tendon(tendon).name or str(tendon)) for tendon in tendons], 20)
         notes.append(f"tendons are ignored, every joint moves on its own: {named}")
     pairs = [
         pair for pair in range(model.npair)
         if {int(model.geom_bodyid[geom]) for geom in (model.pair_geom1[pair], model.pair_geom2[pair])} & own
     ]  # fmt: skip
     if pairs:
-        named = listed([model.pair(pair).name or str(pair) for pair in pairs])
+        named = listed([repr(model.pair(pair).name or str(pair)) for pair in pairs], 20)
         notes.append(f"contacts are ignored: {named}")
     return notes
 

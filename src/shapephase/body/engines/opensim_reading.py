@@ -22,14 +22,14 @@ from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, tensor_o
 from .opensim_poses import add_poses
 
 _CUBIC = 3
-_FREE = 6
-"""Coordinates of a body that floats."""
+_FREE = 6  # coordinates of a body that floats
 _X = np.array([1.0, 0.0, 0.0])
 _Y = np.array([0.0, 1.0, 0.0])
 _Z = np.array([0.0, 0.0, 1.0])
 _NAMED = {"x": _X, "y": _Y, "z": _Z}
 _TURN = "revolute"
 _SLIDE = "prismatic"
+# Axes of OpenSim's joints in order, and the coordinate of each.
 _KNOWN = {
     "WeldJoint": (),
     "PinJoint": ((_TURN, _Z, 0),),
@@ -38,7 +38,6 @@ _KNOWN = {
     "GimbalJoint": ((_TURN, _X, 0), (_TURN, _Y, 1), (_TURN, _Z, 2)),
     "PlanarJoint": ((_SLIDE, _X, 1), (_SLIDE, _Y, 2), (_TURN, _Z, 0)),
 }
-"""Of OpenSim's joints their axes in order, and which coordinate each has."""
 
 
 class _Axis(NamedTuple):

@@ -22,13 +22,11 @@ import yeadon
 from ...arrays import Array
 from .chain import EXACT, Chain, UnusableModelError, inertia_and_momentum, rates_by_differences
 
-_X = np.array([1.0, 0.0, 0.0])
-"""To the left, as the package has it; it turns forwards and back."""
-_Y = np.array([0.0, 1.0, 0.0])
-"""To the back."""
-_Z = np.array([0.0, 0.0, 1.0])
-"""Up, of a person who stands."""
+_X = np.array([1.0, 0.0, 0.0])  # to the left in the package's axes: turns forwards and back
+_Y = np.array([0.0, 1.0, 0.0])  # to the back
+_Z = np.array([0.0, 0.0, 1.0])  # up, for a person who stands
 _ROOT = "P"
+# For each segment the one it hangs on, and the package's names of the turns between them, in their order.
 _JOINTS = {
     "T": ("P", (("PTsagittalFlexion", _X), ("PTbending", _Y))),
     "C": ("T", (("TCsagittalSpinalFlexion", _X), ("TCspinalTorsion", _Z))),
@@ -41,18 +39,14 @@ _JOINTS = {
     "K1": ("P", (("PK1extension", _X), ("PK1abduction", _Y))),
     "K2": ("K1", (("K1K2flexion", _X),)),
 }
-"""Of each segment the one it hangs on, and the package's names of the turns between them, in their order."""
-_BY_DIFFERENCES = 1e-11
-"""The same of a momentum by differences."""
+_BY_DIFFERENCES = 1e-11  # share of the largest terms in a momentum by differences
+# factor off the perimeters possible for a width, 2 to pi times; sample female1 is off by 1.46, a slipped point by more
 _TYPO = 2.0
-"""Factor by which a perimeter may miss what is possible for its width (2 to pi times): the package then takes a circle
-of this perimeter; its own sample female1 is off by 1.46. A slip of the decimal point is off by more."""
 _STADIUM = re.compile(r"Stadium '(.*?)'.*this ratio is ([-+.\deE]+?)\.?$", re.DOTALL)
+# as people write them; YAML reads `1:30` as 90, `012` as 10 and `1e3` as a text
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
-"""As people write them; for YAML `1:30` is 90, `1_0` and `012` are 10, and `1e3` is a text."""
 _OF_NUMBERS = ("tag:yaml.org,2002:float", "tag:yaml.org,2002:int")
-_LONGEST = 60
-"""Letters of an entry in a message."""
+_LONGEST = 60  # characters of an entry in a message
 
 
 def chain_of(path: str) -> Chain:

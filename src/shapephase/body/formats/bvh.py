@@ -14,12 +14,10 @@ from .bvh_text import Bone, BvhFaultError, Skeleton, bvh_skeleton, check_base, c
 from .human_segments import Person, Segment, person_of
 from .mvnx_text import read_suit, suit_skeleton
 
-_MASS = 70.0
-"""[kg] of a person of whom nobody has said it: a usual one of reference persons."""
+_MASS = 70.0  # [kg] a usual reference person
+# Lengths of usual units [m]; the last is an inch by 0.45.
 _LIKELY = {"m": 1.0, "cm": 0.01, "in": 0.0254, "of the motion capture library of Carnegie Mellon": 0.056444}
-"""Lengths of units [m] that are met; the last is an inch by 0.45."""
-_HEIGHTS = (0.5, 2.5)
-"""[m] Between which people are tall, of whatever age; puppets and giants are made by another unit."""
+_HEIGHTS = (0.5, 2.5)  # [m] of people of any age; puppets and giants come from another unit
 _WRONG_SIZE = ": is the unit of length another (--length-unit)?"
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
 
@@ -34,10 +32,7 @@ def bvh_tree(
     length_unit : length of a unit of the file [m]; needed
     person_mass : [kg]; None: 70 kg, with a note
 
-    Raises
-    ------
-    ModelFileError
-        For faults of the file, for bones that are not known by their names, without `length_unit`.
+    Raises ModelFileError for faults of the file, for bones that are not known by their names, without `length_unit`.
     """
     try:
         skeleton = bvh_skeleton(content)
@@ -56,10 +51,7 @@ def mvnx_tree(content: bytes, name: str, where: str, person_mass: float | None =
 
     person_mass : [kg]; None: 70 kg, with a note
 
-    Raises
-    ------
-    ModelFileError
-        For faults of the file, and for segments that are not those of a person.
+    Raises ModelFileError for faults of the file, and for segments that are not those of a person.
     """
     try:
         skeleton = suit_skeleton(read_suit(content, motion=False))

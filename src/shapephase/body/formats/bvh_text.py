@@ -19,14 +19,10 @@ from ...arrays import FARTHEST, Array
 _START = b"HIERARCHY"
 _PLACES = ("Xposition", "Yposition", "Zposition")
 _TURNS = ("Xrotation", "Yrotation", "Zrotation")
-_MOST_DEPTH = 100
-"""Bones from the root; one with all fingers has twelve."""
-_MOST_OFFSET = 1e6
-"""Units; the square is far from what overflows."""
-_SHOWN = 40
-"""Characters of a file in a message."""
-_STAYS = 1e-4
-"""Share of a bone's length by which its place may differ from the offset: files have six digits."""
+_MOST_DEPTH = 100  # bones from the root; with all fingers there are twelve
+_MOST_OFFSET = 1e6  # units; far larger squares overflow
+_SHOWN = 40  # characters of a file in a message
+_STAYS = 1e-4  # of a bone's length, between its place and the offset: files have six digits
 
 
 class BvhFaultError(Exception):
@@ -41,8 +37,6 @@ class BvhFaultError(Exception):
 class Bone:
     """A joint of the skeleton and what it moves.
 
-    Attributes
-    ----------
     name, line : its name and where that stands
     parent : number of the bone it hangs on; None for the root
     offset : (3,) from the parent's joint, all angles zero [units of the file]
@@ -88,8 +82,6 @@ class Bone:
 class Skeleton:
     """All bones, parents before children in the file's order, and their motion.
 
-    Attributes
-    ----------
     frames : (N, c) of all channels [degrees or units]
     lines : where the frames stand
     step : between frames [s]
@@ -162,10 +154,7 @@ def is_bvh(content: bytes) -> bool:
 def bvh_skeleton(content: bytes) -> Skeleton:
     """Read a file.
 
-    Raises
-    ------
-    BvhFaultError
-        For whatever is no BVH, or has other numbers than it says.
+    Raises BvhFaultError for whatever is no BVH, or has other numbers than it says.
     """
     try:
         text = content.decode("utf-8-sig")

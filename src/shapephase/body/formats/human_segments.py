@@ -40,12 +40,10 @@ _TABLE = {
     "foot": _Row(0.0137, 0.4415, (0.257, 0.245, 0.124), 0.2581),
 }
 _TRUNK = ("upper_trunk", "middle_trunk", "lower_trunk")
-_SHOULDERS = 0.8556
-"""Of the trunk's length, where the shoulders are above the hips: robots/astronaut.urdf, after Drillis and Contini."""
-_HEEL = 0.05 / 0.2581
-"""Of the foot's length, by which the heel is behind the ankle (HeiMan)."""
-_ALONG = 0.7
-"""Cosine of the angle to the long axis above which the front-back axis of the body is none of a segment."""
+_SHOULDERS = 0.8556  # height over the hips, of the trunk's length: robots/astronaut.urdf, after Drillis and Contini
+_HEEL = 0.05 / 0.2581  # behind the ankle, of the foot's length (HeiMan)
+_ALONG = 0.7  # cosine to the long axis above which the body's front-back axis is not a segment's
+# Names of the bones that carry a segment, without their side, the most specific first.
 _NAMES = {
     "thigh": ("upleg", "upperleg", "thigh", "hip"),
     "shank": ("leg", "lowerleg", "lowleg", "calf", "shin", "knee"),
@@ -54,8 +52,8 @@ _NAMES = {
     "forearm": ("forearm", "lowerarm", "lowarm", "elbow"),
     "hand": ("wrist", "hand"),
 }
-"""Of the bones that carry a segment, without their side; the first that there is counts."""
 _SIDES = {"left": ("left", "l"), "right": ("right", "r")}
+# Usual names, behind the side.
 _CALLED = {
     "thigh": "UpLeg",
     "shank": "Leg",
@@ -64,15 +62,10 @@ _CALLED = {
     "forearm": "ForeArm",
     "hand": "Hand",
 }
-"""Behind their side, the names that most files have."""
-_MAY_LACK = {"hand": "forearm"}
-"""Segments that the bone above carries where they have none of their own."""
-_MOST_POSTURES = 2000
-"""Frames that are compared, the first and the last among them: a person stands straight for longer than a frame."""
-_AS_STRAIGHT = 5e-3
-"""Share of the length from shoulders to feet: knees bent by 15 degrees take off so much."""
-_AS_WIDE = 1e-6
-"""Share of a span: files have six digits, and of frames that they cannot tell apart the first counts."""
+_MAY_LACK = {"hand": "forearm"}  # segments that the bone above carries where a skeleton ends early
+_MOST_POSTURES = 2000  # frames that are compared: a person stands straight for longer than a frame
+_AS_STRAIGHT = 5e-3  # of the length from shoulders to feet: knees bent by 15 degrees shorten it so much
+_AS_WIDE = 1e-6  # of a span: files have six digits, and among equal frames the first counts
 
 
 class Segment(NamedTuple):
@@ -88,8 +81,6 @@ class Segment(NamedTuple):
 class Person(NamedTuple):
     """A skeleton with the masses of a person.
 
-    Attributes
-    ----------
     segments : all sixteen of them, each in axes of its bone
     base : the nearest bone that carries all of these, itself or by bones that hang on it
     moving : the base and the bones between it and the segments, parents before children
@@ -116,10 +107,7 @@ def person_of(skeleton: Skeleton, mass: float, metre: float) -> Person:
     mass : of the person [kg]
     metre : length of a unit of the file [m]
 
-    Raises
-    ------
-    BvhFaultError
-        If a bone is not found by its name, or has no length.
+    Raises BvhFaultError if a bone is not found by its name, or has no length.
     """
     return _Layout(skeleton, mass, metre).person()
 

@@ -18,18 +18,15 @@ from ... import so3
 from ...arrays import FARTHEST, Array
 from .bvh_text import Bone, BvhFaultError, Skeleton
 
-_NORMAL = "normal"
-"""Type of a frame of the motion; every other type is a calibration pose."""
+_NORMAL = "normal"  # type of a frame of the motion; every other type is a calibration pose
+# calibration poses, the best first; others, like `tpose-isb`, have axes of their own
 _STANDING = ("tpose", "npose", "identity")
-"""Calibration poses, the best one to lay out a person first; others, as `tpose-isb`, have axes of their own."""
-_ON_TIME = 2e-3
-"""[s] Times are whole milliseconds; frames nearer to index / frame rate are there."""
-_OFF_UNIT = 1e-3
-"""A quaternion's length may be off one by so much: files have six digits."""
+_ON_TIME = 2e-3  # [s] from index / frame rate: times are whole milliseconds
+_OFF_UNIT = 1e-3  # of a quaternion's length: files have six digits
+# Segment -> the point at its far end.
 _TIPS = {"Head": "pTopOfHead", "RightHand": "pRightTopOfHand", "LeftHand": "pLeftTopOfHand"} | {
     f"{side}Toe": f"p{side}Toe" for side in ("Right", "Left")
 }
-"""Segment -> the point at its far end."""
 _CHANNELS = ("Xposition", "Yposition", "Zposition", "Zrotation", "Xrotation", "Yrotation")
 
 
@@ -41,8 +38,6 @@ class MvnxFaultError(BvhFaultError):
 class Poses:
     """Poses of k segments at N times.
 
-    Attributes
-    ----------
     turns : (N, k, 3, 3) segment axes to the room's
     origins : (N, k, 3) [m]
     lines : where the frames stand
@@ -57,8 +52,6 @@ class Poses:
 class Suit:
     """What an MVNX file holds.
 
-    Attributes
-    ----------
     segments : their names
     points : for each, name -> place in its axes (3,) [m]
     joints : number of the child -> number of its parent, and the joint's place in the parent's axes [m]
@@ -93,10 +86,7 @@ def read_suit(content: bytes, *, motion: bool = True) -> Suit:
 
     motion : False: what stands before the motion is enough, if it has a calibration pose
 
-    Raises
-    ------
-    MvnxFaultError
-        For whatever is no MVNX, or has other numbers than it says.
+    Raises MvnxFaultError for whatever is no MVNX, or has other numbers than it says.
     """
     return _Reader(motion=motion).read(content)
 
@@ -265,10 +255,7 @@ def suit_skeleton(suit: Suit) -> Skeleton:
 
     A segment's axes are those of its bone.
 
-    Raises
-    ------
-    MvnxFaultError
-        If joints are missing, or are no tree.
+    Raises MvnxFaultError if joints are missing, or are no tree.
     """
     # A prop in a hand is a segment without joints.
     roots = sorted({parent for parent, _ in suit.joints.values()} - suit.joints.keys())

@@ -37,28 +37,24 @@ from .xml_text import (
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _BALL = "spherical"
-_WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)
-"""[rad] as rounded in a file; no angle of a frame needs more, and 10 degrees do."""
-_WORLD = "world"
-"""A link that is there without being written, as Drake and Gazebo have it."""
+_WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)  # [rad] as rounded in a file; 10 degrees are beyond it
+_WORLD = "world"  # an implicit link of Drake and Gazebo
 _EXPRESSION = re.compile(r"\$[{(]")
 _DRAKE_JOINT = "drake:joint"
 _DRAKE_BALL = "ball"
-_UNIVERSAL = "universal"
-"""Kinds of Drake's own joints; a universal one turns about x, then about the y that was turned (`UniversalJoint`)."""
+_UNIVERSAL = "universal"  # of Drake: about x, then about the y that was turned (`UniversalJoint`)
 _ROBOT_PARTS = ("link", "joint", _DRAKE_JOINT)
 _LINK_PARTS = ("inertial", "visual", "collision")
 _JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
+# Elements that move a body: in the wrong place they would be ignored, and the body be another.
 _MOVING = (*_ROBOT_PARTS, "parent", "child", "axis", "limit", "mimic", "inertial", "mass", "inertia")
-"""Elements that say how a body moves: in the wrong place they would be passed over, and the body be another."""
+# Elements of other programs, without influence on how a free body turns.
 _OF_OTHERS = {
     "robot": ("material", "transmission", "gazebo", "sensor", "ros2_control", "mujoco", "group", "disable_collisions"),
     "link": ("contact", "surface", "self_filter", "collision_checking", "gravity", "kinematic", "origin", "material"),
     "joint": ("hardwareInterface", "material"),
 }
-"""Elements of other programs, which have no part in how a free body turns."""
-# The offset of an <origin> that states none [m].
-_NO_OFFSET = np.zeros(3)
+_NO_OFFSET = np.zeros(3)  # [m] of an <origin> without xyz
 
 
 @dataclass(frozen=True)
@@ -84,10 +80,7 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
 
     free : "free": a single joint between a root without mass and the rest goes, too
 
-    Raises
-    ------
-    ModelFileError
-        If it is no URDF, needs xacro, or a link or joint is faulty.
+    Raises ModelFileError if it is no URDF, needs xacro, or a link or joint is faulty.
     """
     if root.tag != "robot":
         raise root.fault(f"<{quoted(root.tag)}>", f"expected <robot>: this is {foreign_root(root.tag)}")

@@ -16,10 +16,8 @@ from xml.parsers import expat
 from ...errors import InputFileNotFoundError, ModelFileError
 from ...files import no_such_file
 
-_MOST_QUOTED = 60
-"""Characters of the file that a message quotes."""
-_DECLARED = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([\w.-]+)["']""")
-"""The encoding that the first line states."""
+_MOST_QUOTED = 60  # characters of the file in a message
+_DECLARED = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([\w.-]+)["']""")  # the encoding that the first line states
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -58,10 +56,7 @@ class Node:
 def read_file(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a body's file, read once.
 
-    Raises
-    ------
-    InputFileNotFoundError
-        If there is no readable file at `path`.
+    Raises InputFileNotFoundError if there is no readable file at `path`.
     """
     where = Path(path)
     if "\0" in str(where):
@@ -112,10 +107,7 @@ def xml_text(content: bytes, where: str) -> str:
 def xml_tree(content: bytes, where: str) -> Node:
     """The root element of an XML file; `where` names the file in messages.
 
-    Raises
-    ------
-    ModelFileError
-        If it is not well-formed XML, has a document type, or is in another encoding than it states.
+    Raises ModelFileError if it is not well-formed XML, has a document type, or is in another encoding than it states.
     """
     text = xml_text(content, where)
     builder = _Builder(where, above=text[: len(text) - len(text.lstrip())].count("\n"))

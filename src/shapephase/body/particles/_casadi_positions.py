@@ -21,10 +21,7 @@ def is_casadi_function(value: object) -> bool:
 class CasadiPositions:
     """Places of `particles` particles, shape (n) -> (m, 3), or (m, 2) in the plane z = 0.
 
-    Raises
-    ------
-    ShapeError
-        If the function has other arguments or results.
+    Raises ShapeError if the function has other arguments or results.
     """
 
     def __init__(self, function: Any, n_shape: int, particles: int) -> None:

@@ -19,15 +19,10 @@ from ..shape_arguments import ShapeArguments
 from ._casadi_positions import CasadiPositions, is_casadi_function
 
 _Places = Callable[[Array], tuple[ArrayLike, ArrayLike]]
-_STEP = 0.02
-"""[unit of the parameter] of the differences that give second derivatives: their errors are some 1e-13 of places that
-swing once in a radian."""
-_DIFFERENCES = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
-"""Weights of f(h k) - f(-h k), k = 1 to 4, of the central difference of eighth order."""
-_BROAD_STEP = 1e-4
-"""[unit of the parameter] of the differences by which given derivatives are compared with the places."""
-_NOT_DERIVATIVES = 1e-5
-"""Relative to the places: what those differences leave of true derivatives is a thousandth of it."""
+_STEP = 0.02  # of differences for second derivatives: errors of 1e-13 where places swing once in a radian
+_DIFFERENCES = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)  # of f(k h) - f(-k h), k = 1 to 4 (Fornberg 1988)
+_BROAD_STEP = 1e-4  # of differences that are compared with given derivatives
+_NOT_DERIVATIVES = 1e-5  # of the places' size: a thousand times what these differences leave of true derivatives
 
 
 @dataclass(frozen=True, eq=False)
