@@ -191,7 +191,7 @@ def test_other_roots_are_left_out_or_named(tmp_path):
         sp.load_body(tmp_path / "two.bioMod")
     with pytest.warns(IgnoredElementWarning, match="1 segments on other roots"):
         assert sp.load_body(tmp_path / "two.bioMod", root_body="Pelvis").n_shape == 6
-    with pytest.raises(ModelFileError, match="'Thorax' is no root segment; there is 'Pelvis', 'Ground'"):
+    with pytest.raises(ModelFileError, match="'Thorax' is not a root segment; there is 'Pelvis', 'Ground'"):
         sp.load_body(tmp_path / "two.bioMod", root_body="Thorax")
     (tmp_path / "two.bioMod").write_text("version 4\n" + BESIDE)
     with pytest.raises(ModelFileError, match=":3: no segment has mass"):
@@ -226,7 +226,7 @@ def test_other_words_for_the_same(tmp_path):
         ("parent Thorax", "parent Torso", r":\d+: segment 'RightArm': its parent 'Torso' does not exist"),
         ("mass 30", "mass nan", "no real body has mass nan"),
         ("mass 30", "mass -30", "no real body has mass -30"),
-        ("com 0 0 0.2", "cm 0 0 0.2", r":\d+: segment 'Thorax': biorbd passes over the word 'cm'; 'com' is near"),
+        ("com 0 0 0.2", "cm 0 0 0.2", r":\d+: segment 'Thorax': biorbd ignores the word 'cm'; 'com' is near"),
         ("rotations	xz", "rotations x z", r"biorbd reads 'x' alone; write `rotations xz`"),
         ("segment Hand", "segment Slider", r":\d+: two segments are named 'Slider'"),
         ("parent Slider", "", "one root segment is needed, got 'Pelvis', 'Hand'"),
@@ -238,9 +238,13 @@ def test_other_words_for_the_same(tmp_path):
         ("RT 0.1 -0.2 0.3 xyz", "RT 0.1 -0.2 0.3 abc", "biorbd does not accept it"),
         ("RT 0.1 -0.2 0.3 xyz", "RT 0.1 -0.2 xyz", r":\d+: segment 'RightArm': RT is three angles.*got 6 values"),
         ("com 0 0 0.2", "com 0 0 0.2 7", r":\d+: segment 'Thorax': com has 4 values, not 3"),
-        ("com 0 0 0.2", "com 0 0,2 0", r":\d+: segment 'Thorax': com: '0,2' is no number that biorbd reads$"),
-        ("mass 30", "mass 0x10", r":\d+: segment 'Thorax': mass: '0x10' is no number that biorbd reads$"),
-        ("mass 30", "mass 3.0E+01", r":\d+: segment 'Thorax': mass: '3.0E\+01' is no number that.*; write a small e"),
+        ("com 0 0 0.2", "com 0 0,2 0", r":\d+: segment 'Thorax': com: '0,2' is not a number that biorbd reads$"),
+        ("mass 30", "mass 0x10", r":\d+: segment 'Thorax': mass: '0x10' is not a number that biorbd reads$"),
+        (
+            "mass 30",
+            "mass 3.0E+01",
+            r":\d+: segment 'Thorax': mass: '3.0E\+01' is not a number that.*; write a small e",
+        ),
         ("0 0.35 0\n", "0 0.35 0\n\tmeshfile a.stl\n", r":\d+: segment 'Thorax': inertia has 6 values, not 9"),
         (
             "rangesQ -0.5 0.9",
@@ -248,7 +252,7 @@ def test_other_words_for_the_same(tmp_path):
             r":\d+: joint 'Thorax_RotX': the lower limit 0.9 is not below the upper",
         ),
         ("segment Hand", "segment Hand" + 300 * "d", r":\d+: segment 'Handd.* 304 characters; up to 256 are allowed"),
-        ("mass 30", "mass 2^5", r":\d+: segment 'Thorax': mass: '2\^5' is no number"),
+        ("mass 30", "mass 2^5", r":\d+: segment 'Thorax': mass: '2\^5' is not a number"),
         ("mass 30", "mass 30\n\tmass 40", r":\d+: segment 'Thorax': 'mass' stands twice"),
         ("com 0.01 0 -0.02\nendsegment\n", "com 0.01 0 -0.0", r":\d+: segment 'Hand' has no endsegment"),
         ("endsegment\n\nsegment RightArm", "segment RightArm", r":\d+: segment 'Thorax' has no endsegment"),
@@ -387,13 +391,13 @@ def test_a_perimeter_that_is_too_long_makes_the_circle_that_yeadon_makes(width, 
         (measured(Ls3w=".nan"), r":\d+: Ls3w: a number above zero is needed, got .nan"),
         (measured(Ls3w="wide"), r":\d+: Ls3w: a number above zero is needed, got 'wide'"),
         (measured(Ls3w=None), "the file lacks Ls3w"),
-        (measured(Ls9w=0.3), "has Ls9w, which are no measurements"),
+        (measured(Ls9w=0.3), "has Ls9w, which are not measurements"),
         (measured(Ls3w="1:30"), r":\d+: Ls3w: a number above zero is needed, got 1:30"),
         (measured(Ls3w="012"), r":\d+: Ls3w: for YAML 012 is not this number; write 12.0$"),
         (measured() + "Ls3w: 0.4\n", r":98: Ls3w stands twice"),
         (measured(totalmass=0), r":\d+: totalmass: a number above zero is needed, got 0"),
         (measured(Ls0w=3.0), "level 'Ls0: hip joint centre': its perimeter is 0.3167 times its width"),
-        (measured() + "a: [", r":\d+: it is no YAML file of measurements"),
+        (measured() + "a: [", r":\d+: it is not a YAML file of measurements"),
     ],
 )
 def test_measurements_that_cannot_be_used(tmp_path, text, message):

@@ -134,7 +134,7 @@ ALIASES = "a: &a [1,1]\n" + "".join(
 YEADON = {
     "aliases that multiply": (ALIASES + measured(), "a: a number above zero is needed"),
     "a call": (measured() + "x: !!python/object/apply:os.abort []\n", "x: a number above zero is needed"),
-    "fifty thousand levels": (measured() + "x: " + 50_000 * "[" + "\n", "it is no YAML file of measurements"),
+    "fifty thousand levels": (measured() + "x: " + 50_000 * "[" + "\n", "it is not a YAML file of measurements"),
     "a list of itself": ("measurementconversionfactor: &a [*a]\n", "a number above zero is needed"),
     "a length beyond the stars": (measured(Ls1L="1.0e+300"), r"no real body|finite|has a mass|does not accept|beyond"),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
 import numpy as np
 import pinocchio as pin
@@ -16,7 +16,7 @@ _BASE = 6  # velocities of the free-flyer, first in Pinocchio's order: three of 
 def full_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
     """[I, J] with a column for every joint of the model: (N, n) -> (N, 3, 3 + joints)."""
     centroidal_map = pin.computeCentroidalMap
-    # Each call returns a copy: all at once are put together sooner than one by one.
+    # Each call returns a copy: concatenating all of them is faster than filling an array.
     maps = [centroidal_map(model, data, q) for q in joints.configurations(shapes)]
     return np.concatenate(maps).reshape(-1, 6, model.nv)[:, 3:, 3:] if maps else np.empty((0, 3, model.nv - 3))
 
@@ -76,7 +76,7 @@ def kinetic_energies(
 
 
 def centres_of_mass(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
-    """From the base origin, base axes: (N, 3) [m]."""
+    """Centres of mass from the base origin, base axes: (N, 3) [m]."""
     configurations = joints.configurations(shapes)
     centres = np.empty((len(configurations), 3))
     for row, q in enumerate(configurations):

@@ -122,7 +122,7 @@ def inertia_and_momentum(
     offsets = (pose_turn @ np.array([link.centre for link in links])[..., None])[..., 0]
     tensors = pose_turn @ np.array([link.inertia for link in links]) @ np.swapaxes(pose_turn, -1, -2)
     centres, speeds = pose_place + offsets, velocity + np.cross(omega, offsets)
-    # Of every sum the largest term, and with it the rounding, is that of the farthest part at the fastest rate.
+    # The largest term of every sum, and with it the rounding, is that of the farthest part at the fastest rate.
     distances = np.sqrt((centres**2).sum(axis=-1))
     extent = float(masses @ distances**2 + np.abs(tensors).sum())
     motion = float(distances.max() * (masses @ np.sqrt((speeds**2).sum(axis=-1))))
@@ -154,7 +154,7 @@ def _coordinates(tree: LinkTree, shape: dict[str, float], rate: dict[str, float]
 
 
 def _four_numbers(name: str, shape: dict[str, float], rate: dict[str, float]) -> Array:
-    """Of a ball joint, and their derivatives: (2, 4)."""
+    """The four numbers of a ball joint and their derivatives: (2, 4)."""
     return np.array([[one[key] for key in coordinate_names(name)] for one in (shape, rate)])
 
 

@@ -1,8 +1,8 @@
-"""From a checked tree of links to a Pinocchio model, and what a model must be like to be a body."""
+"""Pinocchio's model of a checked tree of links, and checks of a user's own model."""
 
 from __future__ import annotations
 
-# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
 from collections.abc import Sequence
 from typing import Any
@@ -48,7 +48,7 @@ def checked_model(source: Any, on_unphysical: str) -> tuple[pin.Model, list[Link
 
     A link named after the joint is added to whatever a joint moves without a link of its own, so that it has a pose.
 
-    Raises ModelFileError if it is no model, its root joint is no free-flyer, or nothing has mass;
+    Raises ModelFileError for another object, a root joint that is not a free-flyer, or a model without mass;
     UnphysicalInertiaError like `inertia_warnings`.
     """
     if not isinstance(source, pin.Model):
@@ -102,7 +102,7 @@ def moving_joints(model: pin.Model) -> dict[str, int]:
 
 
 def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:
-    """What Pinocchio was built with, by the names of its own flags."""
+    """Features that Pinocchio was built with, by the names of its own flags."""
     return {name: bool(getattr(pin, name, False)) for name in names}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
 import math
 import threading
@@ -81,7 +81,7 @@ class Body(ShapeArguments):
     ----------
     name : str
     sha256, file : of the file it was loaded from, and where that was; None without a file
-    packages : folders in which the packages that the file names were looked for
+    packages : folders that were searched for the packages that the file names
     xacro_args : the arguments that its xacro file was expanded with
     joint_names : tuple of the independent joints, in the order of the shape vector; of a ball joint "shoulder" its
         four numbers "shoulder.x", "shoulder.y", "shoulder.z" and "shoulder.w"
@@ -146,12 +146,12 @@ class Body(ShapeArguments):
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """Of the rates of the independent joints."""
+        """Names of the rates of the independent joints."""
         return self._joints.rate_names
 
     @property
     def rate_units(self) -> tuple[str, ...]:
-        """Of the joints that the rates are of, "rad" or "m"."""
+        """Unit of the joint of each rate, "rad" or "m"."""
         return self._joints.rate_units
 
     @property
@@ -246,7 +246,7 @@ class Body(ShapeArguments):
     def with_inertias(
         self, masses: Given = None, centres: Given = None, inertias: Given = None, *, on_unphysical: str = "error"
     ) -> Body | BodyFamily:
-        """The same joints between links of other mass, centre of mass or rotational inertia: a body, or N of them.
+        """Equal joints between links of other mass, centre of mass or rotational inertia: a body, or N of them.
 
         Each argument is for all moving parts, in the order of `moving_parts`, or for some: a mapping from the first
         link of a part. What is not given stays as it is. A leading axis N of anything that is given makes a
@@ -264,9 +264,9 @@ class Body(ShapeArguments):
         Raises
         ------
         UnknownNameError, ShapeError
-            For a name that is no link, a link fixed to another, or arrays of the wrong shape.
+            For an unknown link, a link fixed to another, or arrays of the wrong shape.
         UnphysicalInertiaError
-            For a mass that is not positive, a tensor that is not symmetric or, with "error", as said above.
+            For a mass that is not positive, a tensor that is not symmetric or, with "error", an impossible one.
 
         Warns
         -----
@@ -295,7 +295,7 @@ class Body(ShapeArguments):
         return changed
 
     def with_couplings(self, couplings: Mapping[str, Coupling]) -> Body:
-        """The same body with joints that follow others: their coordinates are functions of the others', and no longer
+        """The body with joints that follow others: their coordinates are functions of the others', and no longer
         of the shape.
 
         Joints that follow others already keep doing so, unless they are given another coupling here. Chains of joints
@@ -309,7 +309,7 @@ class Body(ShapeArguments):
         Raises
         ------
         UnknownNameError
-            If there is no such joint.
+            For an unknown joint.
         ModelFileError
             If joints follow each other in a circle, or one that the body does not have.
 
@@ -342,7 +342,7 @@ class Body(ShapeArguments):
         Raises
         ------
         UnknownNameError
-            For a name that is no joint.
+            For an unknown joint.
 
         Examples
         --------
@@ -356,7 +356,7 @@ class Body(ShapeArguments):
         return sorted(found)
 
     def rate_frame(self, shape: ArrayLike) -> Array:
-        """What the coordinates of a shape do at unit rates of its joints: (..., n) -> (..., n, m), m = `n_rates`.
+        """Derivatives of the coordinates at unit rates of the joints: (..., n) -> (..., n, m), m = `n_rates`.
 
         One column a rate: for a joint of one axis its coordinate alone; for a ball joint with the four numbers p, the
         product of quaternions p (w, 0)/2, which keeps the length of p. So an array with an axis of coordinates, such as
@@ -443,7 +443,7 @@ class Body(ShapeArguments):
         return flat[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
     def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
-        """How the angular momentum I w + J rate changes with each joint while w and the rates stay the same, exact.
+        """Derivative of the angular momentum I w + J rate by each joint while w and the rates stay the same, exact.
 
         Parameters
         ----------
@@ -474,7 +474,7 @@ class Body(ShapeArguments):
         Raises
         ------
         UnknownNameError
-            If there is no such link.
+            For an unknown link.
         """
         frame = self._link_frame(link)
         r = self._checked(shape)
@@ -487,7 +487,7 @@ class Body(ShapeArguments):
         return poses.reshape(*r.shape[:-1], 4, 4)
 
     def link_angular_velocity(self, shape: ArrayLike, rate: ArrayLike, link: str) -> Array:
-        """How a link turns as seen from the base: (..., n), (..., n) -> (..., 3), base axes [rad/s].
+        """Angular velocity of a link relative to the base: (..., n), (..., n) -> (..., 3), base axes [rad/s].
 
         Raises as `link_pose`.
         """

@@ -24,7 +24,7 @@ from .link_tree import LEAST_MASS, MOST_MASS, NEGATIVE, ROUNDING, TRIANGLE
 if TYPE_CHECKING:
     from .body import Body
 
-_AT_ONCE = 10_000_000  # numbers of regressors in one pass: some hundred MB
+_AT_ONCE = 10_000_000  # numbers of regressors in one pass: 80 MB
 _OF_A_LINK = 150
 
 
@@ -69,7 +69,7 @@ class BodyFamily(Sequence["Body"]):
     def __getitem__(self, index: slice) -> BodyFamily: ...
 
     def __getitem__(self, index: int | slice) -> Body | BodyFamily:
-        """One of the bodies, made when it is asked for, or a family of those of a slice."""
+        """One of the bodies, made on access, or a family of those of a slice."""
         if isinstance(index, slice):
             return self.some(index)
         if not isinstance(index, int | np.integer):
@@ -86,7 +86,7 @@ class BodyFamily(Sequence["Body"]):
 
     @property
     def mass(self) -> Array:
-        """Of each: (N,) [kg]."""
+        """Mass of each body: (N,) [kg]."""
         return self.masses.sum(axis=-1)
 
     def sample(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
@@ -116,7 +116,7 @@ _ITEMS: dict[str, tuple[int, ...]] = {"masses": (), "centres": (3,), "inertias":
 
 
 class Inertias(NamedTuple):
-    """Of all frames of a chain, in their axes; the leading axis, if there is one, counts bodies.
+    """Inertias of all frames of a chain, in their axes; the leading axis, if there is one, counts bodies.
 
     masses : (..., k + 1) [kg]
     centres : (..., k + 1, 3) [m]
@@ -169,7 +169,7 @@ def given_inertias(
 
 
 def _by_part(value: Any, name: str, parts: tuple[tuple[str, ...], ...]) -> dict[int, Array]:
-    """What is given for each part, by its number."""
+    """Given values by number of the part."""
     item, unit = _ITEMS[name], _UNITS[name]
     if not isinstance(value, Mapping):
         array = finite_array(value, name, (len(parts), *item), unit=unit)
@@ -248,7 +248,7 @@ def _checked_tensors(tensors: Array, link: str, extent: float) -> tuple[Array, l
 
 
 def _surely_physical(moment: Array) -> Mask:
-    """Whether second moments are positive definite, by their leading minors: (..., 3, 3) -> (...)."""
+    """True where second moments are positive definite, by their leading minors: (..., 3, 3) -> (...)."""
     a, b, c = moment[..., 0, 0], moment[..., 1, 1], moment[..., 2, 2]
     d, e, f = moment[..., 1, 2], moment[..., 0, 2], moment[..., 0, 1]
     minor = a * b - f * f
@@ -256,6 +256,6 @@ def _surely_physical(moment: Array) -> Mask:
 
 
 def _first(which: Mask, values: Array) -> tuple[str, float]:
-    """Where something is true first, as a message begins, and the value there."""
+    """The first place where something is true, as a message begins, and the value there."""
     flat = int(np.argmax(np.ravel(which)))
     return (f"body {flat}: " if np.ndim(which) else ""), float(np.ravel(values)[flat])

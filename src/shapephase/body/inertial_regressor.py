@@ -17,7 +17,7 @@ from .joint_chain import JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 PARAMETERS = 10
-"""Of a link, in its axes and about the centre of mass that it has in the body the matrices were made for: mass [kg],
+"""Of a link, in its axes and about its centre of mass in the body that the matrices were made for: mass [kg],
 first moment (3) [kg m], inertia xx yy zz yz xz xy [kg m^2]."""
 _OUTPUTS = 15
 """About the point that is that body's centre of mass: inertia xx yy zz yz xz xy, angular momentum (3), first moment of
@@ -84,7 +84,7 @@ def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> Inerti
 def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving: bool = True) -> Array:
     """Sums over N shapes of row . (dI spin + dL_o) by the ten parameters of each link: (k, 10 links).
 
-    The same derivatives as those of the regressor, at the body itself, without its matrices.
+    Equal to the derivatives by the regressor, at the body itself, without its matrices.
 
     rows : (N, k, 3)
     spins : (N, 3)
@@ -124,12 +124,12 @@ def parameters(masses: Array, centres: Array, inertias: Array, about: Array) -> 
 
 
 def _of_masses(links: LinkMotions) -> list[Array]:
-    """What one kilogram at the centre of each link adds: (N, k, ...)."""
+    """Sums that one kilogram at the centre of each link adds: (N, k, ...)."""
     return [_voigt(_of_point(links.places)), np.cross(links.places, links.speeds), links.places, links.speeds]
 
 
 def _of_first_moments(links: LinkMotions, axis: int) -> list[Array]:
-    """What a first moment of one along an axis of each link adds."""
+    """Sums that a unit first moment along an axis of each link adds."""
     moment = links.turns[..., axis]
     rate = np.cross(links.spins, moment)
     product = links.places[..., :, None] * moment[..., None, :]

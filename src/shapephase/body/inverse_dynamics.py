@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
 import numpy as np
 import pinocchio as pin
@@ -18,7 +18,7 @@ _BASE = 6  # velocities of the free-flyer, which come first in Pinocchio's order
 def falling_efforts(
     body: Body, shapes: Array, rates: Array, accelerations: Array, spins: Array, spin_rates: Array
 ) -> tuple[Array, Array]:
-    """What the joints of a body in free fall must do, by Newton-Euler steps from link to link (Pinocchio's `rnea`).
+    """Efforts of the joints of a body in free fall, by Newton-Euler steps from link to link (Pinocchio's `rnea`).
 
     The centre of mass falls freely: gravity moves all links alike, and loads no joint. The effort of a joint that
     follows another adds to the effort of that one by the work it does.

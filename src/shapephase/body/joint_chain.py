@@ -48,7 +48,7 @@ class LinkRows:
     __repr__ = short_repr
 
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
-        """Of all joints, followers included: (N, n), (N, n) -> (N, k), (N, k), each in one piece."""
+        """Coordinates and rates of all joints, followers included, contiguous: (N, n), (N, n) -> (N, k), (N, k)."""
         coordinates, speeds = self.follows.with_rates(shapes, rates)
         return np.ascontiguousarray(coordinates), np.ascontiguousarray(speeds)
 
@@ -123,12 +123,12 @@ class JointChain:
 
     @property
     def has_rows(self) -> bool:
-        """Whether machine code knows all its joints; it does not know ball joints."""
+        """True where compiled code supports all its joints; it has no ball joints."""
         return not self.follows.balls
 
     @cached_property
     def rows(self) -> LinkRows:
-        """The same for loops in machine code, made when first needed; only where `has_rows`."""
+        """The chain as rows for compiled code, made when first needed; only where `has_rows`."""
         return link_rows(self)
 
     def turns_at(self, shapes: Array) -> Array:
@@ -160,7 +160,7 @@ class JointChain:
         return found
 
     def with_inertias(self, masses: Array, centres: Array, inertias: Array) -> JointChain:
-        """The same joints between other links; what is known of the joints' rows goes with them."""
+        """The chain with other links; rows that were already made are carried over."""
         changed = replace(self, masses=masses, centres=centres, inertias=inertias)
         if "rows" in vars(self):
             vars(changed)["rows"] = rows_with(self.rows, masses, centres, inertias)
@@ -248,7 +248,7 @@ def rows_with(rows: LinkRows, masses: Array, centres: Array, inertias: Array) ->
 
 
 def inertial_numbers(bases: Any, masses: Array, centres: Array, inertias: Array) -> Array:
-    """What the rows say of masses: (..., k + 1), (..., k + 1, 3), (..., k + 1, 3, 3) -> (..., k + 1, 10)."""
+    """Entries of rows that depend on masses: (..., k + 1), (..., k + 1, 3), (..., k + 1, 3, 3) -> (..., k + 1, 10)."""
     back = np.swapaxes(bases, -1, -2)
     turned = (back @ inertias @ bases).reshape(*masses.shape, 9)[..., [0, 4, 8, 5, 2, 1]]
     return np.concatenate([masses[..., None], (back @ centres[..., None])[..., 0], turned], axis=-1).astype(float)

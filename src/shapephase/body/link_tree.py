@@ -81,7 +81,7 @@ class LinkTree:
     joints : in the order in which they were found on the way down from the root
     couplings : of the joints that follow others, by name
     frames : names of links that are mere steps between the axes of one joint and the next
-    notes : what the file says and is not taken up
+    notes : what is left out of the file
     text : the URDF that was checked, written anew; None for other formats, and with ball joints
     base_joints : what leads to the root link from a world without mass: coordinates of the base, not of the shape
     base_angles : names of three angles of the root link, and the axis that each turns about as those before have turned
@@ -107,7 +107,7 @@ class LinkTree:
 class JointOrder:
     """An order of all joints of a body, those that follow others among them.
 
-    word : that asks for it
+    word : the user's name of the order
     joints : names of coordinates; of a ball joint four, w first
     links : in the simulator's order of bodies: the base, and behind it what each joint moves, or all links of the file
     """
@@ -174,7 +174,7 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
 
 
 def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "link {!r}") -> list[str]:
-    """What is doubtful about the inertia of links, one message for each kind.
+    """Doubts about the inertia of links, one message for each kind.
 
     Negative moments; moments that break the triangle inequality by more than 0.1 %; a mass or a radius of gyration
     that suggests wrong units. What rounding leaves of an inertia, judged against the largest of the whole body, is
@@ -285,15 +285,15 @@ def massless_warning(tree: LinkTree) -> list[str]:
 def grouped(notes: Iterable[tuple[str, str, str, str]]) -> tuple[str, ...]:
     """One sentence for each kind of note: of many joints with one fault, all names stand in one.
 
-    notes : "file:line", what it is about ("joint"), its name, and what is to be said
+    notes : "file:line", what it is about ("joint"), its name, and the text
     """
     found: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for where, kind, name, said in notes:
-        found.setdefault((kind, said), []).append((where, name))
+    for where, kind, name, text in notes:
+        found.setdefault((kind, text), []).append((where, name))
     sentences = []
-    for (kind, said), places in found.items():
+    for (kind, text), places in found.items():
         first = places[0][0]
         # Later ones by their line alone, where a line is known.
         names = [name if where == first else f"{name} (line {where.rpartition(':')[2]})" for where, name in places]
-        sentences.append(f"{first}: {kind}{'s' * (len(names) > 1)} {listed(names)}: {said}")
+        sentences.append(f"{first}: {kind}{'s' * (len(names) > 1)} {listed(names)}: {text}")
     return tuple(sentences)

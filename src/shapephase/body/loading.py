@@ -134,7 +134,7 @@ def loading_options(
     length_unit: float | None = None,
     person_mass: float | None = None,
 ) -> dict[str, Any]:
-    """Those of these arguments of `load_body` that differ from their defaults, checked. Raises ShapePhaseError."""
+    """The given ones of these arguments of `load_body`, checked; defaults are left out. Raises ShapePhaseError."""
     check_choice(on_unphysical, "value of on_unphysical", ("error", "warn"))
     if root is not None:
         check_choice(root, "value of root", ("free",))

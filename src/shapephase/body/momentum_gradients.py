@@ -1,6 +1,6 @@
-"""How a body's angular momentum answers to its shape and to its rates, for all joints at once and without Pinocchio.
+"""Derivatives of a body's angular momentum by its shape and rates, for all joints at once and without Pinocchio.
 
-What hangs on a joint moves with it as one: the sums over it are those over its links, a product with a fixed matrix.
+Links that hang on a joint move with it together: sums over them are products with a fixed matrix.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
 def by_independent(
     chain: JointChain, by_shape: Array, by_rate: Array, shapes: Array, rates: Array
 ) -> tuple[Array, Array]:
-    """From derivatives by coordinates and rates of all joints to those by the shape and its rate: (N, m, k), (N, m, k)
+    """Derivatives by the shape and its rate from those by coordinates and rates of all joints: (N, m, k), (N, m, k)
     -> (N, m, n), (N, m, n)."""
     follows = chain.follows
     folded = follows.folded(by_shape, shapes)
@@ -110,7 +110,7 @@ class _Sums:
 
 @dataclass(frozen=True, eq=False)
 class _Axes:
-    """Of the joints, in axes of the base and about the centre of mass of all; components first, (3, N, k).
+    """Axes of the joints, in axes of the base and about the centre of mass of all; components first, (3, N, k).
 
     axes, slides : unit vectors, zero of a joint that does not turn, or does not slide
     origins, speeds : a point of each axis, and its velocity as part of what the joint hangs on
@@ -125,7 +125,7 @@ class _Axes:
 
 
 def _link_sums(chain: JointChain, links: LinkMotions) -> Array:
-    """What each frame adds to the sums: (15, N, k + 1), in the order of mass times place, mass times velocity, angular
+    """Sums that each frame adds: (15, N, k + 1), in the order of mass times place, mass times velocity, angular
     momentum and inertia."""
     places, speeds, spins = (components(one) for one in (links.places, links.speeds, links.spins))
     own = components((links.turns @ chain.inertias @ so3.transpose(links.turns)).reshape(*places.shape[1:], 9))

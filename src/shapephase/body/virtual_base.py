@@ -30,7 +30,7 @@ class FreeBase(NamedTuple):
     link : its name
     way : the joints from the root of the file to it, those that move nothing among them; none: it is the root
     joints : those of the body, parents before children
-    notes : what is done without being asked for
+    notes : what was decided without an option
     """
 
     link: str
@@ -102,7 +102,7 @@ def free_base(
 
 
 def way_words(names: Sequence[str], above: str, link: str, root: str | None) -> tuple[str, str]:
-    """Fault and note on the joints between a massless root and the link that floats; empty where there is none."""
+    """Fault and note on the joints between a massless root and the link that floats; empty without any."""
     if not names or root is not None:
         return "", ""
     if len(names) == 1:
@@ -173,7 +173,7 @@ def _has_mass(links: Mapping[str, Link], names: Iterable[str]) -> bool:
 
 
 def _leading(fixed: Sequence[Joint], link: str, to: str) -> list[Joint]:
-    """Those of the fixed joints on a link that lead to another."""
+    """The fixed joints on a link that lead to another."""
     above = {joint.child: joint for joint in fixed}
     found: list[Joint] = []
     while to != link:
@@ -216,7 +216,7 @@ def _single_axes(joint: Joint) -> tuple[Joint, ...]:
 
 
 def _inside(joint: Joint) -> str:
-    """Why a floating or planar joint inside a body is none."""
+    """The reason why a floating or planar joint cannot be inside a body."""
     why, instead = {
         ANYWHERE: (
             "it has the coordinates of a rigid motion, and only the base floats here",

@@ -1,4 +1,4 @@
-"""From the independent coordinates of a body to those of all its joints, with two derivatives."""
+"""The map from the independent coordinates of a body to those of all its joints, with two derivatives."""
 
 from __future__ import annotations
 
@@ -57,19 +57,19 @@ class CoordinateMap:
 
     @property
     def is_linear(self) -> bool:
-        """Whether all joints depend on the shape by matrix and offset."""
+        """True where all joints depend on the shape by matrix and offset."""
         return not self.curved and not self.balls
 
     @cached_property
     def is_identity(self) -> bool:
-        """Whether no joint follows another."""
+        """True where no joint follows another."""
         count = len(self.names)
         whole = self.matrix.shape == (count, count) and np.array_equal(self.matrix, np.eye(count))
         return self.is_linear and whole and not self.offset.any()
 
     @cached_property
     def drivers(self) -> tuple[str, ...]:
-        """The joints that a curved one follows, by a function that is no straight line or after others."""
+        """The joints that a curved one follows, by a function that is not a straight line or after others."""
         return tuple(dict.fromkeys(self.names[source] for joint in self.curved for source, _ in joint.terms))
 
     @cached_property
@@ -89,12 +89,12 @@ class CoordinateMap:
 
     @property
     def is_smooth(self) -> bool:
-        """Whether no function has knots."""
+        """True where no function has knots."""
         return not self.knotted
 
     @property
     def has_kinks(self) -> bool:
-        """Whether a slope jumps at some knot."""
+        """True where a slope jumps at some knot."""
         return any(kinked for _, _, kinked in self.knotted)
 
     def coordinates(self, shapes: Array) -> Array:
@@ -126,7 +126,7 @@ class CoordinateMap:
         return self._slopes_and_rates(shapes, np.zeros_like(shapes))[0]
 
     def slope_rates(self, shapes: Array, rates: Array) -> Array:
-        """How those change along rates, which are at the same time the derivatives of all rates by the shape while the
+        """Rates of these derivatives along a motion, which are also the derivatives of all rates by the shape while the
         rates of the shape stay: (N, n), (N, n) -> (N, k, n)."""
         return self._slopes_and_rates(shapes, rates)[1]
 
@@ -166,7 +166,7 @@ def coordinate_map(
     for name, coupling in couplings.items():
         for ball in {name, *coupling.drivers} & set(balls):
             raise ModelFileError(
-                f"joint {name!r}: {ball!r} is a ball joint, whose turn is no one number that follows or leads another"
+                f"joint {name!r}: {ball!r} is a ball joint, whose turn is not one number that follows or leads another"
             )
     names = tuple(row for name in joints for row in (rate_names(name) if name in balls else [name]))
     free = [name for name in joints if name not in couplings]
@@ -250,7 +250,7 @@ def check_smooth(follows: CoordinateMap, what: str, *, kinks_only: bool = False)
 
 
 def check_no_balls(follows: CoordinateMap, what: str) -> None:
-    """Raise ShapeError where a joint is a ball joint, whose rates are no derivatives of coordinates.
+    """Raise ShapeError for a ball joint, whose rates are not derivatives of coordinates.
 
     what : that needs such coordinates, with its verb: "extremals need"
     """

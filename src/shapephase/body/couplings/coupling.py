@@ -1,4 +1,4 @@
-"""What a user or a file says of a joint that follows others."""
+"""Joints that follow others, by functions that a user or a file states."""
 
 from __future__ import annotations
 

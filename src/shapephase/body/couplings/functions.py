@@ -83,7 +83,7 @@ class JointFunction:
             raise ShapeError(f"the function jumps by {jumps[worst]:.6g} at {self.knots[worst]:.6g}; it must go on")
 
     def _sides(self) -> tuple[Array, Array, Array]:
-        """At the knots: by how much the value jumps, and the slopes before and behind."""
+        """Jumps of the value at the knots, and the slopes before and behind."""
         before, behind = (self._on(np.arange(len(self.knots)) + side, self.knots) for side in (0, 1))
         return behind.value - before.value, before.slope, behind.slope
 
@@ -148,7 +148,7 @@ def hermite(knots: Array, values: Array, slopes: Array | None) -> JointFunction:
 
 
 def _four_point_slopes(x: Array, y: Array) -> Array:
-    """Of the spline whose third derivative at both ends is that of the cubic through four points, with fewer none."""
+    """Slopes of the spline whose third derivative at both ends is that of the cubic through four points, or zero."""
     widths, rise = np.diff(x), np.diff(y) / np.diff(x)
     if len(x) == 2:
         return np.array([rise[0], rise[0]])

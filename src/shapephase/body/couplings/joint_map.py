@@ -1,4 +1,4 @@
-"""From the independent joints of a body to the configuration and velocity vectors of its Pinocchio model."""
+"""The map from the independent joints of a body to configurations and velocities of its Pinocchio model."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_LIMIT = 1e30  # [rad/s, m/s, N m or N] a larger stated limit means none
 
 
 class JointMap:
-    """Where each joint stands in Pinocchio's vectors, joints that follow others and joints kept as (cos, sin) included.
+    """Places of joints in Pinocchio's vectors, joints that follow others and joints kept as (cos, sin) included.
 
     Pinocchio's rates of a ball joint are the angular velocity in axes of the child, as ours; its coordinates a unit
     quaternion.
@@ -42,7 +42,7 @@ class JointMap:
         balls = [name for name, kind in moving.items() if kind.nv == _BALL]
         self.follows = coordinate_map(tuple(moving), couplings, balls)
         self.names = self.follows.independent
-        # Of each row; the coordinates of a ball joint have places of their own.
+        # By row; the coordinates of a ball joint have places of their own.
         kinds = [kind for kind in moving.values() for _ in range(kind.nv)]
         self._round = np.array([kind.nv == _BALL for kind in kinds], dtype=bool)
         turning = np.array([kind.nq == 2 for kind in kinds], dtype=bool)
@@ -85,7 +85,7 @@ class JointMap:
         self.units = tuple("1" if self._round[i] else "m" if sliding[i] else "rad" for i in independent)
 
     def _slowest(self, stated: Array) -> Array:
-        """Of each independent joint, so that its followers keep theirs, too; a limit of zero says nothing: (n,)."""
+        """Rate limits of the independent joints that their followers' limits allow; zero means none: (n,)."""
         stated = np.where((stated > 0.0) & (stated < _NO_LIMIT), stated, np.inf)
         factors = np.abs(self.follows.matrix)
         each = np.full(factors.shape, np.inf)
@@ -133,7 +133,7 @@ class JointMap:
         return found
 
     def independent_rates(self, shapes: Array, rates: Array) -> Array:
-        """Of the independent joints, of ball joints the angular velocity: (N, n), (N, n) -> (N, m)."""
+        """Rates of the independent joints, for ball joints the angular velocity: (N, n), (N, n) -> (N, m)."""
         return self.follows.with_rates(shapes, rates)[1][:, self._own_rows]
 
     def frames(self, shapes: Array) -> Array:
@@ -150,19 +150,19 @@ class JointMap:
         return self.follows.folded(joints[..., self._velocity_index], shapes)
 
     def bent_columns(self, joints: Array, shapes: Array, rates: Array) -> Array:
-        """The same, folded by how the fold changes along rates, as a second derivative needs it."""
+        """Columns of joints, folded by the rate of the fold along a motion: a second derivative needs it."""
         return joints[..., self._velocity_index] @ self._slope_rates(shapes, rates)
 
     def bent_rates(self, joints: Array, shapes: Array, rates: Array) -> Array:
-        """The same, folded by how Pinocchio's rates change with the shape while its own rates stay. The two differ for
-        ball joints only, whose rates are no derivatives of coordinates: by the bracket of the rates."""
+        """Columns of joints, folded by the change of Pinocchio's rates with the shape at constant own rates. Differs for
+        ball joints only, whose rates are not derivatives of coordinates: by the bracket of the rates."""
         bent = self.follows.slope_rates(shapes, rates)
         for ball in self.follows.balls:
             bent[:, ball.rows, ball.columns] = ball.rates_by_shape(shapes, rates)
         return joints[..., self._velocity_index] @ bent
 
     def _slope_rates(self, shapes: Array, rates: Array) -> Array:
-        """How the derivatives of Pinocchio's rates by those of the shape change along a motion: (N, k, n)."""
+        """Rate, along a motion, of the derivatives of Pinocchio's rates by those of the shape: (N, k, n)."""
         bent = self.follows.slope_rates(shapes, rates)
         for ball in self.follows.balls:
             bent[:, ball.rows, ball.columns] = ball.slope_rates(shapes, rates)

@@ -1,1 +1,1 @@
-"""What is drawn of a body: the shapes and meshes of its file, boxes of equal inertia, hulls of what is too much."""
+"""Shapes and meshes of a body's file, boxes of equal inertia, and hulls in place of too many shapes."""

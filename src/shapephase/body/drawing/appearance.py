@@ -1,4 +1,4 @@
-"""What is drawn of a body: the shapes and meshes of its file by link, and boxes of equal inertia elsewhere."""
+"""Shapes to draw of a body: those of its file by link, and boxes of equal inertia elsewhere."""
 
 from __future__ import annotations
 

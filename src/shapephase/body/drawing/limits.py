@@ -1,4 +1,4 @@
-"""How much of a body is drawn: meshes and shapes beyond what a page holds are replaced by their hulls."""
+"""Limits of a drawing: meshes and shapes beyond what a page holds are replaced by their hulls."""
 
 from __future__ import annotations
 

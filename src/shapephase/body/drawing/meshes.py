@@ -48,7 +48,7 @@ class MeshFiles:
         return path, self._scaled[path, scale]
 
     def _places(self, name: str) -> Iterator[Path]:
-        """Where a mesh may be: in a given package, one around the URDF or of example-robot-data, or beside the URDF."""
+        """Places where a mesh may be: in a given package, around the URDF, in example-robot-data, beside the URDF."""
         folder = self._folder
         scheme, _, rest = name.rpartition("://")
         given = [Path(place) for package in self._packages for place in (package, os.path.dirname(package))]

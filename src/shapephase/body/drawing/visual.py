@@ -17,7 +17,7 @@ from ..body import MovingPart
 Colour = tuple[float, float, float, float]
 
 PLAIN: Colour = (0.72, 0.74, 0.78, 1.0)
-BOX_COLOUR: Colour = (0.337, 0.706, 0.914, 1.0)  # sky blue of Okabe and Ito: told apart by all eyes
+BOX_COLOUR: Colour = (0.337, 0.706, 0.914, 1.0)  # sky blue of Okabe and Ito: distinct for colour-blind readers
 _THINNEST = 0.01  # of a box's longest edge: a flat box is still visible from the side
 _WATER = 1000.0  # density of the ball that stands for a point mass [kg/m^3]
 _CORNERS = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T

@@ -1,6 +1,6 @@
 """bioMod models of the acrobatics community, as biorbd (Michaud and Begon 2021) reads them.
 
-Segments, frames, masses and ranges come from biorbd; the text itself is looked at only for what biorbd passes over in
+Segments, frames, masses and ranges come from biorbd; the text itself is searched only for what biorbd ignores in
 silence. Coordinates of the root segment are the free base.
 """
 
@@ -87,8 +87,8 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
                 raise UnusableModelError(
                     f"segment {name!r}: the frame of a mirror is no base, and no joints move in it", line
                 )
-            said = "with the frame of a mirror, where mass is taken over as biorbd sees it"
-            notes.append(("segment", repr(name), said))
+            message = "with the frame of a mirror, where mass is taken over as biorbd sees it"
+            notes.append(("segment", repr(name), message))
         traits, flip = segment.characteristics(), flips[name]
         tensor = flip @ traits.inertia().to_array() @ flip
         chain.add_link(name, traits.mass(), flip @ traits.CoM().to_array(), tensor, line)
@@ -120,19 +120,19 @@ def _model(path: str, notes: list[Any], starts: dict[str, int]) -> Any:
             raise _refused(str(error), starts) from None
 
 
-def _refused(said: str, starts: dict[str, int]) -> UnusableModelError:
-    """What biorbd says, in one line, at the segment that it names."""
-    text = " ".join(said.split("Alternatively")[0].split())
-    named = re.search(r"Element: segment, named: (\S+)", " ".join(said.split()))
+def _refused(message: str, starts: dict[str, int]) -> UnusableModelError:
+    """The error of biorbd in one line, at the segment that it names."""
+    text = " ".join(message.split("Alternatively")[0].split())
+    named = re.search(r"Element: segment, named: (\S+)", " ".join(message.split()))
     reason = re.sub(r'^Reading of file "[^"]*" failed with the following error: ', "", text)
     segment = f"segment {named[1]!r}: " if named else ""
     return UnusableModelError(f"{segment}biorbd does not accept it: {reason}", starts.get(named[1], 1) if named else 1)
 
 
 def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
-    """The text without meshes. Raises UnusableModelError for what biorbd would pass over."""
+    """The text without meshes. Raises UnusableModelError for what biorbd would ignore."""
     kept, segment, meshes, constraints, number = [], None, 0, 0, 1
-    said: list[tuple[str, int]] = []
+    message: list[tuple[str, int]] = []
     without_blocks = re.sub(r"/\*.*?\*/", lambda found: "\n" * found[0].count("\n"), text, flags=re.DOTALL)
     for number, line in enumerate(without_blocks.splitlines(), 1):
         words = line.split("//")[0].split()
@@ -142,7 +142,7 @@ def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
         if word in _DROPPED:
             meshes += word == "meshfile"
             kept.append("")
-            said += [(text, number) for text in words[:1]]
+            message += [(text, number) for text in words[:1]]
             continue
         kept.append(line)
         if word == "segment":
@@ -151,16 +151,16 @@ def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
             check_name(segment, f"segment {segment!r}", number)
             if segment in starts:
                 raise UnusableModelError(f"two segments are named {segment!r}; give each a name of its own", number)
-            starts[segment], said = number, [(text, number) for text in words[2:]]
+            starts[segment], message = number, [(text, number) for text in words[2:]]
         elif word == "endsegment":
             if segment is not None:
-                _check_values(segment, said)
+                _check_values(segment, message)
             segment = None
         elif word == "loopconstraint" and segment is None:
             constraints += 1
         elif segment is not None and word:
             _check_word(words, word, segment, number)
-            said += [(text, number) for text in words]
+            message += [(text, number) for text in words]
     _check_closed(segment, number)
     if meshes:
         notes.append(f"{meshes} mesh files are not read: they have no part in how the body turns")
@@ -179,7 +179,7 @@ def _check_word(words: list[str], word: str, segment: str, line: int) -> None:
     if re.match(r"[a-z]", word) and word not in _WORDS and len(words) > 1 and not word.startswith(("pi", "nan", "inf")):
         near = difflib.get_close_matches(word, _WORDS, 1)
         meant = f"; {near[0]!r} is near" if near else ""
-        raise UnusableModelError(f"segment {segment!r}: biorbd passes over the word {words[0]!r}{meant}", line)
+        raise UnusableModelError(f"segment {segment!r}: biorbd ignores the word {words[0]!r}{meant}", line)
     if word in ("rotations", "translations") and len(words) > 2:
         written, meant = " ".join(words), f"{words[0]} {''.join(words[1:])}"
         raise UnusableModelError(
@@ -187,11 +187,11 @@ def _check_word(words: list[str], word: str, segment: str, line: int) -> None:
         )
 
 
-def _check_values(segment: str, said: list[tuple[str, int]]) -> None:
-    """Raise UnusableModelError for values of a segment that biorbd would pass over, or read in part."""
+def _check_values(segment: str, message: list[tuple[str, int]]) -> None:
+    """Raise UnusableModelError for values of a segment that biorbd would ignore, or read in part."""
     found: dict[str, list[str]] = {}
     word, start = "", 1
-    for text, line in [*said, ("", said[-1][1] if said else 1)]:
+    for text, line in [*message, ("", message[-1][1] if message else 1)]:
         named = text.lower() in _WORDS and not (word == "parent" and not found["parent"])
         if text and not named:
             if not word:
@@ -205,7 +205,7 @@ def _check_values(segment: str, said: list[tuple[str, int]]) -> None:
 
 
 def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int) -> None:
-    """Raise UnusableModelError where a word has too few or too many values, or one that is no number."""
+    """Raise UnusableModelError where a word has too few or too many values, or one that is not a number."""
     values = found.get(word, [])
     numbers = values
     if word == "rt" and len(values) == 7:
@@ -229,7 +229,7 @@ def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int
             if not _VALUE.fullmatch(text):
                 hint = "; write a small e" if re.fullmatch(r"[-+.\d]+E[-+\d]+", text) else ""
                 raise UnusableModelError(
-                    f"segment {segment!r}: {word}: {text!r:.40} is no number that biorbd reads{hint}", line
+                    f"segment {segment!r}: {word}: {text!r:.40} is not a number that biorbd reads{hint}", line
                 )
 
 
@@ -257,7 +257,7 @@ def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str,
     roots = [root for root, mass in masses.items() if mass > 0.0] or list(trees)
     listed = ", ".join(map(repr, roots[:20])) or "none"
     if root_body is not None and root_body not in trees:
-        raise UnusableModelError(f"root_body: {root_body[:60]!r} is no root segment; there is {listed}")
+        raise UnusableModelError(f"root_body: {root_body[:60]!r} is not a root segment; there is {listed}")
     if len(roots) != 1 and root_body is None:
         heaviest = max(roots, key=lambda root: masses[root], default="")
         way = f"; say which one by root_body={heaviest!r} (--root-body {heaviest})" if roots else ""
@@ -342,13 +342,14 @@ def _orthonormal(matrix: Array, name: str, line: int) -> tuple[Array, Array, flo
     left, values, right = np.linalg.svd(matrix)
     nearest = left @ right
     if not np.abs(values - 1.0).max() < 1e-2:
-        raise UnusableModelError(f"segment {name!r}: its frame {matrix.tolist()} is no rotation; correct its RT", line)
+        fault = f"its frame {matrix.tolist()} is not a rotation; correct its RT"
+        raise UnusableModelError(f"segment {name!r}: {fault}", line)
     flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(nearest))])
     return nearest @ flip, flip, float(np.abs(matrix - nearest).max())
 
 
 def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, lack: float) -> None:
-    """What biorbd computes with the base at rest."""
+    """Add inertia and momentum by biorbd with the base at rest."""
     names = [name.to_string() for name in model.nameDof()]
     still = np.zeros(model.nbQ())
     # The scalar parts of quaternions come last, in the order of the segments.

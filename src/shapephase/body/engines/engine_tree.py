@@ -46,7 +46,7 @@ def expanded(path: Path, packages: Sequence[str], arguments: Mapping[str, str]) 
 
 
 def engine_shapes(path: Path, name: str) -> dict[str, Any]:
-    """What can be drawn of such a file, as plain numbers. Raises what `engine_tree` raises."""
+    """Shapes to draw of such a file, as plain numbers. Raises what `engine_tree` raises."""
     return _result(path, name, SHAPES)
 
 

@@ -60,10 +60,10 @@ def compiled_without(written: mujoco.MjSpec) -> tuple[Any, frozenset[int], list[
     )
 
 
-def _asset_of(written: mujoco.MjSpec, said: str, left: dict[str, tuple[str, str]]) -> tuple[str, Any]:
+def _asset_of(written: mujoco.MjSpec, message: str, left: dict[str, tuple[str, str]]) -> tuple[str, Any]:
     """The kind and the asset that an error is about; None where it is about something else."""
-    missing = re.search(r"[Oo]pening file '([^']*)'", said)
-    element = re.search(r"Element name '([^']*)'", said)
+    missing = re.search(r"[Oo]pening file '([^']*)'", message)
+    element = re.search(r"Element name '([^']*)'", message)
     for group, kind in _KINDS.items():
         for asset in getattr(written, group):
             file = _file_of(asset)

@@ -1,4 +1,4 @@
-"""What MuJoCo's own viewer would show of a body: geoms and meshes, as plain numbers."""
+"""Geoms and meshes that MuJoCo's own viewer would show of a body, as plain numbers."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def shapes_of(path: str) -> dict[str, Any]:
 
 
 def _drawn(compiled: Compiled, body: int) -> list[int]:
-    """Of the geoms of a body, those that the viewer shows, or all if it shows none."""
+    """The geoms of a body that the viewer shows, or all if it shows none."""
     model = compiled.model
     first = int(model.body_geomadr[body])
     geoms = range(first, first + int(model.body_geomnum[body]))

@@ -74,12 +74,12 @@ class Compiled:
         return self.model.joint(joint).name or f"{self.names[body]}_joint{joint - self.joints_of(body)[0] + 1}"
 
     def line(self, number: int, kind: str = "body") -> int:
-        """Where a body or joint begins; 1 where that is in another file."""
+        """Line at which a body or joint begins; 1 for one in another file."""
         return self.lines.get((kind, number), 1)
 
 
 def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
-    """What MuJoCo makes of a file, with shapes that are drawn only or not.
+    """The model that MuJoCo compiles from a file, with or without shapes that are only drawn.
 
     Raises UnusableModelError for what it does not accept.
     """
@@ -122,20 +122,20 @@ def _check_passed_over(content: bytes, path: str) -> None:
         for name in set(node.attributes) - set(_PASSED_OVER.get(node.tag, node.attributes)):
             near = difflib.get_close_matches(name, _PASSED_OVER[node.tag], 1)
             meant = f"; did you mean {near[0]}=?" if near else ""
-            raise UnusableModelError(f"<{node.tag}>: MuJoCo passes over {name[:60]!r}{meant}", node.line)
+            raise UnusableModelError(f"<{node.tag}>: MuJoCo ignores {name[:60]!r}{meant}", node.line)
 
 
-def _line(said: str, name: str, lines: list[str]) -> int:
-    """Where the element of this name begins; 1 if that is not in these lines."""
-    found = re.search(r"line (\d+)", said)
+def _line(message: str, name: str, lines: list[str]) -> int:
+    """Line at which the element of this name begins; 1 if it is not in these lines."""
+    found = re.search(r"line (\d+)", message)
     number = int(found[1]) if found else 1
     here = 0 < number <= len(lines) and name in "\n".join(lines[number - 1 : number - 1 + _TAG_LINES])
     return number if here else 1
 
 
-def _refused(said: str, text: str) -> UnusableModelError:
-    """What MuJoCo says, in one line, with the element and its line."""
-    words = " ".join(said.split())
+def _refused(message: str, text: str) -> UnusableModelError:
+    """The error of MuJoCo in one line, with the element and its line."""
+    words = " ".join(message.split())
     at = re.search(r"\s*Element (name )?'([^']*)'(?:, id \d+)?(?:, line (\d+))?\.?$", words)
     reason = re.sub(r"^(XML )?(Error: )+", "", words[: at.start()] if at else words)
     reason += " (it may have run out of memory)" if "unknown exception" in reason else ""
@@ -147,7 +147,7 @@ def _refused(said: str, text: str) -> UnusableModelError:
         named = f"{tag[1]} {at[2]!r}" if tag else f"<mujoco>, element {at[2]!r}"
         element = f"<{at[2]}>" if not at[1] else named if at[2] else element
     if number == 0:
-        # Of what is included MuJoCo keeps no lines.
+        # MuJoCo keeps no lines of included files.
         reason += "; in a file that is included"
     return UnusableModelError(f"{element}: MuJoCo does not accept it: {reason}", max(number, 1))
 
@@ -188,12 +188,12 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
         raise UnusableModelError(
             f"joint {compiled.joint_name(joints[0])!r}: {fault}", compiled.line(joints[0], "joint")
         )
-    # Behind what has mass nobody knows where the world is.
+    # The world's place relative to something with mass in between is unknown.
     return base, [] if above else way, notes + [note] * bool(note)
 
 
 def _way_to_mass(compiled: Compiled, top: int) -> list[int]:
-    """From a body in the world to the first that has mass, or on which several move, each the only one on the last."""
+    """Bodies from one in the world to the first with mass, or on which several move, each alone on the last."""
     model, way = compiled.model, [top]
     while not any(model.jnt_type[joint] == FREE for joint in compiled.joints_of(way[-1])):
         fixed, moving = _rigid_part(compiled, way[-1])
@@ -204,7 +204,7 @@ def _way_to_mass(compiled: Compiled, top: int) -> list[int]:
 
 
 def _way_from_world(compiled: Compiled, base: int) -> list[int]:
-    """From a body in the world to another where nothing on the way has mass; else the last alone."""
+    """Bodies from one in the world to another where nothing on the way has mass; else the last alone."""
     model, way = compiled.model, [*_between(compiled, 0, base), base]
     clear = all(not model.body_mass[body] for step in way[:-1] for body in _rigid_part(compiled, step)[0])
     return way if clear else [base]
@@ -249,7 +249,7 @@ def _only_tree(compiled: Compiled, notes: list[str]) -> int:
 
 
 def rotation(quaternion: Array) -> Array:
-    """Of a quaternion w x y z of length one, or nearly: (3, 3)."""
+    """Rotation of a quaternion w x y z, made of length one: (3, 3)."""
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew)

@@ -34,7 +34,7 @@ _MOST_LENGTH = 1e6  # [m] of places: differences of larger ones lose their digit
 
 
 class Rule(NamedTuple):
-    """Of a joint that follows one other or none: `start` + sum of powers[p] (coordinate of the other - about)^p."""
+    """A joint that follows one other or none: `start` + sum of powers[p] (coordinate of the other - about)^p."""
 
     leaders: tuple[int, ...]
     start: float
@@ -63,7 +63,7 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
             _add_joints(chain, compiled, body)
     moved = Chain("")
     for body in way:
-        # Of a free joint, or without one, nothing leads to the body.
+        # A free joint does not lead to the body.
         if all(compiled.model.jnt_type[joint] != FREE for joint in compiled.joints_of(body)):
             _add_joints(moved, compiled, body)
     chain.base_joints = moved.joints if moved.moving() else []
@@ -138,7 +138,7 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         last = joint == joints[-1]
         below = child if last else f"{child}\0{name}"
         if not last:
-            # Between two joints of a body lie axes that are no link.
+            # A step between two joints of a body.
             chain.add_frame(below)
         after = -anchor if last else np.zeros(3)
         chain.add_joint(name, kind, parent, below, place, turn, axis, limits, after, line)
@@ -224,7 +224,7 @@ def _held(model: Any, number: int) -> tuple[int, int]:
 
 
 def _check_carried(compiled: Compiled, own: set[int]) -> None:
-    """That what is left out and moves is not tied to the body, and that no soft part is among its own."""
+    """Raise UnusableModelError where parts outside the body are tied to it, or soft parts are among its own."""
     model = compiled.model
     for number in _active(model, _CONNECT, _WELD):
         one, other = _held(model, number)
@@ -242,7 +242,7 @@ def _check_carried(compiled: Compiled, own: set[int]) -> None:
         if soft:
             body = min(soft)
             raise UnusableModelError(
-                f"body {compiled.names[body]!r}: soft bodies (flex) are no rigid links; remove them",
+                f"body {compiled.names[body]!r}: soft bodies (flex) are not rigid links; remove them",
                 compiled.line(body),
             )
 
@@ -253,7 +253,7 @@ def _equality(model: Any, number: int) -> str:
 
 
 def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, str]]:
-    """What holds or drives joints of the body, of which a free body with given joints knows nothing."""
+    """Notes on what holds or drives joints of the body, which are free here."""
     model = compiled.model
     notes: list[str | tuple[str, str, str]] = []
     for number in _active(model, _CONNECT, _WELD):

@@ -1,4 +1,4 @@
-"""What OpenSim itself computes of a model at some shapes; in the reading process alone."""
+"""Inertia and momentum by OpenSim itself at some shapes; in the reading process alone."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def add_poses(
 
 
 def _moving(part: Any, state: Any) -> tuple[Array, Array, Array]:
-    """Of a body the centre of mass, its velocity, and the angular velocity, in the ground's axes."""
+    """Centre of mass of a body, its velocity and the angular velocity, in the ground's axes."""
     station = part.getMassCenter()
     centre, speed = part.findStationLocationInGround(state, station), part.findStationVelocityInGround(state, station)
     return vector_of(centre), vector_of(speed), vector_of(part.getAngularVelocityInGround(state))
 
 
 def _rules(model: Any) -> dict[str, tuple[Any, list[str]]]:
-    """Of coordinates that follow others a copy of OpenSim's function, and whom they follow."""
+    """OpenSim's functions of the coordinates that follow others, copied, and the coordinates that each follows."""
     rules, constraints = {}, model.getConstraintSet()
     for k in range(constraints.getSize()):
         coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraints.get(k))

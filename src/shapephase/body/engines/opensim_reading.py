@@ -50,7 +50,7 @@ class _Axis(NamedTuple):
 
 
 class _Coordinate(NamedTuple):
-    """Of the shape: with its limits; locked at a value; or as it follows others."""
+    """A coordinate of the shape: with its limits; locked at a value; or following others."""
 
     kind: str
     limits: tuple[float, float]
@@ -134,8 +134,8 @@ class _Reading:
         joint = grounded[0 if root_body is None else bodies.index(root_body)]
         name, count, body = joint.getName(), joint.numCoordinates(), ends(joint)[1]
         if count < _FREE:
-            said = f"joint {name!r} to the ground has {count} coordinates: {body!r} floats freely instead"
-            self._chain.notes.append(said)
+            text = f"joint {name!r} to the ground has {count} coordinates: {body!r} floats freely instead"
+            self._chain.notes.append(text)
         return joint
 
     def _below(self, root: str) -> set[str]:
@@ -227,7 +227,7 @@ class _Reading:
             raise self._fault(f"coordinate {name!r} follows itself, by way of others; remove a coupler", name)
 
     def _couplers(self) -> dict[str, Coupling]:
-        """How coordinates follow others."""
+        """Couplings of coordinates that follow others."""
         found = {}
         constraints = self._model.getConstraintSet()
         for k in range(constraints.getSize()):
@@ -237,8 +237,8 @@ class _Reading:
             coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraint)
             if coupler is None:
                 kind = constraint.getConcreteClassName()
-                said = "not taken up: its joints are free to move"
-                self._chain.notes.append((kind, repr(constraint.getName()), said))
+                text = "ignored, its joints are free to move"
+                self._chain.notes.append((kind, repr(constraint.getName()), text))
                 continue
             names = coupler.getIndependentCoordinateNames()
             drivers = [names.get(place) for place in range(names.getSize())]
@@ -277,7 +277,7 @@ class _Reading:
         return _Axis(label, _SLIDE if number > 2 else _TURN, vector_of(axis.getAxis()), rule)
 
     def _unlocked(self, rule: Coupling) -> Coupling:
-        """With the values of locked coordinates."""
+        """The coupling with the values of locked coordinates."""
         start, kept = rule.start, []
         for driver, function in rule.terms:
             locked = self._coordinates[driver].locked

@@ -101,15 +101,15 @@ def _human(path: str, notes: list[str]) -> Any:
 
 
 def _check_numbers(content: bytes) -> None:
-    """That every entry stands once, and is a number as it is written; the package multiplies what it gets."""
+    """Raise UnusableModelError unless every entry stands once and is a number: the package multiplies anything."""
     try:
         root = yaml.compose(content.decode("utf-8"), Loader=yaml.SafeLoader)
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark is not None else 1
-        raise UnusableModelError("it is no YAML file of measurements, `name: number` a line", line) from None
+        raise UnusableModelError("it is not a YAML file of measurements, `name: number` a line", line) from None
     if not isinstance(root, yaml.MappingNode):
-        raise UnusableModelError("it is no YAML file of measurements, `name: number` a line")
+        raise UnusableModelError("it is not a YAML file of measurements, `name: number` a line")
     read: dict[str, float] = {}
     for key, value in root.value:
         name, line = str(key.value)[:_LONGEST], key.start_mark.line + 1
@@ -127,12 +127,12 @@ def _check_numbers(content: bytes) -> None:
     missing, unknown = sorted(names - set(read)), sorted(map(str, set(read) - names - {"totalmass"}))
     if missing or unknown:
         lacks = f"lacks {', '.join(missing)}" if missing else ""
-        has = f"has {', '.join(unknown)}, which are no measurements" if unknown else ""
+        has = f"has {', '.join(unknown)}, which are not measurements" if unknown else ""
         raise UnusableModelError(f"the file {' and '.join(text for text in (lacks, has) if text)}")
 
 
 def _link(part: Any) -> str:
-    """As the package calls it, without its key: 'A1: Left upper arm' -> 'left_upper_arm'."""
+    """The package's label without its key: 'A1: Left upper arm' -> 'left_upper_arm'."""
     return part.label.split(":")[1].strip().lower().replace(" ", "_").replace("-", "_")
 
 

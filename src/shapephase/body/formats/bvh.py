@@ -27,7 +27,7 @@ def bvh_tree(
 ) -> LinkTree:
     """Links and joints of a skeleton, in the order of its file.
 
-    What the base hangs on moves it, and is no part of the tree.
+    The tree begins at the base; bones above it only move it.
 
     length_unit : length of a unit of the file [m]; needed
     person_mass : [kg]; None: 70 kg, with a note
@@ -64,7 +64,7 @@ def mvnx_tree(content: bytes, name: str, where: str, person_mass: float | None =
 def _notes(skeleton: Skeleton, person: Person, where: str, person_mass: float | None) -> list[str]:
     notes = []
     if person_mass is None:
-        notes.append(f"{where}:1: the person is taken to have {_MASS:g} kg; person_mass (--person-mass) says another")
+        notes.append(f"{where}:1: the person is taken to have {_MASS:g} kg; person_mass (--person-mass) states another")
     if person.frame is not None:
         low, high = _HEIGHTS
         notes.append(
@@ -136,7 +136,7 @@ def _joints_of(bone: Bone) -> list[tuple[str, str, str]]:
 
 
 def _link(name: str, where: str, carried: list[Segment]) -> Link:
-    """What a bone carries, in one."""
+    """One link of all segments that a bone carries."""
     mass = sum(segment.mass for segment in carried)
     if not carried:
         return Link(name, where)

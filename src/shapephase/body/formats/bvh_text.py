@@ -26,7 +26,7 @@ _STAYS = 1e-4  # of a bone's length, between its place and the offset: files hav
 
 
 class BvhFaultError(Exception):
-    """What is wrong with a file, and in which line."""
+    """A fault of a file, with its line."""
 
     def __init__(self, message: str, line: int) -> None:
         super().__init__(message)
@@ -69,12 +69,12 @@ class Bone:
 
     @property
     def is_ball(self) -> bool:
-        """Whether it turns about all axes, in whatever order: then its angles are a rotation, and no hinges."""
+        """True for a bone that turns about all axes, in any order: its angles are a rotation, not hinges."""
         return len(self.turns) > 2
 
     @property
     def hinge_names(self) -> tuple[str, ...]:
-        """Of the hinges that its channels of rotation would be, each by itself."""
+        """Names of the hinges that its channels of rotation would be, each by itself."""
         return tuple(f"{self.name}_{axis.upper()}rotation" for axis, _ in self.turns)
 
 
@@ -93,13 +93,13 @@ class Skeleton:
     step: float
 
     def turned(self, number: int, frames: Array) -> Array:
-        """How a bone is turned in the axes of the one that it hangs on: frames (M, c) -> (M, 3, 3)."""
+        """Rotations of a bone in the axes of the one that it hangs on: frames (M, c) -> (M, 3, 3)."""
         turns = self.bones[number].turns
         angles = np.radians(frames[:, [column for _, column in turns]])
         return so3.matrix_from_euler(angles, "".join(axis for axis, _ in turns))
 
     def placed(self, number: int, frames: Array) -> Array:
-        """Where a bone's joint is in the axes of the one that it hangs on: frames (M, c) -> (M, 3) [units]."""
+        """Places of a bone's joint in the axes of the one that it hangs on: frames (M, c) -> (M, 3) [units]."""
         bone = self.bones[number]
         places = np.tile(bone.offset, (len(frames), 1))
         for axis, column in bone.slides:
@@ -147,14 +147,14 @@ class Skeleton:
 
 
 def is_bvh(content: bytes) -> bool:
-    """Whether bytes begin as a BVH file does."""
+    """True where bytes begin like a BVH file."""
     return content[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()[: len(_START)].upper() == _START
 
 
 def bvh_skeleton(content: bytes) -> Skeleton:
     """Read a file.
 
-    Raises BvhFaultError for whatever is no BVH, or has other numbers than it says.
+    Raises BvhFaultError for another format, or other counts than the file states.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -169,7 +169,7 @@ def bvh_skeleton(content: bytes) -> Skeleton:
         raise lines.fault("MOTION is needed behind the skeleton: one ROOT, as many closing braces as opening ones")
     count = lines.after("Frames:")
     if not (count.isascii() and count.isdigit() and len(count) < 10):
-        raise lines.fault(f"Frames: {count[:_SHOWN]!r} is no number of frames")
+        raise lines.fault(f"Frames: {count[:_SHOWN]!r} is not a number of frames")
     step = _numbers([lines.after("Frame Time:")], lines)[0]
     if not 1e-9 <= step <= 1e9:
         raise lines.fault(f"Frame Time: {step:g} s between frames; a time above 0 is needed")
@@ -201,7 +201,7 @@ class _Lines:
         return line.split()
 
     def after(self, label: str) -> str:
-        """What follows a label in the next line."""
+        """The text after a label in the next line."""
         words = " ".join(self.next(label))
         if not words.lower().startswith(label.lower()):
             raise self.fault(f"{label} is needed, got {words[:_SHOWN]!r}")
@@ -289,7 +289,7 @@ class _Hierarchy:
                     f"{name}: the channel {word[:_SHOWN]!r} is unknown; these are: {', '.join(known.values())}"
                 )
         if words[1] != str(len(channels)):
-            raise self.lines.fault(f"{name}: CHANNELS {words[1][:_SHOWN]} are said, and {len(channels)} follow")
+            raise self.lines.fault(f"{name}: CHANNELS {words[1][:_SHOWN]} are stated, and {len(channels)} follow")
         places = [channel for channel in channels if channel in _PLACES]
         turns = [channel for channel in channels if channel in _TURNS]
         if len(set(places)) < len(places) or (len(turns) == 2 and len(set(turns)) == 1):
@@ -305,12 +305,12 @@ def _numbers(words: Sequence[str], lines: _Lines) -> list[float]:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise lines.fault(f"{word[:_SHOWN]!r} is no finite number")
+            raise lines.fault(f"{word[:_SHOWN]!r} is not a finite number")
     return [float(word) for word in words]
 
 
 def _quick_numbers(line: str, words: list[str]) -> list[float] | None:
-    """A whole frame at once; None where each number has to be looked at."""
+    """A whole frame at once; None where each number must be checked."""
     if not line.isascii() or "_" in line:
         return None
     try:
@@ -327,19 +327,19 @@ def _frames(lines: _Lines, count: int, width: int) -> tuple[Array, list[int]]:
         if len(words) != width:
             raise lines.fault(f"{len(words)} numbers in a frame, and the skeleton has {width} channels")
         if len(at) == count:
-            raise lines.fault(f"Frames: {count} are said, and more follow")
+            raise lines.fault(f"Frames: {count} are stated, and more follow")
         numbers = _quick_numbers(line, words) or _numbers(words, lines)
         if max(map(abs, numbers), default=0.0) > FARTHEST:
             raise lines.fault(f"{max(numbers, key=abs):.6g} in a frame; up to {FARTHEST:g} can be resolved")
         values.extend(numbers)
         at.append(lines.number)
     if len(at) < count:
-        raise lines.fault(f"Frames: {count} are said, and {len(at)} follow; the file is cut off")
+        raise lines.fault(f"Frames: {count} are stated, and {len(at)} follow; the file is cut off")
     return np.frombuffer(values, dtype=np.float64).reshape(-1, width) if at else np.empty((0, width)), at
 
 
 def check_base(skeleton: Skeleton, base: int) -> None:
-    """Raise BvhFaultError where a bone and those it hangs on do not say how it is turned and where it is."""
+    """Raise BvhFaultError unless a bone and those it hangs on have three rotations, and three positions or none."""
     way = [skeleton.bones[number] for number in skeleton.above(base)]
     turns = [axis for bone in way for axis, _ in bone.turns]
     if len(turns) < len(_TURNS):
@@ -361,7 +361,7 @@ def check_lengths(skeleton: Skeleton, numbers: Sequence[int]) -> None:
         worst = int(np.argmax(off))
         if off[worst] > _STAYS * max(1.0, float(np.abs(bone.offset).max())):
             raise BvhFaultError(
-                f"bone {bone.name!r} is {off[worst]:.3g} units from its OFFSET: bones of changing length are no rigid "
+                f"bone {bone.name!r} is {off[worst]:.3g} units from its OFFSET: bones of changing length are not rigid "
                 "links; export rotations alone, or positions of the root only",
                 skeleton.lines[worst],
             )

@@ -1,4 +1,4 @@
-"""Files that are no body, told by their content: what each is, and what to do next.
+"""Files that are not bodies, recognised by their content: what each is, and what to do next.
 
 People load what a download, an export or another program has left; a parser's first complaint about it names neither.
 """
@@ -74,7 +74,7 @@ _TABLE = re.compile(rb"[\w.\" -]+([,;\t][\w.\" -]*)+\r?\n[-+\d.eE\" ]+([,;\t][-+
 
 
 def foreign_kind(content: bytes) -> str | None:
-    """What a file is that can be no body, with what to do next; None where that is not known."""
+    """Kind of a file that is not a body, with what to do next; None for an unknown one."""
     head = content[:_HEAD].removeprefix(b"\xef\xbb\xbf")
     if not content.strip(b"\0 \t\r\n"):
         return "an empty file; download or write it again"
@@ -100,7 +100,7 @@ def foreign_kind(content: bytes) -> str | None:
 
 
 def foreign_root(tag: str) -> str:
-    """What an XML file is by the tag of its root element, with what to do next."""
+    """Kind of an XML file by the tag of its root element, with what to do next."""
     return _ROOTS.get(tag, "neither a URDF nor an MJCF model; load a file whose first element is <robot> or <mujoco>")
 
 

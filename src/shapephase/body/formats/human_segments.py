@@ -4,7 +4,7 @@ Masses, centres of mass and radii of gyration are those of men by P. de Leva, J.
 table 4. Limbs are as long as their bones; trunk and head take their length from the distance of hips and shoulders.
 
 All of it is laid out where the joints are in one frame of the file, that of the straightest posture. How the axes of
-bones lie has no part in it: zero angles are no posture where bones have axes of their own.
+bones lie has no part in it: zero angles are not a posture where bones have axes of their own.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ _AS_WIDE = 1e-6  # of a span: files have six digits, and among equal frames the 
 
 
 class Segment(NamedTuple):
-    """What a bone carries, in its axes: mass [kg], centre from its joint (3,) [m], inertia about that centre (3, 3)
+    """A segment in axes of its bone: mass [kg], centre from its joint (3,) [m], inertia about that centre (3, 3)
     [kg m^2]."""
 
     bone: int
@@ -216,12 +216,12 @@ class _Layout:
         return self._segment(part, bone, centre, direction, length)
 
     def _wrist(self, side: str) -> Array:
-        """Where the forearm ends."""
+        """End of the forearm."""
         forearm, hand = self.bones[side, "forearm"], self.bones[side, "hand"]
         return self.places[hand] if hand != forearm else self.places[forearm] + self._towards(forearm)
 
     def _hand(self, side: str, wrist: Array) -> Segment:
-        """From the wrist on, as long as hands are beside forearms."""
+        """The hand from the wrist on, as long as hands are beside forearms."""
         forearm, hand = self.bones[side, "forearm"], self.bones[side, "hand"]
         along = wrist - self.places[forearm]
         ahead = self._towards(hand) if hand != forearm else along
@@ -230,7 +230,7 @@ class _Layout:
         return self._segment("hand", hand, wrist + _TABLE["hand"].centre * length * direction, direction, length)
 
     def _foot(self, foot: int, shank: float) -> Segment:
-        """From heel to toes, as long as feet are beside shanks."""
+        """The foot from heel to toes, as long as feet are beside shanks."""
         ahead = self._towards(foot)
         direction = self._direction(ahead if ahead.any() else self.front, "it points nowhere", foot)
         length = shank * _TABLE["foot"].length / _TABLE["shank"].length
@@ -251,7 +251,7 @@ class _Layout:
         return Segment(bone, mass, turn.T @ (centre - self.places[bone]), inertia)
 
     def _towards(self, bone: int) -> Array:
-        """From a bone's joint to the next one that is elsewhere, or to the end of the bone: (3,) [m]; or zeros."""
+        """Vector from a bone's joint to the next one elsewhere, or to the end of the bone: (3,) [m]; or zeros."""
         waiting = [bone]
         while waiting:
             at = waiting.pop(0)

@@ -31,7 +31,7 @@ _CHANNELS = ("Xposition", "Yposition", "Zposition", "Zrotation", "Xrotation", "Y
 
 
 class MvnxFaultError(BvhFaultError):
-    """What is wrong with a file, and in which line."""
+    """A fault of a file, with its line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class Poses:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Suit:
-    """What an MVNX file holds.
+    """Contents of an MVNX file.
 
     segments : their names
     points : for each, name -> place in its axes (3,) [m]
@@ -86,7 +86,7 @@ def read_suit(content: bytes, *, motion: bool = True) -> Suit:
 
     motion : False: what stands before the motion is enough, if it has a calibration pose
 
-    Raises MvnxFaultError for whatever is no MVNX, or has other numbers than it says.
+    Raises MvnxFaultError for another format, or other counts than the file states.
     """
     return _Reader(motion=motion).read(content)
 
@@ -145,7 +145,7 @@ class _Reader:
         self.path.append(name)
         self.text.clear()
         if len(self.path) == 1 and name != "mvnx":
-            raise self.fault(f"<{name[:40]}>: expected <mvnx>; this is no MVNX file")
+            raise self.fault(f"<{name[:40]}>: expected <mvnx>; this is not an MVNX file")
         if name == "subject":
             self.rate = self._number(attributes.get("frameRate", "nan"), "frameRate")
         elif name == "segment" and self.path[-2:-1] == ["segments"]:
@@ -195,7 +195,7 @@ class _Reader:
         try:
             return float(word)
         except ValueError:
-            raise self.fault(f"{what}: {word[:40]!r} is no number") from None
+            raise self.fault(f"{what}: {word[:40]!r} is not a number") from None
 
     def _poses(self, frames: list[_Frame]) -> Poses:
         count = len(self.segments)
@@ -255,7 +255,7 @@ def suit_skeleton(suit: Suit) -> Skeleton:
 
     A segment's axes are those of its bone.
 
-    Raises MvnxFaultError if joints are missing, or are no tree.
+    Raises MvnxFaultError if joints are missing, or not a tree.
     """
     # A prop in a hand is a segment without joints.
     roots = sorted({parent for parent, _ in suit.joints.values()} - suit.joints.keys())

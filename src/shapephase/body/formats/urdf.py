@@ -68,7 +68,7 @@ class Mimic:
 
 @dataclass
 class _Reading:
-    """What is found on the way through the file."""
+    """Results collected on the way through the file."""
 
     text: dict[tuple[str, str], str] = field(default_factory=dict)  # by kind of element and name
     mimics: dict[str, tuple[Node, Mimic]] = field(default_factory=dict)
@@ -80,7 +80,7 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
 
     free : "free": a single joint between a root without mass and the rest goes, too
 
-    Raises ModelFileError if it is no URDF, needs xacro, or a link or joint is faulty.
+    Raises ModelFileError if it is not a URDF, needs xacro, or a link or joint is faulty.
     """
     if root.tag != "robot":
         raise root.fault(f"<{quoted(root.tag)}>", f"expected <robot>: this is {foreign_root(root.tag)}")
@@ -137,7 +137,7 @@ def macro_of(root: Node) -> Node | None:
 
 
 def _check_parts(node: Node, known: Sequence[str], owner: str, reading: _Reading) -> None:
-    """Raise ModelFileError for an element that would be lost; note those that are nobody's."""
+    """Raise ModelFileError for an element that would be lost; note those of no known program."""
     no_misspelt_children(node, known, owner)
     others = _OF_OTHERS["joint" if node.tag == _DRAKE_JOINT else node.tag]
     for child in node.children:
@@ -251,8 +251,8 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
         effort = _effort(limit)
         for key in ("velocity", "effort"):
             if (limit.get(key) or "").strip().startswith("-"):
-                said = f"the {key} limit is negative, read as its size; write it without the sign"
-                reading.notes.append((f"{limit.file}:{limit.line}", "joint", repr(name), said))
+                text = f"the {key} limit is negative, read as its size; write it without the sign"
+                reading.notes.append((f"{limit.file}:{limit.line}", "joint", repr(name), text))
     if kind in ("revolute", "prismatic"):
         limits = _limits(node, kind, owner)
         parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="{effort!r}" velocity="{fastest!r}"/>'
@@ -298,8 +298,8 @@ def _origin(node: Node, owner: str, reading: _Reading) -> tuple[Array, Array, st
     if rpy is not None and max(map(abs, rpy)) > _WHOLE_TURN:
         kind, _, name = owner.partition(" ")
         radians = _brief(np.radians(rpy).tolist())
-        said = f'rpy="{_brief(rpy)}" goes beyond a whole turn; is it in degrees? Give radians: rpy="{radians}"'
-        reading.notes.append((f"{origin.file}:{origin.line}", kind, name, said))
+        text = f'rpy="{_brief(rpy)}" goes beyond a whole turn; is it in degrees? Give radians: rpy="{radians}"'
+        reading.notes.append((f"{origin.file}:{origin.line}", kind, name, text))
     turn = np.eye(3) if rpy is None or not any(rpy) else rpy_matrix(np.array(rpy))
     return np.array(parts.get("xyz", _NO_OFFSET)), turn, f"<origin {written}/>"
 

@@ -56,7 +56,7 @@ class Node:
 def read_file(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a body's file, read once.
 
-    Raises InputFileNotFoundError if there is no readable file at `path`.
+    Raises InputFileNotFoundError without a readable file at `path`.
     """
     where = Path(path)
     if "\0" in str(where):
@@ -80,7 +80,7 @@ def xml_text(content: bytes, where: str) -> str:
     """The text of an XML file, without what editors and downloads put around it.
 
     A byte order mark, blank lines before the declaration and zero bytes at the end are left out; lines are counted as
-    in the file. Raises ModelFileError for bytes that are no text in UTF-8 or the encoding that the file states.
+    in the file. Raises ModelFileError for bytes that are not text in UTF-8 or the encoding that the file states.
     """
     stated = _DECLARED.match(content.lstrip())
     # UTF-8 first: bytes that it allows are hardly ever another encoding, whatever the file states.
@@ -126,7 +126,7 @@ def xml_tree(content: bytes, where: str) -> Node:
 
 
 class _Builder:
-    """What expat calls, element by element.
+    """Callbacks of expat, element by element.
 
     Tags keep their prefix, as in "drake:joint", whatever address it stands for: programs that read robots go by it.
     """
@@ -135,7 +135,7 @@ class _Builder:
 
     def __init__(self, where: str, above: int) -> None:
         self.where, self.above = where, above
-        # UTF-8, which the text was encoded in, whatever the declaration says.
+        # The text was encoded in UTF-8, whatever the declaration states.
         self.parser = expat.ParserCreate("utf-8")
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self._doctype
@@ -217,7 +217,7 @@ def no_misspelt_children(node: Node, tags: Sequence[str], owner: str) -> None:
 
 @lru_cache(maxsize=1024)
 def _near(name: str, known: tuple[str, ...]) -> str | None:
-    """Which of the known names a misspelt one was meant to be; None for one of them, or one far from all."""
+    """The known name closest to a misspelt one; None for a known name, or one far from all."""
     if name in known or len(name) > _MOST_QUOTED:
         return None
     near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.75)

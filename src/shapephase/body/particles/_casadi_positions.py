@@ -13,7 +13,7 @@ from ...letters import what_came
 
 
 def is_casadi_function(value: object) -> bool:
-    """Whether this is a `casadi.Function`; CasADi is not imported to find out."""
+    """True for a `casadi.Function`; CasADi is not imported to find out."""
     kind = type(value)
     return kind.__name__ == "Function" and kind.__module__.partition(".")[0] == "casadi"
 

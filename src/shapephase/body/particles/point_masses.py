@@ -67,7 +67,7 @@ class ParticleBody(ShapeArguments):
     _coordinate = "parameter"
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for places given by a lambda."""
+        """State for pickle. Raises LocalFunctionError for places given by a lambda."""
         given = self.places
         check_picklable(given.function if isinstance(given, _Given) else given, "a body of particles")
         return self.__dict__
@@ -90,7 +90,7 @@ class ParticleBody(ShapeArguments):
         return shape
 
     def positions(self, shape: ArrayLike) -> Array:
-        """Where the particles are, from their centre of mass: (..., n) -> (..., m, 3) [m]."""
+        """Places of the particles from their centre of mass: (..., n) -> (..., m, 3) [m]."""
         r = self._checked(shape)
         return self._centred(self._rows(r))[0].reshape(*r.shape[:-1], len(self.masses), 3)
 
@@ -127,7 +127,7 @@ class ParticleBody(ShapeArguments):
         return np.einsum("...kab,...b->...ka", self.angular_map_gradient(r), np.concatenate([w, v], axis=-1))
 
     def centre_of_mass(self, shape: ArrayLike) -> Array:
-        """From the origin of the places: (..., n) -> (..., 3) [m]."""
+        """Centre of mass from the origin of the places: (..., n) -> (..., 3) [m]."""
         r = self._checked(shape)
         return ((self.masses / self.mass) @ self.places(self._rows(r))[0]).reshape(*r.shape[:-1], 3)
 
