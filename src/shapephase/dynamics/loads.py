@@ -11,26 +11,19 @@ import numpy as np
 from numpy.polynomial import chebyshev as series
 from numpy.polynomial.legendre import leggauss
 
-from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..chebyshev import chebyshev
 from ..display import short_repr
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..refinement import halved, settled
-from ._driven_motion import BY_JOINTS, Drive, drive
-from .moving_body import needed_body_and_path
+from .moving_body import BY_JOINTS, Drive, check_motion, drive, needed_body_and_path
 
-# Of a panel of the quadrature.
-_POINTS = 10
-# Of a panel, at which peaks are looked for: between two of them a smooth torque hides 1e-4 of itself at most.
-_LOOKS = 65
-# Of the work done back and forth: how far two quadratures may differ.
-_SETTLED = 1e-11
-# Halvings of the steps of a motion; its torques are as smooth as what was integrated.
-_MOST_HALVINGS = 5
-# Power below this share of the largest is rounding, whose sign means nothing.
-_NO_POWER = 1e-13
+_POINTS = 10  # Gauss points of a panel
+_LOOKS = 65  # places of a panel where peaks are searched: a smooth torque hides at most 1e-4 of itself between two
+_SETTLED = 1e-11  # difference of two quadratures, of the work done back and forth
+_MOST_HALVINGS = 5  # of the motion's steps: its torques are as smooth as what was integrated
+_NO_POWER = 1e-13  # of the largest power: below it the sign is rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -105,25 +98,23 @@ class JointLoads:
 
     def to_dict(self) -> dict[str, Any]:
         """All of it for JSON: by joint, with units in the names; null for a limit that is not stated."""
-        names = {"rad": ("N_m", "rad"), "m": ("N", "m")}
         joints = {}
         for k, (name, unit) in enumerate(zip(self.joint_names, self.joint_units, strict=True)):
-            effort, length = names[unit]
-            effort_limit, rate_limit = float(self.effort_limits[k]), float(self.rate_limits[k])
-            joints[name] = {
-                f"peak_torque_{effort}" if unit == "rad" else f"peak_force_{effort}": np.asarray(
-                    self.peak_torque[..., k]
-                ).tolist(),
-                f"peak_per_mass_{effort}_kg": np.asarray(self.peak_torque_per_mass[..., k]).tolist(),
-                "peak_time_s": np.asarray(self.peak_time[..., k]).tolist(),
-                f"effort_limit_{effort}": effort_limit if np.isfinite(effort_limit) else None,
-                f"peak_rate_{length}_s": np.asarray(self.peak_rate[k]).tolist(),
-                f"rate_limit_{length}_s": rate_limit if np.isfinite(rate_limit) else None,
-                "peak_power_W": np.asarray(self.peak_power[..., k]).tolist(),
-                "work_J": np.asarray(self.work[..., k]).tolist(),
-                "positive_work_J": np.asarray(self.positive_work[..., k]).tolist(),
-                "negative_work_J": np.asarray(self.negative_work[..., k]).tolist(),
+            kind, effort = ("torque", "N_m") if unit == "rad" else ("force", "N")
+            columns = {
+                f"peak_{kind}_{effort}": self.peak_torque,
+                f"peak_per_mass_{effort}_kg": self.peak_torque_per_mass,
+                "peak_time_s": self.peak_time,
+                f"effort_limit_{effort}": self.effort_limits,
+                f"peak_rate_{unit}_s": self.peak_rate,
+                f"rate_limit_{unit}_s": self.rate_limits,
+                "peak_power_W": self.peak_power,
+                "work_J": self.work,
+                "positive_work_J": self.positive_work,
+                "negative_work_J": self.negative_work,
             }
+            values = {label: np.asarray(array[..., k]).tolist() for label, array in columns.items()}
+            joints[name] = {label: None if value == np.inf else value for label, value in values.items()}
         return {
             "mass_kg": self.mass,
             "joints": joints,
@@ -136,8 +127,6 @@ class JointLoads:
 class _Panels:
     """The joints at Gauss points of panels.
 
-    Attributes
-    ----------
     edges : (P + 1,) [s]
     torque, power : (B, P, m, n)
     rate : (P, m, n)
@@ -163,8 +152,7 @@ class _Panels:
 
 def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     """The loads over a whole motion, on its steps, which are halved until the work no longer changes."""
-    if not isinstance(motion, ForcedMotion):
-        check_object(motion, "Motion", "motion")
+    check_motion(motion)
     body, _ = needed_body_and_path(motion, BY_JOINTS)
     breaks = motion.breaks if isinstance(motion, ForcedMotion) else motion.deformation.breaks
     edges = np.union1d(motion.solution.times, breaks)

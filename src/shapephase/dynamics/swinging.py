@@ -26,20 +26,14 @@ from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import PiecewisePolynomial
 from ..shape_space.shape_path import ShapePath
 
+# Time, coordinates (k,) and rates (k,) of the free hinges -> efforts of springs and dampers (k,) [N m or N].
 Effort = Callable[[float, Array, Array], ArrayLike]
-"""Time, coordinates (k,) and rates (k,) of the free hinges -> what springs and dampers do to them (k,) [N m or N]."""
-# Of the tolerance: error of the hinges' integration.
-_INTEGRATED = 0.3
-# Of the tolerance: how far polynomials between knots may be from what was integrated [rad or m].
-_SHARE = 0.03
-# Of the duration: times nearer to each other are one.
-_SAME_TIME = 1e-12
-# Times, besides the ends and middles of what limits steps, at which the fastest joint is looked for.
-_LOOKS = 65
-# Pieces between knots; more are not made.
-_MOST_PIECES = 20_000
-# Where a piece is compared with what was integrated.
-_PLACES = (0.25, 0.5, 0.75)
+_INTEGRATED = 0.3  # of the tolerance, for the hinges' integration
+_SHARE = 0.03  # of the tolerance, for polynomials between knots [rad or m]
+_SAME_TIME = 1e-12  # of the duration: nearer times are one
+_LOOKS = 65  # times, beside those that limit steps, where the fastest joint is searched
+_MOST_PIECES = 20_000  # between knots: a path of more takes minutes
+_PLACES = (0.25, 0.5, 0.75)  # of a piece, where it is compared with the integrated motion
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -15,16 +15,13 @@ from ..errors import ShapeError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_noise import path_errors, summed_errors
-from ._driven_motion import BY_JOINTS, drive
 from .loads import JointLoads
-from .moving_body import needed_body_and_path
+from .moving_body import BY_JOINTS, drive, needed_body_and_path
 from .torques import JointTorques
 
+# Steps of shapes [rad or m], rates and accelerations: torques are quadratic in rates and linear in accelerations.
 _STEPS = (1e-5, 1.0, 1.0)
-"""By which shapes [rad or m], rates and accelerations are moved: torques are quadratic in rates, and linear in
-accelerations, of which central differences leave rounding alone."""
-_TIMES_OF_WORK = 201
-"""Even times over which errors of the power are summed: bars need few digits."""
+_TIMES_OF_WORK = 201  # even times at which errors of the power are summed: bars need few digits
 
 
 @dataclass(frozen=True, eq=False)

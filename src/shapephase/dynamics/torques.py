@@ -10,21 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object, times_argument
+from ..arguments import times_argument
 from ..arrays import Array, lock_arrays
 from ..display import short_repr
 from ..errors import MissingExtraError, ShapeError, WrongObjectError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
-from ._driven_motion import BY_JOINTS, drive
 from .loads import JointLoads, joint_loads
-from .moving_body import needed_body_and_path
+from .moving_body import BY_JOINTS, check_motion, drive, needed_body_and_path
 
-# Rows of a table.
-_ROWS = 201
-_UNITS = {"rad": "N_m", "m": "N"}
-"""Of efforts, as names of columns have them."""
+_ROWS = 201  # of a table without given times
+_UNITS = {"rad": "N_m", "m": "N"}  # of efforts, in names of columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,8 +161,7 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     >>> print(float(found.loads.energy_defect) < 1e-9)  # work of the joints against the change of energy
     True
     """
-    if not isinstance(motion, ForcedMotion):
-        check_object(motion, "Motion", "motion")
+    check_motion(motion)
     body, _ = needed_body_and_path(motion, BY_JOINTS)
     if not body.n_shape:
         raise WrongObjectError(f"{body.name} has no joints, and so no torques of joints; `split` says how it turns")

@@ -19,20 +19,19 @@ from ..files import write_whole
 from ..reconstruction.attitude_angles import euler_angles
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import ORIGIN, Fall, WholeMotion, checked_times, whole_motion
+from ._whole_motion import Fall, WholeMotion, checked_times, whole_motion
 
-# Places first, then angles about z, x and y, one after the other: what all readers take.
+# Places first, then angles about z, x and y, one after the other: all readers take this order.
 _PLACES = "Xposition Yposition Zposition"
 _TURNS = "Zrotation Xrotation Yrotation"
 _ORDER = "ZXY"
-# Inertial and base axes to those of a skeleton, whose y is up.
+# From inertial and base axes to those of a skeleton, whose y is up.
 _UPWARD = {
     "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "y": np.eye(3),
     "z": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
 }
-# A link whose centre of mass is nearer to its joint ends there [m]: some readers drop bones of no length.
-_SHORTEST = 1e-3
+_SHORTEST = 1e-3  # [m] from a joint to its link's centre of mass: some readers drop bones of no length
 _MOST_FRAMES = 1_000_000
 
 
@@ -91,7 +90,7 @@ def write_bvh(
     if frames > _MOST_FRAMES:
         raise ShapeError(f"rate: {frames} frames are more than {_MOST_FRAMES}; ask for fewer in a second")
     times = np.minimum(np.arange(frames) / often, motion.duration)
-    whole = whole_motion(motion, times, Fall.of(**(ORIGIN | fall)))
+    whole = whole_motion(motion, times, Fall.of(**fall))
     chain, axes = whole.body.chain, _UPWARD[up]
     rest = _rest_orientations(chain)
     lines = ["HIERARCHY", *_skeleton(whole, rest, axes, longer), "MOTION", f"Frames: {frames}"]

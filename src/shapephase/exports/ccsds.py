@@ -20,10 +20,8 @@ from ..reconstruction.reconstruction import Motion
 from ._attitude_records import WINDOW, error_argument, even_times
 from ._whole_motion import base_attitude, continued_quaternions
 
-TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")
-"""In which the epochs of a message may be."""
-# Digits of a second: a body that turns at 100 rad/s does not notice the next.
-_DIGITS = 15
+TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")  # of the epochs of a message
+_DIGITS = 15  # of a second: a turn at 100 rad/s within the last one is below rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -24,14 +24,10 @@ from ..reconstruction.reconstruction import Motion
 from ._attitude_records import error_argument, slerp_times
 from ._whole_motion import base_attitude, base_rate, continued_quaternions
 
-# Ticks of the clock in a second. Times of a C-kernel are counted in them, as floating-point numbers.
-_TICKS = 10**9
-# Seconds that the clock counts.
-_LONGEST = 10**6
-# Identifiers of a clock stand for this many of instruments.
-_OF_A_CLOCK = 1000
-# Of a line of comments, of which SPICE takes up to 255.
-_COMMENT = 100
+_TICKS = 10**9  # of the clock in a second
+_LONGEST = 10**6  # [s] that the clock counts
+_OF_A_CLOCK = 1000  # SPICE numbers the instruments of clock N from -1000 N on
+_COMMENT = 100  # characters of a line; SPICE takes up to 255
 _SEGMENT = "shapephase"
 _CLOCK = """\
 KPL/SCLK

@@ -22,21 +22,20 @@ from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import ORIGIN, Fall, WholeMotion, checked_times, continued_quaternions, whole_motion
+from ._whole_motion import Fall, checked_times, continued_quaternions, whole_motion
 
 _AXES = ("x", "y", "z")
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
-# Bytes of text that a MATLAB file begins with.
-_MATLAB_TEXT = 116
+_MATLAB_TEXT = 116  # bytes of text at the beginning of a MATLAB file
 _DATA_SET = "a data set needs xarray; install it with: pip install 'shapephase[study]'"
 
 
 class _Samples(dict[str, tuple[Array, str, str]]):
     """Arrays by name, each with the dimension of its columns ("" for none) and its unit."""
 
-    joint_names: tuple[str, ...]
-    joint_units: tuple[str, ...]
+    joint_names: tuple[str, ...] = ()
+    joint_units: tuple[str, ...] = ()
     attributes: dict[str, Any]
 
 
@@ -135,40 +134,33 @@ def export_motion(
 
 
 def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike]) -> _Samples:
-    at = checked_times(motion, times)
-    falling = Fall.of(**(ORIGIN | fall))
-    whole = None if body_and_path(motion) is None else whole_motion(motion, at, falling)
-    found = _Samples() if whole is None else _of_joints(whole)
-    attitude = motion.attitude(at) if whole is None else whole.attitude
-    found["time"] = at, "", "s"
-    if whole is None:
+    at, falling, samples = checked_times(motion, times), Fall.of(**fall), _Samples()
+    samples["time"] = at, "", "s"
+    if body_and_path(motion) is None:
+        attitude = motion.attitude(at)
         centre = so3.apply(attitude, motion.deformation.centre_of_mass(at))
-        found["base_quat_xyzw"] = continued_quaternions(attitude), "quaternion", ""
-        found["angular_velocity"] = motion.angular_velocity(at), "axis", "rad/s"
-        found["base_position"] = falling.centre(at) - centre, "axis", "m"
-        found.joint_names, found.joint_units = (), ()
+        samples["base_quat_xyzw"] = continued_quaternions(attitude), "quaternion", ""
+        samples["angular_velocity"] = motion.angular_velocity(at), "axis", "rad/s"
+        samples["base_position"] = falling.centre(at) - centre, "axis", "m"
+    else:
+        whole = whole_motion(motion, at, falling)
+        samples.joint_names, samples.joint_units = whole.body.joint_names, whole.body.joint_units
+        angles = set(samples.joint_units) == {"rad"}
+        samples["base_quat_xyzw"] = whole.quat_xyzw, "quaternion", ""
+        samples["angular_velocity"] = whole.angular_velocity, "axis", "rad/s"
+        samples["base_position"] = whole.position, "axis", "m"
+        samples["base_velocity"] = whole.world_velocity, "axis", "m/s"
+        samples["shapes"] = whole.shapes, "joint", "rad" * angles
+        samples["shape_rates"] = whole.shape_rates, "joint", "rad/s" * angles
     momentum = motion.momentum(at) if isinstance(motion, ForcedMotion) else motion.momentum
-    found.attributes = {
+    samples.attributes = {
         "momentum": np.asarray(momentum).reshape(-1, 3)[0].tolist(),
         "momentum_units": "kg m^2/s",
         "provenance": json.dumps(provenance(motion.deformation.made_from)),
     }
     if isinstance(motion, Motion):
-        found.attributes["error_estimate"] = float(motion.error_estimate)
-        found.attributes["error_estimate_units"] = "rad"
-    return found
-
-
-def _of_joints(whole: WholeMotion) -> _Samples:
-    found = _Samples()
-    found.joint_names, found.joint_units = whole.body.joint_names, whole.body.joint_units
-    found["base_quat_xyzw"] = whole.quat_xyzw, "quaternion", ""
-    found["angular_velocity"] = whole.angular_velocity, "axis", "rad/s"
-    found["base_position"] = whole.position, "axis", "m"
-    found["base_velocity"] = whole.world_velocity, "axis", "m/s"
-    found["shapes"] = whole.shapes, "joint", "rad" if set(found.joint_units) == {"rad"} else ""
-    found["shape_rates"] = whole.shape_rates, "joint", "rad/s" if set(found.joint_units) == {"rad"} else ""
-    return found
+        samples.attributes |= {"error_estimate": float(motion.error_estimate), "error_estimate_units": "rad"}
+    return samples
 
 
 def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
@@ -265,5 +257,4 @@ _WRITERS: dict[str, Callable[[Any, Any, Any], bytes]] = {
     ".mat": _matlab,
     ".h5": _hdf5,
 }
-ENDINGS = tuple(_WRITERS)
-"""Of the files that `export_motion` writes."""
+ENDINGS = tuple(_WRITERS)  # of the files that `export_motion` writes

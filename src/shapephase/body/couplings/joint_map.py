@@ -154,7 +154,7 @@ class JointMap:
         return joints[..., self._velocity_index] @ self._slope_rates(shapes, rates)
 
     def bent_rates(self, joints: Array, shapes: Array, rates: Array) -> Array:
-        """Columns of joints, folded by the change of Pinocchio's rates with the shape at constant own rates. Differs for
+        """Columns of joints, folded by the change of Pinocchio's rates with the shape at constant own rates. Other for
         ball joints only, whose rates are not derivatives of coordinates: by the bracket of the rates."""
         bent = self.follows.slope_rates(shapes, rates)
         for ball in self.follows.balls:
