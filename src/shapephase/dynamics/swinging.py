@@ -157,7 +157,7 @@ class _Swing:
     momentum: Array
 
     def rates(self, times: Array, turned: Array, states: Array) -> tuple[Array, Array]:
-        """As `driven_attitude` asks for; states are the coordinates of the hinges and then their rates."""
+        """Rates for `driven_attitude`; states are the coordinates of the hinges and then their rates."""
         omega, accelerations = self.accelerations(times, turned, states)
         return omega, np.concatenate([states[:, len(self.columns) :], accelerations], axis=1)
 
@@ -185,7 +185,7 @@ class _Swing:
         return omega, np.asarray(found, dtype=np.float64)
 
     def _given(self, t: float, state: Array) -> Array:
-        """What springs and dampers do: (2 k,) -> (k,)."""
+        """Efforts of springs and dampers: (2 k,) -> (k,)."""
         count = len(self.columns)
         if self.effort is None:
             return np.zeros(count)

@@ -92,7 +92,7 @@ class _Slopes(NamedTuple):
 
 
 def torque_errors(torques: JointTorques, joints: ArrayLike | None = None) -> TorqueErrors:
-    """How far torques, rates and power may be off by the noise of the samples of the joints.
+    """Standard deviations of torques, rates and power by the noise of the samples of the joints.
 
     Attitude and momentum are taken as they are: what the noise turns them by moves a torque far less than what it does
     to the accelerations.
@@ -108,7 +108,7 @@ def torque_errors(torques: JointTorques, joints: ArrayLike | None = None) -> Tor
     ShapeError
         For a batch, and as `path_errors`.
     WrongObjectError
-        As `path_errors`.
+        For a path that is not through samples, see `path_errors`.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def torque_errors(torques: JointTorques, joints: ArrayLike | None = None) -> Tor
 
 
 def load_errors(motion: Motion | ForcedMotion, loads: JointLoads, joints: ArrayLike | None = None) -> LoadErrors:
-    """How far peaks, each at its time, and work may be off by the noise of the samples; arguments as `torque_errors`.
+    """Standard deviations of peaks, each at its time, and work by the noise of the samples; see `torque_errors`.
 
     The largest of many values that noise moves is rather too large; its bar does not hold that.
 
@@ -182,7 +182,7 @@ def _slopes(motion: Motion | ForcedMotion, times: Array) -> _Slopes:
 
 
 def _work_errors(motion: Motion | ForcedMotion, joints: ArrayLike | None) -> tuple[Array, float]:
-    """Of each joint's work, and of all together: sums of the power over even times."""
+    """Errors of each joint's work, and of all together: sums of the power over even times."""
     _, path = needed_body_and_path(motion, BY_JOINTS)
     times = np.linspace(0.0, motion.duration, _TIMES_OF_WORK)
     weights = np.full(len(times), times[1])

@@ -26,7 +26,7 @@ _UNITS = {"rad": "N_m", "m": "N"}  # of efforts, in names of columns
 
 @dataclass(frozen=True, eq=False)
 class JointTorques:
-    """What the joints do at some times; results are batch + t.shape + (n,), joints in the order of the body's.
+    """Efforts of the joints at some times; results are batch + t.shape + (n,), joints in the order of the body's.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class JointTorques:
 
     @cached_property
     def error_estimate(self) -> Array:
-        """How far the torques may be off by the error of the attitudes: batch + t.shape + (n,) [N m or N].
+        """Error of the torques by the error of the attitudes: batch + t.shape + (n,) [N m or N].
 
         To first order, for an attitude that is off by the motion's `error_estimate` about the worst axis.
         """
@@ -85,7 +85,7 @@ class JointTorques:
 
     @property
     def torque_per_mass(self) -> Array:
-        """Of the mass of the body, as biomechanists compare them [N m/kg or N/kg]."""
+        """Torque per mass of the body, the figure that biomechanics compares [N m/kg or N/kg]."""
         return self.torque / self.mass
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
@@ -164,7 +164,7 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     check_motion(motion)
     body, _ = needed_body_and_path(motion, BY_JOINTS)
     if not body.n_shape:
-        raise WrongObjectError(f"{body.name} has no joints, and so no torques of joints; `split` says how it turns")
+        raise WrongObjectError(f"{body.name} has no joints, and so no torques of joints; `split` analyses its turn")
     given = np.linspace(0.0, motion.duration, _ROWS) if t is None else t
     times = times_argument(given, motion.duration)
     found = drive(motion, times.ravel())

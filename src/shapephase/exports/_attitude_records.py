@@ -1,4 +1,4 @@
-"""At which times an attitude is recorded, so that what a reader has between the records is as near as is asked for."""
+"""Times at which an attitude is recorded, so that interpolation between the records is within a requested error."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ._whole_motion import base_attitude, checked_times, continued_quaternions
 
-_MOST_RECORDS = 2_000_000  # of a file: some hundred bytes each
+_MOST_RECORDS = 2_000_000  # of a file: 100 to 200 bytes each
 _USED = 0.5  # of the error, where it is measured: between these places it may be larger
 # between two records, where errors are measured; a constant rate is farthest off in the middle
 _PLACES = np.array([0.25, 0.5, 0.75])
@@ -85,7 +85,7 @@ def interpolated(quaternions: Array, place: Array) -> Array:
 
 
 def _off_at_constant_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
-    """How far a turn at a constant rate is from the motion, at most, in each step: (N - 1,) [rad]."""
+    """Largest distance of a turn at a constant rate from the motion, in each step: (N - 1,) [rad]."""
     ends = base_attitude(motion, times)
     turns = so3.log(so3.transpose(ends[:-1]) @ ends[1:])
     inside = times[:-1, None] + np.diff(times)[:, None] * _PLACES

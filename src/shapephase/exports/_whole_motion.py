@@ -1,4 +1,4 @@
-"""What other programs ask of one motion at some times: base, joints, their rates, and accelerations where needed."""
+"""A motion at some times for other programs: base, joints, their rates, and accelerations where needed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ROWS = 201  # of a table without given times
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fall:
-    """How the centre of mass moves: start + velocity t + gravity t^2 / 2, inertial axes [m], [m/s], [m/s^2]."""
+    """Motion of the centre of mass: start + velocity t + gravity t^2 / 2, inertial axes [m], [m/s], [m/s^2]."""
 
     start: Array
     velocity: Array
@@ -158,7 +158,7 @@ def _spins(motion: Motion | ForcedMotion, body: Body, times: Array, shapes: Arra
 
 
 def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
-    """Of the base of the body, in whatever gauge the motion is: (N,) -> (N, 3, 3)."""
+    """Attitude of the base of the body, in whatever gauge the motion is: (N,) -> (N, 3, 3)."""
     turned = motion.attitude(times)
     return turned if body_and_path(motion) is None else turned @ motion.deformation.frame(times)
 

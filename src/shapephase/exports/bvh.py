@@ -88,7 +88,7 @@ def write_bvh(
     checked_times(motion, [0.0])
     frames = int(np.floor(motion.duration * often * (1.0 + np.finfo(float).eps))) + 1
     if frames > _MOST_FRAMES:
-        raise ShapeError(f"rate: {frames} frames are more than {_MOST_FRAMES}; ask for fewer in a second")
+        raise ShapeError(f"rate: {frames} frames are more than {_MOST_FRAMES}; give fewer in a second")
     times = np.minimum(np.arange(frames) / often, motion.duration)
     whole = whole_motion(motion, times, Fall.of(**fall))
     chain, axes = whole.body.chain, _UPWARD[up]
@@ -100,7 +100,7 @@ def write_bvh(
 
 
 def _rest_orientations(chain: JointChain) -> Array:
-    """Of all frames at zero coordinates, base axes: (k + 1, 3, 3)."""
+    """Orientations of all frames at zero coordinates, base axes: (k + 1, 3, 3)."""
     found = np.empty((len(chain.names) + 1, 3, 3))
     found[0] = np.eye(3)
     for joint, parent in enumerate(chain.parents):
@@ -109,7 +109,7 @@ def _rest_orientations(chain: JointChain) -> Array:
 
 
 class _Bone(NamedTuple):
-    """What one joint of a skeleton moves: joints of the chain from `first` to `last`, of a ball joint its three."""
+    """A bone and the joint that moves it: joints `first` to `last` of the chain, three for a ball joint."""
 
     name: str
     first: int
@@ -118,7 +118,7 @@ class _Bone(NamedTuple):
 
 
 def _bones(chain: JointChain) -> list[_Bone]:
-    """As a skeleton lists them: each before what hangs on it, and that before the next."""
+    """Bones in the order of a skeleton: each before those that hang on it, and these before the next."""
     balls = {ball.row: ball for ball in chain.follows.balls}
     found: list[_Bone] = []
     waiting = [(joint, 1) for joint, parent in enumerate(chain.parents) if parent == 0][::-1]

@@ -64,8 +64,8 @@ def write_aem(
     """Write the attitude of the base as an Attitude Ephemeris Message (CCSDS 504.0-B-1), in keywords and values.
 
     Quaternions turn the inertial axes into those of the base, scalar part last, every digit kept. Records are at even
-    times, as near to each other as the error asks for of a reader that interpolates as the message says: each part of
-    the quaternion by Lagrange's polynomial of degree 7 through the eight records nearest to a time.
+    times, near enough for the error where a reader interpolates as the message states: each part of the quaternion by
+    Lagrange's polynomial of degree 7 through the eight records nearest to a time.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def write_aem(
     AccuracyNotReached
         If millions of records were needed: the polynomials do not take kinks well.
     UnknownNameError
-        For another time system, an epoch that is none.
+        For another time system, an invalid epoch.
     OutputFileError
         If it cannot be written.
 

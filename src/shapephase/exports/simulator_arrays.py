@@ -159,7 +159,7 @@ def pinocchio_arrays(
     Raises
     ------
     ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it; if joints follow others with kinks, where there is no `a`.
+        If the motion is a batch, for times outside of it; if joints follow others with kinks, which have no `a`.
     WrongObjectError
         If the body has no joints along a path.
     UnknownNameError
@@ -203,7 +203,7 @@ def _fill(array: Array, columns: Array, first: int) -> None:
 
 
 def _order(whole: WholeMotion, names: list[str], program: str, free: int) -> list[int]:
-    """Where each joint of a model stands among those of the body. Raises UnknownNameError."""
+    """Places of a model's joints among those of the body. Raises UnknownNameError."""
     if free != 1:
         raise UnknownNameError(f"model: a model of {program} with one free joint, the base, is needed; it has {free}")
     for given, others, fault in (

@@ -101,7 +101,7 @@ def write_spice_ck(
     """Write the attitude of the base as a C-kernel (`.bc`), and beside it clock and frame as a text kernel (`.tsc`).
 
     The C-kernel is of type 3: SPICE turns at a constant rate from one record to the next. Records are as near to each
-    other as the error asks for. The angular velocities are those of the records, and linear between them.
+    other as the error requires. The angular velocities are those of the records, and linear between them.
 
     Parameters
     ----------
@@ -208,8 +208,8 @@ def _c_kernel(spiceypy: Any, motion: Motion | ForcedMotion, times: Array, instru
             spiceypy.dafac(handle, comments)
             spiceypy.ckcls(handle)
         except spiceypy.utils.exceptions.SpiceyError as fault:
-            said = str(getattr(fault, "short", "") or fault).strip()
-            if "FRAME" in said:
+            reason = str(getattr(fault, "short", "") or fault).strip()
+            if "FRAME" in reason:
                 raise UnknownNameError(f"reference: SPICE knows no inertial frame {reference!r}") from None
-            raise OutputFileError(f"SPICE cannot write the kernel: {said}") from None
+            raise OutputFileError(f"SPICE cannot write the kernel: {reason}") from None
         return Path(file).read_bytes()

@@ -7,6 +7,7 @@ import io
 import json
 import os
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,6 @@ _AXES = ("x", "y", "z")
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
 _MATLAB_TEXT = 116  # bytes of text at the beginning of a MATLAB file
-_DATA_SET = "a data set needs xarray; install it with: pip install 'shapephase[study]'"
 
 
 class _Samples(dict[str, tuple[Array, str, str]]):
@@ -67,10 +67,7 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     [2. 2.] rad/s
     """
     check_keywords(fall, motion_dataset)
-    try:
-        import xarray
-    except ImportError:
-        raise MissingExtraError(_DATA_SET) from None
+    xarray = _extra("xarray", "a data set needs xarray", "study")
     samples = _samples(motion, times, fall)
     labels = {"quaternion": _QUATERNION, "axis": _AXES, "joint": samples.joint_names}
     variables = {
@@ -90,14 +87,14 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 def export_motion(
     motion: Motion | ForcedMotion, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike
 ) -> None:
-    """Write samples of one motion, base and joints, to a file whose ending says the format.
+    """Write samples of one motion, base and joints, to a file in the format of its ending.
 
-    - `.csv`, `.parquet`: one row a sample; labels of joints say their units, in Parquet as metadata `unit`.
+    - `.csv`, `.parquet`: one row a sample; labels of joints contain their units, in Parquet as metadata `unit`.
     - `.nc`: the data set of `Motion.to_xarray` as NetCDF.
     - `.mat`, `.h5`: the same as arrays by their names, with `joint_names`.
 
-    All hold every digit, and all but `.nc` are read by `read_recorded_motion`. For the whole motion, to be asked at any
-    time, there is `Motion.save`.
+    All hold every digit, and all but `.nc` are read by `read_recorded_motion`. `Motion.save` keeps
+    the whole motion, to be evaluated at any time.
 
     Parameters
     ----------
@@ -131,6 +128,13 @@ def export_motion(
         raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)
     content = _WRITERS[where.suffix.lower()](motion, times, fall)
     write_whole(where, lambda stream: stream.write(content))
+
+
+def _extra(name: str, needed: str, extra: str = "data") -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise MissingExtraError(f"{needed}; install it with: pip install 'shapephase[{extra}]'") from None
 
 
 def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike]) -> _Samples:
@@ -196,11 +200,7 @@ def _csv(motion: Any, times: Any, fall: Any) -> bytes:
 
 
 def _parquet(motion: Any, times: Any, fall: Any) -> bytes:
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError:
-        raise MissingExtraError("Parquet files need pyarrow; install it with: pip install 'shapephase[data]'") from None
+    pyarrow, parquet = (_extra(name, "Parquet files need pyarrow") for name in ("pyarrow", "pyarrow.parquet"))
     samples = _samples(motion, times, fall)
     columns = _columns(samples)
     fields = [
@@ -232,10 +232,7 @@ def _matlab(motion: Any, times: Any, fall: Any) -> bytes:
 
 
 def _hdf5(motion: Any, times: Any, fall: Any) -> bytes:
-    try:
-        import h5py
-    except ImportError:
-        raise MissingExtraError("HDF5 files need h5py; install it with: pip install 'shapephase[data]'") from None
+    h5py = _extra("h5py", "HDF5 files need h5py")
     samples, stream = _samples(motion, times, fall), io.BytesIO()
     with h5py.File(stream, "w") as file:
         for name, (values, _, unit) in samples.items():
