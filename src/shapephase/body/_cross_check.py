@@ -15,6 +15,7 @@ from ..arrays import Array
 from ..errors import ModelFileError
 from .body import Body
 from .couplings.ball_joints import coordinate_names
+from .couplings.coupling import with_followers
 from .link_tree import LinkTree
 from .virtual_base import joint_coordinates
 
@@ -87,7 +88,8 @@ def inertia_and_momentum(
     place = {name: number for number, name in enumerate(names)}
     parents = [place[joint.parent] for joint in tree.joints]
     children = [place[joint.child] for joint in tree.joints]
-    angles, rates = np.array(_coordinates(tree, shape, rate)).reshape(2, -1)
+    states = with_followers(tree.couplings, shape, rate)
+    angles, rates = np.array([[values.get(joint.name, 0.0) for joint in tree.joints] for values in states])
     sliding = np.array([joint.kind == "prismatic" for joint in tree.joints], dtype=bool)
     stacked = [np.array([getattr(j, what) for j in tree.joints]) for what in ("axis", "place", "after", "turn")]
     axes, places, afters = (each.reshape(-1, 3) for each in stacked[:3])
@@ -133,24 +135,6 @@ def inertia_and_momentum(
     inertia = (tensors + masses[:, None, None] * squares).sum(axis=0)
     momentum = masses @ np.cross(centres, speeds) + (tensors @ omega[..., None])[..., 0].sum(axis=0)
     return inertia, momentum, extent, motion
-
-
-def _coordinates(tree: LinkTree, shape: dict[str, float], rate: dict[str, float]) -> tuple[list[float], list[float]]:
-    """Coordinates and rates of all joints, followers by their rules; of a fixed joint zero."""
-    where, speed = dict(shape), dict(rate)
-
-    def find(name: str) -> None:
-        if name in where or name not in tree.couplings:
-            return
-        rule = tree.couplings[name]
-        for driver in rule.drivers:
-            find(driver)
-        where[name], speed[name] = rule.at(where), rule.rate(where, speed)
-
-    for joint in tree.joints:
-        find(joint.name)
-    names = [joint.name for joint in tree.joints]
-    return [where.get(name, 0.0) for name in names], [speed.get(name, 0.0) for name in names]
 
 
 def _four_numbers(name: str, shape: dict[str, float], rate: dict[str, float]) -> Array:

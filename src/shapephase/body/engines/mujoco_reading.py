@@ -8,7 +8,7 @@ joints (`armature`) belongs to no link and is left out.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 # What its compiled part brings, a type checker does not see.
 # pyright: reportAttributeAccessIssue=false
@@ -17,7 +17,7 @@ import numpy as np
 
 from ...arrays import Array
 from ..couplings.ball_joints import BallJoint, coordinate_names
-from ..couplings.coupling import Coupling
+from ..couplings.coupling import Coupling, circular, with_followers
 from ..couplings.functions import polynomial
 from ..formats.xml_text import listed
 from ..link_tree import MOST_LINKS, MOST_MASS
@@ -33,15 +33,6 @@ _OF_SITES = int(mujoco.mjtObj.mjOBJ_SITE)
 _MOST_LENGTH = 1e6  # [m] of places: differences of larger ones lose their digits
 
 
-class Rule(NamedTuple):
-    """A joint that follows one other or none: `start` + sum of powers[p] (coordinate of the other - about)^p."""
-
-    leaders: tuple[int, ...]
-    start: float
-    powers: list[float]
-    about: float
-
-
 def chain_of(path: str, root: str | None = None, root_body: str | None = None) -> Chain:
     """Links and joints of an MJCF file.
 
@@ -55,7 +46,7 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
         raise UnusableModelError(f"<mujoco>: the body has {len(bodies)} links; up to {MOST_LINKS} are supported")
     own = set(bodies)
     chain = Chain(_model_name(compiled.model) or Path(path).stem, notes=[*compiled.notes, *notes])
-    rules = _rules(compiled, own, base)
+    chain.couplings = _couplings(compiled, own, base)
     _check_carried(compiled, own)
     for body in bodies:
         _add_link(chain, compiled, body)
@@ -67,13 +58,9 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
         if all(compiled.model.jnt_type[joint] != FREE for joint in compiled.joints_of(body)):
             _add_joints(moved, compiled, body)
     chain.base_joints = moved.joints if moved.moving() else []
-    for joint, rule in rules.items():
-        function = polynomial(np.array(rule.powers or [0.0]), rule.about)
-        terms = tuple((compiled.joint_name(leader), function) for leader in rule.leaders)
-        chain.couplings[compiled.joint_name(joint)] = Coupling(rule.start, terms)
     chain.notes += _ignored(compiled, own)
     if compiled.model.body_subtreemass[base] > 0.0:
-        _add_poses(chain, compiled, bodies, rules)
+        _add_poses(chain, compiled, bodies)
     return chain
 
 
@@ -152,63 +139,41 @@ def _about(axis: Array, angle: float) -> Array:
 # ---- Equalities and what else holds parts together ------------------------------------------------------------------
 
 
-def _rules(compiled: Compiled, own: set[int], base: int) -> dict[int, Rule]:
+def _couplings(compiled: Compiled, own: set[int], base: int) -> dict[str, Coupling]:
     """The joints of the body that follow others, by equalities of joints; those at the root are gone."""
     model = compiled.model
     joints = {joint for body in own - {base} for joint in compiled.joints_of(body)}
-    rules: dict[int, Rule] = {}
+    couplings: dict[str, Coupling] = {}
+    lines: dict[str, int] = {}
     for number in _active(model, _COUPLED):
         follower, leader = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
         if follower not in joints:
             continue
-        owner, line = f"joint {compiled.joint_name(follower)!r}", compiled.line(follower, "joint")
-        if follower in rules:
-            raise UnusableModelError(f"{owner}: two equalities hold it; keep one", line)
-        here, powers = _reference(model, follower), model.eq_data[number, :5].tolist()
+        name, line = compiled.joint_name(follower), compiled.line(follower, "joint")
+        if name in couplings:
+            raise UnusableModelError(f"joint {name!r}: two equalities hold it; keep one", line)
+        start, powers, lines[name] = _reference(model, follower), model.eq_data[number, :5], line
         if leader < 0:
-            rules[follower] = Rule((), here + powers[0], [], 0.0)
+            couplings[name] = Coupling(start + float(powers[0]))
             continue
         if leader not in joints:
             raise UnusableModelError(
-                f"{owner}: it follows {compiled.joint_name(leader)!r}, which does not belong to the free body; remove "
-                "the equality",
+                f"joint {name!r}: it follows {compiled.joint_name(leader)!r}, which does not belong to the free body; "
+                "remove the equality",
                 line,
             )
-        rules[follower] = Rule((leader,), here, powers, _reference(model, leader))
-    for joint in rules:
-        _check_no_circle(compiled, joint, rules)
-    return rules
+        function = polynomial(np.array(powers), _reference(model, leader))
+        couplings[name] = Coupling(start, ((compiled.joint_name(leader), function),))
+    if (name := circular(couplings)) is not None:
+        raise UnusableModelError(
+            f"joint {name!r}: by equalities joints follow each other in a circle; remove one", lines[name]
+        )
+    return couplings
 
 
 def _reference(model: Any, joint: int) -> float:
     """The coordinate at which the body is where the file has it."""
     return float(model.qpos0[model.jnt_qposadr[joint]])
-
-
-def _check_no_circle(compiled: Compiled, joint: int, rules: dict[int, Rule]) -> None:
-    seen, leader = {joint}, joint
-    while leader in rules and rules[leader].leaders:
-        (leader,) = rules[leader].leaders
-        if leader in seen:
-            raise UnusableModelError(
-                f"joint {compiled.joint_name(joint)!r}: by equalities joints follow each other in a circle; remove one",
-                compiled.line(joint, "joint"),
-            )
-        seen.add(leader)
-
-
-def _coordinate(joint: int, rules: dict[int, Rule], own: dict[int, tuple[float, float]]) -> tuple[float, float]:
-    """Coordinate and rate of a joint, where those that follow no other have their own."""
-    rule = rules.get(joint)
-    if rule is None:
-        return own[joint]
-    value, speed = rule.start, 0.0
-    for leader in rule.leaders:
-        at, rate = _coordinate(leader, rules, own)
-        polynomial = np.polynomial.Polynomial(rule.powers)
-        value += float(polynomial(at - rule.about))
-        speed += float(polynomial.deriv()(at - rule.about)) * rate
-    return value, speed
 
 
 def _active(model: Any, *kinds: int) -> list[int]:
@@ -294,7 +259,7 @@ def _led_over(model: Any, tendon: int) -> set[int]:
 # ---- What MuJoCo computes -------------------------------------------------------------------------------------------
 
 
-def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[int, Rule]) -> None:
+def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int]) -> None:
     """Mass, centre, inertia and momentum with the body that floats at rest."""
     model, base = compiled.model, bodies[0]
     names = {joint: compiled.joint_name(joint) for body in bodies[1:] for joint in compiled.joints_of(body)}
@@ -312,7 +277,7 @@ def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[
             first = int(model.jnt_qposadr[joint])
             data.qpos[first : first + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     for shape, rate in chain.random_shapes():
-        own = {joint: (shape[name], rate[name]) for joint, name in names.items() if name in shape}
+        coordinates, rates = with_followers(chain.couplings, shape, rate)
         for joint, name in names.items():
             if model.jnt_type[joint] == BALL:
                 ball, where, first = BallJoint(name, 0, 0), int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
@@ -320,8 +285,8 @@ def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[
                 data.qpos[where : where + 4] = np.roll(ball.quaternions(four[0])[0], 1)
                 data.qvel[first : first + 3] = ball.rates(*four)[0]
                 continue
-            value, speed = _coordinate(joint, rules, own)
-            data.qpos[model.jnt_qposadr[joint]], data.qvel[model.jnt_dofadr[joint]] = value, speed
+            data.qpos[model.jnt_qposadr[joint]] = coordinates[name]
+            data.qvel[model.jnt_dofadr[joint]] = rates[name]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)

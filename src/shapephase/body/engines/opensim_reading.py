@@ -14,7 +14,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import ShapeError
-from ..couplings.coupling import Coupling
+from ..couplings.coupling import Coupling, circular
 from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
 from ..link_tree import Joint
 from .chain import Chain, UnusableModelError, check_name
@@ -214,17 +214,9 @@ class _Reading:
             for driver, _ in rule.terms:
                 if driver not in found:
                     raise self._fault(f"coordinate {name!r} follows {driver!r}, which is the base's or unknown", name)
-            self._check_circle(name, couplers)
-        return found
-
-    def _check_circle(self, name: str, couplers: dict[str, Coupling]) -> None:
-        """Raise UnusableModelError where a coordinate follows itself in the end."""
-        reached, ahead = set(), {name}
-        while ahead:
-            ahead = {driver for one in ahead if one in couplers for driver, _ in couplers[one].terms} - reached
-            reached |= ahead
-        if name in reached:
+        if (name := circular({name: rule for name, rule in couplers.items() if name in found})) is not None:
             raise self._fault(f"coordinate {name!r} follows itself, by way of others; remove a coupler", name)
+        return found
 
     def _couplers(self) -> dict[str, Coupling]:
         """Couplings of coordinates that follow others."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import ModelFileError
-from ..couplings.coupling import Coupling
+from ..couplings.coupling import Coupling, circular
 from ..link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root, grouped
 from ..virtual_base import ANYWHERE, IN_A_PLANE, free_base
 from .foreign import foreign_root
@@ -102,6 +102,8 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
     couplings = {
         key: Coupling.linear(rule.leader, rule.multiplier, rule.offset) for key, (_, rule) in reading.mimics.items()
     }
+    if (key := circular(couplings)) is not None:
+        raise _mimic_fault(reading.mimics[key][0], f"joint {key!r}", "mimic joints follow each other in a circle")
     base = free_base(first, links, ordered, couplings, free)
     found = {base.link: links[base.link]} | {joint.child: links[joint.child] for joint in base.joints}
     # The parser of Pinocchio knows no ball joints, and makes links of mere frames.
@@ -329,7 +331,7 @@ def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
 
 
 def _check_mimics(mimics: dict[str, tuple[Node, Mimic]], joints: dict[str, Joint]) -> None:
-    """Every leader exists and is of the follower's kind, and no joint follows itself."""
+    """Raise ModelFileError unless every leader exists and is of the follower's kind."""
     for name, (element, rule) in mimics.items():
         owner, leader = f"joint {name!r}", joints.get(rule.leader)
         if leader is None:
@@ -337,12 +339,6 @@ def _check_mimics(mimics: dict[str, tuple[Node, Mimic]], joints: dict[str, Joint
         kinds = joints[name].kind, leader.kind
         if kinds[1] in ("fixed", "ball") or (kinds[0] == "prismatic") != (kinds[1] == "prismatic"):
             raise _mimic_fault(element, owner, f"is {kinds[0]} and mimics joint {rule.leader!r}, which is {kinds[1]}")
-        seen, follower = {name}, name
-        while follower in mimics:
-            follower = mimics[follower][1].leader
-            if follower in seen:
-                raise _mimic_fault(element, owner, "mimic joints follow each other in a circle")
-            seen.add(follower)
 
 
 def _mimic_fault(element: Node, owner: str, message: str) -> ModelFileError:
