@@ -67,7 +67,7 @@ class Joint:
     place: Array
     turn: Array
     axis: Array
-    after: Array
+    after: Array = field(default_factory=lambda: np.zeros(3))
     limits: tuple[float, float] = (-np.inf, np.inf)
     most: tuple[float, float] = (0.0, 0.0)
 

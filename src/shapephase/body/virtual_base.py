@@ -198,21 +198,15 @@ def _single_axes(joint: Joint) -> tuple[Joint, ...]:
         return (joint,)
     axis = joint.axis / np.linalg.norm(joint.axis)
     turn = so3.between(np.array([0.0, 0.0, 1.0]), axis)
-    none, still = np.zeros(3), np.eye(3)
+    first, last = (joint.place, joint.turn), joint.after
+    still = np.zeros(3), np.eye(3)
     return tuple(
         Joint(
-            name=joint.name + ending,
-            where=joint.where,
-            kind=kind,
-            parent=joint.parent,
-            child=joint.child,
-            place=joint.place if number == 0 else none,
-            turn=joint.turn if number == 0 else still,
-            axis=turn[:, number],
-            after=joint.after if number == 2 else none,
+            joint.name + ending, joint.where, kind, joint.parent, joint.child,
+            *(first if number == 0 else still), turn[:, number], last if number == 2 else np.zeros(3),
         )
         for ending, kind, number in _PARTS
-    )
+    )  # fmt: skip
 
 
 def _inside(joint: Joint) -> str:

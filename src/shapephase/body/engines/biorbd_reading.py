@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +110,7 @@ def _model(path: str, notes: list[Any], starts: dict[str, int]) -> Any:
         text = content.decode("utf-8")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    kept = _looked_through(text, notes, starts)
+    kept = _without_meshes(text, notes, starts)
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "model.bioMod"
         copy.write_text(kept, encoding="utf-8")
@@ -129,38 +130,95 @@ def _refused(message: str, starts: dict[str, int]) -> UnusableModelError:
     return UnusableModelError(f"{segment}biorbd does not accept it: {reason}", starts.get(named[1], 1) if named else 1)
 
 
-def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
+@dataclass
+class _Segment:
+    """A segment of the text on the way through it: words and values with their lines."""
+
+    name: str
+    entries: list[tuple[str, int]]
+
+    def fault(self, message: str, line: int) -> UnusableModelError:
+        return UnusableModelError(f"segment {self.name!r}: {message}", line)
+
+    def add_line(self, words: list[str], line: int) -> None:
+        """Add the words of a line. Raises UnusableModelError for an unknown word, or axes with blanks between."""
+        word = words[0].lower()
+        value = not re.match(r"[a-z]", word) or word.startswith(("pi", "nan", "inf"))
+        if word not in _WORDS and len(words) > 1 and not value:
+            near = difflib.get_close_matches(word, _WORDS, 1)
+            meant = f"; {near[0]!r} is near" if near else ""
+            raise self.fault(f"biorbd ignores the word {words[0]!r}{meant}", line)
+        if word in ("rotations", "translations") and len(words) > 2:
+            meant = f"{words[0]} {''.join(words[1:])}"
+            raise self.fault(f"of `{' '.join(words)}` biorbd reads {words[1]!r} alone; write `{meant}`", line)
+        self.entries += [(text, line) for text in words]
+
+    def check(self, end: int) -> None:
+        """Raise UnusableModelError for values that biorbd would ignore, or read in part."""
+        values: dict[str, list[str]] = {}
+        word, start = "", 1
+        for text, line in [*self.entries, ("", end)]:
+            named = text.lower() in _WORDS and not (word == "parent" and not values["parent"])
+            if text and not named:
+                if not word:
+                    raise self.fault(f"{text!r} follows no word; write `word values`", line)
+                values[word].append(text)
+                continue
+            self._check_count(word, values, start)
+            word, start = text.lower(), line
+            if values.setdefault(word, []) and word in _ONCE:
+                raise self.fault(f"{text!r} stands twice; keep one", line)
+
+    def _check_count(self, word: str, by_word: dict[str, list[str]], line: int) -> None:
+        numbers = values = by_word.get(word, [])
+        if word == "rt" and len(values) == 7:
+            numbers = values[:3] + values[4:]
+        elif word == "rt" and len(values) != _FRAME:
+            raise self.fault(
+                "RT is three angles, an order such as xyz and three coordinates, or a matrix of 16 numbers; got "
+                f"{len(values)} values",
+                line,
+            )
+        elif word in _COUNTS and len(values) != _COUNTS[word]:
+            raise self.fault(f"{word} has {len(values)} values, not {_COUNTS[word]}", line)
+        elif word == "rangesq":
+            axes = sum(len("".join(by_word.get(kind, ()))) for kind in ("translations", "rotations"))
+            if len(values) != 2 * axes:
+                raise self.fault(f"rangesQ has {len(values)} values of {axes} coordinates", line)
+        for text in numbers if word in _OF_NUMBERS else ():
+            if not _VALUE.fullmatch(text):
+                hint = "; write a small e" if re.fullmatch(r"[-+.\d]+E[-+\d]+", text) else ""
+                raise self.fault(f"{word}: {text!r:.40} is not a number that biorbd reads{hint}", line)
+
+
+def _without_meshes(text: str, notes: list[Any], starts: dict[str, int]) -> str:
     """The text without meshes. Raises UnusableModelError for what biorbd would ignore."""
     kept, segment, meshes, constraints, number = [], None, 0, 0, 1
-    message: list[tuple[str, int]] = []
-    without_blocks = re.sub(r"/\*.*?\*/", lambda found: "\n" * found[0].count("\n"), text, flags=re.DOTALL)
+    without_blocks = re.sub(r"/\*.*?\*/", lambda block: "\n" * block[0].count("\n"), text, flags=re.DOTALL)
     for number, line in enumerate(without_blocks.splitlines(), 1):
         words = line.split("//")[0].split()
         word = words[0].lower() if words else ""
         if any(word.startswith("/*") for word in words):
             raise UnusableModelError("a comment that begins with /* has no end; close it by */", number)
+        kept.append("" if word in _DROPPED else line)
         if word in _DROPPED:
             meshes += word == "meshfile"
-            kept.append("")
-            message += [(text, number) for text in words[:1]]
-            continue
-        kept.append(line)
-        if word == "segment":
-            _check_closed(segment, number)
-            segment = words[1] if len(words) > 1 else ""
-            check_name(segment, f"segment {segment!r}", number)
-            if segment in starts:
-                raise UnusableModelError(f"two segments are named {segment!r}; give each a name of its own", number)
-            starts[segment], message = number, [(text, number) for text in words[2:]]
-        elif word == "endsegment":
             if segment is not None:
-                _check_values(segment, message)
+                segment.entries.append((words[0], number))
+        elif word == "segment":
+            _check_closed(segment, number)
+            segment = _Segment(words[1] if len(words) > 1 else "", [(text, number) for text in words[2:]])
+            check_name(segment.name, f"segment {segment.name!r}", number)
+            if segment.name in starts:
+                raise UnusableModelError(f"two segments are named {segment.name!r}; rename one", number)
+            starts[segment.name] = number
+        elif word == "endsegment" and segment is not None:
+            segment.check(number)
             segment = None
         elif word == "loopconstraint" and segment is None:
             constraints += 1
         elif segment is not None and word:
-            _check_word(words, word, segment, number)
-            message += [(text, number) for text in words]
+            segment.add_line(words, number)
     _check_closed(segment, number)
     if meshes:
         notes.append(f"{meshes} mesh files are not read: they have no part in how the body turns")
@@ -169,68 +227,10 @@ def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
     return "\n".join(kept) + "\n"
 
 
-def _check_closed(segment: str | None, line: int) -> None:
+def _check_closed(segment: _Segment | None, line: int) -> None:
     """Raise UnusableModelError where a segment goes on, as in a file that is cut off."""
     if segment is not None:
-        raise UnusableModelError(f"segment {segment!r} has no endsegment; add it", line)
-
-
-def _check_word(words: list[str], word: str, segment: str, line: int) -> None:
-    if re.match(r"[a-z]", word) and word not in _WORDS and len(words) > 1 and not word.startswith(("pi", "nan", "inf")):
-        near = difflib.get_close_matches(word, _WORDS, 1)
-        meant = f"; {near[0]!r} is near" if near else ""
-        raise UnusableModelError(f"segment {segment!r}: biorbd ignores the word {words[0]!r}{meant}", line)
-    if word in ("rotations", "translations") and len(words) > 2:
-        written, meant = " ".join(words), f"{words[0]} {''.join(words[1:])}"
-        raise UnusableModelError(
-            f"segment {segment!r}: of `{written}` biorbd reads {words[1]!r} alone; write `{meant}`", line
-        )
-
-
-def _check_values(segment: str, message: list[tuple[str, int]]) -> None:
-    """Raise UnusableModelError for values of a segment that biorbd would ignore, or read in part."""
-    found: dict[str, list[str]] = {}
-    word, start = "", 1
-    for text, line in [*message, ("", message[-1][1] if message else 1)]:
-        named = text.lower() in _WORDS and not (word == "parent" and not found["parent"])
-        if text and not named:
-            if not word:
-                raise UnusableModelError(f"segment {segment!r}: {text!r} follows no word; write `word values`", line)
-            found[word].append(text)
-            continue
-        _check_count(segment, word, found, start)
-        word, start = text.lower(), line
-        if found.setdefault(word, []) and word in _ONCE:
-            raise UnusableModelError(f"segment {segment!r}: {text!r} stands twice; keep one", line)
-
-
-def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int) -> None:
-    """Raise UnusableModelError where a word has too few or too many values, or one that is not a number."""
-    values = found.get(word, [])
-    numbers = values
-    if word == "rt" and len(values) == 7:
-        numbers = values[:3] + values[4:]
-    elif word == "rt" and len(values) != _FRAME:
-        raise UnusableModelError(
-            f"segment {segment!r}: RT is three angles, an order such as xyz and three coordinates, or a matrix of 16 "
-            f"numbers; got {len(values)} values",
-            line,
-        )
-    elif word in _COUNTS and len(values) != _COUNTS[word]:
-        raise UnusableModelError(f"segment {segment!r}: {word} has {len(values)} values, not {_COUNTS[word]}", line)
-    elif word == "rangesq":
-        axes = sum(len("".join(found.get(one, ()))) for one in ("translations", "rotations"))
-        if len(values) != 2 * axes:
-            raise UnusableModelError(
-                f"segment {segment!r}: rangesQ has {len(values)} values of {axes} coordinates", line
-            )
-    if word in _OF_NUMBERS:
-        for text in numbers:
-            if not _VALUE.fullmatch(text):
-                hint = "; write a small e" if re.fullmatch(r"[-+.\d]+E[-+\d]+", text) else ""
-                raise UnusableModelError(
-                    f"segment {segment!r}: {word}: {text!r:.40} is not a number that biorbd reads{hint}", line
-                )
+        raise UnusableModelError(f"segment {segment.name!r} has no endsegment; add it", line)
 
 
 def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str, int]) -> dict[str, int]:

@@ -62,7 +62,7 @@ class Chain:
             raise UnusableModelError(f"two links are named {name!r}; give each a name of its own", line)
         if not np.isfinite(centre).all():
             raise UnusableModelError(f"link {name!r}: its centre of mass is {np.ravel(centre).tolist()}", line)
-        self.links[name] = Link(name, str(line), float(mass), np.ravel(centre), np.reshape(inertia, (3, 3)))
+        self.links[name] = Link(name, str(line), float(mass), np.array(centre).ravel(), np.array(inertia).reshape(3, 3))
 
     def add_frame(self, name: str) -> None:
         """Add a step between two axes, a link without mass."""
@@ -114,9 +114,10 @@ class Chain:
             raise UnusableModelError(
                 f"joint {name!r}: the lower limit {lower:g} is not below the upper one, {upper:g}", line
             )
-        after = np.zeros(3) if after is None else after
-        arrays = np.ravel(place), np.reshape(turn, (3, 3)), np.ravel(axis), np.ravel(after)
-        self.joints.append(Joint(name, str(line), kind, parent, child, *arrays, (lower, upper)))
+        # Copies, as engines change their arrays.
+        vectors = (np.array(vector).ravel() for vector in (axis, np.zeros(3) if after is None else after))
+        frame = np.array(place).ravel(), np.array(turn).reshape(3, 3)
+        self.joints.append(Joint(name, str(line), kind, parent, child, *frame, *vectors, (lower, upper)))
 
     def moving(self) -> list[str]:
         """Names of the coordinates of joints that follow no other; a ball joint has four."""

@@ -99,25 +99,12 @@ def _tree(skeleton: Skeleton, person: Person, name: str, where: str, metre: floa
             # It stays as it is in the frame in which segments are laid out.
             turn = person.turns[bone.parent].T @ person.turns[number]
             moves = [(f"{bone.name}_fixed", "fixed", "x")]
-        for order, (joint, kind, axis) in enumerate(moves):
-            last = order == len(moves) - 1
-            child = bone.name if last else f"{bone.name}__{axis}"
-            if not last:
+        for order, (joint, kind, axis) in enumerate(moves, 1):
+            child = bone.name if order == len(moves) else f"{bone.name}__{axis}"
+            if child != bone.name:
                 links[child] = Link(child, at)
                 frames.add(child)
-            joints.append(
-                Joint(
-                    name=joint,
-                    where=at,
-                    kind=kind,
-                    parent=parent,
-                    child=child,
-                    place=place,
-                    turn=turn,
-                    axis=_AXES[axis],
-                    after=np.zeros(3),
-                )
-            )
+            joints.append(Joint(joint, at, kind, parent, child, place, turn, _AXES[axis]))
             parent, place = child, np.zeros(3)
     idle = [bones[number].name for number in below if number not in person.moving and bones[number].turns]
     if idle:
