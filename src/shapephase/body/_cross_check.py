@@ -92,7 +92,7 @@ def inertia_and_momentum(
     angles, rates = np.array([[values.get(joint.name, 0.0) for joint in tree.joints] for values in states])
     sliding = np.array([joint.kind == "prismatic" for joint in tree.joints], dtype=bool)
     stacked = [np.array([getattr(j, what) for j in tree.joints]) for what in ("axis", "place", "after", "turn")]
-    axes, places, afters = (each.reshape(-1, 3) for each in stacked[:3])
+    axes, places, afters = (array.reshape(-1, 3) for array in stacked[:3])
     axes = axes / np.sqrt((axes**2).sum(axis=-1, keepdims=True))
     turns = stacked[3].reshape(-1, 3, 3)
     own = _about(axes, np.where(sliding, 0.0, angles))
@@ -139,7 +139,7 @@ def inertia_and_momentum(
 
 def _four_numbers(name: str, shape: dict[str, float], rate: dict[str, float]) -> Array:
     """The four numbers of a ball joint and their derivatives: (2, 4)."""
-    return np.array([[one[key] for key in coordinate_names(name)] for one in (shape, rate)])
+    return np.array([[values[key] for key in coordinate_names(name)] for values in (shape, rate)])
 
 
 def _ball_motion(numbers: Array, derivatives: Array) -> tuple[Array, Array]:

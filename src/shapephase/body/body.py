@@ -275,8 +275,8 @@ class Body(ShapeArguments):
         """
         parts = tuple(part.links for part in self.moving_parts)
         given = {"masses": masses, "centres": centres, "inertias": inertias}
-        found = given_inertias(self.chain, parts, given, on_unphysical)
-        return self.with_frame_inertias(*found) if found.masses.ndim == 1 else BodyFamily(self, *found)
+        changed = given_inertias(self.chain, parts, given, on_unphysical)
+        return self.with_frame_inertias(*changed) if changed.masses.ndim == 1 else BodyFamily(self, *changed)
 
     def with_frame_inertias(self, masses: Array, centres: Array, tensors: Array) -> Body:
         """The body with other inertias of all frames of its chain, in their axes, unchecked.
@@ -349,11 +349,11 @@ class Body(ShapeArguments):
         >>> sp.load_body("cat_two_halves").joint_columns(["waist_roll", "waist_pitch"])
         [0, 2]
         """
-        found: set[int] = set()
+        columns: set[int] = set()
         for name in names:
             balls = [ball for ball in self.chain.follows.balls if name == ball.name or name in ball.names]
-            found |= set(range(self.n_shape)[balls[0].columns]) if balls else {self.joint_index(name)}
-        return sorted(found)
+            columns |= set(range(self.n_shape)[balls[0].columns]) if balls else {self.joint_index(name)}
+        return sorted(columns)
 
     def rate_frame(self, shape: ArrayLike) -> Array:
         """Derivatives of the coordinates at unit rates of the joints: (..., n) -> (..., n, m), m = `n_rates`.
@@ -521,9 +521,9 @@ class Body(ShapeArguments):
         masses, moments = self.chain.masses[:, None], second_moment(self.chain.inertias)
         then = link_motions(self.chain, still[None], np.zeros((1, self.n_shape)))
         now = link_motions(self.chain, self._rows(r), self._rows(v))
-        there, weighted = moments @ so3.transpose(then.turns[0]), masses * then.places[0]
-        correlation = so3.transpose(now.places) @ weighted + (now.turns @ there).sum(axis=1)
-        slope = so3.transpose(now.speeds) @ weighted + (so3.hat(now.spins) @ now.turns @ there).sum(axis=1)
+        reference_moments, weighted = moments @ so3.transpose(then.turns[0]), masses * then.places[0]
+        correlation = so3.transpose(now.places) @ weighted + (now.turns @ reference_moments).sum(axis=1)
+        slope = so3.transpose(now.speeds) @ weighted + (so3.hat(now.spins) @ now.turns @ reference_moments).sum(axis=1)
         matrix = (*r.shape[:-1], 3, 3)
         return correlation.reshape(matrix), slope.reshape(matrix)
 

@@ -96,8 +96,8 @@ class BodyFamily(Sequence["Body"]):
         for first in range(0, len(shapes), at_once):
             part = slice(first, first + at_once)
             regressor = inertial_regressor(self.body.chain, shapes[part], rates[part])
-            found = regressor.inertia_and_momentum(self.masses, self.centres, self.tensors)
-            inertia[:, part], momentum[:, part] = found
+            values = regressor.inertia_and_momentum(self.masses, self.centres, self.tensors)
+            inertia[:, part], momentum[:, part] = values
         return inertia, momentum
 
     @cached_property
@@ -158,9 +158,9 @@ def given_inertias(
     for part, value in chosen.get("inertias", {}).items():
         frame, pose = chain.link_frames[parts[part][0]]
         extent = (centres[..., frame, :] ** 2).sum(axis=-1) * masses[..., frame]
-        symmetric, found = _checked_tensors(value, parts[part][0], float(np.max(extent, initial=0.0)))
+        symmetric, doubts = _checked_tensors(value, parts[part][0], float(np.max(extent, initial=0.0)))
         tensors[..., frame, :, :] = pose[:3, :3] @ symmetric @ so3.transpose(pose[:3, :3])
-        faults += found
+        faults += doubts
     if faults and on_unphysical == "error":
         raise UnphysicalInertiaError("; ".join(faults) + "; correct it, or pass on_unphysical='warn'")
     if faults and on_unphysical == "warn":
@@ -178,8 +178,8 @@ def _by_part(value: Any, name: str, parts: tuple[tuple[str, ...], ...]) -> dict[
         return dict(enumerate(np.moveaxis(array, array.ndim - 1 - len(item), 0)))
     first = {links[0]: number for number, links in enumerate(parts)}
     leads = {link: links[0] for links in parts for link in links}
-    found = {}
-    for link, one in value.items():
+    arrays = {}
+    for link, entry in value.items():
         if link not in leads:
             raise unknown_name(f"link in {name}", link, first)
         if link not in first:
@@ -187,10 +187,10 @@ def _by_part(value: Any, name: str, parts: tuple[tuple[str, ...], ...]) -> dict[
                 f"{name}: link {link!r} is fixed to {leads[link]!r}: give {leads[link]!r} what both have together, in "
                 "its axes, as in `Body.moving_parts`"
             )
-        found[first[link]] = finite_array(one, f"{name} of link {link!r}", item, unit=unit)
-        if found[first[link]].ndim > len(item) + 1:
-            raise ShapeError(f"{name} of link {link!r}: one, or one for each body, is needed, got {np.shape(one)}")
-    return found
+        arrays[first[link]] = finite_array(entry, f"{name} of link {link!r}", item, unit=unit)
+        if arrays[first[link]].ndim > len(item) + 1:
+            raise ShapeError(f"{name} of link {link!r}: one, or one for each body, is needed, got {np.shape(entry)}")
+    return arrays
 
 
 def _batch(chosen: Mapping[str, Mapping[int, Array]], parts: tuple[tuple[str, ...], ...]) -> tuple[int, ...]:

@@ -95,8 +95,8 @@ def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving:
     all_spins = spin + (components(links.spins) if moving else np.zeros_like(places))
     speeds = cross(spin, places) + (components(links.speeds) if moving else 0.0)
     turning = _seen(turns, all_spins)
-    found = np.empty((rows.shape[1], places.shape[2], PARAMETERS))
-    for row, sums in zip(np.moveaxis(rows, 0, 2), found, strict=True):
+    result = np.empty((rows.shape[1], places.shape[2], PARAMETERS))
+    for row, sums in zip(np.moveaxis(rows, 0, 2), result, strict=True):
         across = np.broadcast_to(row[:, :, None], places.shape)
         arms, near = cross(across, places), _seen(turns, across)
         sums[:, 0] = (arms * speeds).sum(axis=(0, 1))
@@ -104,7 +104,7 @@ def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving:
         for entry, (i, j) in enumerate(_VOIGT):
             product = near[i] * turning[j]
             sums[:, 4 + entry] = (product if i == j else product + near[j] * turning[i]).sum(axis=0)
-    return found.reshape(len(found), -1)
+    return result.reshape(len(result), -1)
 
 
 def _seen(turns: Array, vectors: Array) -> Array:

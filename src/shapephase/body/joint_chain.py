@@ -54,12 +54,12 @@ class LinkRows:
 
     def in_chain_axes(self, derivatives: Array) -> Array:
         """Derivatives by first moments and inertias of frames, (m, k + 1, 10) as `inertial_sums` has them, turned."""
-        bases, found = np.asarray(self.bases, dtype=np.float64), derivatives.copy()
-        found[..., 1:4] = (bases @ derivatives[..., 1:4, None])[..., 0]
+        bases, result = np.asarray(self.bases, dtype=np.float64), derivatives.copy()
+        result[..., 1:4] = (bases @ derivatives[..., 1:4, None])[..., 0]
         # An entry off the diagonal of a tensor stands there twice.
         tensors = derivatives[..., [4, 9, 8, 9, 5, 7, 8, 7, 6]] * [1.0, 0.5, 0.5, 0.5, 1.0, 0.5, 0.5, 0.5, 1.0]
         turned = bases @ tensors.reshape(*derivatives.shape[:2], 3, 3) @ np.swapaxes(bases, -1, -2)
-        found[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., [0, 4, 8, 5, 2, 1]] * [
+        result[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., [0, 4, 8, 5, 2, 1]] * [
             1.0,
             1.0,
             1.0,
@@ -67,7 +67,7 @@ class LinkRows:
             2.0,
             2.0,
         ]
-        return found
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,12 +152,12 @@ class JointChain:
     @cached_property
     def hanging(self) -> Array:
         """(k, k + 1) one where a frame hangs on a joint, at whatever distance, else zero."""
-        found = np.zeros((len(self.names), len(self.names) + 1))
+        carried = np.zeros((len(self.names), len(self.names) + 1))
         for joint in range(len(self.names) - 1, -1, -1):
-            found[joint, joint + 1] = 1.0
+            carried[joint, joint + 1] = 1.0
             if self.parents[joint]:
-                found[self.parents[joint] - 1] += found[joint]
-        return found
+                carried[self.parents[joint] - 1] += carried[joint]
+        return carried
 
     def with_inertias(self, masses: Array, centres: Array, inertias: Array) -> JointChain:
         """The chain with other links; rows that were already made are carried over."""

@@ -35,13 +35,13 @@ def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:
         below.setdefault(joint.parent, []).append(joint)
     first = next(iter(tree.links))
     moved = tuple(joint.child for joint in tree.joints if joint.kind != "fixed" and joint.child not in tree.frames)
-    found = [JointOrder(MUJOCO, _coordinates(tree.joints), (first, *moved))]
+    orders = [JointOrder(MUJOCO, _coordinates(tree.joints), (first, *moved))]
     if from_urdf:
-        found = [_order(MUJOCO, first, _depth_first(first, below), merged=True)]
+        orders = [_order(MUJOCO, first, _depth_first(first, below), merged=True)]
     for word, key in ((ISAAC, None), (ISAAC_BY_NAME, lambda joint: joint.name)):
         for merged in (True, False):
-            found.append(_order(word, first, _breadth_first(first, below, key, merged=merged), merged=merged))
-    return tuple(found)
+            orders.append(_order(word, first, _breadth_first(first, below, key, merged=merged), merged=merged))
+    return tuple(orders)
 
 
 def simulator_order(body: Body, word: str, otherwise: tuple[str, ...]) -> tuple[str, ...]:
@@ -56,27 +56,27 @@ def _order(word: str, first: str, joints: Sequence[Joint], *, merged: bool) -> J
 
 
 def _coordinates(joints: Iterable[Joint]) -> tuple[str, ...]:
-    found: list[str] = []
+    coordinates: list[str] = []
     for joint in joints:
         names = joint_coordinates(joint)
-        found += [names[k] for k in _SCALAR_FIRST] if joint.kind == "ball" else names
-    return tuple(found)
+        coordinates += [names[k] for k in _SCALAR_FIRST] if joint.kind == "ball" else names
+    return tuple(coordinates)
 
 
 def _depth_first(first: str, below: dict[str, list[Joint]]) -> list[Joint]:
-    found: list[Joint] = []
+    ordered: list[Joint] = []
     waiting = below.get(first, [])[::-1]
     while waiting:
-        found.append(waiting.pop())
-        waiting += below.get(found[-1].child, [])[::-1]
-    return found
+        ordered.append(waiting.pop())
+        waiting += below.get(ordered[-1].child, [])[::-1]
+    return ordered
 
 
 def _breadth_first(
     first: str, below: dict[str, list[Joint]], key: Callable[[Joint], str] | None, *, merged: bool
 ) -> list[Joint]:
     """Level by level; where fixed links are merged, what moves on them is on the level of what they are fixed to."""
-    found: list[Joint] = []
+    ordered: list[Joint] = []
     level = [first]
     while level:
         after: list[str] = []
@@ -84,20 +84,20 @@ def _breadth_first(
             joints = _on(link, below) if merged else list(below.get(link, []))
             if key is not None:
                 joints.sort(key=key)
-            found += joints
+            ordered += joints
             after += [joint.child for joint in joints]
         level = after
-    return found
+    return ordered
 
 
 def _on(link: str, below: dict[str, list[Joint]]) -> list[Joint]:
     """The joints that move on a link and on what is fixed to it, as listed depth first."""
-    found: list[Joint] = []
+    moving: list[Joint] = []
     waiting = below.get(link, [])[::-1]
     while waiting:
         joint = waiting.pop()
         if joint.kind == "fixed":
             waiting += below.get(joint.child, [])[::-1]
         else:
-            found.append(joint)
-    return found
+            moving.append(joint)
+    return moving

@@ -138,10 +138,10 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
                     f"{listed(get_close_matches(link, links, 5, 0.4) or list(links)[:5])}"
                 )
         if joint.child in above:
-            other = above[joint.child]
+            first = above[joint.child]
             raise ModelFileError(
-                f"{joint.where}: joint {joint.name!r}: link {joint.child!r} has two parents, joints {other.name!r} "
-                f"({other.where}) and {joint.name!r}; keep one"
+                f"{joint.where}: joint {joint.name!r}: link {joint.child!r} has two parents, joints {first.name!r} "
+                f"({first.where}) and {joint.name!r}; keep one"
             )
         above[joint.child] = joint
         below[joint.parent].append(joint)
@@ -160,9 +160,9 @@ def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -
                 f"{links[level[0]].where}: link {level[0]!r}: a chain of more than {MOST_DEPTH} "
                 "links; fix some into one"
             )
-        found = [joint for parent in level for joint in below[parent]]
-        sorted_joints += found
-        level = [joint.child for joint in found]
+        joints_below = [joint for parent in level for joint in below[parent]]
+        sorted_joints += joints_below
+        level = [joint.child for joint in joints_below]
         reached.update(level)
     lost = [name for name in links if name not in reached]
     if lost:
@@ -220,12 +220,12 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
             f"{_LEAST_RADIUS:g} m; the units are kg, m and kg m^2",
         ),
     )
-    found = []
+    doubts = []
     for which, text in kinds:
         if which.any():
             bad = [links[i] for i in np.flatnonzero(which)]
-            found.append(f"{bad[0].where}: {listed([label.format(link.name) for link in bad])}: {text}")
-    return found
+            doubts.append(f"{bad[0].where}: {listed([label.format(link.name) for link in bad])}: {text}")
+    return doubts
 
 
 def hollow_warnings(
@@ -245,24 +245,24 @@ def hollow_warnings(
         return []
     # Scaled so that the body's is the identity; what it has about its thinnest axis may be nothing but rounding.
     scaled = axes / np.sqrt(np.maximum(moments, ROUNDING * moments[-1]))
-    found = []
+    hollow = []
     for link, turn in zip(links, turns, strict=True):
         largest = float(np.linalg.eigvalsh(link.inertia)[-1])
         if link.mass == 0.0 and largest > ROUNDING * moments[-1]:
             share = float(np.linalg.eigvalsh(scaled.T @ turn @ link.inertia @ turn.T @ scaled)[-1])
-            found.append((share, largest, link))
-    if not found:
+            hollow.append((share, largest, link))
+    if not hollow:
         return []
-    share, largest, worst = max(found, key=lambda each: each[0])
+    share, largest, worst = max(hollow, key=lambda each: each[0])
     if share > _HOLLOW and on_unphysical == "error":
         raise UnphysicalInertiaError(
             f"{worst.where}: {label.format(worst.name)} has no mass and a moment of inertia of {largest:.4g} kg m^2, "
             f"{share:.3g} of the whole body's: no distribution of mass has that; give it its mass, or none of both, or "
             "load it with on_unphysical='warn' (--on-unphysical warn)"
         )
-    named = listed([f"{label.format(link.name)} ({moment:.3g} kg m^2)" for _, moment, link in found])
+    named = listed([f"{label.format(link.name)} ({moment:.3g} kg m^2)" for _, moment, link in hollow])
     return [
-        f"{found[0][2].where}: {named}: moments of inertia without mass, up to {share:.2g} of the whole body's: no "
+        f"{hollow[0][2].where}: {named}: moments of inertia without mass, up to {share:.2g} of the whole body's: no "
         "distribution of mass has them; they count as the file has them"
     ]
 
@@ -287,11 +287,11 @@ def grouped(notes: Iterable[tuple[str, str, str, str]]) -> tuple[str, ...]:
 
     notes : "file:line", what it is about ("joint"), its name, and the text
     """
-    found: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    by_text: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for where, kind, name, text in notes:
-        found.setdefault((kind, text), []).append((where, name))
+        by_text.setdefault((kind, text), []).append((where, name))
     sentences = []
-    for (kind, text), places in found.items():
+    for (kind, text), places in by_text.items():
         first = places[0][0]
         # Later ones by their line alone, where a line is known.
         names = [name if where == first else f"{name} (line {where.rpartition(':')[2]})" for where, name in places]

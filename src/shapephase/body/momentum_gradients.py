@@ -36,10 +36,10 @@ def by_shape_and_rate(
         _carried(chain, _link_sums(chain, links)),
         _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1]),
     )
-    count, several, each, _ = rows.shape
+    count, several, count_of_rows, _ = rows.shape
     arms = cross(at.axes, at.origins)
     by_rate = _turned(sums.inertia, at.axes) + cross(sums.moment, at.slides - arms)
-    by_shape = np.empty((count, several, each, by_rate.shape[-1]))
+    by_shape = np.empty((count, several, count_of_rows, by_rate.shape[-1]))
     for which in range(several):
         spin = spins[:, which].T[:, :, None]
         drift = sums.drift + cross(spin, sums.moment)
@@ -47,11 +47,11 @@ def by_shape_and_rate(
         whole = spin + at.spins
         swung = cross(whole, at.axes)
         point = cross(at.axes, at.speeds + cross(spin, at.origins)) + cross(swung, at.origins)
-        found = cross(at.axes, momentum) + _turned(sums.inertia, swung)
-        found += cross(at.slides - arms, drift) + cross(sums.moment, cross(whole, at.slides) - point)
-        np.matmul(rows[:, which], np.moveaxis(found, 0, 1), out=by_shape[:, which])
+        columns = cross(at.axes, momentum) + _turned(sums.inertia, swung)
+        columns += cross(at.slides - arms, drift) + cross(sums.moment, cross(whole, at.slides) - point)
+        np.matmul(rows[:, which], np.moveaxis(columns, 0, 1), out=by_shape[:, which])
     by_rates = rows.reshape(count, -1, 3) @ np.moveaxis(by_rate, 0, 1)
-    return by_independent(chain, by_shape.reshape(count, several * each, -1), by_rates, shapes, rates)
+    return by_independent(chain, by_shape.reshape(count, several * count_of_rows, -1), by_rates, shapes, rates)
 
 
 def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Array, Array]:
@@ -66,9 +66,9 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     Returns (N, n) each [J per unit of joint], [J s per unit of joint]
     """
     links = link_motions(chain, shapes, rates)
-    each = _link_sums(chain, links)
-    sums, at = _carried(chain, each), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
-    inertia, momentum = each[9:].sum(axis=-1), each[6:9].sum(axis=-1)
+    link_sums = _link_sums(chain, links)
+    sums, at = _carried(chain, link_sums), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
+    inertia, momentum = link_sums[9:].sum(axis=-1), link_sums[6:9].sum(axis=-1)
     tensors = np.moveaxis(inertia[[0, 5, 4, 5, 1, 3, 4, 3, 2]], 0, -1).reshape(-1, 3, 3)
     spin = -np.linalg.solve(tensors, momentum.T[..., None])[..., 0].T[:, :, None]
     drift = sums.drift + cross(spin, sums.moment)
@@ -77,8 +77,8 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     speeds = at.speeds + cross(spin, at.origins)
     by_shape = cross(whole, at.axes) * about - cross(at.axes, speeds) * drift + cross(whole, at.slides) * drift
     by_rate = at.axes * about + at.slides * drift
-    found = by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
-    return found[0][:, 0], found[1][:, 0]
+    gradients = by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
+    return gradients[0][:, 0], gradients[1][:, 0]
 
 
 def by_independent(
@@ -127,7 +127,7 @@ class _Axes:
 def _link_sums(chain: JointChain, links: LinkMotions) -> Array:
     """Sums that each frame adds: (15, N, k + 1), in the order of mass times place, mass times velocity, angular
     momentum and inertia."""
-    places, speeds, spins = (components(one) for one in (links.places, links.speeds, links.spins))
+    places, speeds, spins = (components(vectors) for vectors in (links.places, links.speeds, links.spins))
     own = components((links.turns @ chain.inertias @ so3.transpose(links.turns)).reshape(*places.shape[1:], 9))
     own = own[[0, 4, 8, 5, 2, 1]]
     moment = chain.masses * places
@@ -148,8 +148,10 @@ def _carried(chain: JointChain, each: Array) -> _Sums:
 def _joint_axes(chain: JointChain, links: LinkMotions, rates: Array) -> _Axes:
     """rates: (N, k) of all joints."""
     turns = links.turns[:, 1:]
-    axes, slides, levers = (components(so3.apply(turns, one)) for one in (chain.axes, chain.slides, chain.centres[1:]))
-    spins, places, speeds = (components(one[:, 1:]) for one in (links.spins, links.places, links.speeds))
+    axes, slides, levers = (
+        components(so3.apply(turns, vectors)) for vectors in (chain.axes, chain.slides, chain.centres[1:])
+    )
+    spins, places, speeds = (components(vectors[:, 1:]) for vectors in (links.spins, links.places, links.speeds))
     return _Axes(axes, slides, places - levers, speeds - cross(spins, levers) - slides * rates, spins)
 
 

@@ -175,21 +175,21 @@ def _has_mass(links: Mapping[str, Link], names: Iterable[str]) -> bool:
 def _leading(fixed: Sequence[Joint], link: str, to: str) -> list[Joint]:
     """The fixed joints on a link that lead to another."""
     above = {joint.child: joint for joint in fixed}
-    found: list[Joint] = []
+    way: list[Joint] = []
     while to != link:
-        found.append(above[to])
+        way.append(above[to])
         to = above[to].parent
-    return found[::-1]
+    return way[::-1]
 
 
 def _below(link: str, below: Mapping[str, list[Joint]]) -> set[str]:
     """A link and all that hang on it."""
-    found, waiting = {link}, [link]
+    reached, waiting = {link}, [link]
     while waiting:
         children = [joint.child for joint in below.get(waiting.pop(), ())]
-        found.update(children)
+        reached.update(children)
         waiting += children
-    return found
+    return reached
 
 
 def _single_axes(joint: Joint) -> tuple[Joint, ...]:

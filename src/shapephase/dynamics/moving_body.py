@@ -187,5 +187,5 @@ def wheel_speeds(motion: Motion | ForcedMotion, t: ArrayLike) -> Array:
         )
     times = times_argument(t, motion.duration)
     omega = motion.angular_velocity(times).reshape(-1, times.size, 3)
-    found = description.spins(times.ravel(), omega)
-    return np.reshape(found, (*motion.batch, *times.shape, len(description.rotors)))
+    speeds = description.spins(times.ravel(), omega)
+    return np.reshape(speeds, (*motion.batch, *times.shape, len(description.rotors)))

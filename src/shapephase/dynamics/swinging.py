@@ -135,12 +135,12 @@ def free_hinges(
     fastest = np.abs(route.curve(np.union1d(looked, 0.5 * (looked[:-1] + looked[1:])))[1]).max(initial=0.0)
     rates = np.full(len(names), 1.0 / route.duration + fastest) + np.abs(starts[1])
     scales = np.concatenate([np.ones(len(names)), rates])
-    found = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _INTEGRATED * goal, limits)
-    whole = _path_of(swing, found, breaks, goal)
+    integrated = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _INTEGRATED * goal, limits)
+    whole = _path_of(swing, integrated, breaks, goal)
     motion = reconstruct(articulated(body, whole), mu, attitude, tolerance=goal)
-    times = found.error_times
-    defect = float(so3.angle(so3.transpose(motion.attitude(times)) @ found.attitude(times)).max())
-    worst = float(max(found.attitude_errors[-1], found.state_errors[-1, : len(names)].max()))
+    times = integrated.error_times
+    defect = float(so3.angle(so3.transpose(motion.attitude(times)) @ integrated.attitude(times)).max())
+    worst = float(max(integrated.attitude_errors[-1], integrated.state_errors[-1, : len(names)].max()))
     return FreeHinges(
         motion=motion, path=whole, hinges=names, attitude_defect=defect, error_estimate=worst + defect + _SHARE * goal
     )
@@ -175,14 +175,14 @@ class _Swing:
         efforts, _ = falling_efforts(self.body, shape, rate, acceleration, omega, slopes)
         # Efforts are linear in accelerations: those of one of each hinge from rest, which the others may be far above.
         shapes = np.repeat(shape, count, axis=0)
-        ones = np.tile(np.eye(shape.shape[1])[self.columns], (len(times), 1))
-        answers = -so3.apply(np.repeat(inverse, count, axis=0), so3.apply(np.repeat(matrix, count, axis=0), ones))
+        unit_rates = np.tile(np.eye(shape.shape[1])[self.columns], (len(times), 1))
+        answers = -so3.apply(np.repeat(inverse, count, axis=0), so3.apply(np.repeat(matrix, count, axis=0), unit_rates))
         rest = np.zeros_like(shapes)
-        by_one, _ = falling_efforts(self.body, shapes, rest, ones, np.zeros_like(answers), answers)
+        by_one, _ = falling_efforts(self.body, shapes, rest, unit_rates, np.zeros_like(answers), answers)
         by_one = np.swapaxes(by_one[:, self.columns].reshape(-1, count, count), 1, 2)
         given = np.array([self._given(float(t), state) for t, state in zip(times, states, strict=True)])
-        found = np.linalg.solve(by_one, (given - efforts[:, self.columns])[..., None])[..., 0]
-        return omega, np.asarray(found, dtype=np.float64)
+        solution = np.linalg.solve(by_one, (given - efforts[:, self.columns])[..., None])[..., 0]
+        return omega, np.asarray(solution, dtype=np.float64)
 
     def _given(self, t: float, state: Array) -> Array:
         """Efforts of springs and dampers: (2 k,) -> (k,)."""

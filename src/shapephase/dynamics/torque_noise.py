@@ -141,13 +141,17 @@ def load_errors(motion: Motion | ForcedMotion, loads: JointLoads, joints: ArrayL
     _check_single(motion)
     count = len(loads.joint_names)
     own = np.arange(count)
-    peaks = np.concatenate([loads.peak_time, loads.rate_time, loads.power_time])
-    times, place = np.unique(peaks, return_inverse=True)
-    found = _errors_at(motion, times, joints)
+    peak_times = np.concatenate([loads.peak_time, loads.rate_time, loads.power_time])
+    times, place = np.unique(peak_times, return_inverse=True)
+    errors = _errors_at(motion, times, joints)
     places = place.reshape(3, count)
-    each = [values[at, own] for values, at in zip((found.torque, found.rate, found.power), places, strict=True)]
+    peak_errors = [
+        values[at, own] for values, at in zip((errors.torque, errors.rate, errors.power), places, strict=True)
+    ]
     work, total = _work_errors(motion, joints)
-    return LoadErrors(peak_torque=each[0], peak_rate=each[1], peak_power=each[2], work=work, total_work=total)
+    return LoadErrors(
+        peak_torque=peak_errors[0], peak_rate=peak_errors[1], peak_power=peak_errors[2], work=work, total_work=total
+    )
 
 
 def _check_single(motion: Motion | ForcedMotion) -> None:
@@ -175,9 +179,9 @@ def _slopes(motion: Motion | ForcedMotion, times: Array) -> _Slopes:
             torques.append((ahead.torque[0] - behind.torque[0]) / (2.0 * step))
             rates.append((ahead.rate - behind.rate) / (2.0 * step))
     shape = (len(times), -1, path.n_shape, len(_STEPS))
-    by_torque, by_rate = (np.stack(found, axis=-1).reshape(shape) for found in (torques, rates))
-    here = drive(motion, times)
-    power = here.rate[..., None, None] * by_torque + here.torque[0][..., None, None] * by_rate
+    by_torque, by_rate = (np.stack(columns, axis=-1).reshape(shape) for columns in (torques, rates))
+    efforts = drive(motion, times)
+    power = efforts.rate[..., None, None] * by_torque + efforts.torque[0][..., None, None] * by_rate
     return _Slopes(by_torque, by_rate, power)
 
 
@@ -189,5 +193,5 @@ def _work_errors(motion: Motion | ForcedMotion, joints: ArrayLike | None) -> tup
     weights[[0, -1]] *= 0.5
     slopes = weights[:, None, None, None] * _slopes(motion, times).power
     both = np.concatenate([slopes, slopes.sum(axis=1, keepdims=True)], axis=1)
-    found = summed_errors(path, times, both, joints)
-    return found[:-1], float(found[-1])
+    errors = summed_errors(path, times, both, joints)
+    return errors[:-1], float(errors[-1])

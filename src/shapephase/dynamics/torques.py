@@ -167,7 +167,7 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
         raise WrongObjectError(f"{body.name} has no joints, and so no torques of joints; `split` analyses its turn")
     given = np.linspace(0.0, motion.duration, _ROWS) if t is None else t
     times = times_argument(given, motion.duration)
-    found = drive(motion, times.ravel())
+    efforts = drive(motion, times.ravel())
     whole = (*motion.batch, *times.shape)
     return JointTorques(
         motion=motion,
@@ -175,8 +175,8 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
         joint_names=body.rate_names,
         joint_units=body.rate_units,
         mass=body.mass,
-        torque=found.torque.reshape(*whole, body.n_rates),
-        rate=found.rate.reshape(*times.shape, body.n_rates),
-        power=found.power.reshape(*whole, body.n_rates),
-        base_wrench=found.wrench.reshape(*whole, 6),
+        torque=efforts.torque.reshape(*whole, body.n_rates),
+        rate=efforts.rate.reshape(*times.shape, body.n_rates),
+        power=efforts.power.reshape(*whole, body.n_rates),
+        base_wrench=efforts.wrench.reshape(*whole, 6),
     )

@@ -80,8 +80,8 @@ def interpolated(quaternions: Array, place: Array) -> Array:
     for k in nodes:
         others = nodes[nodes != k]
         weights[:, k] = np.prod((at - others) / (k - others), axis=1)
-    found = np.einsum("mk,mkd->md", weights, quaternions[first[:, None] + nodes])
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
+    between = np.einsum("mk,mkd->md", weights, quaternions[first[:, None] + nodes])
+    return between / np.linalg.norm(between, axis=1, keepdims=True)
 
 
 def _off_at_constant_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
@@ -90,8 +90,8 @@ def _off_at_constant_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
     turns = so3.log(so3.transpose(ends[:-1]) @ ends[1:])
     inside = times[:-1, None] + np.diff(times)[:, None] * _PLACES
     truth = base_attitude(motion, inside.ravel()).reshape(*inside.shape, 3, 3)
-    there = ends[:-1, None] @ so3.exp(turns[:, None] * _PLACES[:, None])
-    return so3.angle(so3.transpose(truth) @ there).max(axis=1)
+    turned = ends[:-1, None] @ so3.exp(turns[:, None] * _PLACES[:, None])
+    return so3.angle(so3.transpose(truth) @ turned).max(axis=1)
 
 
 def _check_count(count: int, error: float) -> None:

@@ -139,15 +139,15 @@ def whole_accelerations(motion: Motion | ForcedMotion, whole: WholeMotion, fall:
     body, path = needed_body_and_path(motion, "this export needs")
     moving = moving_body(motion, body, path, whole.times)
     shapes, rates, spins = moving.shapes, moving.rates, moving.spins[0]
-    found = floating_states(body, shapes, rates, moving.accelerations, spins, moving.spin_rates[0])[2]
+    accelerations = floating_states(body, shapes, rates, moving.accelerations, spins, moving.spin_rates[0])[2]
     backwards = so3.transpose(whole.attitude)
     speed = so3.apply(backwards, fall.speed(whole.times))
-    found[:, :3] += so3.apply(backwards, np.broadcast_to(fall.gravity, speed.shape)) - np.cross(spins, speed)
+    accelerations[:, :3] += so3.apply(backwards, np.broadcast_to(fall.gravity, speed.shape)) - np.cross(spins, speed)
     follows = body.chain.follows
     slopes = follows.with_rates(shapes, moving.accelerations)[1]
     if not follows.is_linear:
         slopes = slopes + (follows.slope_rates(shapes, rates) @ rates[..., None])[..., 0]
-    return found, slopes
+    return accelerations, slopes
 
 
 def _spins(motion: Motion | ForcedMotion, body: Body, times: Array, shapes: Array, rates: Array) -> Array:
@@ -165,10 +165,10 @@ def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
 
 def base_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
     """Angular velocity of the base of the body, base axes, in whatever gauge the motion is: (N,) -> (N, 3) [rad/s]."""
-    found = body_and_path(motion)
-    if found is None:
+    pair = body_and_path(motion)
+    if pair is None:
         return motion.angular_velocity(times)
-    return _spins(motion, found[0], times, *found[1].curve(times))
+    return _spins(motion, pair[0], times, *pair[1].curve(times))
 
 
 def continued_quaternions(attitudes: Array) -> Array:

@@ -101,11 +101,11 @@ def write_bvh(
 
 def _rest_orientations(chain: JointChain) -> Array:
     """Orientations of all frames at zero coordinates, base axes: (k + 1, 3, 3)."""
-    found = np.empty((len(chain.names) + 1, 3, 3))
-    found[0] = np.eye(3)
+    orientations = np.empty((len(chain.names) + 1, 3, 3))
+    orientations[0] = np.eye(3)
     for joint, parent in enumerate(chain.parents):
-        found[joint + 1] = found[parent] @ chain.turns[joint]
-    return found
+        orientations[joint + 1] = orientations[parent] @ chain.turns[joint]
+    return orientations
 
 
 class _Bone(NamedTuple):
@@ -120,15 +120,15 @@ class _Bone(NamedTuple):
 def _bones(chain: JointChain) -> list[_Bone]:
     """Bones in the order of a skeleton: each before those that hang on it, and these before the next."""
     balls = {ball.row: ball for ball in chain.follows.balls}
-    found: list[_Bone] = []
+    bones: list[_Bone] = []
     waiting = [(joint, 1) for joint, parent in enumerate(chain.parents) if parent == 0][::-1]
     while waiting:
         joint, depth = waiting.pop()
         ball = balls.get(joint)
         name, last = (chain.names[joint], joint) if ball is None else (ball.name, ball.rows.stop - 1)
-        found.append(_Bone(re.sub(r"\s", "_", name), joint, last, depth))
+        bones.append(_Bone(re.sub(r"\s", "_", name), joint, last, depth))
         waiting += [(below, depth + 1) for below, parent in enumerate(chain.parents) if parent == last + 1][::-1]
-    return found
+    return bones
 
 
 def _skeleton(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> list[str]:
@@ -155,17 +155,17 @@ def _channels(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> lis
     """Columns of all bones in the order of the skeleton."""
     chain = whole.body.chain
     balls = {ball.row: ball.turns(whole.shapes) for ball in chain.follows.balls}
-    found = [scale * whole.position @ axes.T, _degrees(axes @ whole.attitude @ axes.T)]
+    columns = [scale * whole.position @ axes.T, _degrees(axes @ whole.attitude @ axes.T)]
     for bone in _bones(chain):
         joint = bone.first
         coordinate, parent = whole.joints[:, joint], rest[chain.parents[joint]]
         if chain.slides[joint].any():
             along = chain.places[joint] + coordinate[:, None] * (chain.turns[joint] @ chain.slides[joint])
-            found.append(scale * along @ (axes @ parent).T)
+            columns.append(scale * along @ (axes @ parent).T)
         about = axes @ rest[joint + 1]
         turned = so3.exp(coordinate[:, None] * (about @ chain.axes[joint]))
-        found.append(_degrees(about @ balls[joint] @ about.T if joint in balls else turned))
-    return found
+        columns.append(_degrees(about @ balls[joint] @ about.T if joint in balls else turned))
+    return columns
 
 
 def _degrees(rotations: Array) -> Array:

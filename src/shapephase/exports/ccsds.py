@@ -144,20 +144,20 @@ def _epoch(text: str) -> tuple[datetime.datetime, Decimal]:
     try:
         if rest and not (rest.isascii() and rest.isdigit()):
             raise ValueError
-        found = datetime.datetime.fromisoformat(whole)
+        epoch = datetime.datetime.fromisoformat(whole)
     except ValueError:
-        found = None
-    if found is None or found.tzinfo is not None:
+        epoch = None
+    if epoch is None or epoch.tzinfo is not None:
         raise UnknownNameError(f"epoch: a date and time as 2026-11-23T10:00:00.5 are needed, got {text!r}")
-    return found, Decimal(f"0.{rest or 0}")
+    return epoch, Decimal(f"0.{rest or 0}")
 
 
 def _epochs(begin: tuple[datetime.datetime, Decimal], times: Array) -> list[str]:
     """The epochs of times after the start."""
-    found, step = [], Decimal(1).scaleb(-_DIGITS)
+    epochs, step = [], Decimal(1).scaleb(-_DIGITS)
     for time in times.tolist():
         after = (begin[1] + Decimal(time)).quantize(step)
         whole = int(after)
         fraction = f"{after - whole:.{_DIGITS}f}".removeprefix("0.")
-        found.append(f"{(begin[0] + datetime.timedelta(seconds=whole)).isoformat()}.{fraction}")
-    return found
+        epochs.append(f"{(begin[0] + datetime.timedelta(seconds=whole)).isoformat()}.{fraction}")
+    return epochs

@@ -99,10 +99,10 @@ def write_opensim_motion(
 def _axes(body: Body, given: ArrayLike | None) -> Array:
     if given is None:
         return _TO_PELVIS if body.base_angles is None else np.eye(3)
-    found = so3.rotation_argument(given, "base_axes")
-    if found.shape != (3, 3):
-        raise ShapeError(f"base_axes: one rotation (3, 3) is needed, got shape {found.shape}")
-    return found
+    rotation = so3.rotation_argument(given, "base_axes")
+    if rotation.shape != (3, 3):
+        raise ShapeError(f"base_axes: one rotation (3, 3) is needed, got shape {rotation.shape}")
+    return rotation
 
 
 def _places(body: Body) -> tuple[str, ...]:

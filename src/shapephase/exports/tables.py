@@ -77,7 +77,9 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     }
     coordinates: dict[str, Any] = {"time": ("time", samples["time"][0], {"units": "s"})}
     coordinates |= {
-        name: list(entries) for name, entries in labels.items() if any(name == one[0][1] for one in variables.values())
+        name: list(entries)
+        for name, entries in labels.items()
+        if any(name == variable[0][1] for variable in variables.values())
     }
     if "joint" in coordinates:
         coordinates["joint_unit"] = ("joint", list(samples.joint_units))
@@ -177,16 +179,16 @@ def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
         "shapes": samples.joint_names,
     }
     units = {"shapes": samples.joint_units}
-    found: dict[str, tuple[Array, str]] = {"time": (samples["time"][0], "s")}
+    table: dict[str, tuple[Array, str]] = {"time": (samples["time"][0], "s")}
     for name, columns in labels.items():
         if name in samples:
             values, _, unit = samples[name]
-            each = units.get(name, (unit,) * len(columns))
-            found |= {
-                label: (np.ascontiguousarray(column), one)
-                for label, column, one in zip(columns, values.T, each, strict=True)
+            column_units = units.get(name, (unit,) * len(columns))
+            table |= {
+                label: (np.ascontiguousarray(column), own_unit)
+                for label, column, own_unit in zip(columns, values.T, column_units, strict=True)
             }
-    return found
+    return table
 
 
 def _csv(motion: Any, times: Any, fall: Any) -> bytes:

@@ -79,13 +79,13 @@ class CoordinateMap:
         order = [*range(len(self.names))]
         depth = {joint.row: place for place, joint in enumerate(self.curved)}
         order.sort(key=lambda row: depth.get(row, -1))
-        found = []
+        knotted = []
         for row in order:
             own = [f for joint in self.curved for source, f in joint.terms if source == row and len(f.knots)]
             if own:
                 knots = np.unique(np.concatenate([function.knots for function in own]))
-                found.append((row, knots, any(len(function.kinks) for function in own)))
-        return tuple(found)
+                knotted.append((row, knots, any(len(function.kinks) for function in own)))
+        return tuple(knotted)
 
     @property
     def is_smooth(self) -> bool:
@@ -114,9 +114,9 @@ class CoordinateMap:
         for joint in self.curved:
             full[:, joint.row] = joint.start
             for source, function in joint.terms:
-                there = function(full[:, source])
-                full[:, joint.row] += there.value
-                speeds[:, joint.row] += there.slope * speeds[:, source]
+                values = function(full[:, source])
+                full[:, joint.row] += values.value
+                speeds[:, joint.row] += values.slope * speeds[:, source]
         for ball in self.balls:
             speeds[:, ball.rows] = ball.rates(shapes, rates)
         return full, speeds
@@ -145,10 +145,10 @@ class CoordinateMap:
         changes = np.zeros_like(slopes)
         for joint in self.curved:
             for source, function in joint.terms:
-                there = function(full[:, source])
-                slopes[:, joint.row] += there.slope[:, None] * slopes[:, source]
-                bent = (there.bend * speeds[:, source])[:, None] * slopes[:, source]
-                changes[:, joint.row] += bent + there.slope[:, None] * changes[:, source]
+                values = function(full[:, source])
+                slopes[:, joint.row] += values.slope[:, None] * slopes[:, source]
+                bent = (values.bend * speeds[:, source])[:, None] * slopes[:, source]
+                changes[:, joint.row] += bent + values.slope[:, None] * changes[:, source]
         for ball in self.balls:
             slopes[:, ball.rows, ball.columns] = ball.slopes(shapes)
             changes[:, ball.rows, ball.columns] = ball.hinge_slope_rates(shapes, rates)
@@ -171,9 +171,9 @@ def coordinate_map(
     names = tuple(row for name in joints for row in (rate_names(name) if name in balls else [name]))
     free = [name for name in joints if name not in couplings]
     independent = tuple(part for name in free for part in (coordinate_names(name) if name in balls else [name]))
-    for each in (names, independent):
-        for name in each:
-            if balls and each.count(name) > 1:
+    for group in (names, independent):
+        for name in group:
+            if balls and group.count(name) > 1:
                 raise ModelFileError(f"joint {name!r} has the name of a part of a ball joint; rename one of them")
     place = {name: row for row, name in enumerate(names)}
     columns = {name: column for column, name in enumerate(independent)}
@@ -205,7 +205,7 @@ def _ordered(names: tuple[str, ...], couplings: Mapping[str, Coupling]) -> list[
     """The joints that follow others, each behind those that it follows."""
     waiting = [name for name in names if name in couplings]
     known = set(names) - set(waiting)
-    found: list[str] = []
+    ordered: list[str] = []
     for name in waiting:
         for driver in couplings[name].drivers:
             if driver not in names:
@@ -214,10 +214,10 @@ def _ordered(names: tuple[str, ...], couplings: Mapping[str, Coupling]) -> list[
         ready = [name for name in waiting if known.issuperset(couplings[name].drivers)]
         if not ready:
             raise ModelFileError(f"joints follow each other in a circle: {', '.join(map(repr, waiting))}")
-        found += ready
+        ordered += ready
         known.update(ready)
         waiting = [name for name in waiting if name not in known]
-    return found
+    return ordered
 
 
 def _straight(function: JointFunction) -> bool:

@@ -105,8 +105,8 @@ class Coupling:
     def at(self, coordinates: dict[str, float]) -> float:
         """The coordinate where those of the drivers are known [rad or m]."""
         check_mapping(coordinates, "coordinates", "joint -> coordinate")
-        found = (float(function(np.array(coordinates[name])).value) for name, function in self.terms)
-        return self.start + sum(found)
+        values = (float(function(np.array(coordinates[name])).value) for name, function in self.terms)
+        return self.start + sum(values)
 
     def rate(self, coordinates: dict[str, float], rates: dict[str, float]) -> float:
         """The rate where coordinates and rates of the drivers are known [rad/s or m/s]."""

@@ -88,9 +88,9 @@ class JointMap:
         """Rate limits of the independent joints that their followers' limits allow; zero means none: (n,)."""
         stated = np.where((stated > 0.0) & (stated < _NO_LIMIT), stated, np.inf)
         factors = np.abs(self.follows.matrix)
-        each = np.full(factors.shape, np.inf)
-        np.divide(stated[:, None], factors, out=each, where=factors > 0.0)
-        least = each.min(axis=0, initial=np.inf)
+        allowed = np.full(factors.shape, np.inf)
+        np.divide(stated[:, None], factors, out=allowed, where=factors > 0.0)
+        least = allowed.min(axis=0, initial=np.inf)
         place = {name: column for column, name in enumerate(self.names)}
         for joint in self.follows.curved:
             for source, function in joint.terms:
@@ -126,11 +126,11 @@ class JointMap:
 
     def accelerations(self, shapes: Array, rates: Array, accelerations: Array) -> Array:
         """Pinocchio's accelerations with the base at rest: (N, n), (N, n), (N, n) -> (N, nv)."""
-        found = self.velocities(shapes, accelerations)
+        slopes = self.velocities(shapes, accelerations)
         if not self.follows.is_linear:
             bent = (self._slope_rates(shapes, rates) @ rates[..., None])[..., 0]
-            found[:, _BASE + self._velocity_index] += bent
-        return found
+            slopes[:, _BASE + self._velocity_index] += bent
+        return slopes
 
     def independent_rates(self, shapes: Array, rates: Array) -> Array:
         """Rates of the independent joints, for ball joints the angular velocity: (N, n), (N, n) -> (N, m)."""
@@ -138,12 +138,12 @@ class JointMap:
 
     def frames(self, shapes: Array) -> Array:
         """Derivatives of the shape at unit rates of the independent joints: (N, n) -> (N, n, m)."""
-        found = np.repeat(self.follows.matrix[self._own_rows].T[None], len(shapes), axis=0)
+        frames = np.repeat(self.follows.matrix[self._own_rows].T[None], len(shapes), axis=0)
         place = {row: column for column, row in enumerate(self._own_rows.tolist())}
         for ball in self.follows.balls:
             first = place[ball.row]
-            found[:, ball.columns, first : first + len(RATES)] = ball.frame(shapes)
-        return found
+            frames[:, ball.columns, first : first + len(RATES)] = ball.frame(shapes)
+        return frames
 
     def columns(self, joints: Array, shapes: Array) -> Array:
         """Columns of Pinocchio's joints, base left out, folded into the independent: (N, ..., m) -> (N, ..., n)."""

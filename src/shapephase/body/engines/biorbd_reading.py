@@ -321,7 +321,7 @@ def _add_way(chain: Chain, way: list[Any]) -> None:
 
 def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float] | None]]:
     """Slides, then hinges or a ball joint, each moved by those before it."""
-    ranges = [[found.min(), found.max()] for found in segment.QRanges()]
+    ranges = [[interval.min(), interval.max()] for interval in segment.QRanges()]
     kinds = [("prismatic", axis) for axis in segment.seqT().to_string()]
     kinds += [("revolute", axis) for axis in segment.seqR().to_string()]
     words = {"prismatic": "Trans", "revolute": "Rot"}
@@ -377,15 +377,15 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
     tensors = np.array([part.inertia().to_array() for part in traits])
 
     def frames(shape: dict[str, float]) -> Array:
-        there = biorbd.GeneralizedCoordinates(coordinates(shape))
-        return np.array([frame.to_array() for frame in model.allGlobalJCS(there)])
+        state = biorbd.GeneralizedCoordinates(coordinates(shape))
+        return np.array([frame.to_array() for frame in model.allGlobalJCS(state)])
 
     def poses(shape: dict[str, float]) -> tuple[Array, Array]:
         own = frames(shape)[numbers]
         return own[:, :3, 3] + (own[:, :3, :3] @ offsets[:, :, None])[:, :, 0], own[:, :3, :3]
 
     for shape, rate in chain.random_shapes():
-        there, v = biorbd.GeneralizedCoordinates(coordinates(shape)), np.zeros(model.nbQdot())
+        state, v = biorbd.GeneralizedCoordinates(coordinates(shape)), np.zeros(model.nbQdot())
         for name in names[: len(v)]:
             v[names.index(name)] = rate.get(name, 0.0)
         velocities = biorbd.GeneralizedVelocity(v)
@@ -396,7 +396,7 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
             coarse = max(tolerance, _COARSE)
         else:
             # Part by part: not all segments need belong to the body.
-            speeds = np.array([s.to_array() for s in model.CoMdotBySegment(there, velocities, True)])[numbers]
-            omega = np.array([model.segmentAngularVelocity(there, velocities, k, False).to_array() for k in numbers])
+            speeds = np.array([s.to_array() for s in model.CoMdotBySegment(state, velocities, True)])[numbers]
+            omega = np.array([model.segmentAngularVelocity(state, velocities, k, False).to_array() for k in numbers])
         inertia, momentum = inertia_and_momentum(masses, tensors, *poses(shape), speeds, omega)
         chain.add_pose(shape, rate, root.T @ inertia @ root, root.T @ momentum, (tolerance, coarse))

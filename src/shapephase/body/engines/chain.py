@@ -6,7 +6,7 @@ This module and the readers beside it run in the child process.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
@@ -75,7 +75,7 @@ class Chain:
         child: str,
         place: Array,
         turn: Array,
-        axes: list[tuple[str, str, Array, list[float] | None]],
+        axes: Sequence[tuple[str, str, Array, list[float] | None]],
         line: int = 1,
     ) -> None:
         """Add the joints between two links, each moved by the one before it.
@@ -115,9 +115,10 @@ class Chain:
                 f"joint {name!r}: the lower limit {lower:g} is not below the upper one, {upper:g}", line
             )
         # Copies, as engines change their arrays.
-        vectors = (np.array(vector).ravel() for vector in (axis, np.zeros(3) if after is None else after))
-        frame = np.array(place).ravel(), np.array(turn).reshape(3, 3)
-        self.joints.append(Joint(name, str(line), kind, parent, child, *frame, *vectors, (lower, upper)))
+        after = np.zeros(3) if after is None else after
+        place, axis, after = (np.array(vector).ravel() for vector in (place, axis, after))
+        turn = np.array(turn).reshape(3, 3)
+        self.joints.append(Joint(name, str(line), kind, parent, child, place, turn, axis, after, (lower, upper)))
 
     def moving(self) -> list[str]:
         """Names of the coordinates of joints that follow no other; a ball joint has four."""

@@ -69,7 +69,7 @@ def _asset_of(written: mujoco.MjSpec, message: str, left: dict[str, tuple[str, s
             file = _file_of(asset)
             if not file or f"{kind} {asset.name!r}" in left:
                 continue
-            if missing and PurePath(missing[1]).name in {PurePath(one).name for one in _files_of(asset)}:
+            if missing and PurePath(missing[1]).name in {PurePath(path).name for path in _files_of(asset)}:
                 return kind, asset
             if element and element[1] == asset.name:
                 return kind, asset
@@ -115,10 +115,10 @@ def _check_masses(
     masses = [np.array(getattr(model, name)) for name in _OF_MASS]
     for mesh in meshes:
         _shape(mesh, _EDGES[1])
-    other = written.compile()
+    larger = written.compile()
     changed = np.zeros(model.nbody, dtype=bool)
     for name, before in zip(_OF_MASS, masses, strict=True):
-        changed |= (np.array(getattr(other, name)) != before).reshape(model.nbody, -1).any(axis=1)
+        changed |= (np.array(getattr(larger, name)) != before).reshape(model.nbody, -1).any(axis=1)
     if not changed.any():
         return
     body = int(np.argmax(changed))

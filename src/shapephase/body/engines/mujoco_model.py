@@ -57,11 +57,11 @@ class Compiled:
 
     def below(self, base: int) -> list[int]:
         """A body and all that hang on it, parents first."""
-        found = {base}
+        reached = {base}
         for body in range(base + 1, self.model.nbody):
-            if int(self.model.body_parentid[body]) in found:
-                found.add(body)
-        return sorted(found)
+            if int(self.model.body_parentid[body]) in reached:
+                reached.add(body)
+        return sorted(reached)
 
     def joints_of(self, body: int) -> range:
         """Numbers of the joints between a body and the one it hangs on."""
@@ -127,10 +127,10 @@ def _check_passed_over(content: bytes, path: str) -> None:
 
 def _line(message: str, name: str, lines: list[str]) -> int:
     """Line at which the element of this name begins; 1 if it is not in these lines."""
-    found = re.search(r"line (\d+)", message)
-    number = int(found[1]) if found else 1
-    here = 0 < number <= len(lines) and name in "\n".join(lines[number - 1 : number - 1 + _TAG_LINES])
-    return number if here else 1
+    match = re.search(r"line (\d+)", message)
+    number = int(match[1]) if match else 1
+    inside = 0 < number <= len(lines) and name in "\n".join(lines[number - 1 : number - 1 + _TAG_LINES])
+    return number if inside else 1
 
 
 def _refused(message: str, text: str) -> UnusableModelError:
@@ -142,8 +142,8 @@ def _refused(message: str, text: str) -> UnusableModelError:
     element, number = "<mujoco>", 1
     if at:
         number = int(at[3] or 1)
-        here = "\n".join(text.splitlines()[number - 1 : number - 1 + _TAG_LINES])
-        tag = re.search(rf"<(\w+)[^<>]*\bname\s*=\s*[\"']{re.escape(at[2])}[\"']", here)
+        lines = "\n".join(text.splitlines()[number - 1 : number - 1 + _TAG_LINES])
+        tag = re.search(rf"<(\w+)[^<>]*\bname\s*=\s*[\"']{re.escape(at[2])}[\"']", lines)
         named = f"{tag[1]} {at[2]!r}" if tag else f"<mujoco>, element {at[2]!r}"
         element = f"<{at[2]}>" if not at[1] else named if at[2] else element
     if number == 0:
@@ -221,10 +221,10 @@ def _rigid_part(compiled: Compiled, body: int) -> tuple[list[int], list[int]]:
 
 def _between(compiled: Compiled, above: int, below: int) -> list[int]:
     """The bodies between one and another that hangs on it, from above; without both."""
-    found = [int(compiled.model.body_parentid[below])]
-    while found[-1] != above:
-        found.append(int(compiled.model.body_parentid[found[-1]]))
-    return found[-2::-1]
+    bodies = [int(compiled.model.body_parentid[below])]
+    while bodies[-1] != above:
+        bodies.append(int(compiled.model.body_parentid[bodies[-1]]))
+    return bodies[-2::-1]
 
 
 def _only_tree(compiled: Compiled, notes: list[str]) -> int:
@@ -236,10 +236,10 @@ def _only_tree(compiled: Compiled, notes: list[str]) -> int:
     moving = [body for body in tops if any(len(compiled.joints_of(part)) for part in compiled.below(body))]
     trees = moving or tops
     if len(trees) > 1:
-        found = [repr(names[body]) for body in trees]
+        moved = [repr(names[body]) for body in trees]
         raise UnusableModelError(
-            f"body {found[1]}: {len(trees)} bodies in the world, one is a free body: {listed(found, 20)}; choose one "
-            f"by root_body={found[0]} (--root-body {names[trees[0]]})",
+            f"body {moved[1]}: {len(trees)} bodies in the world, one is a free body: {listed(moved, 20)}; choose one "
+            f"by root_body={moved[0]} (--root-body {names[trees[0]]})",
             compiled.line(trees[1]),
         )
     left = [repr(names[body]) for body in tops if body != trees[0] and model.body_subtreemass[body] > 0.0]

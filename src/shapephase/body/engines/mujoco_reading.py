@@ -192,10 +192,10 @@ def _check_carried(compiled: Compiled, own: set[int]) -> None:
     """Raise UnusableModelError where parts outside the body are tied to it, or soft parts are among its own."""
     model = compiled.model
     for number in _active(model, _CONNECT, _WELD):
-        one, other = _held(model, number)
-        outside = other if one in own else one
-        if (one in own) != (other in own) and model.body_treeid[outside] >= 0:
-            inside = one if one in own else other
+        first_body, second_body = _held(model, number)
+        outside = second_body if first_body in own else first_body
+        if (first_body in own) != (second_body in own) and model.body_treeid[outside] >= 0:
+            inside = first_body if first_body in own else second_body
             raise UnusableModelError(
                 f"body {compiled.names[inside]!r}: the equality {_equality(model, number)} makes it carry "
                 f"{compiled.names[outside]!r}, which is not part of the free body; remove one of them",
@@ -222,12 +222,12 @@ def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, st
     model = compiled.model
     notes: list[str | tuple[str, str, str]] = []
     for number in _active(model, _CONNECT, _WELD):
-        one, other = _held(model, number)
-        pair = f"{compiled.names[one]!r} and {compiled.names[other]!r}"
+        first_body, second_body = _held(model, number)
+        pair = f"{compiled.names[first_body]!r} and {compiled.names[second_body]!r}"
         named = _equality(model, number)
-        if one in own and other in own:
+        if first_body in own and second_body in own:
             notes.append(("equality", f"{named} of {pair}", "ignored, every joint moves on its own"))
-        elif one in own or other in own:
+        elif first_body in own or second_body in own:
             notes.append(("equality", f"{named} of {pair}", "ignored, the body is free"))
     tendons = [tendon for tendon in range(model.ntendon) if _led_over(model, tendon) & own]
     if tendons:
@@ -246,14 +246,14 @@ def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, st
 def _led_over(model: Any, tendon: int) -> set[int]:
     """The bodies of its joints and sites."""
     first = int(model.tendon_adr[tendon])
-    found = set()
+    bodies = set()
     for wrap in range(first, first + int(model.tendon_num[tendon])):
         kind, number = int(model.wrap_type[wrap]), int(model.wrap_objid[wrap])
         if kind == _BY_JOINT:
-            found.add(int(model.jnt_bodyid[number]))
+            bodies.add(int(model.jnt_bodyid[number]))
         elif kind == _BY_SITE:
-            found.add(int(model.site_bodyid[number]))
-    return found
+            bodies.add(int(model.site_bodyid[number]))
+    return bodies
 
 
 # ---- What MuJoCo computes -------------------------------------------------------------------------------------------

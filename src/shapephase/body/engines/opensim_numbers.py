@@ -46,12 +46,12 @@ def value_and_slope(function: Any, places: list[float]) -> list[float]:
     where = engine().Vector(len(places), 0.0)
     for k, place in enumerate(places):
         where.set(k, place)
-    found = [function.calcValue(where)]
+    results = [function.calcValue(where)]
     for k in range(len(places)):
         which = engine().StdVectorInt()
         which.append(k)
-        found.append(function.calcDerivative(which, where))
-    return found
+        results.append(function.calcDerivative(which, where))
+    return results
 
 
 def pose_of(transform: Any) -> tuple[Array, Array]:

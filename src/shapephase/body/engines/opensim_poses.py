@@ -24,8 +24,8 @@ def add_poses(
     rules = _rules(bare)
     for components in (bare.updForceSet(), bare.updControllerSet(), bare.updConstraintSet(), bare.updProbeSet()):
         components.clearAndDestroy()
-    found = bare.updCoordinateSet()
-    known = {found.get(k).getName(): found.get(k) for k in range(found.getSize())}
+    coordinate_set = bare.updCoordinateSet()
+    known = {coordinate_set.get(k).getName(): coordinate_set.get(k) for k in range(coordinate_set.getSize())}
     for coordinate in known.values():
         coordinate.setDefaultLocked(False)
         coordinate.setDefaultClamped(False)
@@ -77,22 +77,22 @@ def _of_all(
     rules: Mapping[str, tuple[Any, list[str]]],
 ) -> dict[str, tuple[float, float]]:
     """Values and speeds of all coordinates but the base's; dependent ones by OpenSim's own functions."""
-    found: dict[str, tuple[float, float]] = {}
+    states: dict[str, tuple[float, float]] = {}
 
     def find(name: str) -> tuple[float, float]:
-        if name not in found:
+        if name not in states:
             locked = coordinates[name]
             if locked is not None:
-                found[name] = locked, 0.0
+                states[name] = locked, 0.0
             elif name in rules:
                 function, drivers = rules[name]
-                there = [find(driver) for driver in drivers]
-                value, *slopes = value_and_slope(function, [value for value, _ in there])
-                found[name] = value, sum(s * speed for s, (_, speed) in zip(slopes, there, strict=True))
+                leaders = [find(driver) for driver in drivers]
+                value, *slopes = value_and_slope(function, [value for value, _ in leaders])
+                states[name] = value, sum(s * speed for s, (_, speed) in zip(slopes, leaders, strict=True))
             else:
-                found[name] = shape.get(name, 0.0), rate.get(name, 0.0)
-        return found[name]
+                states[name] = shape.get(name, 0.0), rate.get(name, 0.0)
+        return states[name]
 
     for name in coordinates:
         find(name)
-    return found
+    return states

@@ -104,16 +104,16 @@ class _Reading:
 
     def _fault(self, message: str, name: str) -> UnusableModelError:
         """A fault at the first line that has an object of this name."""
-        before, found, _ = self._text.partition(f'name="{name}"')
-        return UnusableModelError(message, before.count("\n") + 1 if found else 1)
+        before, match, _ = self._text.partition(f'name="{name}"')
+        return UnusableModelError(message, before.count("\n") + 1 if match else 1)
 
     def _base_joint(self, root_body: str | None) -> Any:
         """The one joint to the ground. Raises UnusableModelError where there are several or none."""
         grounded = [joint for joint in self._joints if "ground" in ends(joint)]
         bodies = [ends(joint)[1] for joint in grounded]
         if root_body is not None and root_body not in bodies:
-            there = ", ".join(map(repr, bodies[:20])) or "none"
-            raise self._fault(f"root_body: {root_body[:60]!r} is not joined to the ground; there is {there}", "ground")
+            listed = ", ".join(map(repr, bodies[:20])) or "none"
+            raise self._fault(f"root_body: {root_body[:60]!r} is not joined to the ground; there is {listed}", "ground")
         if len(grounded) != 1 and root_body is None:
             named = ", ".join(repr(joint.getName()) for joint in grounded[:20]) or "none"
             most = max(bodies, key=lambda name: len(self._below(name)), default="")
@@ -141,7 +141,7 @@ class _Reading:
     def _below(self, root: str) -> set[str]:
         """Names of the bodies that hang on one, and its own."""
         reached, more = {root}, {root}
-        while more := {ends(one)[1] for one in self._joints if ends(one)[0] in more} - reached:
+        while more := {ends(joint)[1] for joint in self._joints if ends(joint)[0] in more} - reached:
             reached |= more
         return reached
 
@@ -151,14 +151,14 @@ class _Reading:
         reached = self._below(ends(self._base)[1])
         if len(reached) < len(bodies):
             self._chain.notes.append(f"{len(bodies) - len(reached)} bodies that hang elsewhere are left out")
-        self._joints = [one for one in self._joints if ends(one)[1] in reached]
+        self._joints = [joint for joint in self._joints if ends(joint)[1] in reached]
         return [body for body in bodies if body.getName() in reached]
 
     def _base_angles(self) -> tuple[list[str], str] | None:
         """The angles of the base, where each turns about one of the ground's axes as the others have turned it."""
         joint = engine().CustomJoint.safeDownCast(self._base)
         frames = (self._base.getParentFrame(), self._base.getChildFrame())
-        if joint is None or any(np.any(pose_of(one.findTransformInBaseFrame())[0] != np.eye(3)) for one in frames):
+        if joint is None or any(np.any(pose_of(frame.findTransformInBaseFrame())[0] != np.eye(3)) for frame in frames):
             return None
         names, turned = [], ""
         for k in range(3):
@@ -191,14 +191,14 @@ class _Reading:
 
     def _known_coordinates(self) -> dict[str, _Coordinate]:
         """By name; those of the base are not among them."""
-        found: dict[str, _Coordinate] = {}
+        coordinates: dict[str, _Coordinate] = {}
         couplers = self._couplers()
         for joint in self._joints:
             for k in range(joint.numCoordinates() if joint is not self._base else 0):
                 coordinate = joint.get_coordinates(k)
                 name = coordinate.getName()
                 check_name(name, f"coordinate {name!r}", self._fault("", name).line)
-                if name in found:
+                if name in coordinates:
                     raise self._fault(f"two coordinates are named {name!r}; give each a name of its own", name)
                 if coordinate.getDefaultIsPrescribed():
                     self._chain.notes.append(("coordinate", repr(name), "prescribed in the file, free to move here"))
@@ -207,20 +207,20 @@ class _Reading:
                 locked = coordinate.getDefaultValue() if coordinate.getDefaultLocked() else None
                 sliding = coordinate.getMotionType() == engine().Coordinate.Translational
                 rule = None if locked is not None else couplers.get(name)
-                found[name] = _Coordinate(_SLIDE if sliding else _TURN, limits, locked, rule)
+                coordinates[name] = _Coordinate(_SLIDE if sliding else _TURN, limits, locked, rule)
         for name, rule in couplers.items():
-            if name not in found:
+            if name not in coordinates:
                 continue
             for driver, _ in rule.terms:
-                if driver not in found:
+                if driver not in coordinates:
                     raise self._fault(f"coordinate {name!r} follows {driver!r}, which is the base's or unknown", name)
-        if (name := circular({name: rule for name, rule in couplers.items() if name in found})) is not None:
+        if (name := circular({name: rule for name, rule in couplers.items() if name in coordinates})) is not None:
             raise self._fault(f"coordinate {name!r} follows itself, by way of others; remove a coupler", name)
-        return found
+        return coordinates
 
     def _couplers(self) -> dict[str, Coupling]:
         """Couplings of coordinates that follow others."""
-        found = {}
+        couplers = {}
         constraints = self._model.getConstraintSet()
         for k in range(constraints.getSize()):
             constraint = constraints.get(k)
@@ -234,32 +234,34 @@ class _Reading:
                 continue
             names = coupler.getIndependentCoordinateNames()
             drivers = [names.get(place) for place in range(names.getSize())]
-            found[coupler.getDependentCoordinateName()] = self._rule(coupler.getFunction(), drivers, coupler.getName())
-        return found
+            couplers[coupler.getDependentCoordinateName()] = self._rule(
+                coupler.getFunction(), drivers, coupler.getName()
+            )
+        return couplers
 
     def _own_axes(self, joint: Any) -> list[_Axis]:
         """The axes of a joint in the order in which they move what is behind them."""
         name, kind = joint.getName(), joint.getConcreteClassName()
         if kind == "CustomJoint":
             transform = engine().CustomJoint.safeDownCast(joint).getSpatialTransform()
-            found = [self._custom_axis(name, transform.getTransformAxis(k), k) for k in (3, 4, 5, 0, 1, 2)]
+            axes = [self._custom_axis(name, transform.getTransformAxis(k), k) for k in (3, 4, 5, 0, 1, 2)]
         elif kind in _KNOWN:
-            found = [
+            axes = [
                 _Axis(f"{name}_{k}", moves, axis, Coupling(0.0, ((joint.get_coordinates(place).getName(), _SAME),)))
                 for k, (moves, axis, place) in enumerate(_KNOWN[kind])
             ]
         else:
             raise self._fault(f"joint {name!r} is a {kind}; {', '.join(_KNOWN)} and CustomJoint are supported", name)
-        return found
+        return axes
 
     def _axes(self, joint: Any) -> list[_Axis]:
         """The axes of a joint of the body, with the values of locked coordinates."""
-        found = self._own_axes(joint)
-        for driver in (driver for axis in found for driver, _ in axis.rule.terms):
+        axes = self._own_axes(joint)
+        for driver in (driver for axis in axes for driver, _ in axis.rule.terms):
             if driver not in self._coordinates:
                 name = joint.getName()
                 raise self._fault(f"joint {name!r} follows coordinate {driver!r}, which is the base's or unknown", name)
-        return [axis._replace(rule=self._unlocked(axis.rule)) for axis in found]
+        return [axis._replace(rule=self._unlocked(axis.rule)) for axis in axes]
 
     def _custom_axis(self, joint: str, axis: Any, number: int) -> _Axis:
         names = axis.getCoordinateNames()
@@ -323,13 +325,13 @@ class _Reading:
 
     def _carriers(self, axes: dict[str, list[_Axis]]) -> dict[str, str]:
         """The axis, by its name, that is the joint of a coordinate: the first that goes as it does, or against it."""
-        found: dict[str, str] = {}
+        carriers: dict[str, str] = {}
         for axis in (axis for own in axes.values() for axis in own):
             terms = axis.rule.terms
             kind = self._coordinates[terms[0][0]].kind if len(terms) == 1 else ""
-            if kind == axis.kind and _sign(terms[0][1]) and terms[0][0] not in found:
-                found[terms[0][0]] = axis.name
-        return found
+            if kind == axis.kind and _sign(terms[0][1]) and terms[0][0] not in carriers:
+                carriers[terms[0][0]] = axis.name
+        return carriers
 
     def _add_bare_coordinates(self, base: str, axes: dict[str, list[_Axis]], carriers: dict[str, str]) -> None:
         """Joints that move nothing, on the base, of coordinates that others follow by curves alone."""

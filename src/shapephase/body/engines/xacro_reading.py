@@ -39,7 +39,7 @@ def text_of(path: str, packages: Sequence[str] = (), xacro_args: Mapping[str, st
     # Files that are included are named as seen from it.
     with contextlib.chdir(Path(path).parent):
         try:
-            found = XacroDoc.from_string(text, subargs=given, resolve_packages=False).dom.toxml()
+            expanded = XacroDoc.from_string(text, subargs=given, resolve_packages=False).dom.toxml()
         except MemoryError:
             raise
         except Exception as error:
@@ -54,7 +54,7 @@ def text_of(path: str, packages: Sequence[str] = (), xacro_args: Mapping[str, st
             f"<robot>: the file has no argument {unknown[0]!r}; it has {_listed(text)}. Type --xacro NAME:=VALUE "
             "with one of them (Python: xacro_args)"
         )
-    return found
+    return expanded
 
 
 def _texts(text: str) -> list[str]:
@@ -68,18 +68,18 @@ def _texts(text: str) -> list[str]:
 
 def _declared(text: str) -> dict[str, str | None]:
     """The arguments that the files declare, with their defaults."""
-    found: dict[str, str | None] = {}
-    for one in _texts(text):
-        for tag in _TAG.findall(one):
+    defaults: dict[str, str | None] = {}
+    for content in _texts(text):
+        for tag in _TAG.findall(content):
             attributes = {name: first or second for name, first, second in _ATTRIBUTE.findall(tag)}
             if "name" in attributes:
-                found.setdefault(attributes["name"], attributes.get("default"))
-    return found
+                defaults.setdefault(attributes["name"], attributes.get("default"))
+    return defaults
 
 
 def _named_in(text: str) -> set[str]:
     """The arguments that the files use, declared or not."""
-    return {name for one in _texts(text) for name in _USED.findall(one)}
+    return {name for content in _texts(text) for name in _USED.findall(content)}
 
 
 def _listed(text: str) -> str:

@@ -83,8 +83,8 @@ def _human(path: str, notes: list[str]) -> Any:
     except Exception as error:
         # The package raises bare exceptions.
         raise UnusableModelError(f"yeadon does not accept it: {' '.join(map(str, error.args))}") from None
-    found = (_STADIUM.search(str(doubt.message)) for doubt in doubts)
-    ratios = {one[1]: float(one[2]) for one in found if one}
+    matches = (_STADIUM.search(str(doubt.message)) for doubt in doubts)
+    ratios = {match[1]: float(match[2]) for match in matches if match}
     for level, ratio in ratios.items():
         if not 2.0 / _TYPO < ratio < _TYPO * math.pi:
             raise UnusableModelError(

@@ -111,15 +111,15 @@ class Skeleton:
 
         Every bone is at its OFFSET; axes are those of the room.
         """
-        found: dict[int, tuple[Array, Array]] = {}
-        for number in sorted({above for each in numbers for above in self.above(each)}):
+        poses: dict[int, tuple[Array, Array]] = {}
+        for number in sorted({above for bone in numbers for above in self.above(bone)}):
             turn, parent = self.turned(number, frames), self.bones[number].parent
             place = np.zeros((len(frames), 3))
             if parent is not None:
-                above_turn, above_place = found[parent]
+                above_turn, above_place = poses[parent]
                 turn, place = above_turn @ turn, above_place + above_turn @ self.bones[number].offset
-            found[number] = turn, place
-        return found
+            poses[number] = turn, place
+        return poses
 
     def base_motion(self, base: int) -> tuple[Array, Array | None]:
         """Turns (N, 3, 3) and places (N, 3) [units] of a bone in the room, those that it hangs on multiplied in.
@@ -135,15 +135,15 @@ class Skeleton:
 
     def below(self, number: int) -> list[int]:
         """The bones that hang on one."""
-        return [other for other, bone in enumerate(self.bones) if bone.parent == number]
+        return [child for child, bone in enumerate(self.bones) if bone.parent == number]
 
     def above(self, number: int) -> list[int]:
         """A bone and those it hangs on, up to the root."""
-        found, at = [], number
+        way, at = [], number
         while at is not None:
-            found.append(at)
+            way.append(at)
             at = self.bones[at].parent
-        return found
+        return way
 
 
 def is_bvh(content: bytes) -> bool:
@@ -356,7 +356,7 @@ def check_lengths(skeleton: Skeleton, numbers: Sequence[int]) -> None:
     for bone in (skeleton.bones[number] for number in numbers):
         if not bone.slides or not len(skeleton.frames):
             continue
-        axes, columns = (list(each) for each in zip(*bone.slides, strict=True))
+        axes, columns = (list(entries) for entries in zip(*bone.slides, strict=True))
         off = np.abs(skeleton.frames[:, columns] - bone.offset[axes]).max(axis=1)
         worst = int(np.argmax(off))
         if off[worst] > _STAYS * max(1.0, float(np.abs(bone.offset).max())):

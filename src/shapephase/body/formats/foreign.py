@@ -121,10 +121,10 @@ def _json_kind(content: bytes, head: bytes) -> str | None:
     if not head.lstrip().startswith((b"{", b"[")):
         return None
     try:
-        found: Any = json.loads(content)
+        data: Any = json.loads(content)
     except (ValueError, RecursionError):
         return None
-    keys = set(found) if isinstance(found, dict) else set()
+    keys = set(data) if isinstance(data, dict) else set()
     if "asset" in keys:
         return f"a glTF file: {_MESH}"
     if {"Frames", "frames"} & keys:

@@ -170,19 +170,19 @@ class _Layout:
         return best, whole[[best]]
 
     def _segments(self) -> list[Segment]:
-        found = self._torso()
+        segments = self._torso()
         for side in _SIDES:
             upper, forearm, thigh, shank, foot = (
                 self.bones[side, part] for part in ("upper_arm", "forearm", "thigh", "shank", "foot")
             )
-            found.append(self._between("upper_arm", upper, self.places[forearm]))
+            segments.append(self._between("upper_arm", upper, self.places[forearm]))
             wrist = self._wrist(side)
-            found.append(self._between("forearm", forearm, wrist))
-            found.append(self._hand(side, wrist))
-            found.append(self._between("thigh", thigh, self.places[shank]))
-            found.append(self._between("shank", shank, self.places[foot]))
-            found.append(self._foot(foot, float(np.linalg.norm(self.places[foot] - self.places[shank]))))
-        return found
+            segments.append(self._between("forearm", forearm, wrist))
+            segments.append(self._hand(side, wrist))
+            segments.append(self._between("thigh", thigh, self.places[shank]))
+            segments.append(self._between("shank", shank, self.places[foot]))
+            segments.append(self._foot(foot, float(np.linalg.norm(self.places[foot] - self.places[shank]))))
+        return segments
 
     def _torso(self) -> list[Segment]:
         """Pelvis, middle and chest along the line from the hips, and the head on its end."""
@@ -191,17 +191,17 @@ class _Layout:
         above = self.skeleton.above(pelvis)
         way = [pelvis, *(bone for bone in self.skeleton.above(chest)[::-1] if bone not in above)]
         whole = sum(_TABLE[part].length for part in _TRUNK)
-        found, top = [], self.trunk
+        segments, top = [], self.trunk
         for part in _TRUNK:
             row = _TABLE[part]
             length = self.trunk * row.length / whole
             height = top - row.centre * length
             top -= length
             carrier = {"upper_trunk": way[-1], "lower_trunk": pelvis}.get(part, self._reaching(way, height))
-            found.append(self._segment(part, carrier, self.hips + height * self.up, self.up, length))
+            segments.append(self._segment(part, carrier, self.hips + height * self.up, self.up, length))
         row, length = _TABLE["head"], self.trunk * _TABLE["head"].length / whole
         centre = self.hips + (self.trunk + (1.0 - row.centre) * length) * self.up
-        return [*found, self._segment("head", self._head(), centre, self.up, length)]
+        return [*segments, self._segment("head", self._head(), centre, self.up, length)]
 
     def _reaching(self, way: list[int], height: float) -> int:
         """The last bone of the trunk whose joint is not above a height over the hips."""
@@ -280,9 +280,9 @@ class _Layout:
         raise self._unknown("head", "Head")
 
     def _unknown(self, what: str, name: str) -> BvhFaultError:
-        there = ", ".join(bone.name for bone in self.skeleton.bones[:40])
+        names = ", ".join(bone.name for bone in self.skeleton.bones[:40])
         return BvhFaultError(
-            f"no bone is known as the {what} of a human; call it {name} in the file. There are: {there}",
+            f"no bone is known as the {what} of a human; call it {name} in the file. There are: {names}",
             self.skeleton.bones[0].line,
         )
 

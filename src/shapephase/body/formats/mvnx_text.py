@@ -237,7 +237,7 @@ class _Reader:
 
     def _joints(self) -> dict[int, tuple[int, Array]]:
         """Number of the child -> its parent and the joint's place there, by `Pelvis/jLeftHip` and its like."""
-        found: dict[int, tuple[int, Array]] = {}
+        joints: dict[int, tuple[int, Array]] = {}
         for ends in self.connections:
             parts = [end.partition("/") for end in ends]
             if len(parts) != 2 or any(name not in self.segments for name, _, _ in parts):
@@ -246,8 +246,8 @@ class _Reader:
             above = self.segments.index(parent)
             if point not in self.points[above]:
                 raise self.fault(f"joint {ends[0][:80]!r}: {parent} has no such point; export the file again")
-            found[self.segments.index(child)] = above, self.points[above][point]
-        return found
+            joints[self.segments.index(child)] = above, self.points[above][point]
+        return joints
 
 
 def suit_skeleton(suit: Suit) -> Skeleton:

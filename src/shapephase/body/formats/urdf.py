@@ -105,14 +105,14 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
     if (key := circular(couplings)) is not None:
         raise _mimic_fault(reading.mimics[key][0], f"joint {key!r}", "mimic joints follow each other in a circle")
     base = free_base(first, links, ordered, couplings, free)
-    found = {base.link: links[base.link]} | {joint.child: links[joint.child] for joint in base.joints}
+    kept = {base.link: links[base.link]} | {joint.child: links[joint.child] for joint in base.joints}
     # The parser of Pinocchio knows no ball joints, and makes links of mere frames.
     text = None
     if not frames and all(joint.kind != "ball" for joint in base.joints):
-        written = [("link", link) for link in found] + [("joint", joint.name) for joint in base.joints]
+        written = [("link", link) for link in kept] + [("joint", joint.name) for joint in base.joints]
         text = f"<robot name={quoteattr(name)}>{''.join(reading.text[key] for key in written)}</robot>"
     notes = (*grouped(reading.notes), *base.notes)
-    return LinkTree(name, found, base.joints, couplings, frames, notes, text, base_joints=base.way)
+    return LinkTree(name, kept, base.joints, couplings, frames, notes, text, base_joints=base.way)
 
 
 def rpy_matrix(rpy: Array) -> Array:
@@ -176,18 +176,18 @@ def _split_universal(root: Node, node: Node) -> str:
 
 def _named(root: Node, *tags: str) -> dict[str, Node]:
     """The links or joints by name."""
-    found: dict[str, Node] = {}
+    named: dict[str, Node] = {}
     for node in root.children:
         if node.tag not in tags:
             continue
         name = name_of(node)
-        if name in found:
+        if name in named:
             raise node.fault(
                 f"{tags[0]} {name!r}",
-                f"two <{node.tag}> elements have this name, the first in line {found[name].line}; rename one",
+                f"two <{node.tag}> elements have this name, the first in line {named[name].line}; rename one",
             )
-        found[name] = node
-    return found
+        named[name] = node
+    return named
 
 
 def _link(name: str, node: Node, reading: _Reading) -> Link:

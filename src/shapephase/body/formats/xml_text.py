@@ -184,18 +184,18 @@ def name_of(node: Node, name: str = "name") -> str:
 
 def child_of(node: Node, tag: str, owner: str) -> Node | None:
     """The only child of this tag, or None. Raises ModelFileError if there are several."""
-    found = node.all(tag)
-    if len(found) > 1:
-        raise found[1].fault(owner, f"{len(found)} <{tag}> elements, at most one is allowed; remove the others")
-    return found[0] if found else None
+    children = node.all(tag)
+    if len(children) > 1:
+        raise children[1].fault(owner, f"{len(children)} <{tag}> elements, at most one is allowed; remove the others")
+    return children[0] if children else None
 
 
 def needed_child(node: Node, tag: str, owner: str) -> Node:
     """The only child of this tag. Raises ModelFileError."""
-    found = child_of(node, tag, owner)
-    if found is None:
+    child = child_of(node, tag, owner)
+    if child is None:
         raise node.fault(owner, f"<{node.tag}> has no <{tag}>; add it")
-    return found
+    return child
 
 
 def known_attributes(node: Node, names: Sequence[str], owner: str) -> None:

@@ -227,9 +227,9 @@ def particle_body(
     if len(of_each) != len(names) or not set(of_each) <= {"rad", "m"}:
         raise ShapeError(f'units: "rad" or "m", of all or of each of {len(names)}, are needed, got {what_came(units)}')
     endless = names_argument(continuous, "continuous", "names of parameters in a list")
-    for one in endless:
-        if one not in names:
-            raise unknown_name("parameter", one, names)
+    for parameter in endless:
+        if parameter not in names:
+            raise unknown_name("parameter", parameter, names)
     if is_casadi_function(places):
         function = CasadiPositions(places, len(names), len(weights))
     elif callable(places) and not isinstance(places, type):
@@ -239,7 +239,7 @@ def particle_body(
             f"places: a function of shapes that gives places and derivatives is needed, got {what_came(places)}"
         )
     limits = np.tile([-np.inf, np.inf], (len(names), 1))
-    turning = np.array([one in endless for one in names], dtype=bool)
+    turning = np.array([parameter in endless for parameter in names], dtype=bool)
     return ParticleBody(
         masses=weights,
         joint_names=names,
@@ -265,12 +265,12 @@ class _Given:
         return places, slopes
 
     def _returned(self, rows: Array) -> tuple[Array, Array]:
-        found = self.function(rows)
-        if not isinstance(found, tuple | list) or len(found) != 2:
+        pair = self.function(rows)
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
             raise ShapeError(
-                f"places: a pair, places and their derivatives, must be returned for shapes, got {what_came(found)}"
+                f"places: a pair, places and their derivatives, must be returned for shapes, got {what_came(pair)}"
             )
-        places, slopes = finite_array(found[0], "places", unit="m"), finite_array(found[1], "derivatives of places")
+        places, slopes = finite_array(pair[0], "places", unit="m"), finite_array(pair[1], "derivatives of places")
         expected = (len(rows), self.particles, 3), (len(rows), rows.shape[1], self.particles, 3)
         if (places.shape, slopes.shape) != expected:
             raise ShapeError(
