@@ -14,10 +14,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.body.engines import engine_tree as asking
 from shapephase.body.engines.formats import format_of
-from shapephase.body.engines.reading import MISSING, NO_MEMORY
-from shapephase.errors import IgnoredElementWarning, MissingExtraError, ModelFileError
+from shapephase.errors import IgnoredElementWarning, ModelFileError
 from support.engine_files import ACROBAT, MASSLESS_ROOT, measured
 
 # That a file is read in a process of its own is left to test_published_flights.py and the README's bodies.
@@ -414,43 +412,3 @@ def test_formats_are_told_by_content(tmp_path):
     assert format_of(measured().encode()) == "yeadon"
     assert format_of(b"<robot name='version 4'/>") is None
     assert loaded(tmp_path, ACROBAT, "person.urdf").n_shape == 6
-
-
-@pytest.mark.parametrize(
-    ("ended", "error", "message"),
-    [
-        (MISSING, MissingExtraError, r"biorbd reads: pip install 'shapephase\[biomod\]'"),
-        (NO_MEMORY, ModelFileError, "biorbd took more than 1024 MiB and was stopped"),
-        (-11, ModelFileError, "biorbd crashed on it, signal 11"),
-        (1, ModelFileError, "biorbd does not read it: it broke"),
-    ],
-)
-def test_an_engine_that_fails(tmp_path, monkeypatch, ended, error, message):
-    ends = subprocess.CompletedProcess([], ended, b"", b"Traceback\nit broke\n")
-    monkeypatch.setattr(asking, "run_alone", lambda *_: ends)
-    with pytest.raises(error, match=message):
-        loaded(tmp_path, ACROBAT)
-
-
-def test_an_engine_that_hangs(tmp_path, monkeypatch):
-    def hangs(*_):
-        raise subprocess.TimeoutExpired("biorbd", 60.0)
-
-    monkeypatch.setattr(asking, "run_alone", hangs)
-    with pytest.raises(ModelFileError, match="took more than 60 s and was stopped"):
-        loaded(tmp_path, ACROBAT)
-
-
-def test_a_body_that_is_not_the_engines_is_not_handed_out(tmp_path, monkeypatch):
-    """What the engine computes is held against the body: a momentum of the wrong sign does not pass."""
-    real = asking.run_alone
-
-    def turned(*arguments):
-        done = real(*arguments)
-        said = json.loads(done.stdout)
-        said["poses"][-1]["momentum"] = [-value for value in said["poses"][-1]["momentum"]]
-        return subprocess.CompletedProcess([], 0, json.dumps(said).encode(), b"")
-
-    monkeypatch.setattr(asking, "run_alone", turned)
-    with pytest.raises(ModelFileError, match="another momentum than the engine"):
-        loaded(tmp_path, ACROBAT)

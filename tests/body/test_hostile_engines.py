@@ -41,6 +41,7 @@ ENDS = {
     "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)": "crashed on it, signal 11",
     "import time; time.sleep(60)": "took more than 2 s and was stopped",
     "import sys; sys.exit(1)": "does not read it: no reason given",
+    "import sys; sys.exit('first\\nit broke')": "does not read it: it broke",
     f"import sys; sys.exit({NO_MEMORY})": "took more than 1024 MiB and was stopped",
 }
 """What a reading process may do instead of an answer, and what is said of it."""
