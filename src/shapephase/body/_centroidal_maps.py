@@ -8,9 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from ..arrays import Array
-from .couplings.joint_map import JointMap
-
-_BASE = 6  # velocities of the free-flyer, first in Pinocchio's order: three of translation, three of rotation
+from .couplings.joint_map import BASE, JointMap
 
 
 def full_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
@@ -50,7 +48,7 @@ def momentum_gradients(
     gradients = np.empty((len(velocities), 3, model.nv))
     for row, (q, full) in enumerate(zip(joints.configurations(shapes), velocities, strict=True)):
         gradients[row] = pin.computeCentroidalDynamicsDerivatives(model, data, q, full, none)[0][3:]
-    columns = joints.columns(gradients[:, :, _BASE:], shapes)
+    columns = joints.columns(gradients[:, :, BASE:], shapes)
     if not joints.follows.is_linear:
         columns += joints.bent_rates(full_map(model, data, joints, shapes)[:, :, 3:], shapes, rates)
     return columns
@@ -58,7 +56,7 @@ def momentum_gradients(
 
 def internal_momenta(whole: Array, joints: JointMap, shapes: Array, rates: Array) -> Array:
     """L_o from full maps: (N, 3, 3 + joints), (N, n), (N, n) -> (N, 3)."""
-    return np.einsum("nij,nj->ni", whole[:, :, 3:], joints.velocities(shapes, rates)[:, _BASE:])
+    return np.einsum("nij,nj->ni", whole[:, :, 3:], joints.velocities(shapes, rates)[:, BASE:])
 
 
 def kinetic_energies(

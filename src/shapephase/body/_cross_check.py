@@ -16,11 +16,9 @@ from ..errors import ModelFileError
 from .body import Body
 from .couplings.ball_joints import coordinate_names
 from .couplings.coupling import with_followers
+from .engines.chain import EXACT, SEED
 from .link_tree import LinkTree
 from .virtual_base import joint_coordinates
-
-_TOLERANCE = 1e-12  # share of the largest terms of the sums: thousands of roundings
-_SEED = 20060518  # arbitrary, so that every loading compares at an equal shape
 
 
 def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
@@ -44,13 +42,13 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
         if own != expected:
             raise _differs(where, what, f"lost {sorted(expected - own)}", f"gained {sorted(own - expected)}")
     mass = sum(link.mass for link in tree.links.values())
-    _compare(where, "mass", body.mass, mass, _TOLERANCE * mass)
-    random = np.random.default_rng(_SEED)
+    _compare(where, "mass", body.mass, mass, EXACT * mass)
+    random = np.random.default_rng(SEED)
     shape, rate = random.uniform(-1.0, 1.0, (2, body.n_shape))
     by_name = [dict(zip(body.joint_names, values, strict=True)) for values in (shape.tolist(), rate.tolist())]
     inertia, momentum, extent, motion = inertia_and_momentum(tree, *by_name)
-    _compare(where, "inertia", body.locked_inertia(shape), inertia, _TOLERANCE * extent)
-    _compare(where, "momentum", body.internal_momentum(shape, rate), momentum, _TOLERANCE * motion)
+    _compare(where, "inertia", body.locked_inertia(shape), inertia, EXACT * extent)
+    _compare(where, "momentum", body.internal_momentum(shape, rate), momentum, EXACT * motion)
 
 
 def check_against_engine(body: Body, tree: LinkTree, poses: list[dict[str, Any]], where: str) -> None:

@@ -17,7 +17,7 @@ from ..arrays import Array, Integers, Mask, finite_array, lock_arrays, read_only
 from ..errors import ShapeError, UnphysicalInertiaError, UnphysicalInertiaWarning, unknown_name
 from ..inertia_tensor import second_moment
 from ..letters import what_came
-from .inertial_regressor import inertial_regressor
+from .inertial_regressor import OUTPUTS, PARAMETERS, inertial_regressor
 from .joint_chain import GEOMETRY, JointChain, inertial_numbers
 from .link_tree import LEAST_MASS, MOST_MASS, NEGATIVE, ROUNDING, TRIANGLE
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from .body import Body
 
 _AT_ONCE = 10_000_000  # numbers of regressors in one pass: 80 MB
-_OF_A_LINK = 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +91,7 @@ class BodyFamily(Sequence["Body"]):
     def sample(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
         """I and L_o of all along a trajectory: (S, n), (S, n) -> (N, S, 3, 3), (N, S, 3). Unchecked."""
         inertia, momentum = np.empty((len(self), len(shapes), 3, 3)), np.empty((len(self), len(shapes), 3))
-        at_once = max(1, _AT_ONCE // (_OF_A_LINK * self.masses.shape[1]))
+        at_once = max(1, _AT_ONCE // (PARAMETERS * OUTPUTS * self.masses.shape[1]))
         for first in range(0, len(shapes), at_once):
             part = slice(first, first + at_once)
             regressor = inertial_regressor(self.body.chain, shapes[part], rates[part])

@@ -13,17 +13,16 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from .joint_chain import JointChain
+from .joint_chain import FULL_FROM_SIX, JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 PARAMETERS = 10
 """Of a link, in its axes and about its centre of mass in the body that the matrices were made for: mass [kg],
 first moment (3) [kg m], inertia xx yy zz yz xz xy [kg m^2]."""
-_OUTPUTS = 15
+OUTPUTS = 15
 """About the point that is that body's centre of mass: inertia xx yy zz yz xz xy, angular momentum (3), first moment of
 mass (3), its rate (3)."""
 _VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-_MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +48,10 @@ class InertialRegressor:
         """
         given = parameters(masses, centres, inertias, self.centres)
         count = len(self.matrices)
-        sums = (given @ self.matrices.reshape(count * _OUTPUTS, -1).T).reshape(len(masses), count, _OUTPUTS)
+        sums = (given @ self.matrices.reshape(count * OUTPUTS, -1).T).reshape(len(masses), count, OUTPUTS)
         moment, rate = sums[..., 9:12], sums[..., 12:]
         whole = masses.sum(axis=-1)[:, None, None]
-        inertia = sums[..., :6][..., _MATRIX].reshape(*sums.shape[:2], 3, 3)
+        inertia = sums[..., :6][..., FULL_FROM_SIX].reshape(*sums.shape[:2], 3, 3)
         return inertia - _of_point(moment) / whole[..., None], sums[..., 6:9] - np.cross(moment, rate) / whole
 
 
@@ -67,7 +66,7 @@ def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> Inerti
     """
     links = link_motions(chain, shapes, rates)
     count, frames = links.places.shape[:2]
-    whole = np.zeros((count, frames, _OUTPUTS, PARAMETERS))
+    whole = np.zeros((count, frames, OUTPUTS, PARAMETERS))
     whole[..., 0] = np.concatenate(_of_masses(links), axis=-1)
     for axis in range(3):
         whole[..., 1 + axis] = np.concatenate(_of_first_moments(links, axis), axis=-1)
@@ -77,7 +76,7 @@ def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> Inerti
         tensor = turned if i == j else turned + so3.transpose(turned)
         whole[..., :6, 4 + entry] = _voigt(tensor)
         whole[..., 6:9, 4 + entry] = so3.apply(tensor, links.spins)
-    matrices = np.swapaxes(whole, 1, 2).reshape(count, _OUTPUTS, frames * PARAMETERS)
+    matrices = np.swapaxes(whole, 1, 2).reshape(count, OUTPUTS, frames * PARAMETERS)
     return InertialRegressor(np.ascontiguousarray(matrices), chain.centres)
 
 

@@ -11,8 +11,7 @@ from ..arguments import check_object
 from ..arrays import Array
 from .body import Body
 from .couplings.coordinate_map import check_smooth
-
-_BASE = 6  # velocities of the free-flyer, which come first in Pinocchio's order
+from .couplings.joint_map import BASE
 
 
 def falling_efforts(
@@ -39,7 +38,7 @@ def falling_efforts(
     states[2][:, :3] += model.gravity.linear
     whole = np.array([pin.rnea(model, data, *state) for state in zip(*states, strict=True)])
     whole = whole.reshape(len(shapes), model.nv)
-    return joints.columns(whole[:, _BASE:], shapes), whole[:, :_BASE]
+    return joints.columns(whole[:, BASE:], shapes), whole[:, :BASE]
 
 
 def floating_velocities(body: Body, shapes: Array, rates: Array, spins: Array) -> tuple[Array, Array]:
@@ -52,7 +51,7 @@ def floating_velocities(body: Body, shapes: Array, rates: Array, spins: Array) -
     configurations, velocities = joints.configurations(shapes), joints.velocities(shapes, rates)
     for row, (q, v) in enumerate(zip(configurations, velocities, strict=True)):
         pin.centerOfMass(model, data, q, v)
-        v[:3], v[3:_BASE] = -data.vcom[0] - _cross(spins[row], data.com[0]), spins[row]
+        v[:3], v[3:BASE] = -data.vcom[0] - _cross(spins[row], data.com[0]), spins[row]
     return configurations, velocities
 
 
@@ -76,8 +75,8 @@ def floating_states(
     for row, (q, v, a) in enumerate(zip(configurations, velocities, slopes, strict=True)):
         pin.centerOfMass(model, data, q, v, a)
         centre, speed, w = data.com[0].copy(), data.vcom[0].copy(), spins[row]
-        v[:3], v[3:_BASE] = -speed - _cross(w, centre), w
-        a[3:_BASE] = spin_rates[row]
+        v[:3], v[3:BASE] = -speed - _cross(w, centre), w
+        a[3:BASE] = spin_rates[row]
         a[:3] = -data.acom[0] - _cross(spin_rates[row], centre) - _cross(w, speed)
     return configurations, velocities, slopes
 

@@ -17,6 +17,8 @@ from .couplings.coordinate_map import CoordinateMap
 _BASE = 1  # Pinocchio's number of the free-flyer: joint 0 is the universe
 
 
+SIX_OF_FULL = [0, 4, 8, 5, 2, 1]  # xx yy zz yz xz xy among the nine entries of a tensor
+FULL_FROM_SIX = [0, 5, 4, 5, 1, 3, 4, 3, 2]  # the nine entries among these six
 NUMBERS = 22
 """In the row of a frame: its turn at rest in the parent's axes (9, row by row), its place there (3) [m]; then of what
 moves with it the mass [kg], the centre of mass (3) [m] and the inertia about that (xx yy zz yz xz xy) [kg m^2]."""
@@ -57,16 +59,9 @@ class LinkRows:
         bases, result = np.asarray(self.bases, dtype=np.float64), derivatives.copy()
         result[..., 1:4] = (bases @ derivatives[..., 1:4, None])[..., 0]
         # An entry off the diagonal of a tensor stands there twice.
-        tensors = derivatives[..., [4, 9, 8, 9, 5, 7, 8, 7, 6]] * [1.0, 0.5, 0.5, 0.5, 1.0, 0.5, 0.5, 0.5, 1.0]
+        tensors = derivatives[..., 4:][..., FULL_FROM_SIX] * (0.5 + 0.5 * np.eye(3)).ravel()
         turned = bases @ tensors.reshape(*derivatives.shape[:2], 3, 3) @ np.swapaxes(bases, -1, -2)
-        result[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., [0, 4, 8, 5, 2, 1]] * [
-            1.0,
-            1.0,
-            1.0,
-            2.0,
-            2.0,
-            2.0,
-        ]
+        result[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., SIX_OF_FULL] * np.repeat([1.0, 2.0], 3)
         return result
 
 
@@ -250,7 +245,7 @@ def rows_with(rows: LinkRows, masses: Array, centres: Array, inertias: Array) ->
 def inertial_numbers(bases: Any, masses: Array, centres: Array, inertias: Array) -> Array:
     """Entries of rows that depend on masses: (..., k + 1), (..., k + 1, 3), (..., k + 1, 3, 3) -> (..., k + 1, 10)."""
     back = np.swapaxes(bases, -1, -2)
-    turned = (back @ inertias @ bases).reshape(*masses.shape, 9)[..., [0, 4, 8, 5, 2, 1]]
+    turned = (back @ inertias @ bases).reshape(*masses.shape, 9)[..., SIX_OF_FULL]
     return np.concatenate([masses[..., None], (back @ centres[..., None])[..., 0], turned], axis=-1).astype(float)
 
 

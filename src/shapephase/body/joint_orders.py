@@ -20,7 +20,6 @@ TITLES = {
     ISAAC_BY_NAME: "breadth first, joints of one link by their names",
     OWN: "the order of the body",
 }
-_SCALAR_FIRST = (3, 0, 1, 2)  # simulators write w x y z
 
 
 def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:
@@ -59,7 +58,8 @@ def _coordinates(joints: Iterable[Joint]) -> tuple[str, ...]:
     coordinates: list[str] = []
     for joint in joints:
         names = joint_coordinates(joint)
-        coordinates += [names[k] for k in _SCALAR_FIRST] if joint.kind == "ball" else names
+        # Simulators write w x y z.
+        coordinates += names[-1:] + names[:-1] if joint.kind == "ball" else names
     return tuple(coordinates)
 
 

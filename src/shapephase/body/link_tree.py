@@ -24,8 +24,7 @@ MOST_MASS = 1e30  # [kg], and [kg m^2] for moments: their squares are still fini
 TRIANGLE = 1e-3  # of the largest moment, above the sum of the others: files round their moments
 NEGATIVE = 1e-6  # of the largest moment, below zero: six digits of a thin body
 ROUNDING = 1e-12  # of the body's largest moment: what rounding leaves of zero
-_LEAST_RADIUS = 1e-4  # [m] of gyration: below, moments are probably not in kg m^2
-_MOST_RADIUS = 10.0  # [m] of gyration: above, lengths are probably in millimetres
+_RADII = (1e-4, 10.0)  # [m] of gyration: outside, moments are probably not in kg m^2, or lengths in millimetres
 _HOLLOW = 0.01  # of the body's inertia about an axis, in links without mass: some files give dummies a little
 _HEAVY = 1e5  # [kg] of a link: above, masses are probably in grams
 
@@ -210,14 +209,14 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     # A radius from the largest moment: a rod may be as thin as it likes.
     radius = np.sqrt(np.maximum(moments[:, 2], 0.0) / np.where(masses > 0.0, masses, np.inf))
     real = (masses > 0.0) & (moments[:, 2] > floor)
-    strange = (real & ((radius > _MOST_RADIUS) | (radius < _LEAST_RADIUS))) | (masses > _HEAVY)
+    strange = (real & ((radius > _RADII[1]) | (radius < _RADII[0]))) | (masses > _HEAVY)
     kinds = (
         (negative, "a negative principal moment"),
         (broken, "principal moments that break the triangle inequality: no distribution of mass has them"),
         (
             strange,
-            f"a mass above {_HEAVY:g} kg, or a radius of gyration above {_MOST_RADIUS:g} m or below "
-            f"{_LEAST_RADIUS:g} m; the units are kg, m and kg m^2",
+            f"a mass above {_HEAVY:g} kg, or a radius of gyration above {_RADII[1]:g} m or below "
+            f"{_RADII[0]:g} m; the units are kg, m and kg m^2",
         ),
     )
     doubts = []

@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from .joint_chain import JointChain
+from .joint_chain import FULL_FROM_SIX, SIX_OF_FULL, JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 
@@ -69,7 +69,7 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     link_sums = _link_sums(chain, links)
     sums, at = _carried(chain, link_sums), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
     inertia, momentum = link_sums[9:].sum(axis=-1), link_sums[6:9].sum(axis=-1)
-    tensors = np.moveaxis(inertia[[0, 5, 4, 5, 1, 3, 4, 3, 2]], 0, -1).reshape(-1, 3, 3)
+    tensors = np.moveaxis(inertia[FULL_FROM_SIX], 0, -1).reshape(-1, 3, 3)
     spin = -np.linalg.solve(tensors, momentum.T[..., None])[..., 0].T[:, :, None]
     drift = sums.drift + cross(spin, sums.moment)
     whole = spin + at.spins
@@ -129,7 +129,7 @@ def _link_sums(chain: JointChain, links: LinkMotions) -> Array:
     momentum and inertia."""
     places, speeds, spins = (components(vectors) for vectors in (links.places, links.speeds, links.spins))
     own = components((links.turns @ chain.inertias @ so3.transpose(links.turns)).reshape(*places.shape[1:], 9))
-    own = own[[0, 4, 8, 5, 2, 1]]
+    own = own[SIX_OF_FULL]
     moment = chain.masses * places
     whole = np.empty((15, *places.shape[1:]))
     whole[:3], whole[3:6] = moment, chain.masses * speeds

@@ -13,16 +13,14 @@ from ..arrays import Array
 from .body import Body
 from .drawing.appearance import drawn_shapes
 from .drawing.visual import Visual, inertia_box
+from .formats.urdf import WHOLE_TURN
 from .formats.xml_text import listed
+from .link_tree import ROUNDING
 
-_DENSEST = 22_600.0  # osmium [kg/m^3]: no matter on earth is denser
-_LIGHTEST = 0.1  # a tenth of air [kg/m^3]: what is lighter and not thin would float away
+_DENSITIES = (0.1, 22_600.0)  # [kg/m^3] a tenth of air, and osmium: no matter on earth is denser
 _MASS_RATIO = 1e4  # of links on one joint: a fingertip on an arm is a thousandth
 _FARTHEST = 50.0  # [m] from joint to joint: a shin is 450 in millimetres, the longest boom in orbit is 30
-_WIDEST_MASS = 3.0  # radius of gyration, of the drawn width: below a half for any solid within it
-_NARROWEST_MASS = 0.01  # the same: a mesh in millimetres is a thousand times as wide as its mass
-_WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)  # [rad] a limit of a whole turn, as files round it
-_ON_A_LINE = 1e-12  # of the moments about the base's origin: what rounding leaves of zero
+_GYRATION = (0.01, 3.0)  # of the drawn width: a solid has less than a half, one drawn in millimetres a thousandth
 _HEIGHTS = (0.9, 2.4)  # [m] of standing people
 _BEYOND_JOINTS = 0.039 + 0.130  # of the height: below ankles, above the head's joint (Drillis and Contini 1964)
 
@@ -101,8 +99,8 @@ def _line_doubts(body: Body) -> Iterable[str]:
     shape = body.shape()
     moments = np.linalg.eigvalsh(body.locked_inertia(shape))
     largest = moments[-1] + body.mass * float(np.sum(body.centre_of_mass(shape) ** 2))
-    if moments[0] <= _ON_A_LINE * largest:
-        where = "on one line" if moments[-1] > _ON_A_LINE * largest else "in one point"
+    if moments[0] <= ROUNDING * largest:
+        where = "on one line" if moments[-1] > ROUNDING * largest else "in one point"
         yield (
             f"all mass is {where} in the neutral shape: its turns about that are not determined; give the links "
             "moments of inertia"
@@ -137,15 +135,15 @@ def _judge_density(doubts: _LinkDoubts, body: Body, frame: int, edges: Array, sh
         # From the largest moment, so that it holds for rods.
         radius = math.sqrt(float(edges[1] ** 2 + edges[2] ** 2) / 12.0)
         numbers = f"radius of gyration {radius:.3g} m, {width:.3g} m wide"
-        if radius > _WIDEST_MASS * width:
+        if radius > _GYRATION[1] * width:
             doubts.add("the inertia is that of a much larger body than is drawn", frame, radius / width, numbers)
-        if 0.0 < radius < _NARROWEST_MASS * width:
+        if 0.0 < radius < _GYRATION[0] * width:
             kind = "the inertia is that of a much smaller body than is drawn; is the drawing in millimetres?"
             doubts.add(kind, frame, width / radius, numbers)
     units = "are masses in kg, lengths in m and moments in kg m^2?"
-    if dense > _DENSEST:
+    if dense > _DENSITIES[1]:
         doubts.add(f"denser than any matter; {units}", frame, dense, f"{mass:.3g} kg, {dense:.2g} kg/m^3 or more")
-    if light < _LIGHTEST:
+    if light < _DENSITIES[0]:
         doubts.add(f"lighter than air; {units}", frame, 1.0 / light, f"{mass:.3g} kg, {light:.2g} kg/m^3")
 
 
@@ -178,7 +176,7 @@ def _limit_doubts(body: Body) -> Iterable[str]:
     beyond = [
         f"{name!r} ({lower:.6g} to {upper:.6g} rad)"
         for name, (lower, upper), unit in joints
-        if unit == "rad" and max(map(abs, filter(math.isfinite, (lower, upper))), default=0.0) > _WHOLE_TURN
+        if unit == "rad" and max(map(abs, filter(math.isfinite, (lower, upper))), default=0.0) > WHOLE_TURN
     ]
     if beyond:
         yield _sentence("joint", beyond, "limited beyond a whole turn; are limits in degrees?")

@@ -13,8 +13,7 @@ from .ball_joints import COORDINATES, RATES
 from .coordinate_map import coordinate_map
 from .coupling import Coupling
 
-_BASE = 6  # velocities of the free-flyer, which come first in Pinocchio's order
-_BALL = 3  # rates of a ball joint
+BASE = 6  # velocities of the free-flyer, which come first in Pinocchio's order
 _NO_LIMIT = 1e30  # [rad/s, m/s, N m or N] a larger stated limit means none
 
 
@@ -39,17 +38,17 @@ class JointMap:
 
     def __init__(self, model: Any, neutral: Array, couplings: Mapping[str, Coupling]) -> None:
         moving = {name: model.joints[number] for name, number in moving_joints(model).items()}
-        balls = [name for name, kind in moving.items() if kind.nv == _BALL]
+        balls = [name for name, kind in moving.items() if kind.nv == len(RATES)]
         self.follows = coordinate_map(tuple(moving), couplings, balls)
         self.names = self.follows.independent
         # By row; the coordinates of a ball joint have places of their own.
         kinds = [kind for kind in moving.values() for _ in range(kind.nv)]
-        self._round = np.array([kind.nv == _BALL for kind in kinds], dtype=bool)
+        self._round = np.array([kind.nv == len(RATES) for kind in kinds], dtype=bool)
         turning = np.array([kind.nq == 2 for kind in kinds], dtype=bool)
         self._configuration_index = np.array([kind.idx_q for kind in kinds], dtype=int)
         self._velocity_index = np.array(
             [kind.idx_v + place for kind in moving.values() for place in range(kind.nv)], dtype=int
-        ) - _BASE  # fmt: skip
+        ) - BASE  # fmt: skip
         self._turning = turning
         self._any_turning = bool(turning.any())
         self._ball_places = [moving[ball.name].idx_q for ball in self.follows.balls]
@@ -72,8 +71,8 @@ class JointMap:
         self.limits.setflags(write=False)
         # What follows by a curve is elsewhere after a whole turn.
         self.continuous = endless & ~np.isin(np.array(self.names, dtype=str), self.follows.drivers)
-        self.rate_limits = self._slowest(np.array(model.velocityLimit)[_BASE + self._velocity_index])
-        efforts = np.array(model.effortLimit)[_BASE + self._velocity_index[independent]]
+        self.rate_limits = self._slowest(np.array(model.velocityLimit)[BASE + self._velocity_index])
+        efforts = np.array(model.effortLimit)[BASE + self._velocity_index[independent]]
         known = (efforts > 0.0) & (efforts < _NO_LIMIT) & ~spherical
         self.effort_limits = np.where(known, efforts, np.inf)
         self.effort_limits.setflags(write=False)
@@ -121,7 +120,7 @@ class JointMap:
     def velocities(self, shapes: Array, rates: Array) -> Array:
         """Pinocchio's velocities with the base at rest: (N, n), (N, n) -> (N, nv)."""
         v = np.zeros((len(rates), self._nv))
-        v[:, _BASE + self._velocity_index] = self.follows.with_rates(shapes, rates)[1]
+        v[:, BASE + self._velocity_index] = self.follows.with_rates(shapes, rates)[1]
         return v
 
     def accelerations(self, shapes: Array, rates: Array, accelerations: Array) -> Array:
@@ -129,7 +128,7 @@ class JointMap:
         slopes = self.velocities(shapes, accelerations)
         if not self.follows.is_linear:
             bent = (self._slope_rates(shapes, rates) @ rates[..., None])[..., 0]
-            slopes[:, _BASE + self._velocity_index] += bent
+            slopes[:, BASE + self._velocity_index] += bent
         return slopes
 
     def independent_rates(self, shapes: Array, rates: Array) -> Array:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...arrays import Array
 from ..couplings.ball_joints import coordinate_names
+from ..formats.xml_text import listed, quoted
 from .chain import (
     EXACT,
     FRAME_ERRORS,
@@ -240,7 +241,7 @@ def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str,
     for name, parent in parents.items():
         if parent not in known and parent.lower() not in _NO_ROOT:
             raise UnusableModelError(
-                f"segment {name!r}: its parent {parent!r} does not exist; there is {', '.join(list(known)[:5])}",
+                f"segment {name!r}: its parent {parent!r} does not exist; there is {listed([*known])}",
                 starts.get(name, 1),
             )
     trees: dict[str, dict[str, int]] = {}
@@ -255,14 +256,14 @@ def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str,
         for root, tree in trees.items()
     }
     roots = [root for root, mass in masses.items() if mass > 0.0] or list(trees)
-    listed = ", ".join(map(repr, roots[:20])) or "none"
+    names = listed([*map(repr, roots)]) or "none"
     if root_body is not None and root_body not in trees:
-        raise UnusableModelError(f"root_body: {root_body[:60]!r} is not a root segment; there is {listed}")
+        raise UnusableModelError(f"root_body: {quoted(root_body)!r} is not a root segment; there is {names}")
     if len(roots) != 1 and root_body is None:
         heaviest = max(roots, key=lambda root: masses[root], default="")
         way = f"; say which one by root_body={heaviest!r} (--root-body {heaviest})" if roots else ""
         raise UnusableModelError(
-            f"one root segment is needed, got {listed}{way}", starts.get(roots[1], 1) if roots else 1
+            f"one root segment is needed, got {names}{way}", starts.get(roots[1], 1) if roots else 1
         )
     root = root_body or roots[0]
     if masses[root] == 0.0:

@@ -14,13 +14,14 @@ import numpy as np
 
 from ...arrays import Array
 from ..couplings.coupling import Coupling
+from ..formats.xml_text import quoted
 from ..link_tree import Joint, Link
 from ..virtual_base import joint_coordinates
 
 EXACT = 1e-12  # share of the largest terms by which an engine's numbers may differ: thousands of roundings
 FRAME_ERRORS = 10.0  # times the deviation of an engine's axes from orthonormal ones, which its sums contain
 _POSES = 3  # random shapes at which the engine's numbers are compared: a wrong sign shows at the first
-_SEED = 20060518  # arbitrary, so that every loading compares at equal shapes
+SEED = 20060518  # arbitrary, so that every loading compares at equal shapes
 _MOST_NAME = 256  # characters; names appear whole in messages and tables
 _STEP = 0.01  # [s] of differences of eighth order: their truncation is near rounding for rates of 1 rad/s
 _WEIGHTS = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)  # of f(k h) - f(-k h), k = 1 to 4 (Fornberg 1988)
@@ -126,7 +127,7 @@ class Chain:
 
     def random_shapes(self) -> list[tuple[dict[str, float], dict[str, float]]]:
         """Coordinates and rates by joint, within a radian or metre, and within the limits."""
-        random, names = np.random.default_rng(_SEED), self.moving()
+        random, names = np.random.default_rng(SEED), self.moving()
         limits_of = {joint.name: joint.limits for joint in self.joints}
         limits = [limits_of.get(name, (-1.0, 1.0)) for name in names]
         lower, upper = np.clip(np.array(limits).reshape(-1, 2), -1.0, 1.0).T
@@ -176,7 +177,7 @@ def _plain(value: Any) -> Any:
 def check_name(name: str, owner: str, line: int) -> None:
     """Raise UnusableModelError for a name that is too long, or cannot be printed."""
     if len(name) > _MOST_NAME:
-        raise UnusableModelError(f"{owner[:60]}: {len(name)} characters; up to {_MOST_NAME} are allowed", line)
+        raise UnusableModelError(f"{quoted(owner)}: {len(name)} characters; up to {_MOST_NAME} are allowed", line)
     if not name.isprintable() or name.isspace():
         raise UnusableModelError(f"{owner}: a name with characters that cannot be printed; rename it", line)
 

@@ -56,7 +56,7 @@ def compiled_without(written: mujoco.MjSpec) -> tuple[Any, frozenset[int], list[
     return (
         model,
         shapeless,
-        [f"not found or not readable, and left out, as no mass comes from them: {listed(names, 20)}"],
+        [f"not found or not readable, and left out, as no mass comes from them: {listed(names)}"],
     )
 
 

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from ...arrays import Array
-from ..formats.xml_text import listed, xml_tree
+from ..formats.xml_text import listed, quoted, xml_tree
 from ..virtual_base import way_words
 from .chain import UnusableModelError
 from .mujoco_assets import compiled_without
@@ -115,14 +115,14 @@ def _check_passed_over(content: bytes, path: str) -> None:
         for name in _NUMBERS & set(node.attributes):
             if any(word.lower().lstrip("+-") == "nan" for word in node.attributes[name].split()):
                 raise UnusableModelError(
-                    f"<{node.tag}>: {name}={node.attributes[name][:60]!r} is not a number, and MuJoCo would take its "
-                    f"default; give a number, or leave {name} out",
+                    f"<{node.tag}>: {name}={quoted(node.attributes[name])!r} is not a number, and MuJoCo would take "
+                    f"its default; give a number, or leave {name} out",
                     node.line,
                 )
         for name in set(node.attributes) - set(_PASSED_OVER.get(node.tag, node.attributes)):
             near = difflib.get_close_matches(name, _PASSED_OVER[node.tag], 1)
             meant = f"; did you mean {near[0]}=?" if near else ""
-            raise UnusableModelError(f"<{node.tag}>: MuJoCo ignores {name[:60]!r}{meant}", node.line)
+            raise UnusableModelError(f"<{node.tag}>: MuJoCo ignores {quoted(name)!r}{meant}", node.line)
 
 
 def _line(message: str, name: str, lines: list[str]) -> int:
@@ -167,7 +167,7 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
     else:
         near = difflib.get_close_matches(root_body, names[1:], 1) or names[1:]
         raise UnusableModelError(
-            f"<worldbody>: root_body: no body is named {root_body[:60]!r}; there is {listed([*map(repr, near)], 20)}",
+            f"<worldbody>: root_body: no body is named {quoted(root_body)!r}; there is {listed([*map(repr, near)])}",
             compiled.line(0),
         )
     base = way[-1]
@@ -179,7 +179,7 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
     above = int(model.body_parentid[way[0]])
     if above and joints and root is None:
         raise UnusableModelError(
-            f"body {names[base]!r}: {listed([repr(compiled.joint_name(joint)) for joint in joints], 20)} between "
+            f"body {names[base]!r}: {listed([repr(compiled.joint_name(joint)) for joint in joints])} between "
             f'{names[above]!r} and the body that floats; a free body has none: root="free" (--root free) removes it',
             compiled.line(base),
         )
@@ -238,13 +238,13 @@ def _only_tree(compiled: Compiled, notes: list[str]) -> int:
     if len(trees) > 1:
         moved = [repr(names[body]) for body in trees]
         raise UnusableModelError(
-            f"body {moved[1]}: {len(trees)} bodies in the world, one is a free body: {listed(moved, 20)}; choose one "
+            f"body {moved[1]}: {len(trees)} bodies in the world, one is a free body: {listed(moved)}; choose one "
             f"by root_body={moved[0]} (--root-body {names[trees[0]]})",
             compiled.line(trees[1]),
         )
     left = [repr(names[body]) for body in tops if body != trees[0] and model.body_subtreemass[body] > 0.0]
     if left:
-        notes.append(f"what stands still in the world is left out: {listed(left, 20)}")
+        notes.append(f"what stands still in the world is left out: {listed(left)}")
     return trees[0]
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import FARTHEST, Array
 from ..couplings.ball_joints import BallJoint, coordinate_names
 from ..couplings.coupling import Coupling, circular, with_followers
 from ..couplings.functions import polynomial
@@ -30,7 +30,6 @@ _WELD = int(mujoco.mjtEq.mjEQ_WELD)
 _BY_JOINT = int(mujoco.mjtWrap.mjWRAP_JOINT)
 _BY_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)  # of a tendon's path, what belongs to a body
 _OF_SITES = int(mujoco.mjtObj.mjOBJ_SITE)
-_MOST_LENGTH = 1e6  # [m] of places: differences of larger ones lose their digits
 
 
 def chain_of(path: str, root: str | None = None, root_body: str | None = None) -> Chain:
@@ -88,8 +87,8 @@ def _add_link(chain: Chain, compiled: Compiled, body: int) -> None:
 def _check_places(places: Array, directions: Array, owner: str, line: int) -> None:
     if not np.isfinite(directions).all():
         raise UnusableModelError(f"{owner}: it is turned by {directions.tolist()}: finite numbers are needed", line)
-    if not np.abs(places).max() < _MOST_LENGTH:
-        raise UnusableModelError(f"{owner}: its places {places.tolist()} m: less than {_MOST_LENGTH:g} is needed", line)
+    if not np.abs(places).max() < FARTHEST:
+        raise UnusableModelError(f"{owner}: its places {places.tolist()} m: less than {FARTHEST:g} is needed", line)
 
 
 def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
@@ -231,14 +230,14 @@ def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, st
             notes.append(("equality", f"{named} of {pair}", "ignored, the body is free"))
     tendons = [tendon for tendon in range(model.ntendon) if _led_over(model, tendon) & own]
     if tendons:
-        named = listed([repr(model.tendon(tendon).name or str(tendon)) for tendon in tendons], 20)
+        named = listed([repr(model.tendon(tendon).name or str(tendon)) for tendon in tendons])
         notes.append(f"tendons are ignored, every joint moves on its own: {named}")
     pairs = [
         pair for pair in range(model.npair)
         if {int(model.geom_bodyid[geom]) for geom in (model.pair_geom1[pair], model.pair_geom2[pair])} & own
     ]  # fmt: skip
     if pairs:
-        named = listed([repr(model.pair(pair).name or str(pair)) for pair in pairs], 20)
+        named = listed([repr(model.pair(pair).name or str(pair)) for pair in pairs])
         notes.append(f"contacts are ignored: {named}")
     return notes
 

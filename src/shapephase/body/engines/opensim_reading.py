@@ -16,6 +16,7 @@ from ...arrays import Array
 from ...errors import ShapeError
 from ..couplings.coupling import Coupling, circular
 from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
+from ..formats.xml_text import listed, quoted
 from ..link_tree import Joint
 from .chain import Chain, UnusableModelError, check_name
 from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, tensor_of, value_and_slope, vector_of
@@ -23,9 +24,7 @@ from .opensim_poses import add_poses
 
 _CUBIC = 3
 _FREE = 6  # coordinates of a body that floats
-_X = np.array([1.0, 0.0, 0.0])
-_Y = np.array([0.0, 1.0, 0.0])
-_Z = np.array([0.0, 0.0, 1.0])
+_X, _Y, _Z = np.eye(3)
 _NAMED = {"x": _X, "y": _Y, "z": _Z}
 _TURN = "revolute"
 _SLIDE = "prismatic"
@@ -112,10 +111,12 @@ class _Reading:
         grounded = [joint for joint in self._joints if "ground" in ends(joint)]
         bodies = [ends(joint)[1] for joint in grounded]
         if root_body is not None and root_body not in bodies:
-            listed = ", ".join(map(repr, bodies[:20])) or "none"
-            raise self._fault(f"root_body: {root_body[:60]!r} is not joined to the ground; there is {listed}", "ground")
+            names = listed([*map(repr, bodies)]) or "none"
+            raise self._fault(
+                f"root_body: {quoted(root_body)!r} is not joined to the ground; there is {names}", "ground"
+            )
         if len(grounded) != 1 and root_body is None:
-            named = ", ".join(repr(joint.getName()) for joint in grounded[:20]) or "none"
+            named = listed([repr(joint.getName()) for joint in grounded]) or "none"
             most = max(bodies, key=lambda name: len(self._below(name)), default="")
             way = f"; say which by root_body={most!r} (--root-body {most})" if bodies else ""
             raise self._fault(

@@ -11,7 +11,7 @@ import xacro
 from xacrodoc import XacroDoc
 from xacrodoc import packages as finder
 
-from ..formats.xml_text import xml_text
+from ..formats.xml_text import quoted, xml_text
 from .chain import UnusableModelError
 
 _USED = re.compile(r"\$\(\s*arg\s+([^\s)]+)\s*\)")
@@ -30,7 +30,9 @@ def text_of(path: str, packages: Sequence[str] = (), xacro_args: Mapping[str, st
     folders = [Path(folder) for folder in packages]
     for folder in folders:
         if not folder.is_dir():
-            raise UnusableModelError(f"<robot>: packages: {str(folder)[:60]!r} is not a folder; name one that exists")
+            raise UnusableModelError(
+                f"<robot>: packages: {quoted(str(folder))!r} is not a folder; name one that exists"
+            )
     finder.look_in([str(folder) for folder in folders])
     inside = {part.name: part for folder in folders for part in (folder.absolute(), *folder.iterdir()) if part.is_dir()}
     finder.update_package_cache(inside)

@@ -20,11 +20,10 @@ import yaml
 import yeadon
 
 from ...arrays import Array
+from ..formats.xml_text import quoted
 from .chain import EXACT, Chain, UnusableModelError, inertia_and_momentum, rates_by_differences
 
-_X = np.array([1.0, 0.0, 0.0])  # to the left in the package's axes: turns forwards and back
-_Y = np.array([0.0, 1.0, 0.0])  # to the back
-_Z = np.array([0.0, 0.0, 1.0])  # up, for a person who stands
+_X, _Y, _Z = np.eye(3)  # to the left (turns forwards and back), to the back, and up for a person who stands
 _ROOT = "P"
 # For each segment the one it hangs on, and the package's names of the turns between them, in their order.
 _JOINTS = {
@@ -46,7 +45,6 @@ _STADIUM = re.compile(r"Stadium '(.*?)'.*this ratio is ([-+.\deE]+?)\.?$", re.DO
 # as people write them; YAML reads `1:30` as 90, `012` as 10 and `1e3` as a text
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _OF_NUMBERS = ("tag:yaml.org,2002:float", "tag:yaml.org,2002:int")
-_LONGEST = 60  # characters of an entry in a message
 
 
 def chain_of(path: str) -> Chain:
@@ -112,7 +110,7 @@ def _check_numbers(content: bytes) -> None:
         raise UnusableModelError("it is not a YAML file of measurements, `name: number` a line")
     read: dict[str, float] = {}
     for key, value in root.value:
-        name, line = str(key.value)[:_LONGEST], key.start_mark.line + 1
+        name, line = quoted(str(key.value)), key.start_mark.line + 1
         if name in read:
             raise UnusableModelError(f"{name} stands twice", line)
         text = value.value if isinstance(value, yaml.ScalarNode) and value.style is None else ""
@@ -121,7 +119,7 @@ def _check_numbers(content: bytes) -> None:
             raise UnusableModelError(f"{name}: for YAML {text} is not this number; write {number!r}", line)
         if not math.isfinite(number) or (number <= 0.0 and not (name == "totalmass" and number == -1.0)):
             shown = value.value if value.tag in _OF_NUMBERS else repr(value.value)
-            raise UnusableModelError(f"{name}: a number above zero is needed, got {shown:.{_LONGEST}}", line)
+            raise UnusableModelError(f"{name}: a number above zero is needed, got {quoted(shown)}", line)
         read[name] = number
     names = {*yeadon.Human.measnames, "measurementconversionfactor"}
     missing, unknown = sorted(names - set(read)), sorted(map(str, set(read) - names - {"totalmass"}))

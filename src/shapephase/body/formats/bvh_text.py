@@ -15,13 +15,12 @@ import numpy as np
 
 from ... import so3
 from ...arrays import FARTHEST, Array
+from .xml_text import quoted
 
 _START = b"HIERARCHY"
 _PLACES = ("Xposition", "Yposition", "Zposition")
 _TURNS = ("Xrotation", "Yrotation", "Zrotation")
 _MOST_DEPTH = 100  # bones from the root; with all fingers there are twelve
-_MOST_OFFSET = 1e6  # units; far larger squares overflow
-_SHOWN = 40  # characters of a file in a message
 _STAYS = 1e-4  # of a bone's length, between its place and the offset: files have six digits
 
 
@@ -169,7 +168,7 @@ def bvh_skeleton(content: bytes) -> Skeleton:
         raise lines.fault("MOTION is needed behind the skeleton: one ROOT, as many closing braces as opening ones")
     count = lines.after("Frames:")
     if not (count.isascii() and count.isdigit() and len(count) < 10):
-        raise lines.fault(f"Frames: {count[:_SHOWN]!r} is not a number of frames")
+        raise lines.fault(f"Frames: {quoted(count)!r} is not a number of frames")
     step = _numbers([lines.after("Frame Time:")], lines)[0]
     if not 1e-9 <= step <= 1e9:
         raise lines.fault(f"Frame Time: {step:g} s between frames; a time above 0 is needed")
@@ -204,7 +203,7 @@ class _Lines:
         """The text after a label in the next line."""
         words = " ".join(self.next(label))
         if not words.lower().startswith(label.lower()):
-            raise self.fault(f"{label} is needed, got {words[:_SHOWN]!r}")
+            raise self.fault(f"{label} is needed, got {quoted(words)!r}")
         return words[len(label) :].strip()
 
     def fault(self, message: str) -> BvhFaultError:
@@ -224,7 +223,7 @@ class _Hierarchy:
         """All bones of one root."""
         words = self.lines.next("ROOT")
         if words[0] != "ROOT":
-            raise self.lines.fault(f"ROOT is needed, got {' '.join(words)[:_SHOWN]!r}")
+            raise self.lines.fault(f"ROOT is needed, got {quoted(' '.join(words))!r}")
         open_bones: list[int] = [self._bone(words, None)]
         while open_bones:
             words = self.lines.next("}")
@@ -237,7 +236,7 @@ class _Hierarchy:
             elif [word.lower() for word in words[:2]] == ["end", "site"]:
                 self._end_site(words, open_bones[-1])
             else:
-                raise self.lines.fault(f"JOINT, End Site or }} is needed, got {' '.join(words)[:_SHOWN]!r}")
+                raise self.lines.fault(f"JOINT, End Site or }} is needed, got {quoted(' '.join(words))!r}")
         return tuple(self.bones)
 
     def _bone(self, words: list[str], parent: int | None) -> int:
@@ -245,7 +244,7 @@ class _Hierarchy:
         brace = words[-1] == "{" and len(words) > 1
         name = " ".join(words[1:-1] if brace else words[1:])
         if not name or not name.isprintable():
-            raise self.lines.fault(f"{words[0]} {name[:_SHOWN]!r}: a name of letters that can be printed is needed")
+            raise self.lines.fault(f"{words[0]} {quoted(name)!r}: a name of letters that can be printed is needed")
         if name in self.names:
             raise self.lines.fault(f"two bones are named {name!r}; give each a name of its own")
         self._open(name, brace)
@@ -271,25 +270,25 @@ class _Hierarchy:
     def _offset(self, name: str) -> Array:
         words = self.lines.next("OFFSET")
         if words[0] != "OFFSET" or len(words) != 4:
-            raise self.lines.fault(f"{name}: OFFSET and three numbers are needed, got {' '.join(words)[:_SHOWN]!r}")
+            raise self.lines.fault(f"{name}: OFFSET and three numbers are needed, got {quoted(' '.join(words))!r}")
         offset = np.array(_numbers(words[1:], self.lines))
-        if np.abs(offset).max() > _MOST_OFFSET:
-            raise self.lines.fault(f"{name}: an offset above {_MOST_OFFSET:g} units, as in no skeleton")
+        if np.abs(offset).max() > FARTHEST:
+            raise self.lines.fault(f"{name}: an offset above {FARTHEST:g} units, as in no skeleton")
         return offset
 
     def _channels(self, name: str) -> tuple[str, ...]:
         words = self.lines.next("CHANNELS")
         if words[0] != "CHANNELS" or len(words) < 2:
-            raise self.lines.fault(f"{name}: CHANNELS and their number are needed, got {' '.join(words)[:_SHOWN]!r}")
+            raise self.lines.fault(f"{name}: CHANNELS and their number are needed, got {quoted(' '.join(words))!r}")
         known = {word.lower(): word for word in (*_PLACES, *_TURNS)}
         channels = [known.get(word.lower(), "") for word in words[2:]]
         for word, channel in zip(words[2:], channels, strict=True):
             if not channel:
                 raise self.lines.fault(
-                    f"{name}: the channel {word[:_SHOWN]!r} is unknown; these are: {', '.join(known.values())}"
+                    f"{name}: the channel {quoted(word)!r} is unknown; these are: {', '.join(known.values())}"
                 )
         if words[1] != str(len(channels)):
-            raise self.lines.fault(f"{name}: CHANNELS {words[1][:_SHOWN]} are stated, and {len(channels)} follow")
+            raise self.lines.fault(f"{name}: CHANNELS {quoted(words[1])} are stated, and {len(channels)} follow")
         places = [channel for channel in channels if channel in _PLACES]
         turns = [channel for channel in channels if channel in _TURNS]
         if len(set(places)) < len(places) or (len(turns) == 2 and len(set(turns)) == 1):
@@ -305,7 +304,7 @@ def _numbers(words: Sequence[str], lines: _Lines) -> list[float]:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise lines.fault(f"{word[:_SHOWN]!r} is not a finite number")
+            raise lines.fault(f"{quoted(word)!r} is not a finite number")
     return [float(word) for word in words]
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ...arrays import Array
 from .bvh_text import BvhFaultError, Skeleton
+from .xml_text import listed
 
 
 class _Row(NamedTuple):
@@ -280,7 +281,7 @@ class _Layout:
         raise self._unknown("head", "Head")
 
     def _unknown(self, what: str, name: str) -> BvhFaultError:
-        names = ", ".join(bone.name for bone in self.skeleton.bones[:40])
+        names = listed([bone.name for bone in self.skeleton.bones], 40)
         return BvhFaultError(
             f"no bone is known as the {what} of a human; call it {name} in the file. There are: {names}",
             self.skeleton.bones[0].line,

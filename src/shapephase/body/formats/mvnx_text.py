@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from ... import so3
 from ...arrays import FARTHEST, Array
 from .bvh_text import Bone, BvhFaultError, Skeleton
+from .xml_text import quoted
 
 _NORMAL = "normal"  # type of a frame of the motion; every other type is a calibration pose
 # calibration poses, the best first; others, like `tpose-isb`, have axes of their own
@@ -145,13 +146,13 @@ class _Reader:
         self.path.append(name)
         self.text.clear()
         if len(self.path) == 1 and name != "mvnx":
-            raise self.fault(f"<{name[:40]}>: expected <mvnx>; this is not an MVNX file")
+            raise self.fault(f"<{quoted(name)}>: expected <mvnx>; this is not an MVNX file")
         if name == "subject":
             self.rate = self._number(attributes.get("frameRate", "nan"), "frameRate")
         elif name == "segment" and self.path[-2:-1] == ["segments"]:
             label = attributes.get("label", "")
             if not label or label in self.segments:
-                raise self.fault(f"segment {label[:40]!r}: a label of its own is needed")
+                raise self.fault(f"segment {quoted(label)!r}: a label of its own is needed")
             self.segments.append(label)
             self.points.append({})
         elif name == "point":
@@ -195,7 +196,7 @@ class _Reader:
         try:
             return float(word)
         except ValueError:
-            raise self.fault(f"{what}: {word[:40]!r} is not a number") from None
+            raise self.fault(f"{what}: {quoted(word)!r} is not a number") from None
 
     def _poses(self, frames: list[_Frame]) -> Poses:
         count = len(self.segments)
@@ -241,11 +242,11 @@ class _Reader:
         for ends in self.connections:
             parts = [end.partition("/") for end in ends]
             if len(parts) != 2 or any(name not in self.segments for name, _, _ in parts):
-                raise self.fault(f"joint {' and '.join(ends)[:80]!r}: two segments of the file are needed")
+                raise self.fault(f"joint {quoted(' and '.join(ends))!r}: two segments of the file are needed")
             (parent, _, point), (child, _, _) = parts
             above = self.segments.index(parent)
             if point not in self.points[above]:
-                raise self.fault(f"joint {ends[0][:80]!r}: {parent} has no such point; export the file again")
+                raise self.fault(f"joint {quoted(ends[0])!r}: {parent} has no such point; export the file again")
             joints[self.segments.index(child)] = above, self.points[above][point]
         return joints
 

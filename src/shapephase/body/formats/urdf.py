@@ -37,7 +37,7 @@ from .xml_text import (
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _BALL = "spherical"
-_WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)  # [rad] as rounded in a file; 10 degrees are beyond it
+WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)  # [rad] as rounded in a file; 10 degrees are beyond it
 _WORLD = "world"  # an implicit link of Drake and Gazebo
 _EXPRESSION = re.compile(r"\$[{(]")
 _DRAKE_JOINT = "drake:joint"
@@ -297,7 +297,7 @@ def _origin(node: Node, owner: str, reading: _Reading) -> tuple[Array, Array, st
     parts = {key: vector(origin, key, owner) for key in ("xyz", "rpy") if origin.get(key) is not None}
     written = " ".join(f'{key}="{_text(values)}"' for key, values in parts.items())
     rpy = parts.get("rpy")
-    if rpy is not None and max(map(abs, rpy)) > _WHOLE_TURN:
+    if rpy is not None and max(map(abs, rpy)) > WHOLE_TURN:
         kind, _, name = owner.partition(" ")
         radians = _brief(np.radians(rpy).tolist())
         text = f'rpy="{_brief(rpy)}" goes beyond a whole turn; is it in degrees? Give radians: rpy="{radians}"'

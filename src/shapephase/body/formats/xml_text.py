@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from xml.parsers import expat
 
+from ...arrays import FARTHEST
 from ...errors import InputFileNotFoundError, ModelFileError
 from ...files import no_such_file
 
@@ -224,12 +225,12 @@ def _near(name: str, known: tuple[str, ...]) -> str | None:
     return near[0] if near else None
 
 
-def number(node: Node, name: str, owner: str, default: str | None = None, most: float = 1e6) -> float:
+def number(node: Node, name: str, owner: str, default: str | None = None, most: float = FARTHEST) -> float:
     """One number of an attribute, its size below `most`. Raises ModelFileError."""
     return numbers(node, name, 1, owner, node.get(name, default), most)[0]
 
 
-def vector(node: Node, name: str, owner: str, count: int = 3, most: float = 1e6) -> list[float]:
+def vector(node: Node, name: str, owner: str, count: int = 3, most: float = FARTHEST) -> list[float]:
     """Numbers of an attribute, each below `most` in size. Raises ModelFileError."""
     return numbers(node, name, count, owner, node.get(name), most)
 
