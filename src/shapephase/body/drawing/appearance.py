@@ -17,7 +17,7 @@ from ..body import Body
 from ..engines.engine_tree import engine_shapes, expanded
 from ..engines.formats import MJCF, format_of
 from ..formats.urdf import macro_of, rpy_matrix
-from ..formats.xml_text import Node, child_of, name_of, needed_child, number, quoted, read_file, vector, xml_tree
+from ..formats.xml_text import Node, quoted, read_file, xml_tree
 from .limits import within_limits
 from .meshes import MeshFiles
 from .visual import PLAIN, Colour, Visual, part_box, pose_of
@@ -105,35 +105,35 @@ class _Drawing:
             # Links that only lead to the base are not part of the body.
             if link.get("name") not in self.links:
                 continue
+            link.own(f"link {link.name()!r}")
             for node in link.all("visual"):
                 try:
-                    self.shapes += self._urdf_shape(name_of(link), node, materials)
+                    self.shapes += self._urdf_shape(link.name(), node, materials)
                 except ModelFileError as error:
                     self.doubts.append(str(error))
-                    self.incomplete.add(name_of(link))
+                    self.incomplete.add(link.name())
 
     def _urdf_shape(self, name: str, node: Node, materials: dict[str, Node]) -> list[Visual]:
-        owner = f"link {name!r}"
-        origin = child_of(node, "origin", owner)
+        origin = node.child("origin")
         place, turn = np.zeros(3), np.eye(3)
         if origin is not None:
-            place = np.array(vector(origin, "xyz", owner)) if origin.get("xyz") is not None else place
-            turn = rpy_matrix(np.array(vector(origin, "rpy", owner))) if origin.get("rpy") is not None else turn
-        material = child_of(node, "material", owner)
-        colour = None if material is None else _urdf_colour(material, materials, owner)
-        shape, kind = _geometry(needed_child(node, "geometry", owner), owner)
+            place = np.array(origin.vector("xyz")) if origin.get("xyz") is not None else place
+            turn = rpy_matrix(np.array(origin.vector("rpy"))) if origin.get("rpy") is not None else turn
+        material = node.child("material")
+        colour = None if material is None else _urdf_colour(material, materials)
+        shape, kind = _geometry(node.needed_child("geometry"))
         pose = pose_of(place, turn)
         if kind == "mesh":
-            scale = tuple(vector(shape, "scale", owner)) if shape.get("scale") is not None else (1.0, 1.0, 1.0)
-            path, pieces = self.meshes.pieces(shape, scale, owner)
+            scale = tuple(shape.vector("scale")) if shape.get("scale") is not None else (1.0, 1.0, 1.0)
+            path, pieces = self.meshes.pieces(shape, scale)
             return [
                 Visual(name, kind, scale, pose, colour or own or PLAIN, path, vertices, faces)
                 for vertices, faces, own in pieces
             ]
         box = kind == "box"
-        sizes = vector(shape, "size", owner) if box else [number(shape, key, owner) for key in _SIZES[kind]]
+        sizes = shape.vector("size") if box else [shape.number(key) for key in _SIZES[kind]]
         if not all(value > 0.0 for value in sizes):
-            raise shape.fault(owner, f"<{kind}> of size {sizes}; sizes are above zero")
+            raise shape.fault(f"<{kind}> of size {sizes}; sizes are above zero")
         return [Visual(name, kind, tuple(sizes), pose, colour or PLAIN)]
 
     def read_mjcf(self) -> None:
@@ -160,22 +160,22 @@ class _Drawing:
             self.shapes.append(visual)
 
 
-def _geometry(node: Node, owner: str) -> tuple[Node, str]:
+def _geometry(node: Node) -> tuple[Node, str]:
     """The shape in a <geometry> and its kind, without the prefix of an extension."""
     valid = (*_SIZES, "mesh")
     shapes = [(child, child.tag.rpartition(":")[2]) for child in node.children]
     if len(shapes) != 1 or shapes[0][1] not in valid:
         tags = ", ".join(f"<{quoted(child.tag)}>" for child, _ in shapes) or "nothing"
-        raise node.fault(owner, f"<geometry> holds {tags}; one of {', '.join(valid)} can be shown")
+        raise node.fault(f"<geometry> holds {tags}; one of {', '.join(valid)} can be shown")
     return shapes[0]
 
 
-def _urdf_colour(material: Node, materials: dict[str, Node], owner: str) -> Colour | None:
+def _urdf_colour(material: Node, materials: dict[str, Node]) -> Colour | None:
     source = material if material.all("color") else materials.get(material.get("name") or "")
-    colour = None if source is None else child_of(source, "color", owner)
+    colour = None if source is None else source.child("color")
     if colour is None:
         return None
-    red, green, blue, opacity = (min(max(value, 0.0), 1.0) for value in vector(colour, "rgba", owner, 4))
+    red, green, blue, opacity = (min(max(value, 0.0), 1.0) for value in colour.vector("rgba", 4))
     return red, green, blue, opacity
 
 

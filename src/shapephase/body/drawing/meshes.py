@@ -28,16 +28,16 @@ class MeshFiles:
         self._pieces: dict[Path, list[Piece]] = {}
         self._scaled: dict[tuple[Path, tuple[float, ...]], list[Piece]] = {}
 
-    def pieces(self, node: Node, scale: tuple[float, ...], owner: str) -> tuple[Path, list[Piece]]:
+    def pieces(self, node: Node, scale: tuple[float, ...]) -> tuple[Path, list[Piece]]:
         """The file that a <mesh> names, and vertices, faces and colour of its pieces. Raises ModelFileError."""
         name = node.get("filename") or ""
         path = next((place for place in self._places(name) if _is_file(place)), None)
         if path is None:
-            raise node.fault(owner, f"the mesh {quoted(name)!r} is not found")
+            raise node.fault(f"the mesh {quoted(name)!r} is not found")
         if path.suffix.lower() not in _ENDINGS:
-            raise node.fault(owner, f"the mesh {quoted(name)!r}: files {', '.join(_ENDINGS)} can be read")
+            raise node.fault(f"the mesh {quoted(name)!r}: files {', '.join(_ENDINGS)} can be read")
         if path not in self._pieces:
-            self._pieces[path] = _read(path, node, owner)
+            self._pieces[path] = _read(path, node)
         # Faces of a mirror image run the other way round.
         order = 1 if np.prod(scale) > 0.0 else -1
         if (path, scale) not in self._scaled:
@@ -74,13 +74,13 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def _read(path: Path, node: Node, owner: str) -> list[Piece]:
+def _read(path: Path, node: Node) -> list[Piece]:
     """Vertices, faces and colour of each piece of a file."""
     ending = path.suffix.lower()
     needed = {"trimesh": "trimesh", **({"collada": "pycollada"} if ending == ".dae" else {})}
     for module, package in needed.items():
         if importlib.util.find_spec(module) is None:
-            raise node.fault(owner, f"the mesh {path.name} needs {package}: pip install 'shapephase[viz]'")
+            raise node.fault(f"the mesh {path.name} needs {package}: pip install 'shapephase[viz]'")
     import trimesh
 
     try:
@@ -91,9 +91,9 @@ def _read(path: Path, node: Node, owner: str) -> list[Piece]:
         pieces = [piece for piece in scene.dump() if isinstance(piece, trimesh.Trimesh) and len(piece.faces)]
     except Exception as error:
         # Readers of mesh files raise whatever a damaged file makes them raise.
-        raise node.fault(owner, f"the mesh {path.name} cannot be read ({type(error).__name__}: {error})") from None
+        raise node.fault(f"the mesh {path.name} cannot be read ({type(error).__name__}: {error})") from None
     if not pieces or not all(np.isfinite(piece.vertices).all() for piece in pieces):
-        raise node.fault(owner, f"the mesh {path.name} has no faces, or vertices that are not finite")
+        raise node.fault(f"the mesh {path.name} has no faces, or vertices that are not finite")
     return [(np.asarray(p.vertices, float), np.asarray(p.faces, np.int64), _colour_of(p)) for p in pieces]
 
 
