@@ -60,10 +60,7 @@ def print_row(name: str, turn: np.ndarray, aim: float, pieces: int | None) -> No
         search = Search(pieces=pieces, iterations=500)
         plan = plan_reorientation(body, so3.exp(turn), rates_at_ends="free", search=search)
     except PlanNotFound as failure:
-        print(
-            f"{name:16}{degrees:>18}{pieces or 'default':>7}{time.process_time() - begin:8.1f}{aim:5.0f}"
-            f"  {failure}"
-        )
+        print(f"{name:16}{degrees:>18}{pieces or 'default':>7}{time.process_time() - begin:8.1f}{aim:5.0f}  {failure}")
         return
     seconds = time.process_time() - begin
     print(

@@ -27,8 +27,9 @@ from .auditing.floating_trajectory import FloatingTrajectory
 from .auditing.reading import read_trajectory
 from .auditing.trajectory_audit import audit
 from .body.body import Body
-from .body.catalog import load_body, robot_names
+from .body.catalog import robot_names
 from .body.family import BodyFamily
+from .body.loading import load_body
 from .body.particles.point_masses import ParticleBody, particle_body
 from .deformation.deformation import Deformation, DeformationFamily, articulated, particles, prescribed, rigid
 from .deformation.gauge import horizontal_gauge, in_gauge, link_gauge, mean_body_gauge, principal_gauge

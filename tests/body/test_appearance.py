@@ -16,9 +16,10 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.body import appearance as visuals
-from shapephase.body import catalog, drawing_limits
-from shapephase.body.appearance import inertia_box
+from shapephase.body import catalog
+from shapephase.body.drawing import appearance as visuals
+from shapephase.body.drawing import limits
+from shapephase.body.drawing.visual import BOX_COLOUR, PLAIN, inertia_box
 from shapephase.errors import VisualWarning
 from support.bodies import BODIES, joint, link, random_shapes, urdf
 
@@ -93,7 +94,7 @@ def test_boxes_of_rods_plates_and_what_cannot_exist():
 @pytest.mark.parametrize("name", BODIES)
 def test_a_model_without_a_file_is_drawn_as_boxes_that_turn_as_heavily(name, rng):
     """The solids drawn, put where `link_pose` says, have the body's locked inertia and centre of mass."""
-    path = catalog._path_of(name)
+    path = catalog.file_of(name)
     body = sp.load_body(pin.buildModelFromUrdf(str(path), pin.JointModelFreeFlyer()))
     assert body.link_names == sp.load_body(name).link_names
     masses = {part.links[0]: part.mass for part in body.moving_parts}
@@ -190,7 +191,7 @@ def test_capsules_colours_and_defaults(load_urdf):
     expected = Rotation.from_euler("xyz", [0.4, -0.5, 0.6]).as_matrix()
     np.testing.assert_allclose(first.pose[:3, :3], expected, atol=1e-15)
     np.testing.assert_array_equal(first.pose[:3, 3], [0.1, -0.2, 0.3])
-    assert second.colour == visuals.PLAIN
+    assert second.colour == PLAIN
     np.testing.assert_array_equal(second.pose, np.eye(4))
 
 
@@ -223,7 +224,7 @@ def test_what_cannot_be_shown_is_said_and_drawn_as_a_box(load_urdf, visual, says
         (box,) = shown(body)
     assert says in str(caught[0].message)
     assert "link 'arm'" in str(caught[0].message)
-    assert (box.kind, box.colour) == ("box", visuals.BOX_COLOUR)
+    assert (box.kind, box.colour) == ("box", BOX_COLOUR)
     expected = np.sort(np.sqrt(6.0 * np.array([0.05, 0.03, 0.01])))
     np.testing.assert_allclose(np.sort(box.dimensions), expected, rtol=1e-12)
     np.testing.assert_allclose(box.pose[:3, 3], [0.2, 0.1, 0.0], atol=1e-15)
@@ -332,7 +333,7 @@ def test_the_human_of_example_robot_data_has_all_its_meshes():
     found = visuals.visuals(body)
     root = ElementTree.parse(body.file).getroot()
     assert sum(shape.kind == "mesh" for shape in found) == sum(1 for _ in root.iterfind("link/visual/geometry/mesh"))
-    assert all(shape.colour != visuals.PLAIN for shape in found)
+    assert all(shape.colour != PLAIN for shape in found)
 
 
 def test_the_meshes_of_example_robot_data_are_found_from_elsewhere(tmp_path):
@@ -425,7 +426,7 @@ def test_the_geoms_of_an_mjcf_are_where_mujoco_has_them(tmp_path):
     factors = {"sphere": [1], "capsule": [1, 2], "cylinder": [1, 2], "ellipsoid": [1, 1, 1], "box": [2, 2, 2]}
     hidden = np.flatnonzero((model.geom_group == 3) | (model.geom_bodyid == 0))
     expected = [geom for geom in range(model.ngeom) if geom not in hidden]
-    found = [shape for shape in visuals.visuals(body) if shape.colour != visuals.BOX_COLOUR]
+    found = [shape for shape in visuals.visuals(body) if shape.colour != BOX_COLOUR]
     assert len(found) == len(expected) == 7
     for shape, geom in zip(found, expected, strict=True):
         kind = kinds[int(model.geom_type[geom])]
@@ -463,7 +464,7 @@ def test_what_an_mjcf_shows_not_is_a_box(tmp_path):
     """The last body has an inertia and no geom."""
     path = tmp_path / "toy.xml"
     path.write_text(MJCF)
-    boxes = [shape for shape in visuals.visuals(sp.load_body(path)) if shape.colour == visuals.BOX_COLOUR]
+    boxes = [shape for shape in visuals.visuals(sp.load_body(path)) if shape.colour == BOX_COLOUR]
     assert [box.link for box in boxes] == ["body4"]
     np.testing.assert_allclose(boxes[0].dimensions, math.sqrt(0.6), rtol=1e-12)
 
@@ -547,13 +548,13 @@ def reach_of(shapes, directions):
 
 
 @pytest.mark.parametrize("flat", [False, True])
-def test_more_triangles_than_a_page_holds_are_drawn_as_hulls(tmp_path, monkeypatch, rng, flat):
+def test_more_triangles_than_a_page_holds_are_drawn_as_hulls(tmp_path, rng, flat):
     """1,280 triangles each; the hull of some points of a ball reaches at least as far as 0.97 of its radius."""
     body = crowd(tmp_path, 6, 2, flat=flat)
-    monkeypatch.setattr(drawing_limits, "_MOST_FACES", 5_000)
-    with pytest.warns(VisualWarning, match="meshes are drawn as their convex hulls: all have 15360 triangles together"):
-        shapes = visuals.visuals(body)
-    assert len(shapes) == 13
+    whole = visuals.visuals(body)
+    shapes, (sentence,) = limits.within_limits(list(whole), most_faces=5_000)
+    assert "convex hulls: all have 15360 triangles together" in sentence
+    assert len(shapes) == len(whole) == 13
     assert 1280 < sum(len(shape.faces) for shape in shapes) <= 5_000
     if flat:
         boxes = [shape for shape in shapes if shape.kind == "box"]
@@ -569,18 +570,15 @@ def test_more_triangles_than_a_page_holds_are_drawn_as_hulls(tmp_path, monkeypat
         assert drawn.is_watertight
         assert 0.9 < drawn.volume / (4.0 / 3.0 * np.pi * 1e-3) < 1.0
     directions = so3.normalised(rng.normal(size=(50, 3))).T
-    monkeypatch.setattr(drawing_limits, "_MOST_FACES", 10**9)
-    whole = visuals.visuals(body)
     np.testing.assert_allclose(reach_of(shapes[:12], directions), reach_of(whole[:12], directions), rtol=0.03)
 
 
-def test_more_shapes_than_a_page_holds_are_drawn_as_one_hull(tmp_path, monkeypatch):
-    body = crowd(tmp_path, 30, kind="ball")
-    monkeypatch.setattr(drawing_limits, "_MOST_SHAPES", 20)
-    with pytest.warns(VisualWarning, match="1 links, 'a' first, are drawn as the hull of what they show: .* 31 shapes"):
+def test_more_shapes_than_a_page_holds_are_drawn_as_one_hull(tmp_path):
+    body = crowd(tmp_path, 1000, kind="ball")
+    with pytest.warns(VisualWarning, match="1 links, 'a' first, are drawn as the hull .* 1001 shapes"):
         hull, ball = visuals.visuals(body)
     assert (hull.link, hull.kind, ball.kind) == ("a", "mesh", "sphere")
-    np.testing.assert_allclose([hull.vertices.min(axis=0), hull.vertices.max(axis=0)], [[-0.1] * 3, [0.39, 0.1, 0.1]])
+    np.testing.assert_allclose([hull.vertices.min(axis=0), hull.vertices.max(axis=0)], [[-0.1] * 3, [10.09, 0.1, 0.1]])
 
 
 def test_visuals_of_one_mesh_share_its_numbers(tmp_path):

@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.body import Coupling, catalog
+from shapephase.body import Coupling, catalog, loading
 from shapephase.body._cross_check import check_against_file, inertia_and_momentum
 from shapephase.body.formats.urdf import urdf_tree
 from shapephase.body.formats.xml_text import xml_tree
@@ -285,7 +285,7 @@ def test_what_pinocchio_loses_without_a_word_is_seen(load_urdf, monkeypatch):
             assert old in tree.text
             return replace(tree, text=tree.text.replace(old, new))
 
-        monkeypatch.setattr(catalog, "urdf_tree", spoiling)
+        monkeypatch.setattr(loading, "urdf_tree", spoiling)
         with pytest.raises(ShapePhaseError, match=r"body\.urdf:1: the body made from this file"):
             load_urdf(text)
 

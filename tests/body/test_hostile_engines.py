@@ -40,7 +40,8 @@ ENDS = {
     "import os; os.abort()": "crashed on it, signal 6",
     "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)": "crashed on it, signal 11",
     "import time; time.sleep(60)": "took more than 2 s and was stopped",
-    "import sys; sys.exit(1)": "does not read it: it says nothing",
+    "import sys; sys.exit(1)": "does not read it: no reason given",
+    "import sys; sys.exit('first\\nit broke')": "does not read it: it broke",
     f"import sys; sys.exit({NO_MEMORY})": "took more than 1024 MiB and was stopped",
 }
 """What a reading process may do instead of an answer, and what is said of it."""
@@ -134,7 +135,7 @@ ALIASES = "a: &a [1,1]\n" + "".join(
 YEADON = {
     "aliases that multiply": (ALIASES + measured(), "a: a number above zero is needed"),
     "a call": (measured() + "x: !!python/object/apply:os.abort []\n", "x: a number above zero is needed"),
-    "fifty thousand levels": (measured() + "x: " + 50_000 * "[" + "\n", "it is no YAML file of measurements"),
+    "fifty thousand levels": (measured() + "x: " + 50_000 * "[" + "\n", "it is not a YAML file of measurements"),
     "a list of itself": ("measurementconversionfactor: &a [*a]\n", "a number above zero is needed"),
     "a length beyond the stars": (measured(Ls1L="1.0e+300"), r"no real body|finite|has a mass|does not accept|beyond"),
 }

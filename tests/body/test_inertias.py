@@ -11,12 +11,11 @@ import pytest
 from benchmarks.body_leaf import extent, random_body
 
 import shapephase as sp
-from shapephase.body._changed_body import changed_body
 from shapephase.body.body import Body
 from shapephase.body.family import BodyFamily
 from shapephase.body.inertial_regressor import by_link_parameters, inertial_regressor, parameters
+from shapephase.body.joint_chain import link_rows
 from shapephase.body.link_motions import link_motions
-from shapephase.body.link_rows import link_rows
 from shapephase.errors import ShapeError, UnknownNameError, UnphysicalInertiaError, UnphysicalInertiaWarning
 from support.bodies import joint, link, random_shapes, urdf
 
@@ -67,7 +66,7 @@ def test_the_regressor_is_right_to_rounding():
         inertia, momentum = inertial_regressor(body.chain, shapes, rates).inertia_and_momentum(*given)
         allowed = 8.0 * (len(body.chain.names) + 3.0) * EPS
         for variant in range(3):
-            other = changed_body(body, *(part[variant] for part in given))
+            other = body.with_frame_inertias(*(part[variant] for part in given))
             expected = other.sample(shapes, rates)
             for row in range(2):
                 sizes = extent(other.chain, shapes[row], rates[row])

@@ -17,10 +17,8 @@ import shapephase as sp
 from shapephase import child_process
 from shapephase.body.engines import engine_tree as asking
 from shapephase.body.engines.formats import MJCF, format_of
-from shapephase.body.engines.reading import MISSING
 from shapephase.errors import (
     IgnoredElementWarning,
-    MissingExtraError,
     ModelFileError,
     ShapeError,
     ShapePhaseError,
@@ -483,23 +481,6 @@ def test_a_process_of_its_own_reads_it_and_leaves_nothing(good_file, tmp_path, m
     assert [path.name for path in tmp_path.iterdir()] == ["body.xml"]
 
 
-def test_a_crash_a_hang_and_a_missing_engine(good_file, monkeypatch):
-    def ends_with(source):
-        monkeypatch.setattr(asking, "run_alone", lambda _, *rest: child_process.run_alone(source, *rest))
-
-    ends_with("import os; os.abort()")
-    with pytest.raises(ModelFileError, match=r"body.xml:1: mujoco crashed on it, signal 6"):
-        sp.load_body(good_file)
-    monkeypatch.setattr(asking, "_SECONDS", 0.1)
-    ends_with("import time; time.sleep(60)")
-    with pytest.raises(ModelFileError, match=r"body.xml:1: mujoco took more than 0.1 s and was stopped"):
-        sp.load_body(good_file)
-    monkeypatch.setattr(asking, "_SECONDS", 60)
-    ends_with(f"import sys; sys.exit({MISSING})")
-    with pytest.raises(MissingExtraError, match=r"an MJCF model, which mujoco reads: pip install 'shapephase\[mjcf\]'"):
-        sp.load_body(good_file)
-
-
 @pytest.mark.full
 @pytest.mark.parametrize(
     "inside",
@@ -527,7 +508,7 @@ def test_numbers_that_are_not_mujoco_s_are_not_handed_out(load_mjcf, monkeypatch
             return subprocess.CompletedProcess([], 0, json.dumps(said).encode(), b"")
 
         monkeypatch.setattr(asking, "run_alone", changed)
-        with pytest.raises(ModelFileError, match=f"the engine has another {what} at a random shape"):
+        with pytest.raises(ModelFileError, match=f"another {what} than the engine"):
             load_mjcf(GOOD_MJCF)
 
 

@@ -77,7 +77,7 @@ def test_macros_by_another_prefix_which_xacro_leaves_are_no_urdf(address, tmp_pa
 def test_a_package_that_is_not_found_is_named(walker):
     with pytest.raises(ModelFileError, match=r"walker.urdf.xacro:1: <robot>: xacro does not accept it: .*legs"):
         sp.load_body(walker[0])
-    with pytest.raises(ModelFileError, match=r"packages: .* is no folder"):
+    with pytest.raises(ModelFileError, match=r"packages: .* is not a folder"):
         sp.load_body(walker[0], packages=["nowhere"])
 
 

@@ -164,7 +164,7 @@ def test_what_cannot_be_written_is_said_before_anything_is_computed(capfd, tmp_p
     def never(*_, **__):
         raise AssertionError("it was computed")
 
-    monkeypatch.setattr("shapephase.body.catalog.load_body", never)
+    monkeypatch.setattr("shapephase.body.loading.load_body", never)
     monkeypatch.setattr("shapephase.rigid_body.geodesics.serret_andoyer_metric", never)
     monkeypatch.setattr("shapephase.rigid_body.euler_top.EulerTop.principal", never)
     endings = {"plot": ".svg", "conjugate": ".svg", "plan": ".csv", "split": ".npz", "view": ".html"}

@@ -719,7 +719,7 @@ def _mjcfs() -> Iterator[Case]:
             f"{tag} misspelt",
             slide,
             f'<{tag} {name}="0 0 1" count="1"/>{slide}' if tag == "replicate" else f'<{tag} {name}="0 0 1"/>{slide}',
-            f"<{tag}>: MuJoCo passes over '{name}'; did you mean {near}=",
+            f"<{tag}>: MuJoCo ignores '{name}'; did you mean {near}=",
         )
     yield _mjcf("empty frame", slide, f"<frame/>{slide}")
     yield _mjcf("joint in a frame", slide, f'<frame><joint name="x"/></frame>{slide}')

@@ -97,7 +97,7 @@ def work_at_anything() -> None:
     import pinocchio  # noqa: F401
     import scipy.io  # noqa: F401
 
-    from shapephase.body import catalog  # noqa: F401
+    from shapephase.body import loading  # noqa: F401
     from shapephase.shape_space.files.formats import parser_process  # noqa: F401
 
     for request in requests():

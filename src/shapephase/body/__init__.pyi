@@ -1,10 +1,11 @@
-from .appearance import Visual, inertia_box, visuals
-from .body import Body
-from .catalog import example_file, example_names, load_body, robot_names, robots_folder
+from .body import Body, MovingPart
+from .catalog import example_file, example_names, robot_names, robots_folder
 from .couplings.coupling import Coupling
+from .drawing.appearance import visuals
+from .drawing.visual import Visual, inertia_box
 from .family import BodyFamily
 from .joint_chain import JointChain
-from .moving_parts import MovingPart
+from .loading import load_body
 from .particles.point_masses import ParticleBody, particle_body
 from .plausibility import implausible
 

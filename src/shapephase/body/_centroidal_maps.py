@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
 import numpy as np
 import pinocchio as pin
 
 from ..arrays import Array
-from .couplings.joint_map import JointMap
-
-# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
-_BASE = 6
+from .couplings.joint_map import BASE, JointMap
 
 
 def full_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
     """[I, J] with a column for every joint of the model: (N, n) -> (N, 3, 3 + joints)."""
     centroidal_map = pin.computeCentroidalMap
-    # Each call returns a copy: all at once are put together sooner than one by one.
+    # Each call returns a copy: concatenating all of them is faster than filling an array.
     maps = [centroidal_map(model, data, q) for q in joints.configurations(shapes)]
     return np.concatenate(maps).reshape(-1, 6, model.nv)[:, 3:, 3:] if maps else np.empty((0, 3, model.nv - 3))
 
@@ -51,7 +48,7 @@ def momentum_gradients(
     gradients = np.empty((len(velocities), 3, model.nv))
     for row, (q, full) in enumerate(zip(joints.configurations(shapes), velocities, strict=True)):
         gradients[row] = pin.computeCentroidalDynamicsDerivatives(model, data, q, full, none)[0][3:]
-    columns = joints.columns(gradients[:, :, _BASE:], shapes)
+    columns = joints.columns(gradients[:, :, BASE:], shapes)
     if not joints.follows.is_linear:
         columns += joints.bent_rates(full_map(model, data, joints, shapes)[:, :, 3:], shapes, rates)
     return columns
@@ -59,7 +56,7 @@ def momentum_gradients(
 
 def internal_momenta(whole: Array, joints: JointMap, shapes: Array, rates: Array) -> Array:
     """L_o from full maps: (N, 3, 3 + joints), (N, n), (N, n) -> (N, 3)."""
-    return np.einsum("nij,nj->ni", whole[:, :, 3:], joints.velocities(shapes, rates)[:, _BASE:])
+    return np.einsum("nij,nj->ni", whole[:, :, 3:], joints.velocities(shapes, rates)[:, BASE:])
 
 
 def kinetic_energies(
@@ -77,7 +74,7 @@ def kinetic_energies(
 
 
 def centres_of_mass(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
-    """From the base origin, base axes: (N, 3) [m]."""
+    """Centres of mass from the base origin, base axes: (N, 3) [m]."""
     configurations = joints.configurations(shapes)
     centres = np.empty((len(configurations), 3))
     for row, q in enumerate(configurations):

@@ -5,29 +5,27 @@ Whatever a parser drops, lumps or turns the wrong way shows here, and no such bo
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
 from .body import Body
 from .couplings.ball_joints import coordinate_names
+from .couplings.coupling import with_followers
+from .engines.chain import EXACT, SEED
 from .link_tree import LinkTree
-
-_TOLERANCE = 1e-12
-"""Difference allowed between body and file, a share of the largest terms of the sums: thousands of roundings."""
-_SEED = 20060518
-"""Any number: the random shape is the same at every loading."""
+from .virtual_base import joint_coordinates
 
 
 def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
     """Compare a body with the tree of links that its file has.
 
-    Raises
-    ------
-    ModelFileError
-        If mass, links, joints, or inertia and momentum at a random shape and rate differ by more than rounding, or
-        if nothing in the file has mass.
+    Raises ModelFileError if mass, links, joints, or inertia and momentum at a random shape and rate differ by more than
+    rounding, or if nothing in the file has mass.
     """
     if not body.mass > 0.0:
         first = next(iter(tree.links.values()))
@@ -35,25 +33,41 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
             f"{first.where}: link {first.name!r}: neither it nor any other link has mass; "
             "give each that moves its <inertial> with <mass>, <origin> and <inertia>"
         )
-    expected = {name for name in tree.links if name not in tree.frames}
-    moving = [joint for joint in tree.joints if joint.kind != "fixed" and joint.name not in tree.couplings]
-    _compare_names(set(body.link_names), expected, "links", where)
-    names = (coordinate_names(joint.name) if joint.kind == "ball" else [joint.name] for joint in moving)
-    _compare_names(set(body.joint_names), {name for each in names for name in each}, "joints", where)
+    joints = (joint for joint in tree.joints if joint.name not in tree.couplings)
+    coordinates = {name for joint in joints for name in joint_coordinates(joint)}
+    for what, own, expected in (
+        ("links", set(body.link_names), {*tree.links} - tree.frames),
+        ("joints", set(body.joint_names), coordinates),
+    ):
+        if own != expected:
+            raise _differs(where, what, f"lost {sorted(expected - own)}", f"gained {sorted(own - expected)}")
     mass = sum(link.mass for link in tree.links.values())
-    if abs(body.mass - mass) > _TOLERANCE * mass:
-        raise _differs(where, "mass", f"{body.mass!r} kg", f"{mass!r} kg")
-    random = np.random.default_rng(_SEED)
+    _compare(where, "mass", body.mass, mass, EXACT * mass)
+    random = np.random.default_rng(SEED)
     shape, rate = random.uniform(-1.0, 1.0, (2, body.n_shape))
     by_name = [dict(zip(body.joint_names, values, strict=True)) for values in (shape.tolist(), rate.tolist())]
     inertia, momentum, extent, motion = inertia_and_momentum(tree, *by_name)
-    found = (body.locked_inertia(shape), body.internal_momentum(shape, rate))
-    for what, got, expected, scale in zip(
-        ("inertia", "momentum"), found, (inertia, momentum), (extent, motion), strict=True
-    ):
-        # A comparison that NaN fails.
-        if not np.all(np.abs(got - expected) <= _TOLERANCE * scale):
-            raise _differs(where, what + " at a random shape", got.tolist(), expected.tolist())
+    _compare(where, "inertia", body.locked_inertia(shape), inertia, EXACT * extent)
+    _compare(where, "momentum", body.internal_momentum(shape, rate), momentum, EXACT * motion)
+
+
+def check_against_engine(body: Body, tree: LinkTree, poses: list[dict[str, Any]], where: str) -> None:
+    """Compare a body with the engine that owns its format, at random shapes and rates.
+
+    Raises ModelFileError if mass, centre, inertia or momentum differ by more than rounding.
+    """
+    for pose in poses:
+        shape, rate = (np.array([pose[of][name] for name in body.joint_names]) for of in ("shape", "rate"))
+        *_, extent, motion = inertia_and_momentum(tree, pose["shape"], pose["rate"])
+        exact, coarse = pose["tolerance"]
+        inertia = np.reshape(pose["inertia"], (3, 3))
+        _compare(where, "inertia", body.locked_inertia(shape), inertia, exact * extent, "engine")
+        _compare(where, "momentum", body.internal_momentum(shape, rate), pose["momentum"], coarse * motion, "engine")
+        if pose["mass"] is not None:
+            _compare(where, "mass", body.mass, pose["mass"], exact * body.mass, "engine")
+            # The centre is off by its share of the size of the body.
+            off = exact * np.sqrt(extent / body.mass)
+            _compare(where, "centre", body.centre_of_mass(shape), pose["centre"], off, "engine")
 
 
 def inertia_and_momentum(
@@ -61,27 +75,22 @@ def inertia_and_momentum(
 ) -> tuple[Array, Array, float, float]:
     """Locked inertia and internal momentum from the definitions, link by link.
 
-    Parameters
-    ----------
     shape, rate : coordinates and rates of the independent joints by name [rad or m], [rad/s or m/s]
 
-    Returns
-    -------
     inertia, momentum : (3, 3) [kg m^2], (3,) [kg m^2/s] about the centre of mass, axes of the root link
     extent, motion : the size of the terms they are sums of, seen from the root link; rounding is a share of it
 
-    Notes
-    -----
     Source: theory.md A3, A7.
     """
     names = list(tree.links)
     place = {name: number for number, name in enumerate(names)}
     parents = [place[joint.parent] for joint in tree.joints]
     children = [place[joint.child] for joint in tree.joints]
-    angles, rates = np.array(_coordinates(tree, shape, rate)).reshape(2, -1)
+    states = with_followers(tree.couplings, shape, rate)
+    angles, rates = np.array([[values.get(joint.name, 0.0) for joint in tree.joints] for values in states])
     sliding = np.array([joint.kind == "prismatic" for joint in tree.joints], dtype=bool)
     stacked = [np.array([getattr(j, what) for j in tree.joints]) for what in ("axis", "place", "after", "turn")]
-    axes, places, afters = (each.reshape(-1, 3) for each in stacked[:3])
+    axes, places, afters = (array.reshape(-1, 3) for array in stacked[:3])
     axes = axes / np.sqrt((axes**2).sum(axis=-1, keepdims=True))
     turns = stacked[3].reshape(-1, 3, 3)
     own = _about(axes, np.where(sliding, 0.0, angles))
@@ -113,7 +122,7 @@ def inertia_and_momentum(
     offsets = (pose_turn @ np.array([link.centre for link in links])[..., None])[..., 0]
     tensors = pose_turn @ np.array([link.inertia for link in links]) @ np.swapaxes(pose_turn, -1, -2)
     centres, speeds = pose_place + offsets, velocity + np.cross(omega, offsets)
-    # Of every sum the largest term, and with it the rounding, is that of the farthest part at the fastest rate.
+    # The largest term of every sum, and with it the rounding, is that of the farthest part at the fastest rate.
     distances = np.sqrt((centres**2).sum(axis=-1))
     extent = float(masses @ distances**2 + np.abs(tensors).sum())
     motion = float(distances.max() * (masses @ np.sqrt((speeds**2).sum(axis=-1))))
@@ -126,27 +135,9 @@ def inertia_and_momentum(
     return inertia, momentum, extent, motion
 
 
-def _coordinates(tree: LinkTree, shape: dict[str, float], rate: dict[str, float]) -> tuple[list[float], list[float]]:
-    """Coordinates and rates of all joints, followers by their rules; of a fixed joint zero."""
-    where, speed = dict(shape), dict(rate)
-
-    def find(name: str) -> None:
-        if name in where or name not in tree.couplings:
-            return
-        rule = tree.couplings[name]
-        for driver in rule.drivers:
-            find(driver)
-        where[name], speed[name] = rule.at(where), rule.rate(where, speed)
-
-    for joint in tree.joints:
-        find(joint.name)
-    names = [joint.name for joint in tree.joints]
-    return [where.get(name, 0.0) for name in names], [speed.get(name, 0.0) for name in names]
-
-
 def _four_numbers(name: str, shape: dict[str, float], rate: dict[str, float]) -> Array:
-    """Of a ball joint, and their derivatives: (2, 4)."""
-    return np.array([[one[key] for key in coordinate_names(name)] for one in (shape, rate)])
+    """The four numbers of a ball joint and their derivatives: (2, 4)."""
+    return np.array([[values[key] for key in coordinate_names(name)] for values in (shape, rate)])
 
 
 def _ball_motion(numbers: Array, derivatives: Array) -> tuple[Array, Array]:
@@ -173,13 +164,14 @@ def _about(axes: Array, angles: Array) -> Array:
     return cosine * np.eye(3) + (1.0 - cosine) * axes[:, :, None] * axes[:, None, :] + skew
 
 
-def _compare_names(found: set[str], expected: set[str], what: str, where: str) -> None:
-    if found != expected:
-        raise _differs(where, what, f"lost {sorted(expected - found)}", f"gained {sorted(found - expected)}")
+def _compare(where: str, what: str, own: ArrayLike, expected: ArrayLike, off: float, source: str = "file") -> None:
+    # NaN fails this comparison.
+    if not np.all(np.abs(np.asarray(own) - np.asarray(expected)) <= off):
+        raise _differs(where, what, np.asarray(own).tolist(), np.asarray(expected).tolist(), source)
 
 
-def _differs(where: str, what: str, found: object, expected: object) -> ModelFileError:
+def _differs(where: str, what: str, own: object, expected: object, source: str = "file") -> ModelFileError:
     return ModelFileError(
-        f"{where}:1: the body made from this file has another {what} than the file: {found} against {expected}; "
+        f"{where}:1: the body made from this file has another {what} than the {source}: {own} against {expected}; "
         "please report this file"
     )

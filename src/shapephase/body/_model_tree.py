@@ -1,9 +1,12 @@
-"""From a checked tree of links to a Pinocchio model, and what a model must be like to be a body."""
+"""Pinocchio's model of a checked tree of links, and checks of a user's own model."""
 
 from __future__ import annotations
 
-# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 
@@ -12,11 +15,9 @@ from ..arrays import Array
 from ..errors import ModelFileError
 from .link_tree import Link, LinkTree, inertia_warnings
 
-# Name of the joint that lets the base move: no file is likely to have one of this name.
-_ROOT = "shapephase_free_flyer"
-BALL = "JointModelSpherical"
-"""Pinocchio's name of a ball joint: a unit quaternion, and the angular velocity in axes of the child."""
-# What stands for joints whose own coordinates would not do.
+_ROOT = "shapephase_free_flyer"  # name of the joint that lets the base move: unlikely in a file
+BALL = "JointModelSpherical"  # Pinocchio's ball joint: a unit quaternion, and rates in axes of the child
+# What to use for joints whose own coordinates would not do.
 _INSTEAD = {
     "JointModelSphericalZYX": "its first and last axis can fall together; use the other",
     "JointModelPlanar": "its slides turn with it; use two prismatic joints and a revolute one behind them",
@@ -28,10 +29,7 @@ _INSTEAD = {
 def model_of(tree: LinkTree, where: str) -> pin.Model:
     """A model with a free-flyer from a checked tree: by Pinocchio's parser from a URDF's text, else joint by joint.
 
-    Raises
-    ------
-    ModelFileError
-        If Pinocchio cannot build a model from it.
+    Raises ModelFileError if Pinocchio cannot build a model from it.
     """
     root = _ROOT
     taken = {*tree.links, *(joint.name for joint in tree.joints)}
@@ -45,29 +43,38 @@ def model_of(tree: LinkTree, where: str) -> pin.Model:
         raise ModelFileError(f"{where}:1: robot {tree.name!r}: Pinocchio does not accept it: {error}") from None
 
 
-def checked_model(model: pin.Model, where: str, on_unphysical: str) -> tuple[pin.Model, list[Link], list[str]]:
-    """A copy of a Pinocchio model whose root joint is a free-flyer, what each joint moves, and what is doubtful there.
+def checked_model(source: Any, on_unphysical: str) -> tuple[pin.Model, list[Link], Array, list[str]]:
+    """A copy of a user's model, what each joint moves, its orientation (N, 3, 3) in the neutral shape, and doubts.
 
-    Raises
-    ------
-    ModelFileError
-        If the root joint is no free-flyer, or there is no mass.
-    UnphysicalInertiaError
-        As `inertia_warnings`.
+    A link named after the joint is added to whatever a joint moves without a link of its own, so that it has a pose.
+
+    Raises ModelFileError for another object, a root joint that is not a free-flyer, or a model without mass;
+    UnphysicalInertiaError like `inertia_warnings`.
     """
-    if model.njoints < 2 or model.joints[1].shortname() != "JointModelFreeFlyer":
+    if not isinstance(source, pin.Model):
+        raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(source).__name__}")
+    where = f"model {source.name!r}"
+    if source.njoints < 2 or source.joints[1].shortname() != "JointModelFreeFlyer":
         raise ModelFileError(
             f"{where}: the model's root joint is no free-flyer, so the mass of its root link is lost; build it with "
             "pinocchio.buildModelFromUrdf(path, pinocchio.JointModelFreeFlyer())"
         )
-    moved = [
+    links = [
         Link(name, where, inertia.mass, np.array(inertia.lever), np.array(inertia.inertia))
-        for name, inertia in zip(list(model.names)[1:], model.inertias.tolist()[1:], strict=True)
+        for name, inertia in zip(list(source.names)[1:], source.inertias.tolist()[1:], strict=True)
     ]
-    doubts = inertia_warnings(moved, on_unphysical, "what joint {!r} moves")
-    if not any(link.mass for link in moved):
+    doubts = inertia_warnings(links, on_unphysical, "what joint {!r} moves")
+    if not any(link.mass for link in links):
         raise ModelFileError(f"{where}: nothing in it has mass")
-    return model.copy(), moved, doubts
+    model = source.copy()
+    data = model.createData()
+    pin.forwardKinematics(model, data, pin.neutral(model))
+    turns = np.array([data.oMi[number].rotation for number in range(1, model.njoints)])
+    named = {frame.parentJoint for frame in model.frames if frame.type == pin.FrameType.BODY}
+    for joint in range(1, model.njoints):
+        if joint not in named and not model.existFrame(model.names[joint], pin.FrameType.BODY):
+            model.addBodyFrame(model.names[joint], joint, pin.SE3.Identity(), 0)
+    return model, links, turns, doubts
 
 
 def model_with(model: pin.Model, masses: Array, centres: Array, tensors: Array) -> pin.Model:
@@ -92,6 +99,11 @@ def moving_joints(model: pin.Model) -> dict[str, int]:
             )
         moving[model.names[number]] = number
     return moving
+
+
+def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:
+    """Features that Pinocchio was built with, by the names of its own flags."""
+    return {name: bool(getattr(pin, name, False)) for name in names}
 
 
 def _built(tree: LinkTree, root: str) -> pin.Model:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
 import math
 import threading
 from collections.abc import Iterable, Mapping
+from copy import copy
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,12 +18,12 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import made_by
-from ..arrays import Array, check_reach, common_batch, finite_array
-from ..display import card_html
+from ..arrays import Array, finite_array
+from ..card_pictures import sticks_picture
+from ..display import Card, card_html, numbers, short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
 from ..letters import what_came
-from ._card import body_card
 from ._centroidal_maps import (
     angular_map,
     angular_map_rate,
@@ -31,22 +33,46 @@ from ._centroidal_maps import (
     kinetic_energies,
     momentum_gradients,
 )
-from ._changed_body import changed_body, coupled_body
-from ._given_inertias import Given, given_inertias
+from ._model_tree import model_with, moving_joints
 from .couplings.coupling import Coupling
 from .couplings.joint_map import JointMap
+from .family import BodyFamily, Given, given_inertias
 from .joint_chain import joint_chain
-from .joint_orders import JointOrder
 from .link_motions import link_motions
-from .link_tree import Joint
-from .moving_parts import MovingPart, moving_parts
+from .link_tree import Joint, JointOrder
+from .shape_arguments import ShapeArguments
 
-if TYPE_CHECKING:
-    from .family import BodyFamily
+_MOST_NAMED = 4  # joints on a card: they fit on one line
+
+
+@dataclass(frozen=True, eq=False)
+class MovingPart:
+    """Links that are fixed to each other, and their inertia together, in the axes of the first.
+
+    Attributes
+    ----------
+    links : their names
+    mass : [kg]
+    centre : (3,) centre of mass [m]
+    inertia : (3, 3) about the centre of mass [kg m^2]
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> [part.mass for part in cat.moving_parts]
+    [1.0, 0.0, 0.0, 1.0]
+    """
+
+    links: tuple[str, ...]
+    mass: float
+    centre: Array
+    inertia: Array
+
+    __repr__ = short_repr
 
 
 @made_by("load_body(file or name)")
-class Body:
+class Body(ShapeArguments):
     """A tree of rigid links that floats freely; its shape is the vector of its independent joints.
 
     Made by `load_body`. All quantities are in base axes, about the centre of mass of the whole body where
@@ -57,7 +83,7 @@ class Body:
     ----------
     name : str
     sha256, file : of the file it was loaded from, and where that was; None without a file
-    packages : folders in which the packages that the file names were looked for
+    packages : folders that were searched for the packages that the file names
     xacro_args : the arguments that its xacro file was expanded with
     joint_names : tuple of the independent joints, in the order of the shape vector; of a ball joint "shoulder" its
         four numbers "shoulder.x", "shoulder.y", "shoulder.z" and "shoulder.w"
@@ -111,11 +137,6 @@ class Body:
         self.rate_limits, self.effort_limits = self._joints.rate_limits, self._joints.effort_limits
 
     @property
-    def n_shape(self) -> int:
-        """The number of coordinates of the independent joints: one of each axis, four of a ball joint."""
-        return len(self.joint_names)
-
-    @property
     def n_joints(self) -> int:
         """The number of independent joints, where a ball joint is one."""
         return self.n_shape - 3 * len(self.ball_joints)
@@ -127,12 +148,12 @@ class Body:
 
     @property
     def rate_names(self) -> tuple[str, ...]:
-        """Of the rates of the independent joints."""
+        """Names of the rates of the independent joints."""
         return self._joints.rate_names
 
     @property
     def rate_units(self) -> tuple[str, ...]:
-        """Of the joints that the rates are of, "rad" or "m"."""
+        """Unit of the joint of each rate, "rad" or "m"."""
         return self._joints.rate_units
 
     @property
@@ -153,14 +174,41 @@ class Body:
     @property
     def moving_parts(self) -> tuple[MovingPart, ...]:
         """The base and what each joint moves, in Pinocchio's order; only those that have links."""
-        return moving_parts(self._model)
+        frames: dict[int, list[Any]] = {}
+        for frame in self._model.frames:
+            if frame.type == pin.FrameType.BODY:
+                frames.setdefault(frame.parentJoint, []).append(frame)
+        parts = []
+        for joint, inertia in enumerate(self._model.inertias.tolist()):
+            if joint in frames:
+                own = frames[joint][0].placement.actInv(inertia)
+                names = tuple(frame.name for frame in frames[joint])
+                parts.append(MovingPart(names, own.mass, np.array(own.lever), np.array(own.inertia)))
+        return tuple(parts)
 
     def __repr__(self) -> str:
         """One line for people."""
         return f"Body({self.name!r}, {self.n_joints} joints, {self.mass:.6g} kg)"
 
     _repr_html_ = card_html
-    _card = body_card
+
+    def _card(self) -> Card:
+        """Name, mass, principal moments and joints, with its frames as sticks in the neutral shape."""
+        shape = self.shape()
+        named = ", ".join(self.joint_names[:_MOST_NAMED]) + (", …" if self.n_shape > _MOST_NAMED else "")
+        rows = [
+            ("mass", numbers(self.mass, "kg")),
+            ("links", f"{len(self.link_names)}"),
+            ("joints", f"{self.n_joints}{f': {named}' if named else ''}"),
+            ("centre of mass", numbers(self.centre_of_mass(shape), "m")),
+            ("principal moments", numbers(np.linalg.eigvalsh(self.locked_inertia(shape)), "kg m^2")),
+        ]
+        motions = link_motions(self.chain, shape[None], np.zeros((1, self.n_shape)))
+        centres, parents = motions.places[0], list(self.chain.parents)
+        origins = centres - so3.apply(motions.turns[0], self.chain.centres)
+        # From each frame to the joints that hang on it, and to the centre of mass of what moves with it.
+        starts, ends = np.concatenate([origins[parents], origins]), np.concatenate([origins[1:], centres])
+        return Card(f"Body {self.name!r}", rows, sticks_picture(starts, ends, "its joints"))
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the per-thread work space."""
@@ -200,7 +248,7 @@ class Body:
     def with_inertias(
         self, masses: Given = None, centres: Given = None, inertias: Given = None, *, on_unphysical: str = "error"
     ) -> Body | BodyFamily:
-        """The same joints between links of other mass, centre of mass or rotational inertia: a body, or N of them.
+        """Equal joints between links of other mass, centre of mass or rotational inertia: a body, or N of them.
 
         Each argument is for all moving parts, in the order of `moving_parts`, or for some: a mapping from the first
         link of a part. What is not given stays as it is. A leading axis N of anything that is given makes a
@@ -218,24 +266,38 @@ class Body:
         Raises
         ------
         UnknownNameError, ShapeError
-            For a name that is no link, a link fixed to another, or arrays of the wrong shape.
+            For an unknown link, a link fixed to another, or arrays of the wrong shape.
         UnphysicalInertiaError
-            For a mass that is not positive, a tensor that is not symmetric or, with "error", as said above.
+            For a mass that is not positive, a tensor that is not symmetric or, with "error", an impossible one.
 
         Warns
         -----
         UnphysicalInertiaWarning
             With "warn", for inertias that no distribution of mass has.
         """
-        from .family import BodyFamily
-
         parts = tuple(part.links for part in self.moving_parts)
         given = {"masses": masses, "centres": centres, "inertias": inertias}
-        found = given_inertias(self.chain, parts, given, on_unphysical)
-        return changed_body(self, *found) if found.masses.ndim == 1 else BodyFamily(self, *found)
+        changed = given_inertias(self.chain, parts, given, on_unphysical)
+        return self.with_frame_inertias(*changed) if changed.masses.ndim == 1 else BodyFamily(self, *changed)
+
+    def with_frame_inertias(self, masses: Array, centres: Array, tensors: Array) -> Body:
+        """The body with other inertias of all frames of its chain, in their axes, unchecked.
+
+        masses, centres, tensors : (k + 1,), (k + 1, 3), (k + 1, 3, 3)
+        """
+        changed = copy(self)
+        # The model has no frames between the three axes of a ball joint.
+        between = [frame for ball in self.chain.follows.balls for frame in (ball.row + 1, ball.row + 2)]
+        own = (np.delete(values, between, axis=0) for values in (masses, centres, tensors))
+        changed._model = model_with(self._model, *own)
+        changed.mass = float(pin.computeTotalMass(changed._model))
+        changed.chain = self.chain.with_inertias(masses, centres, tensors)
+        # It no longer agrees with its file.
+        changed.sha256 = changed.file = None
+        return changed
 
     def with_couplings(self, couplings: Mapping[str, Coupling]) -> Body:
-        """The same body with joints that follow others: their coordinates are functions of the others', and no longer
+        """The body with joints that follow others: their coordinates are functions of the others', and no longer
         of the shape.
 
         Joints that follow others already keep doing so, unless they are given another coupling here. Chains of joints
@@ -249,7 +311,7 @@ class Body:
         Raises
         ------
         UnknownNameError
-            If there is no such joint.
+            For an unknown joint.
         ModelFileError
             If joints follow each other in a circle, or one that the body does not have.
 
@@ -260,13 +322,21 @@ class Body:
         >>> bent.joint_names, sp.mechanical_connection(bent, [0.2, 0.0]).shape
         (('waist_pitch', 'waist_yaw'), (3, 2))
         """
-        return coupled_body(self, couplings)
-
-    def joint_index(self, name: str) -> int:
-        """The place of a joint in the shape vector. Raises UnknownNameError."""
-        if name not in self.joint_names:
-            raise unknown_name(f"joint of {self.name}", name, self.joint_names)
-        return self.joint_names.index(name)
+        if not isinstance(couplings, Mapping):
+            came = what_came(couplings)
+            raise ShapeError(
+                f"couplings by joint are needed, such as {{'knee': Coupling.linear('hip', 0.5)}}, got {came}"
+            )
+        joints = tuple(moving_joints(self._model))
+        for name, coupling in couplings.items():
+            if name not in joints:
+                raise unknown_name(f"joint of {self.name}", name, joints)
+            if not isinstance(coupling, Coupling):
+                raise ShapeError(f"joint {name}: a Coupling is needed, got {what_came(coupling)}")
+        changed = Body(self._model, self.name, {**self.couplings, **couplings})
+        for kept in ("joint_orders", "base_joints", "base_angles", "base_slides", "length_unit"):
+            setattr(changed, kept, getattr(self, kept))
+        return changed
 
     def joint_columns(self, names: Iterable[str]) -> list[int]:
         """The places of joints in the shape vector; of a ball joint, by its name or that of a number, all four.
@@ -274,21 +344,21 @@ class Body:
         Raises
         ------
         UnknownNameError
-            For a name that is no joint.
+            For an unknown joint.
 
         Examples
         --------
         >>> sp.load_body("cat_two_halves").joint_columns(["waist_roll", "waist_pitch"])
         [0, 2]
         """
-        found: set[int] = set()
+        columns: set[int] = set()
         for name in names:
             balls = [ball for ball in self.chain.follows.balls if name == ball.name or name in ball.names]
-            found |= set(range(self.n_shape)[balls[0].columns]) if balls else {self.joint_index(name)}
-        return sorted(found)
+            columns |= set(range(self.n_shape)[balls[0].columns]) if balls else {self.joint_index(name)}
+        return sorted(columns)
 
     def rate_frame(self, shape: ArrayLike) -> Array:
-        """What the coordinates of a shape do at unit rates of its joints: (..., n) -> (..., n, m), m = `n_rates`.
+        """Derivatives of the coordinates at unit rates of the joints: (..., n) -> (..., n, m), m = `n_rates`.
 
         One column a rate: for a joint of one axis its coordinate alone; for a ball joint with the four numbers p, the
         product of quaternions p (w, 0)/2, which keeps the length of p. So an array with an axis of coordinates, such as
@@ -360,36 +430,6 @@ class Body:
         r = self._checked(shape)
         return angular_map(*self._maps(), self._rows(r))[:, :, 3:].reshape(*r.shape[:-1], 3, self.n_shape)
 
-    def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
-        """Angular momentum of a joint motion about the centre of mass with the base at rest.
-
-        Parameters
-        ----------
-        shape, rate : (..., n) [rad or m], [rad/s or m/s]; leading axes broadcast
-
-        Returns
-        -------
-        (..., 3) base axes [kg m^2/s]
-
-        Notes
-        -----
-        Raises as `locked_inertia`. Source: Cabrera 2006, section 2.3 (L_o); theory.md A7.
-        """
-        r, v = self._checked(shape), self._checked(rate, "rate")
-        common_batch(shape=r.shape[:-1], rate=v.shape[:-1])
-        return (self.momentum_matrix(r) @ v[..., None])[..., 0]
-
-    def inertia_gradient(self, shape: ArrayLike) -> Array:
-        """dI/dr_k, exact: (..., n) -> (..., n, 3, 3) [kg m^2 per unit of joint].
-
-        Source: numerics.md section 4 (rate of the centroidal map at unit joint rates).
-        """
-        return self.angular_map_gradient(shape)[..., :3]
-
-    def momentum_matrix_gradient(self, shape: ArrayLike) -> Array:
-        """dJ/dr_k, exact: (..., n) -> (..., n, 3, n), the first n counts k. Source: as `inertia_gradient`."""
-        return self.angular_map_gradient(shape)[..., 3:]
-
     def angular_map_gradient(self, shape: ArrayLike) -> Array:
         """d[I, J]/dr_k, both of the above side by side in half the time: (..., n) -> (..., n, 3, 3 + n)."""
         r = self._checked(shape)
@@ -405,7 +445,7 @@ class Body:
         return flat[:, :, :3].reshape(*r.shape[:-1], 3, 3)
 
     def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
-        """How the angular momentum I w + J rate changes with each joint while w and the rates stay the same, exact.
+        """Derivative of the angular momentum I w + J rate by each joint while w and the rates stay the same, exact.
 
         Parameters
         ----------
@@ -421,12 +461,8 @@ class Body:
         One call of Pinocchio for all joints (its derivatives of the centroidal momentum), where `inertia_gradient`
         and `momentum_matrix_gradient` take one for each.
         """
-        w = finite_array(base_rate, "base_rate", (3,), unit="rad/s")
-        r, v = self._pair(shape, rate)
-        if common_batch(shape=r.shape[:-1], base_rate=w.shape[:-1]) != r.shape[:-1]:
-            raise ShapeError(f"base_rate: (3,) or one for each shape {r.shape} is needed, got {w.shape}")
-        w = np.broadcast_to(w, (*r.shape[:-1], 3)).reshape(-1, 3)
-        gradients = momentum_gradients(*self._maps(), self._rows(r), self._rows(v), w)
+        r, v, w = self._with_base_rate(shape, rate, base_rate)
+        gradients = momentum_gradients(*self._maps(), self._rows(r), self._rows(v), w.reshape(-1, 3))
         return np.swapaxes(gradients, -1, -2).reshape(*r.shape, 3)
 
     def centre_of_mass(self, shape: ArrayLike) -> Array:
@@ -440,7 +476,7 @@ class Body:
         Raises
         ------
         UnknownNameError
-            If there is no such link.
+            For an unknown link.
         """
         frame = self._link_frame(link)
         r = self._checked(shape)
@@ -453,7 +489,7 @@ class Body:
         return poses.reshape(*r.shape[:-1], 4, 4)
 
     def link_angular_velocity(self, shape: ArrayLike, rate: ArrayLike, link: str) -> Array:
-        """How a link turns as seen from the base: (..., n), (..., n) -> (..., 3), base axes [rad/s].
+        """Angular velocity of a link relative to the base: (..., n), (..., n) -> (..., 3), base axes [rad/s].
 
         Raises as `link_pose`.
         """
@@ -487,9 +523,9 @@ class Body:
         masses, moments = self.chain.masses[:, None], second_moment(self.chain.inertias)
         then = link_motions(self.chain, still[None], np.zeros((1, self.n_shape)))
         now = link_motions(self.chain, self._rows(r), self._rows(v))
-        there, weighted = moments @ so3.transpose(then.turns[0]), masses * then.places[0]
-        correlation = so3.transpose(now.places) @ weighted + (now.turns @ there).sum(axis=1)
-        slope = so3.transpose(now.speeds) @ weighted + (so3.hat(now.spins) @ now.turns @ there).sum(axis=1)
+        reference_moments, weighted = moments @ so3.transpose(then.turns[0]), masses * then.places[0]
+        correlation = so3.transpose(now.places) @ weighted + (now.turns @ reference_moments).sum(axis=1)
+        slope = so3.transpose(now.speeds) @ weighted + (so3.hat(now.spins) @ now.turns @ reference_moments).sum(axis=1)
         matrix = (*r.shape[:-1], 3, 3)
         return correlation.reshape(matrix), slope.reshape(matrix)
 
@@ -505,12 +541,9 @@ class Body:
         -----
         Source: Cabrera 2006, equation (4); theory.md A6 (with the factor one half that C-E1 restores).
         """
-        r, v = self._pair(shape, rate)
-        omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
-        batch = common_batch(shape=r.shape[:-1], angular_velocity=omega.shape[:-1])
-        r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
-        spins = np.broadcast_to(omega, (*batch, 3)).reshape(-1, 3)
-        return kinetic_energies(*self._maps(), self._rows(r), self._rows(v), spins).reshape(batch)
+        r, v, omega = self._turning(shape, rate, angular_velocity)
+        rows = self._rows(r), self._rows(v), omega.reshape(-1, 3)
+        return kinetic_energies(*self._maps(), *rows).reshape(r.shape[:-1])
 
     def sample(self, shape: Array, rate: Array) -> tuple[Array, Array]:
         """Locked inertia and internal momentum along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3).
@@ -529,26 +562,6 @@ class Body:
         if not isinstance(link, str) or link not in self.link_names:
             raise unknown_name(f"link of {self.name}", link, self.link_names)
         return self._model.getFrameId(link, pin.FrameType.BODY)
-
-    def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
-        array = finite_array(shape, name)
-        if array.ndim == 0 or array.shape[-1] != self.n_shape:
-            raise ShapeError(
-                f"{name}: expected (..., {self.n_shape}), one entry per joint of {self.name} "
-                f"({', '.join(self.joint_names)}), got shape {array.shape}"
-            )
-        check_reach(array, name)
-        return array
-
-    def _pair(self, shape: ArrayLike, rate: ArrayLike) -> tuple[Array, Array]:
-        """Shape and rate with the same leading axes."""
-        r, v = self._checked(shape), self._checked(rate, "rate")
-        batch = common_batch(shape=r.shape[:-1], rate=v.shape[:-1])
-        return np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
-
-    def _rows(self, array: Array) -> Array:
-        """(..., n) -> (N, n); a body without joints has rows too."""
-        return array.reshape(math.prod(array.shape[:-1]), self.n_shape)
 
     def _maps(self) -> tuple[pin.Model, pin.Data, JointMap]:
         return self._model, self._data(), self._joints

@@ -13,17 +13,16 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from .joint_chain import JointChain
+from .joint_chain import FULL_FROM_SIX, JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 PARAMETERS = 10
-"""Of a link, in its axes and about the centre of mass that it has in the body the matrices were made for: mass [kg],
+"""Of a link, in its axes and about its centre of mass in the body that the matrices were made for: mass [kg],
 first moment (3) [kg m], inertia xx yy zz yz xz xy [kg m^2]."""
-_OUTPUTS = 15
+OUTPUTS = 15
 """About the point that is that body's centre of mass: inertia xx yy zz yz xz xy, angular momentum (3), first moment of
 mass (3), its rate (3)."""
 _VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-_MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +32,6 @@ class InertialRegressor:
     At the body that they were made for, the first moment of mass vanishes: there the first six and the next three rows
     are the exact derivatives of I and of L_o by the parameters.
 
-    Attributes
-    ----------
     matrices : (N, 15, 10 links)
     centres : (links, 3) the centres of mass that parameters are about, axes of each link [m]
     """
@@ -45,20 +42,16 @@ class InertialRegressor:
     def inertia_and_momentum(self, masses: Array, centres: Array, inertias: Array) -> tuple[Array, Array]:
         """I and L_o of bodies with the same joints, about the centre of mass of each, axes of the base.
 
-        Parameters
-        ----------
         masses, centres, inertias : (V, links), (V, links, 3), (V, links, 3, 3); the latter about these centres
 
-        Returns
-        -------
-        (V, N, 3, 3) [kg m^2], (V, N, 3) [kg m^2/s]
+        Returns (V, N, 3, 3) [kg m^2], (V, N, 3) [kg m^2/s]
         """
         given = parameters(masses, centres, inertias, self.centres)
         count = len(self.matrices)
-        sums = (given @ self.matrices.reshape(count * _OUTPUTS, -1).T).reshape(len(masses), count, _OUTPUTS)
+        sums = (given @ self.matrices.reshape(count * OUTPUTS, -1).T).reshape(len(masses), count, OUTPUTS)
         moment, rate = sums[..., 9:12], sums[..., 12:]
         whole = masses.sum(axis=-1)[:, None, None]
-        inertia = sums[..., :6][..., _MATRIX].reshape(*sums.shape[:2], 3, 3)
+        inertia = sums[..., :6][..., FULL_FROM_SIX].reshape(*sums.shape[:2], 3, 3)
         return inertia - _of_point(moment) / whole[..., None], sums[..., 6:9] - np.cross(moment, rate) / whole
 
 
@@ -73,7 +66,7 @@ def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> Inerti
     """
     links = link_motions(chain, shapes, rates)
     count, frames = links.places.shape[:2]
-    whole = np.zeros((count, frames, _OUTPUTS, PARAMETERS))
+    whole = np.zeros((count, frames, OUTPUTS, PARAMETERS))
     whole[..., 0] = np.concatenate(_of_masses(links), axis=-1)
     for axis in range(3):
         whole[..., 1 + axis] = np.concatenate(_of_first_moments(links, axis), axis=-1)
@@ -83,17 +76,15 @@ def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> Inerti
         tensor = turned if i == j else turned + so3.transpose(turned)
         whole[..., :6, 4 + entry] = _voigt(tensor)
         whole[..., 6:9, 4 + entry] = so3.apply(tensor, links.spins)
-    matrices = np.swapaxes(whole, 1, 2).reshape(count, _OUTPUTS, frames * PARAMETERS)
+    matrices = np.swapaxes(whole, 1, 2).reshape(count, OUTPUTS, frames * PARAMETERS)
     return InertialRegressor(np.ascontiguousarray(matrices), chain.centres)
 
 
 def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving: bool = True) -> Array:
     """Sums over N shapes of row . (dI spin + dL_o) by the ten parameters of each link: (k, 10 links).
 
-    The same derivatives as those of the regressor, at the body itself, without its matrices.
+    Equal to the derivatives by the regressor, at the body itself, without its matrices.
 
-    Parameters
-    ----------
     rows : (N, k, 3)
     spins : (N, 3)
     moving : whether the links move as seen from the base; else the sums are of row . dI spin
@@ -103,8 +94,8 @@ def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving:
     all_spins = spin + (components(links.spins) if moving else np.zeros_like(places))
     speeds = cross(spin, places) + (components(links.speeds) if moving else 0.0)
     turning = _seen(turns, all_spins)
-    found = np.empty((rows.shape[1], places.shape[2], PARAMETERS))
-    for row, sums in zip(np.moveaxis(rows, 0, 2), found, strict=True):
+    result = np.empty((rows.shape[1], places.shape[2], PARAMETERS))
+    for row, sums in zip(np.moveaxis(rows, 0, 2), result, strict=True):
         across = np.broadcast_to(row[:, :, None], places.shape)
         arms, near = cross(across, places), _seen(turns, across)
         sums[:, 0] = (arms * speeds).sum(axis=(0, 1))
@@ -112,7 +103,7 @@ def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving:
         for entry, (i, j) in enumerate(_VOIGT):
             product = near[i] * turning[j]
             sums[:, 4 + entry] = (product if i == j else product + near[j] * turning[i]).sum(axis=0)
-    return found.reshape(len(found), -1)
+    return result.reshape(len(result), -1)
 
 
 def _seen(turns: Array, vectors: Array) -> Array:
@@ -132,12 +123,12 @@ def parameters(masses: Array, centres: Array, inertias: Array, about: Array) -> 
 
 
 def _of_masses(links: LinkMotions) -> list[Array]:
-    """What one kilogram at the centre of each link adds: (N, k, ...)."""
+    """Sums that one kilogram at the centre of each link adds: (N, k, ...)."""
     return [_voigt(_of_point(links.places)), np.cross(links.places, links.speeds), links.places, links.speeds]
 
 
 def _of_first_moments(links: LinkMotions, axis: int) -> list[Array]:
-    """What a first moment of one along an axis of each link adds."""
+    """Sums that a unit first moment along an axis of each link adds."""
     moment = links.turns[..., axis]
     rate = np.cross(links.spins, moment)
     product = links.places[..., :, None] * moment[..., None, :]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# Pinocchio fills its namespace at import time, where a type checker cannot look.
+# Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
 import numpy as np
 import pinocchio as pin
@@ -11,32 +11,24 @@ from ..arguments import check_object
 from ..arrays import Array
 from .body import Body
 from .couplings.coordinate_map import check_smooth
-
-# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
-_BASE = 6
+from .couplings.joint_map import BASE
 
 
 def falling_efforts(
     body: Body, shapes: Array, rates: Array, accelerations: Array, spins: Array, spin_rates: Array
 ) -> tuple[Array, Array]:
-    """What the joints of a body in free fall must do, by Newton-Euler steps from link to link (Pinocchio's `rnea`).
+    """Efforts of the joints of a body in free fall, by Newton-Euler steps from link to link (Pinocchio's `rnea`).
 
     The centre of mass falls freely: gravity moves all links alike, and loads no joint. The effort of a joint that
     follows another adds to the effort of that one by the work it does.
 
-    Parameters
-    ----------
     shapes, rates, accelerations : (N, n), unchecked
     spins, spin_rates : (N, 3) angular velocity of the base and its rate, base axes [rad/s], [rad/s^2]
 
-    Returns
-    -------
     efforts : (N, n) [N m or N]
     wrenches : (N, 6) force on the base and torque about its origin, base axes, that the motion would need from
         outside, which is none for a free body [N], [N m]
 
-    Notes
-    -----
     Source: Featherstone 2008, Rigid Body Dynamics Algorithms, section 5.3.
     """
     check_object(body, "Body", "body")
@@ -46,7 +38,7 @@ def falling_efforts(
     states[2][:, :3] += model.gravity.linear
     whole = np.array([pin.rnea(model, data, *state) for state in zip(*states, strict=True)])
     whole = whole.reshape(len(shapes), model.nv)
-    return joints.columns(whole[:, _BASE:], shapes), whole[:, :_BASE]
+    return joints.columns(whole[:, BASE:], shapes), whole[:, :BASE]
 
 
 def floating_velocities(body: Body, shapes: Array, rates: Array, spins: Array) -> tuple[Array, Array]:
@@ -59,7 +51,7 @@ def floating_velocities(body: Body, shapes: Array, rates: Array, spins: Array) -
     configurations, velocities = joints.configurations(shapes), joints.velocities(shapes, rates)
     for row, (q, v) in enumerate(zip(configurations, velocities, strict=True)):
         pin.centerOfMass(model, data, q, v)
-        v[:3], v[3:_BASE] = -data.vcom[0] - _cross(spins[row], data.com[0]), spins[row]
+        v[:3], v[3:BASE] = -data.vcom[0] - _cross(spins[row], data.com[0]), spins[row]
     return configurations, velocities
 
 
@@ -71,13 +63,9 @@ def floating_states(
     The base's position is the origin, its attitude the identity. The first six velocities are linear and angular, base
     axes, and their accelerations the derivatives of these six numbers.
 
-    Parameters
-    ----------
     shapes, rates, accelerations, spins, spin_rates : as for `falling_efforts`
 
-    Returns
-    -------
-    (N, nq), (N, nv), (N, nv)
+    Returns (N, nq), (N, nv), (N, nv)
     """
     check_object(body, "Body", "body")
     model, data, joints = body._model, body._data(), body._joints
@@ -87,8 +75,8 @@ def floating_states(
     for row, (q, v, a) in enumerate(zip(configurations, velocities, slopes, strict=True)):
         pin.centerOfMass(model, data, q, v, a)
         centre, speed, w = data.com[0].copy(), data.vcom[0].copy(), spins[row]
-        v[:3], v[3:_BASE] = -speed - _cross(w, centre), w
-        a[3:_BASE] = spin_rates[row]
+        v[:3], v[3:BASE] = -speed - _cross(w, centre), w
+        a[3:BASE] = spin_rates[row]
         a[:3] = -data.acom[0] - _cross(spin_rates[row], centre) - _cross(w, speed)
     return configurations, velocities, slopes
 

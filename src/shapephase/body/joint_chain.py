@@ -13,10 +13,56 @@ from ..arrays import Array, Integers
 from ..display import short_repr
 from ._model_tree import moving_joints
 from .couplings.coordinate_map import CoordinateMap
-from .link_rows import LinkRows, link_rows, rows_with
 
-# Pinocchio's number of the free-flyer: joint 0 is the universe.
-_BASE = 1
+_BASE = 1  # Pinocchio's number of the free-flyer: joint 0 is the universe
+
+
+SIX_OF_FULL = [0, 4, 8, 5, 2, 1]  # xx yy zz yz xz xy among the nine entries of a tensor
+FULL_FROM_SIX = [0, 5, 4, 5, 1, 3, 4, 3, 2]  # the nine entries among these six
+NUMBERS = 22
+"""In the row of a frame: its turn at rest in the parent's axes (9, row by row), its place there (3) [m]; then of what
+moves with it the mass [kg], the centre of mass (3) [m] and the inertia about that (xx yy zz yz xz xy) [kg m^2]."""
+GEOMETRY = 12  # numbers that do not depend on masses; they come first
+_PARALLEL = 1e-14  # sine between a screw's axis and its slide: all that rounding leaves
+
+
+@dataclass(frozen=True, eq=False)
+class LinkRows:
+    """Frame 0 is the base; joint k turns and slides frame k + 1 along its own z axis, by its coordinate q.
+
+    parents : (k,) number of the frame that each hangs on
+    turning : (k,) 1 where a joint turns by q, 0 where it only slides
+    leads : (k,) by how much it slides, in units of q: 1, 0, or the lead of a screw [m/rad]
+    rows : (k + 1, NUMBERS)
+    mass : of all [kg]
+    follows : as in `JointChain`
+    bases : (k + 1, 3, 3) the axes of each frame in those that it has in the chain, in more digits
+    """
+
+    parents: Any
+    turning: Array
+    leads: Array
+    rows: Array
+    mass: float
+    follows: CoordinateMap
+    bases: Any
+
+    __repr__ = short_repr
+
+    def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
+        """Coordinates and rates of all joints, followers included, contiguous: (N, n), (N, n) -> (N, k), (N, k)."""
+        coordinates, speeds = self.follows.with_rates(shapes, rates)
+        return np.ascontiguousarray(coordinates), np.ascontiguousarray(speeds)
+
+    def in_chain_axes(self, derivatives: Array) -> Array:
+        """Derivatives by first moments and inertias of frames, (m, k + 1, 10) as `inertial_sums` has them, turned."""
+        bases, result = np.asarray(self.bases, dtype=np.float64), derivatives.copy()
+        result[..., 1:4] = (bases @ derivatives[..., 1:4, None])[..., 0]
+        # An entry off the diagonal of a tensor stands there twice.
+        tensors = derivatives[..., 4:][..., FULL_FROM_SIX] * (0.5 + 0.5 * np.eye(3)).ravel()
+        turned = bases @ tensors.reshape(*derivatives.shape[:2], 3, 3) @ np.swapaxes(bases, -1, -2)
+        result[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., SIX_OF_FULL] * np.repeat([1.0, 2.0], 3)
+        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,12 +118,12 @@ class JointChain:
 
     @property
     def has_rows(self) -> bool:
-        """Whether machine code knows all its joints; it does not know ball joints."""
+        """True where compiled code supports all its joints; it has no ball joints."""
         return not self.follows.balls
 
     @cached_property
     def rows(self) -> LinkRows:
-        """The same for loops in machine code, made when first needed; only where `has_rows`."""
+        """The chain as rows for compiled code, made when first needed; only where `has_rows`."""
         return link_rows(self)
 
     def turns_at(self, shapes: Array) -> Array:
@@ -101,15 +147,15 @@ class JointChain:
     @cached_property
     def hanging(self) -> Array:
         """(k, k + 1) one where a frame hangs on a joint, at whatever distance, else zero."""
-        found = np.zeros((len(self.names), len(self.names) + 1))
+        carried = np.zeros((len(self.names), len(self.names) + 1))
         for joint in range(len(self.names) - 1, -1, -1):
-            found[joint, joint + 1] = 1.0
+            carried[joint, joint + 1] = 1.0
             if self.parents[joint]:
-                found[self.parents[joint] - 1] += found[joint]
-        return found
+                carried[self.parents[joint] - 1] += carried[joint]
+        return carried
 
     def with_inertias(self, masses: Array, centres: Array, inertias: Array) -> JointChain:
-        """The same joints between other links; what is known of the joints' rows goes with them."""
+        """The chain with other links; rows that were already made are carried over."""
         changed = replace(self, masses=masses, centres=centres, inertias=inertias)
         if "rows" in vars(self):
             vars(changed)["rows"] = rows_with(self.rows, masses, centres, inertias)
@@ -156,3 +202,60 @@ def joint_chain(model: Any, follows: CoordinateMap) -> JointChain:
             if frame.type.name == "BODY"
         },
     )
+
+
+def link_rows(chain: JointChain) -> LinkRows:
+    """The rows of a chain, with each of its frames turned about its origin so that z is the joint's axis."""
+    count = len(chain.names)
+    # Turned in more digits, so that only the results are rounded.
+    bases = [np.eye(3, dtype=np.longdouble)]
+    turning, leads = (chain.axes != 0.0).any(axis=1), np.zeros(count)
+    rows = np.zeros((count + 1, NUMBERS))
+    for joint, (axis, slide) in enumerate(zip(chain.axes, chain.slides, strict=True)):
+        basis = _with_third_axis(axis if turning[joint] else slide)
+        lead = slide @ basis
+        if np.abs(lead[:2]).max() > _PARALLEL * np.abs(lead).max():
+            raise ValueError(f"joint {chain.names[joint]} slides across its axis")
+        leads[joint] = lead[2]
+        parent = bases[chain.parents[joint]]
+        rows[joint + 1, :9] = (parent.T @ chain.turns[joint] @ basis).ravel()
+        rows[joint + 1, 9:12] = parent.T @ chain.places[joint]
+        bases.append(basis)
+    rows[0, [0, 4, 8]] = 1.0
+    axes = np.array(bases)
+    rows[:, GEOMETRY:] = inertial_numbers(axes, chain.masses, chain.centres, chain.inertias)
+    return LinkRows(
+        parents=np.array(chain.parents, dtype=np.uint32),
+        turning=turning.astype(float),
+        leads=leads,
+        rows=rows,
+        mass=float(chain.masses.sum()),
+        follows=chain.follows,
+        bases=axes,
+    )
+
+
+def rows_with(rows: LinkRows, masses: Array, centres: Array, inertias: Array) -> LinkRows:
+    """The rows of a chain with other inertias: its joints are the same."""
+    changed = rows.rows.copy()
+    changed[:, GEOMETRY:] = inertial_numbers(rows.bases, masses, centres, inertias)
+    return replace(rows, rows=changed, mass=float(masses.sum()))
+
+
+def inertial_numbers(bases: Any, masses: Array, centres: Array, inertias: Array) -> Array:
+    """Entries of rows that depend on masses: (..., k + 1), (..., k + 1, 3), (..., k + 1, 3, 3) -> (..., k + 1, 10)."""
+    back = np.swapaxes(bases, -1, -2)
+    turned = (back @ inertias @ bases).reshape(*masses.shape, 9)[..., SIX_OF_FULL]
+    return np.concatenate([masses[..., None], (back @ centres[..., None])[..., 0], turned], axis=-1).astype(float)
+
+
+def _with_third_axis(axis: Array) -> Any:
+    """A rotation whose third column is the direction of `axis`; exact where that is one of the axes: (3, 3)."""
+    third = axis.astype(np.longdouble)
+    third /= np.sqrt(third @ third)
+    first = np.zeros(3, dtype=np.longdouble)
+    # The axis after the nearest: for a coordinate axis the columns are coordinate axes too.
+    first[(int(np.argmax(np.abs(third))) + 1) % 3] = 1.0
+    first -= (first @ third) * third
+    first /= np.sqrt(first @ first)
+    return np.stack([first, np.cross(third, first), third], axis=1)

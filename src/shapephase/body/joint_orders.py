@@ -3,46 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ..arguments import check_object
-from .link_tree import Joint, LinkTree
+from .body import Body
+from .link_tree import Joint, JointOrder, LinkTree
 from .virtual_base import joint_coordinates
-
-if TYPE_CHECKING:
-    from .body import Body
 
 MUJOCO = "mujoco"
 ISAAC = "isaac"
 ISAAC_BY_NAME = "isaac-by-name"
 OWN = "body"
-WORDS = (MUJOCO, ISAAC, ISAAC_BY_NAME, OWN)
-"""What a caller may ask for."""
+WORDS = (MUJOCO, ISAAC, ISAAC_BY_NAME, OWN)  # choices of callers
 TITLES = {
     MUJOCO: "the order in which MuJoCo compiles the body's file",
     ISAAC: "breadth first, joints of one link as the file lists them",
     ISAAC_BY_NAME: "breadth first, joints of one link by their names",
     OWN: "the order of the body",
 }
-_SCALAR_FIRST = (3, 0, 1, 2)
-"""Of the coordinates x y z w of a ball joint, which simulators write w x y z."""
-
-
-@dataclass(frozen=True)
-class JointOrder:
-    """An order of all joints of a body, those that follow others among them.
-
-    Attributes
-    ----------
-    word : that asks for it
-    joints : names of coordinates; of a ball joint four, w first
-    links : in the simulator's order of bodies: the base, and behind it what each joint moves, or all links of the file
-    """
-
-    word: str
-    joints: tuple[str, ...]
-    links: tuple[str, ...]
 
 
 def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:
@@ -57,13 +34,13 @@ def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:
         below.setdefault(joint.parent, []).append(joint)
     first = next(iter(tree.links))
     moved = tuple(joint.child for joint in tree.joints if joint.kind != "fixed" and joint.child not in tree.frames)
-    found = [JointOrder(MUJOCO, _coordinates(tree.joints), (first, *moved))]
+    orders = [JointOrder(MUJOCO, _coordinates(tree.joints), (first, *moved))]
     if from_urdf:
-        found = [_order(MUJOCO, first, _depth_first(first, below), merged=True)]
+        orders = [_order(MUJOCO, first, _depth_first(first, below), merged=True)]
     for word, key in ((ISAAC, None), (ISAAC_BY_NAME, lambda joint: joint.name)):
         for merged in (True, False):
-            found.append(_order(word, first, _breadth_first(first, below, key, merged=merged), merged=merged))
-    return tuple(found)
+            orders.append(_order(word, first, _breadth_first(first, below, key, merged=merged), merged=merged))
+    return tuple(orders)
 
 
 def simulator_order(body: Body, word: str, otherwise: tuple[str, ...]) -> tuple[str, ...]:
@@ -78,27 +55,28 @@ def _order(word: str, first: str, joints: Sequence[Joint], *, merged: bool) -> J
 
 
 def _coordinates(joints: Iterable[Joint]) -> tuple[str, ...]:
-    found: list[str] = []
+    coordinates: list[str] = []
     for joint in joints:
         names = joint_coordinates(joint)
-        found += [names[k] for k in _SCALAR_FIRST] if joint.kind == "ball" else names
-    return tuple(found)
+        # Simulators write w x y z.
+        coordinates += names[-1:] + names[:-1] if joint.kind == "ball" else names
+    return tuple(coordinates)
 
 
 def _depth_first(first: str, below: dict[str, list[Joint]]) -> list[Joint]:
-    found: list[Joint] = []
+    ordered: list[Joint] = []
     waiting = below.get(first, [])[::-1]
     while waiting:
-        found.append(waiting.pop())
-        waiting += below.get(found[-1].child, [])[::-1]
-    return found
+        ordered.append(waiting.pop())
+        waiting += below.get(ordered[-1].child, [])[::-1]
+    return ordered
 
 
 def _breadth_first(
     first: str, below: dict[str, list[Joint]], key: Callable[[Joint], str] | None, *, merged: bool
 ) -> list[Joint]:
     """Level by level; where fixed links are merged, what moves on them is on the level of what they are fixed to."""
-    found: list[Joint] = []
+    ordered: list[Joint] = []
     level = [first]
     while level:
         after: list[str] = []
@@ -106,20 +84,20 @@ def _breadth_first(
             joints = _on(link, below) if merged else list(below.get(link, []))
             if key is not None:
                 joints.sort(key=key)
-            found += joints
+            ordered += joints
             after += [joint.child for joint in joints]
         level = after
-    return found
+    return ordered
 
 
 def _on(link: str, below: dict[str, list[Joint]]) -> list[Joint]:
     """The joints that move on a link and on what is fixed to it, as listed depth first."""
-    found: list[Joint] = []
+    moving: list[Joint] = []
     waiting = below.get(link, [])[::-1]
     while waiting:
         joint = waiting.pop()
         if joint.kind == "fixed":
             waiting += below.get(joint.child, [])[::-1]
         else:
-            found.append(joint)
-    return found
+            moving.append(joint)
+    return moving

@@ -1,4 +1,4 @@
-"""Where the links of a body are and how they move, at many shapes in one call and without Pinocchio."""
+"""Places and motions of the links of a body, at many shapes in one call and without Pinocchio."""
 
 from __future__ import annotations
 
@@ -13,10 +13,8 @@ from .joint_chain import JointChain
 
 @dataclass(frozen=True, eq=False)
 class LinkMotions:
-    """What moves with each of the k + 1 frames of a chain, at N shapes, in axes of the base.
+    """Motion of the k + 1 frames of a chain, at N shapes, in axes of the base.
 
-    Attributes
-    ----------
     turns : (N, k + 1, 3, 3) orientations
     places, speeds : (N, k + 1, 3) of the centres of mass, from the centre of mass of all, which moves [m], [m/s]
     spins : (N, k + 1, 3) angular velocities [rad/s]
@@ -29,13 +27,13 @@ class LinkMotions:
 
 
 def link_motions(chain: JointChain, shapes: Array, rates: Array) -> LinkMotions:
-    """With the base at rest: (N, n), (N, n) of the independent joints. Source: theory.md A7."""
+    """Motions of links with the base at rest: (N, n), (N, n) of the independent joints. Source: theory.md A7."""
     all_coordinates, all_rates = chain.follows.with_rates(shapes, rates)
     count, frames = len(shapes), len(chain.masses)
     turns = np.empty((count, frames, 3, 3))
     places, speeds, spins = np.zeros((3, count, frames, 3))
     turns[:, 0] = np.eye(3)
-    # Of all joints at once, from the parent's axes to the child's.
+    # All joints at once, from the parent's axes to the child's.
     at_rest = chain.turns_at(shapes)
     turned = at_rest @ so3.exp(all_coordinates[..., None] * chain.axes)
     for joints, parents in chain.generations:
@@ -60,11 +58,11 @@ def link_motions(chain: JointChain, shapes: Array, rates: Array) -> LinkMotions:
 
 
 def components(vectors: Array) -> Array:
-    """(N, k, c) -> (c, N, k), each in one piece, which is sooner added and multiplied."""
+    """Components of vectors as contiguous arrays, which are added and multiplied faster: (N, k, c) -> (c, N, k)."""
     return np.ascontiguousarray(np.moveaxis(vectors, -1, 0))
 
 
 def cross(first: Array, second: Array) -> Array:
-    """Of vectors whose components come first: (3, ...), (3, ...) -> (3, ...)."""
+    """Cross product of vectors whose components come first: (3, ...), (3, ...) -> (3, ...)."""
     (a, b, c), (x, y, z) = first, second
     return np.stack([b * z - c * y, c * x - a * z, a * y - b * x])

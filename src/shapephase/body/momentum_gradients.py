@@ -1,6 +1,6 @@
-"""How a body's angular momentum answers to its shape and to its rates, for all joints at once and without Pinocchio.
+"""Derivatives of a body's angular momentum by its shape and rates, for all joints at once and without Pinocchio.
 
-What hangs on a joint moves with it as one: the sums over it are those over its links, a product with a fixed matrix.
+Links that hang on a joint move with it together: sums over them are products with a fixed matrix.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from .joint_chain import JointChain
+from .joint_chain import FULL_FROM_SIX, SIX_OF_FULL, JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 
@@ -25,25 +25,21 @@ def by_shape_and_rate(
     adds z x h - (z x o) x q + J y - p x (z x v_o + y x o), where y is the velocity of z; a unit of slide along s adds
     s x q + p x y, where y is that of s.
 
-    Parameters
-    ----------
     links : of the chain at N shapes and rates
     shapes, rates : (N, n)
     spins : (N, S, 3) w, several for each shape
     rows : (N, S, r, 3)
 
-    Returns
-    -------
-    (N, S r, n) each, by shapes and by rates
+    Returns (N, S r, n) each, by shapes and by rates
     """
     sums, at = (
         _carried(chain, _link_sums(chain, links)),
         _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1]),
     )
-    count, several, each, _ = rows.shape
+    count, several, count_of_rows, _ = rows.shape
     arms = cross(at.axes, at.origins)
     by_rate = _turned(sums.inertia, at.axes) + cross(sums.moment, at.slides - arms)
-    by_shape = np.empty((count, several, each, by_rate.shape[-1]))
+    by_shape = np.empty((count, several, count_of_rows, by_rate.shape[-1]))
     for which in range(several):
         spin = spins[:, which].T[:, :, None]
         drift = sums.drift + cross(spin, sums.moment)
@@ -51,11 +47,11 @@ def by_shape_and_rate(
         whole = spin + at.spins
         swung = cross(whole, at.axes)
         point = cross(at.axes, at.speeds + cross(spin, at.origins)) + cross(swung, at.origins)
-        found = cross(at.axes, momentum) + _turned(sums.inertia, swung)
-        found += cross(at.slides - arms, drift) + cross(sums.moment, cross(whole, at.slides) - point)
-        np.matmul(rows[:, which], np.moveaxis(found, 0, 1), out=by_shape[:, which])
+        columns = cross(at.axes, momentum) + _turned(sums.inertia, swung)
+        columns += cross(at.slides - arms, drift) + cross(sums.moment, cross(whole, at.slides) - point)
+        np.matmul(rows[:, which], np.moveaxis(columns, 0, 1), out=by_shape[:, which])
     by_rates = rows.reshape(count, -1, 3) @ np.moveaxis(by_rate, 0, 1)
-    return by_independent(chain, by_shape.reshape(count, several * each, -1), by_rates, shapes, rates)
+    return by_independent(chain, by_shape.reshape(count, several * count_of_rows, -1), by_rates, shapes, rates)
 
 
 def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Array, Array]:
@@ -65,19 +61,15 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     unit of turn adds y . (h - o x q) - q . (z x v_o), of its rate z . (h - o x q); a unit of slide q . y, of its rate
     q . s.
 
-    Parameters
-    ----------
     shapes, rates : (N, n)
 
-    Returns
-    -------
-    (N, n) each [J per unit of joint], [J s per unit of joint]
+    Returns (N, n) each [J per unit of joint], [J s per unit of joint]
     """
     links = link_motions(chain, shapes, rates)
-    each = _link_sums(chain, links)
-    sums, at = _carried(chain, each), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
-    inertia, momentum = each[9:].sum(axis=-1), each[6:9].sum(axis=-1)
-    tensors = np.moveaxis(inertia[[0, 5, 4, 5, 1, 3, 4, 3, 2]], 0, -1).reshape(-1, 3, 3)
+    link_sums = _link_sums(chain, links)
+    sums, at = _carried(chain, link_sums), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
+    inertia, momentum = link_sums[9:].sum(axis=-1), link_sums[6:9].sum(axis=-1)
+    tensors = np.moveaxis(inertia[FULL_FROM_SIX], 0, -1).reshape(-1, 3, 3)
     spin = -np.linalg.solve(tensors, momentum.T[..., None])[..., 0].T[:, :, None]
     drift = sums.drift + cross(spin, sums.moment)
     whole = spin + at.spins
@@ -85,14 +77,14 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     speeds = at.speeds + cross(spin, at.origins)
     by_shape = cross(whole, at.axes) * about - cross(at.axes, speeds) * drift + cross(whole, at.slides) * drift
     by_rate = at.axes * about + at.slides * drift
-    found = by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
-    return found[0][:, 0], found[1][:, 0]
+    gradients = by_independent(chain, by_shape.sum(axis=0)[:, None], by_rate.sum(axis=0)[:, None], shapes, rates)
+    return gradients[0][:, 0], gradients[1][:, 0]
 
 
 def by_independent(
     chain: JointChain, by_shape: Array, by_rate: Array, shapes: Array, rates: Array
 ) -> tuple[Array, Array]:
-    """From derivatives by coordinates and rates of all joints to those by the shape and its rate: (N, m, k), (N, m, k)
+    """Derivatives by the shape and its rate from those by coordinates and rates of all joints: (N, m, k), (N, m, k)
     -> (N, m, n), (N, m, n)."""
     follows = chain.follows
     folded = follows.folded(by_shape, shapes)
@@ -105,8 +97,6 @@ def by_independent(
 class _Sums:
     """Over what hangs on each joint, about the centre of mass of all, the base at rest; components first.
 
-    Attributes
-    ----------
     moment, drift : (3, N, k) of mass times place, and times velocity
     inertia : (6, N, k) xx yy zz yz xz xy
     momentum : (3, N, k) angular
@@ -120,10 +110,8 @@ class _Sums:
 
 @dataclass(frozen=True, eq=False)
 class _Axes:
-    """Of the joints, in axes of the base and about the centre of mass of all; components first, (3, N, k).
+    """Axes of the joints, in axes of the base and about the centre of mass of all; components first, (3, N, k).
 
-    Attributes
-    ----------
     axes, slides : unit vectors, zero of a joint that does not turn, or does not slide
     origins, speeds : a point of each axis, and its velocity as part of what the joint hangs on
     spins : angular velocity of what turns with the joint
@@ -137,11 +125,11 @@ class _Axes:
 
 
 def _link_sums(chain: JointChain, links: LinkMotions) -> Array:
-    """What each frame adds to the sums: (15, N, k + 1), in the order of mass times place, mass times velocity, angular
+    """Sums that each frame adds: (15, N, k + 1), in the order of mass times place, mass times velocity, angular
     momentum and inertia."""
-    places, speeds, spins = (components(one) for one in (links.places, links.speeds, links.spins))
+    places, speeds, spins = (components(vectors) for vectors in (links.places, links.speeds, links.spins))
     own = components((links.turns @ chain.inertias @ so3.transpose(links.turns)).reshape(*places.shape[1:], 9))
-    own = own[[0, 4, 8, 5, 2, 1]]
+    own = own[SIX_OF_FULL]
     moment = chain.masses * places
     whole = np.empty((15, *places.shape[1:]))
     whole[:3], whole[3:6] = moment, chain.masses * speeds
@@ -160,8 +148,10 @@ def _carried(chain: JointChain, each: Array) -> _Sums:
 def _joint_axes(chain: JointChain, links: LinkMotions, rates: Array) -> _Axes:
     """rates: (N, k) of all joints."""
     turns = links.turns[:, 1:]
-    axes, slides, levers = (components(so3.apply(turns, one)) for one in (chain.axes, chain.slides, chain.centres[1:]))
-    spins, places, speeds = (components(one[:, 1:]) for one in (links.spins, links.places, links.speeds))
+    axes, slides, levers = (
+        components(so3.apply(turns, vectors)) for vectors in (chain.axes, chain.slides, chain.centres[1:])
+    )
+    spins, places, speeds = (components(vectors[:, 1:]) for vectors in (links.spins, links.places, links.speeds))
     return _Axes(axes, slides, places - levers, speeds - cross(spins, levers) - slides * rates, spins)
 
 

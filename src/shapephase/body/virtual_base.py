@@ -18,22 +18,19 @@ from .couplings.ball_joints import coordinate_names
 from .couplings.coupling import Coupling
 from .link_tree import Joint, Link
 
-ANYWHERE = "floating"
+ANYWHERE = "floating"  # joints that only a base has
 IN_A_PLANE = "planar"
-"""Kinds of joints that only a base has."""
+# MuJoCo's names of a planar joint's parts
 _PARTS = (("_TX", "prismatic", 0), ("_TY", "prismatic", 1), ("_RZ", "revolute", 2))
-"""What MuJoCo makes of a planar joint: names after its own, kinds, and axes about a z that is the joint's axis."""
 
 
 class FreeBase(NamedTuple):
     """The link that floats.
 
-    Attributes
-    ----------
     link : its name
     way : the joints from the root of the file to it, those that move nothing among them; none: it is the root
     joints : those of the body, parents before children
-    notes : what is done without being asked for
+    notes : what was decided without an option
     """
 
     link: str
@@ -51,17 +48,12 @@ def free_base(
 ) -> FreeBase:
     """The link that floats: the root, or the first with mass behind joints that follow each other from a massless one.
 
-    Parameters
-    ----------
     first : the root
     joints : parents before children
     root : "free": a single joint, as arms that are bolted down have it, goes, too
 
-    Raises
-    ------
-    ModelFileError
-        For a single joint without `root`, for joints that follow those of the base, or are followed by them, and for
-        floating and planar joints elsewhere.
+    Raises ModelFileError for a single joint without `root`, for joints that follow those of the base, or are followed
+    by them, and for floating and planar joints elsewhere.
     """
     below: dict[str, list[Joint]] = {}
     for joint in joints:
@@ -110,7 +102,7 @@ def free_base(
 
 
 def way_words(names: Sequence[str], above: str, link: str, root: str | None) -> tuple[str, str]:
-    """Fault and note on the joints between a massless root and the link that floats; empty where there is none."""
+    """Fault and note on the joints between a massless root and the link that floats; empty without any."""
     if not names or root is not None:
         return "", ""
     if len(names) == 1:
@@ -140,14 +132,10 @@ def joint_coordinates(joint: Joint) -> tuple[str, ...]:
 def way_poses(way: Sequence[Joint], values: Mapping[str, Array], count: int) -> tuple[Array, Array]:
     """Attitude and place of a base in the axes of the file's root.
 
-    Parameters
-    ----------
     values : (N,) by coordinate [rad or m]; one that is missing is zero
     count : N
 
-    Returns
-    -------
-    (N, 3, 3), (N, 3) [m]
+    Returns (N, 3, 3), (N, 3) [m]
     """
     turned, placed = np.broadcast_to(np.eye(3), (count, 3, 3)), np.zeros((count, 3))
     for joint in way:
@@ -185,23 +173,23 @@ def _has_mass(links: Mapping[str, Link], names: Iterable[str]) -> bool:
 
 
 def _leading(fixed: Sequence[Joint], link: str, to: str) -> list[Joint]:
-    """Those of the fixed joints on a link that lead to another."""
+    """The fixed joints on a link that lead to another."""
     above = {joint.child: joint for joint in fixed}
-    found: list[Joint] = []
+    way: list[Joint] = []
     while to != link:
-        found.append(above[to])
+        way.append(above[to])
         to = above[to].parent
-    return found[::-1]
+    return way[::-1]
 
 
 def _below(link: str, below: Mapping[str, list[Joint]]) -> set[str]:
     """A link and all that hang on it."""
-    found, waiting = {link}, [link]
+    reached, waiting = {link}, [link]
     while waiting:
         children = [joint.child for joint in below.get(waiting.pop(), ())]
-        found.update(children)
+        reached.update(children)
         waiting += children
-    return found
+    return reached
 
 
 def _single_axes(joint: Joint) -> tuple[Joint, ...]:
@@ -210,25 +198,19 @@ def _single_axes(joint: Joint) -> tuple[Joint, ...]:
         return (joint,)
     axis = joint.axis / np.linalg.norm(joint.axis)
     turn = so3.between(np.array([0.0, 0.0, 1.0]), axis)
-    none, still = np.zeros(3), np.eye(3)
+    first, last = (joint.place, joint.turn), joint.after
+    still = np.zeros(3), np.eye(3)
     return tuple(
         Joint(
-            name=joint.name + ending,
-            where=joint.where,
-            kind=kind,
-            parent=joint.parent,
-            child=joint.child,
-            place=joint.place if number == 0 else none,
-            turn=joint.turn if number == 0 else still,
-            axis=turn[:, number],
-            after=joint.after if number == 2 else none,
+            joint.name + ending, joint.where, kind, joint.parent, joint.child,
+            *(first if number == 0 else still), turn[:, number], last if number == 2 else np.zeros(3),
         )
         for ending, kind, number in _PARTS
-    )
+    )  # fmt: skip
 
 
 def _inside(joint: Joint) -> str:
-    """Why a floating or planar joint inside a body is none."""
+    """The reason why a floating or planar joint cannot be inside a body."""
     why, instead = {
         ANYWHERE: (
             "it has the coordinates of a rigid motion, and only the base floats here",

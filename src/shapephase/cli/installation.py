@@ -20,7 +20,8 @@ _COMPILER_TIMEOUT = 10.0  # [s] for the compiler to print its version
 
 def robots_command(*, printing: PrintOptions = PRINT_DEFAULTS) -> Outcome:  # noqa: ARG001
     """List the bodies and motions that come with the library."""
-    from ..body.catalog import example_names, load_body, robot_names
+    from ..body.catalog import example_names, robot_names
+    from ..body.loading import load_body
     from ..examples.scenarios import MOTIONS
 
     bodies = {name: load_body(name) for name in robot_names()}
@@ -96,7 +97,7 @@ def _versions(names: tuple[str, ...]) -> dict[str, str | None]:
 
 
 def _features() -> dict[str, bool]:
-    from ..body.catalog import pinocchio_features
+    from ..body._model_tree import pinocchio_features
 
     return pinocchio_features(_FEATURES)
 

@@ -14,7 +14,7 @@ from .. import so3
 from ..arguments import tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..body.catalog import load_body
+from ..body.loading import load_body
 from ..deformation.deformation import articulated
 from ..deformation.frames import gauge_link
 from ..errors import ShapeError, unknown_name

@@ -1,4 +1,4 @@
-"""What drives a motion: torques of joints (`joint_torques`), hinges that swing freely (`free_hinges`), wheels."""
+"""Efforts behind a motion: torques of joints (`joint_torques`), hinges that swing freely (`free_hinges`), wheels."""
 
 from lazy_loader import attach_stub
 

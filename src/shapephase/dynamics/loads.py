@@ -1,41 +1,33 @@
-"""What the joints of a moving body bear over a whole motion: peaks against limits, and the work that they do."""
+"""Loads of the joints of a moving body over a whole motion: peaks against limits, and the work that they do."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev as series
 from numpy.polynomial.legendre import leggauss
 
-from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..chebyshev import chebyshev
 from ..display import short_repr
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..refinement import halved, settled
-from ._driven_motion import BY_JOINTS, Drive, drive
-from .moving_body import needed_body_and_path
+from .moving_body import BY_JOINTS, check_motion, drive, needed_body_and_path
 
-# Of a panel of the quadrature.
-_POINTS = 10
-# Of a panel, at which peaks are looked for: between two of them a smooth torque hides 1e-4 of itself at most.
-_LOOKS = 65
-# Of the work done back and forth: how far two quadratures may differ.
-_SETTLED = 1e-11
-# Halvings of the steps of a motion; its torques are as smooth as what was integrated.
-_MOST_HALVINGS = 5
-# Power below this share of the largest is rounding, whose sign means nothing.
-_NO_POWER = 1e-13
+_POINTS = 10  # Gauss points of a panel
+_LOOKS = 65  # places of a panel where peaks are searched: a smooth torque hides at most 1e-4 of itself between two
+_SETTLED = 1e-11  # difference of two quadratures, of the work done back and forth
+_MOST_HALVINGS = 5  # of the motion's steps: its torques are as smooth as what was integrated
+_NO_POWER = 1e-13  # of the largest power: below it the sign is rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointLoads:
-    """Peaks and work of the joints over a whole motion; arrays are batch + (n,) where nothing else is said.
+    """Peaks and work of the joints over a whole motion; arrays are batch + (n,) where nothing else is stated.
 
     Attributes
     ----------
@@ -90,7 +82,7 @@ class JointLoads:
 
     @property
     def peak_torque_per_mass(self) -> Array:
-        """Of the mass of the body: batch + (n,) [N m/kg or N/kg]."""
+        """Peak torque per mass of the body: batch + (n,) [N m/kg or N/kg]."""
         return self.peak_torque / self.mass
 
     @property
@@ -105,25 +97,23 @@ class JointLoads:
 
     def to_dict(self) -> dict[str, Any]:
         """All of it for JSON: by joint, with units in the names; null for a limit that is not stated."""
-        names = {"rad": ("N_m", "rad"), "m": ("N", "m")}
         joints = {}
         for k, (name, unit) in enumerate(zip(self.joint_names, self.joint_units, strict=True)):
-            effort, length = names[unit]
-            effort_limit, rate_limit = float(self.effort_limits[k]), float(self.rate_limits[k])
-            joints[name] = {
-                f"peak_torque_{effort}" if unit == "rad" else f"peak_force_{effort}": np.asarray(
-                    self.peak_torque[..., k]
-                ).tolist(),
-                f"peak_per_mass_{effort}_kg": np.asarray(self.peak_torque_per_mass[..., k]).tolist(),
-                "peak_time_s": np.asarray(self.peak_time[..., k]).tolist(),
-                f"effort_limit_{effort}": effort_limit if np.isfinite(effort_limit) else None,
-                f"peak_rate_{length}_s": np.asarray(self.peak_rate[k]).tolist(),
-                f"rate_limit_{length}_s": rate_limit if np.isfinite(rate_limit) else None,
-                "peak_power_W": np.asarray(self.peak_power[..., k]).tolist(),
-                "work_J": np.asarray(self.work[..., k]).tolist(),
-                "positive_work_J": np.asarray(self.positive_work[..., k]).tolist(),
-                "negative_work_J": np.asarray(self.negative_work[..., k]).tolist(),
+            kind, effort = ("torque", "N_m") if unit == "rad" else ("force", "N")
+            columns = {
+                f"peak_{kind}_{effort}": self.peak_torque,
+                f"peak_per_mass_{effort}_kg": self.peak_torque_per_mass,
+                "peak_time_s": self.peak_time,
+                f"effort_limit_{effort}": self.effort_limits,
+                f"peak_rate_{unit}_s": self.peak_rate,
+                f"rate_limit_{unit}_s": self.rate_limits,
+                "peak_power_W": self.peak_power,
+                "work_J": self.work,
+                "positive_work_J": self.positive_work,
+                "negative_work_J": self.negative_work,
             }
+            values = {label: np.asarray(array[..., k]).tolist() for label, array in columns.items()}
+            joints[name] = {label: None if value == np.inf else value for label, value in values.items()}
         return {
             "mass_kg": self.mass,
             "joints": joints,
@@ -132,16 +122,15 @@ class JointLoads:
         }
 
 
+_GAUSS, _WEIGHTS = (np.asarray(values, dtype=np.float64) for values in leggauss(_POINTS))
+_TO_SERIES = np.asarray(np.linalg.inv(chebyshev(_GAUSS, _POINTS)), dtype=np.float64)  # from values at Gauss points
+_EVEN = np.linspace(-1.0, 1.0, _LOOKS)
+_TO_EVEN = chebyshev(_EVEN, _POINTS) @ _TO_SERIES  # from values at Gauss points to those at even places
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Panels:
-    """The joints at Gauss points of panels.
-
-    Attributes
-    ----------
-    edges : (P + 1,) [s]
-    torque, power : (B, P, m, n)
-    rate : (P, m, n)
-    """
+    """The joints at Gauss points of panels: edges (P + 1,) [s], torque, power (B, P, m, n) and rate (P, m, n)."""
 
     edges: Array
     torque: Array
@@ -150,41 +139,61 @@ class _Panels:
 
     @property
     def work(self) -> Array:
-        """(B, n) net [J]."""
-        _, weights, _ = _rule()
-        return np.einsum("p,m,bpmn->bn", 0.5 * np.diff(self.edges), weights, self.power)
+        """Net work of each joint: (B, n) [J]."""
+        return np.einsum("p,m,bpmn->bn", 0.5 * np.diff(self.edges), _WEIGHTS, self.power)
 
     @property
-    def moved(self) -> Array:
-        """(B,) the work done back and forth, about [J]."""
-        _, weights, _ = _rule()
-        return np.einsum("p,m,bpmn->b", 0.5 * np.diff(self.edges), weights, np.abs(self.power))
+    def both_ways(self) -> Array:
+        """The work done back and forth, about: (B,) [J]."""
+        return np.einsum("p,m,bpmn->b", 0.5 * np.diff(self.edges), _WEIGHTS, np.abs(self.power))
+
+    def peaks(self, values: Array) -> tuple[Array, Array]:
+        """Largest sizes and their times: values at Gauss points (B, P, m, n) -> (B, n), (B, n)."""
+        times = _times(self.edges, _EVEN).ravel()
+        sizes = np.abs(np.einsum("lm,bpmn->bpln", _TO_EVEN, values)).reshape(len(values), times.size, -1)
+        return sizes.max(axis=1), times[sizes.argmax(axis=1)]
+
+    def positive_work(self, which: int, joint: int) -> float:
+        """The work of a joint while its power is positive, panels of both signs divided at its zeros [J]."""
+        power, halves = self.power[which, :, :, joint], 0.5 * np.diff(self.edges)
+        between = power @ _TO_EVEN.T
+        small = _NO_POWER * np.abs(power).max(initial=0.0)
+        mixed = (between.min(axis=1) < -small) & (between.max(axis=1) > small)
+        positive = ~mixed & (power.sum(axis=1) > 0.0)
+        total = float(halves[positive] @ (power[positive] @ _WEIGHTS))
+        for row in np.flatnonzero(mixed):
+            coefficients = _TO_SERIES @ power[row]
+            roots = series.chebroots(coefficients)
+            real = np.sort(roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) < 1.0)])
+            cuts = np.concatenate([[-1.0], real, [1.0]])
+            works = np.diff(series.chebval(cuts, series.chebint(coefficients)))
+            total += float(halves[row] * works[works > 0.0].sum())
+        return total
 
 
 def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     """The loads over a whole motion, on its steps, which are halved until the work no longer changes."""
-    if not isinstance(motion, ForcedMotion):
-        check_object(motion, "Motion", "motion")
+    check_motion(motion)
     body, _ = needed_body_and_path(motion, BY_JOINTS)
     breaks = motion.breaks if isinstance(motion, ForcedMotion) else motion.deformation.breaks
     edges = np.union1d(motion.solution.times, breaks)
     edges = edges[np.append(True, np.diff(edges) > 1e-12 * motion.duration)]
     edges[-1] = motion.duration
-    seen: list[_Panels] = []
+    finest: list[_Panels] = []
 
     def finer() -> Iterator[_Panels]:
-        for one in halved(edges, _MOST_HALVINGS):
-            seen[:] = [_sampled(motion, one)]
-            yield seen[0]
+        for steps in halved(edges, _MOST_HALVINGS):
+            finest[:] = [_sampled(motion, steps)]
+            yield finest[0]
 
-    found = settled(finer(), _difference, _SETTLED) or seen[0]
+    panels = settled(finer(), _difference, _SETTLED) or finest[0]
     ends = drive(motion, np.array([0.0, motion.duration]))
     change = ends.energy[:, 1] - ends.energy[:, 0]
     from_outside = float(motion.work(motion.duration)) if isinstance(motion, ForcedMotion) else 0.0
-    positive = np.array([[_positive(found, b, k) for k in range(body.n_rates)] for b in range(len(change))])
+    positive = np.array([[panels.positive_work(b, k) for k in range(body.n_rates)] for b in range(len(change))])
     positive = positive.reshape(len(change), body.n_rates)
-    net, moved = found.work, found.moved
-    torques, rates, powers = (_peaks(values, found.edges) for values in (found.torque, found.rate[None], found.power))
+    net, moved = panels.work, panels.both_ways
+    torques, rates, powers = map(panels.peaks, (panels.torque, panels.rate[None], panels.power))
     single = (*motion.batch, body.n_rates)
     defect = np.abs(net.sum(axis=1) + from_outside - change) / np.where(moved > 0.0, moved, 1.0)
     return JointLoads(
@@ -206,69 +215,20 @@ def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     )
 
 
-def _difference(last: _Panels, found: _Panels) -> float:
-    """Of the works, as parts of the work done back and forth."""
-    moved = np.where(found.moved > 0.0, found.moved, 1.0)
-    return float(np.max(np.abs(found.work - last.work) / moved[:, None], initial=0.0))
+def _difference(last: _Panels, panels: _Panels) -> float:
+    """Largest difference of the works, as a share of the work done back and forth."""
+    moved = np.where(panels.both_ways > 0.0, panels.both_ways, 1.0)
+    return float(np.max(np.abs(panels.work - last.work) / moved[:, None], initial=0.0))
 
 
 def _sampled(motion: Motion | ForcedMotion, edges: Array) -> _Panels:
-    local, _, _ = _rule()
-    times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * local
-    found: Drive = drive(motion, times.ravel())
-    grid = (*times.shape, found.rate.shape[-1])
-    return _Panels(
-        edges=edges,
-        torque=found.torque.reshape(-1, *grid),
-        power=found.power.reshape(-1, *grid),
-        rate=found.rate.reshape(grid),
-    )
+    times = _times(edges, _GAUSS)
+    efforts = drive(motion, times.ravel())
+    grid = (*times.shape, efforts.rate.shape[-1])
+    torque, power = (values.reshape(-1, *grid) for values in (efforts.torque, efforts.power))
+    return _Panels(edges=edges, torque=torque, power=power, rate=efforts.rate.reshape(grid))
 
 
-def _positive(panels: _Panels, which: int, joint: int) -> float:
-    """The work that a joint does while its power is positive, panels of both signs divided at its zeros [J]."""
-    _, weights, to_series = _rule()
-    power = panels.power[which, :, :, joint]
-    halves = 0.5 * np.diff(panels.edges)
-    looked = power @ (chebyshev(_looks(), _POINTS) @ to_series).T
-    small = _NO_POWER * np.abs(power).max(initial=0.0)
-    both = (looked.min(axis=1) < -small) & (looked.max(axis=1) > small)
-    alike = ~both & (power.sum(axis=1) > 0.0)
-    total = float(halves[alike] @ (power[alike] @ weights))
-    for row in np.flatnonzero(both):
-        coefficients = to_series @ power[row]
-        roots = series.chebroots(coefficients)
-        real = np.sort(roots.real[(np.abs(roots.imag) < 1e-9) & (np.abs(roots.real) < 1.0)])
-        cuts = np.concatenate([[-1.0], real, [1.0]])
-        parts = np.diff(series.chebval(cuts, series.chebint(coefficients)))
-        total += float(halves[row] * parts[parts > 0.0].sum())
-    return total
-
-
-def _peaks(values: Array, edges: Array) -> tuple[Array, Array]:
-    """Largest sizes and their times: values at Gauss points (B, P, m, n) -> (B, n), (B, n)."""
-    at = _places(edges).ravel()
-    sizes = np.abs(_between(values)).reshape(len(values), at.size, -1)
-    return sizes.max(axis=1), at[sizes.argmax(axis=1)]
-
-
-def _between(values: Array) -> Array:
-    """Values at Gauss points as those at the even places of `_looks`: (B, P, m, n) -> (B, P, looks, n)."""
-    _, _, to_series = _rule()
-    return np.einsum("lm,bpmn->bpln", chebyshev(_looks(), _POINTS) @ to_series, values)
-
-
-def _places(edges: Array) -> Array:
-    """The times of those places: (P, looks)."""
-    return 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * _looks()
-
-
-def _looks() -> Array:
-    return np.linspace(-1.0, 1.0, _LOOKS)
-
-
-@lru_cache(maxsize=1)
-def _rule() -> tuple[Array, Array, Array]:
-    """Gauss points of [-1, 1], their weights, and the matrix from values there to Chebyshev coefficients."""
-    local, weights = (np.asarray(one, dtype=np.float64) for one in leggauss(_POINTS))
-    return local, weights, np.asarray(np.linalg.inv(chebyshev(local, _POINTS)), dtype=np.float64)
+def _times(edges: Array, places: Array) -> Array:
+    """Times of places in [-1, 1] of each panel: (P, m)."""
+    return 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * places

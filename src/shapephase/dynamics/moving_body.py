@@ -1,27 +1,31 @@
-"""An articulated body along its reconstructed motion, with the second derivatives of joints and base."""
+"""An articulated body along its motion: second derivatives of joints and base, the efforts behind them, its wheels."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import so3
+from ..arguments import check_object, times_argument
 from ..arrays import Array
 from ..body.body import Body
+from ..body.inverse_dynamics import falling_efforts
+from ..deformation.rotors import RotorDescription
 from ..errors import WrongObjectError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 
+BY_JOINTS = "the torques of joints need"  # begins the message for a body without joints
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MovingBody:
     """Joints and spin of the base at N times, in each of B motions of a batch.
 
-    Attributes
-    ----------
     shapes, rates, accelerations : (N, n) of the joints [rad or m], a second, a second squared
     spins : (B, N, 3) angular velocity of the base, base axes [rad/s]
     spin_rates : (B, N, 3) its rate [rad/s^2]
@@ -36,24 +40,51 @@ class MovingBody:
     push: Array
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Drive:
+    """Efforts and rates of the joints at N times, in each of B motions of a batch.
+
+    torque : (B, N, n) by the n rates of the body's joints [N m or N]
+    rate : (N, n) [rad/s or m/s]
+    wrench : (B, N, 6) force on the base and torque about its origin that would be needed from outside [N], [N m]
+    energy : (B, N) kinetic, about the centre of mass [J]
+    """
+
+    torque: Array
+    rate: Array
+    wrench: Array
+    energy: Array
+
+    @property
+    def power(self) -> Array:
+        """(B, N, n) [W]."""
+        return self.torque * self.rate
+
+
 def body_and_path(motion: Motion | ForcedMotion) -> tuple[Body, ShapePath] | None:
-    """Of a motion of an articulated body, in whatever gauge; None of another."""
-    found: object = motion.deformation.description
-    while hasattr(found, "original"):
-        found = found.original  # pyright: ignore[reportAttributeAccessIssue]
-    body, path = getattr(found, "body", None), getattr(found, "path", None)
+    """Body and path of a motion of an articulated body, in any gauge; None for another motion."""
+    description: object = motion.deformation.description
+    while hasattr(description, "original"):
+        description = description.original  # pyright: ignore[reportAttributeAccessIssue]
+    body, path = getattr(description, "body", None), getattr(description, "path", None)
     return (body, path) if isinstance(body, Body) and isinstance(path, ShapePath) else None
 
 
 def needed_body_and_path(motion: Motion | ForcedMotion, what: str) -> tuple[Body, ShapePath]:
-    """The same for those who need it, "the torques of joints need". Raises WrongObjectError where there is none."""
-    found = body_and_path(motion)
-    if found is None:
+    """Body and path of a motion. Raises WrongObjectError without them; `what` begins the message: "torques need"."""
+    pair = body_and_path(motion)
+    if pair is None:
         raise WrongObjectError(
             f"motion: {what} a body with joints along a path, made by `articulated`; this is: "
             f"{motion.deformation.label}"
         )
-    return found
+    return pair
+
+
+def check_motion(motion: object) -> None:
+    """Raise WrongObjectError for anything but a motion."""
+    if not isinstance(motion, ForcedMotion):
+        check_object(motion, "Motion", "motion")
 
 
 def moving_body(
@@ -64,13 +95,11 @@ def moving_body(
     turned: Array | None = None,
     moved: Array | None = None,
 ) -> MovingBody:
-    """What joints and base do at (N,) times of a motion.
+    """Motion of joints and base at (N,) times.
 
     The base's acceleration is that of the reconstructed motion: from I omega + L_o = Pi and Pi' = Pi x omega follows
     I omega' = Pi x omega - I' omega - L_o'; a torque from outside, which acts on the base, adds to both.
 
-    Parameters
-    ----------
     turned : (3,) a small turn of all attitudes, base axes, to see what it changes; None: none [rad]
     moved : (3, n) the same of shapes, rates and accelerations
     """
@@ -94,3 +123,69 @@ def moving_body(
     return MovingBody(
         shapes=shapes, rates=rates, accelerations=accelerations, spins=spins, spin_rates=slopes, push=push
     )
+
+
+def drive(
+    motion: Motion | ForcedMotion, times: Array, turned: Array | None = None, moved: Array | None = None
+) -> Drive:
+    """Inverse dynamics along a motion.
+
+    times : (N,)
+    turned, moved : small changes of attitudes, and of joints with two derivatives, as in `moving_body`
+    """
+    body, path = needed_body_and_path(motion, BY_JOINTS)
+    moving = moving_body(motion, body, path, times, turned, moved)
+    joints, frames = (moving.shapes, moving.rates, moving.accelerations), body.rate_frame(moving.shapes)
+    torques, wrenches, energies = [], [], []
+    for spins, slopes in zip(moving.spins, moving.spin_rates, strict=True):
+        torque, wrench = falling_efforts(body, *joints, spins, slopes)
+        # By the rates of ball joints, which are not those of their four numbers.
+        torques.append((torque[:, None] @ frames)[:, 0])
+        wrench[:, 3:] -= moving.push
+        wrenches.append(wrench)
+        energies.append(body.kinetic_energy(moving.shapes, moving.rates, spins))
+    speeds = body.joint_rates(moving.shapes, moving.rates)
+    return Drive(torque=np.array(torques), rate=speeds, wrench=np.array(wrenches), energy=np.array(energies))
+
+
+def wheel_speeds(motion: Motion | ForcedMotion, t: ArrayLike) -> Array:
+    """The speeds of wheels on their axles, in the order in which `articulated` was given them, speeds held last.
+
+    Parameters
+    ----------
+    motion : of a deformation made by `articulated(..., rotors=, rotor_speeds=)`
+    t : times (...) [s]
+
+    Returns
+    -------
+    batch + t.shape + (wheels,) [rad/s]
+
+    Raises
+    ------
+    WrongObjectError
+        If the body has no such wheels, or is seen in a gauge.
+
+    Notes
+    -----
+    Equation :eq:`routh` of the documentation.
+
+    Examples
+    --------
+    >>> satellite = sp.load_body("satellite")
+    >>> rest = [name for name in satellite.joint_names if name != "wheel_spin"]
+    >>> still = sp.ShapePath.waypoints([0.0, 1.0], np.zeros((2, len(rest))), joint_names=rest)
+    >>> deformation = sp.articulated(satellite, still, rotor_speeds={"wheel_spin": 100.0})
+    >>> print(sp.dynamics.wheel_speeds(sp.reconstruct(deformation, [0.0, 0.0, 1.0]), 0.5))
+    [100.]
+    """
+    check_motion(motion)
+    description = motion.deformation.description
+    if not isinstance(description, RotorDescription):
+        raise WrongObjectError(
+            "motion: the speeds of wheels need a body with wheels, made by `articulated(..., rotors=)`; this is: "
+            f"{motion.deformation.label}"
+        )
+    times = times_argument(t, motion.duration)
+    omega = motion.angular_velocity(times).reshape(-1, times.size, 3)
+    speeds = description.spins(times.ravel(), omega)
+    return np.reshape(speeds, (*motion.batch, *times.shape, len(description.rotors)))

@@ -26,20 +26,14 @@ from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import PiecewisePolynomial
 from ..shape_space.shape_path import ShapePath
 
+# Time, coordinates (k,) and rates (k,) of the free hinges -> efforts of springs and dampers (k,) [N m or N].
 Effort = Callable[[float, Array, Array], ArrayLike]
-"""Time, coordinates (k,) and rates (k,) of the free hinges -> what springs and dampers do to them (k,) [N m or N]."""
-# Of the tolerance: error of the hinges' integration.
-_INTEGRATED = 0.3
-# Of the tolerance: how far polynomials between knots may be from what was integrated [rad or m].
-_SHARE = 0.03
-# Of the duration: times nearer to each other are one.
-_SAME_TIME = 1e-12
-# Times, besides the ends and middles of what limits steps, at which the fastest joint is looked for.
-_LOOKS = 65
-# Pieces between knots; more are not made.
-_MOST_PIECES = 20_000
-# Where a piece is compared with what was integrated.
-_PLACES = (0.25, 0.5, 0.75)
+_INTEGRATED = 0.3  # of the tolerance, for the hinges' integration
+_SHARE = 0.03  # of the tolerance, for polynomials between knots [rad or m]
+_SAME_TIME = 1e-12  # of the duration: nearer times are one
+_LOOKS = 65  # times, beside those that limit steps, where the fastest joint is searched
+_MOST_PIECES = 20_000  # between knots: a path of more takes minutes
+_PLACES = (0.25, 0.5, 0.75)  # of a piece, where it is compared with the integrated motion
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -141,12 +135,12 @@ def free_hinges(
     fastest = np.abs(route.curve(np.union1d(looked, 0.5 * (looked[:-1] + looked[1:])))[1]).max(initial=0.0)
     rates = np.full(len(names), 1.0 / route.duration + fastest) + np.abs(starts[1])
     scales = np.concatenate([np.ones(len(names)), rates])
-    found = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _INTEGRATED * goal, limits)
-    whole = _path_of(swing, found, breaks, goal)
+    integrated = driven_attitude(swing.rates, breaks, start, starts.ravel(), scales, _INTEGRATED * goal, limits)
+    whole = _path_of(swing, integrated, breaks, goal)
     motion = reconstruct(articulated(body, whole), mu, attitude, tolerance=goal)
-    times = found.error_times
-    defect = float(so3.angle(so3.transpose(motion.attitude(times)) @ found.attitude(times)).max())
-    worst = float(max(found.attitude_errors[-1], found.state_errors[-1, : len(names)].max()))
+    times = integrated.error_times
+    defect = float(so3.angle(so3.transpose(motion.attitude(times)) @ integrated.attitude(times)).max())
+    worst = float(max(integrated.attitude_errors[-1], integrated.state_errors[-1, : len(names)].max()))
     return FreeHinges(
         motion=motion, path=whole, hinges=names, attitude_defect=defect, error_estimate=worst + defect + _SHARE * goal
     )
@@ -163,7 +157,7 @@ class _Swing:
     momentum: Array
 
     def rates(self, times: Array, turned: Array, states: Array) -> tuple[Array, Array]:
-        """As `driven_attitude` asks for; states are the coordinates of the hinges and then their rates."""
+        """Rates for `driven_attitude`; states are the coordinates of the hinges and then their rates."""
         omega, accelerations = self.accelerations(times, turned, states)
         return omega, np.concatenate([states[:, len(self.columns) :], accelerations], axis=1)
 
@@ -181,17 +175,17 @@ class _Swing:
         efforts, _ = falling_efforts(self.body, shape, rate, acceleration, omega, slopes)
         # Efforts are linear in accelerations: those of one of each hinge from rest, which the others may be far above.
         shapes = np.repeat(shape, count, axis=0)
-        ones = np.tile(np.eye(shape.shape[1])[self.columns], (len(times), 1))
-        answers = -so3.apply(np.repeat(inverse, count, axis=0), so3.apply(np.repeat(matrix, count, axis=0), ones))
+        unit_rates = np.tile(np.eye(shape.shape[1])[self.columns], (len(times), 1))
+        answers = -so3.apply(np.repeat(inverse, count, axis=0), so3.apply(np.repeat(matrix, count, axis=0), unit_rates))
         rest = np.zeros_like(shapes)
-        by_one, _ = falling_efforts(self.body, shapes, rest, ones, np.zeros_like(answers), answers)
+        by_one, _ = falling_efforts(self.body, shapes, rest, unit_rates, np.zeros_like(answers), answers)
         by_one = np.swapaxes(by_one[:, self.columns].reshape(-1, count, count), 1, 2)
         given = np.array([self._given(float(t), state) for t, state in zip(times, states, strict=True)])
-        found = np.linalg.solve(by_one, (given - efforts[:, self.columns])[..., None])[..., 0]
-        return omega, np.asarray(found, dtype=np.float64)
+        solution = np.linalg.solve(by_one, (given - efforts[:, self.columns])[..., None])[..., 0]
+        return omega, np.asarray(solution, dtype=np.float64)
 
     def _given(self, t: float, state: Array) -> Array:
-        """What springs and dampers do: (2 k,) -> (k,)."""
+        """Efforts of springs and dampers: (2 k,) -> (k,)."""
         count = len(self.columns)
         if self.effort is None:
             return np.zeros(count)

@@ -15,16 +15,13 @@ from ..errors import ShapeError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_noise import path_errors, summed_errors
-from ._driven_motion import BY_JOINTS, drive
 from .loads import JointLoads
-from .moving_body import needed_body_and_path
+from .moving_body import BY_JOINTS, drive, needed_body_and_path
 from .torques import JointTorques
 
+# Steps of shapes [rad or m], rates and accelerations: torques are quadratic in rates and linear in accelerations.
 _STEPS = (1e-5, 1.0, 1.0)
-"""By which shapes [rad or m], rates and accelerations are moved: torques are quadratic in rates, and linear in
-accelerations, of which central differences leave rounding alone."""
-_TIMES_OF_WORK = 201
-"""Even times over which errors of the power are summed: bars need few digits."""
+_TIMES_OF_WORK = 201  # even times at which errors of the power are summed: bars need few digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +92,7 @@ class _Slopes(NamedTuple):
 
 
 def torque_errors(torques: JointTorques, joints: ArrayLike | None = None) -> TorqueErrors:
-    """How far torques, rates and power may be off by the noise of the samples of the joints.
+    """Standard deviations of torques, rates and power by the noise of the samples of the joints.
 
     Attitude and momentum are taken as they are: what the noise turns them by moves a torque far less than what it does
     to the accelerations.
@@ -111,7 +108,7 @@ def torque_errors(torques: JointTorques, joints: ArrayLike | None = None) -> Tor
     ShapeError
         For a batch, and as `path_errors`.
     WrongObjectError
-        As `path_errors`.
+        For a path that is not through samples, see `path_errors`.
 
     Examples
     --------
@@ -127,7 +124,7 @@ def torque_errors(torques: JointTorques, joints: ArrayLike | None = None) -> Tor
 
 
 def load_errors(motion: Motion | ForcedMotion, loads: JointLoads, joints: ArrayLike | None = None) -> LoadErrors:
-    """How far peaks, each at its time, and work may be off by the noise of the samples; arguments as `torque_errors`.
+    """Standard deviations of peaks, each at its time, and work by the noise of the samples; see `torque_errors`.
 
     The largest of many values that noise moves is rather too large; its bar does not hold that.
 
@@ -144,13 +141,17 @@ def load_errors(motion: Motion | ForcedMotion, loads: JointLoads, joints: ArrayL
     _check_single(motion)
     count = len(loads.joint_names)
     own = np.arange(count)
-    peaks = np.concatenate([loads.peak_time, loads.rate_time, loads.power_time])
-    times, place = np.unique(peaks, return_inverse=True)
-    found = _errors_at(motion, times, joints)
+    peak_times = np.concatenate([loads.peak_time, loads.rate_time, loads.power_time])
+    times, place = np.unique(peak_times, return_inverse=True)
+    errors = _errors_at(motion, times, joints)
     places = place.reshape(3, count)
-    each = [values[at, own] for values, at in zip((found.torque, found.rate, found.power), places, strict=True)]
+    peak_errors = [
+        values[at, own] for values, at in zip((errors.torque, errors.rate, errors.power), places, strict=True)
+    ]
     work, total = _work_errors(motion, joints)
-    return LoadErrors(peak_torque=each[0], peak_rate=each[1], peak_power=each[2], work=work, total_work=total)
+    return LoadErrors(
+        peak_torque=peak_errors[0], peak_rate=peak_errors[1], peak_power=peak_errors[2], work=work, total_work=total
+    )
 
 
 def _check_single(motion: Motion | ForcedMotion) -> None:
@@ -178,19 +179,19 @@ def _slopes(motion: Motion | ForcedMotion, times: Array) -> _Slopes:
             torques.append((ahead.torque[0] - behind.torque[0]) / (2.0 * step))
             rates.append((ahead.rate - behind.rate) / (2.0 * step))
     shape = (len(times), -1, path.n_shape, len(_STEPS))
-    by_torque, by_rate = (np.stack(found, axis=-1).reshape(shape) for found in (torques, rates))
-    here = drive(motion, times)
-    power = here.rate[..., None, None] * by_torque + here.torque[0][..., None, None] * by_rate
+    by_torque, by_rate = (np.stack(columns, axis=-1).reshape(shape) for columns in (torques, rates))
+    efforts = drive(motion, times)
+    power = efforts.rate[..., None, None] * by_torque + efforts.torque[0][..., None, None] * by_rate
     return _Slopes(by_torque, by_rate, power)
 
 
 def _work_errors(motion: Motion | ForcedMotion, joints: ArrayLike | None) -> tuple[Array, float]:
-    """Of each joint's work, and of all together: sums of the power over even times."""
+    """Errors of each joint's work, and of all together: sums of the power over even times."""
     _, path = needed_body_and_path(motion, BY_JOINTS)
     times = np.linspace(0.0, motion.duration, _TIMES_OF_WORK)
     weights = np.full(len(times), times[1])
     weights[[0, -1]] *= 0.5
     slopes = weights[:, None, None, None] * _slopes(motion, times).power
     both = np.concatenate([slopes, slopes.sum(axis=1, keepdims=True)], axis=1)
-    found = summed_errors(path, times, both, joints)
-    return found[:-1], float(found[-1])
+    errors = summed_errors(path, times, both, joints)
+    return errors[:-1], float(errors[-1])

@@ -10,26 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object, times_argument
+from ..arguments import times_argument
 from ..arrays import Array, lock_arrays
 from ..display import short_repr
 from ..errors import MissingExtraError, ShapeError, WrongObjectError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
-from ._driven_motion import BY_JOINTS, drive
 from .loads import JointLoads, joint_loads
-from .moving_body import needed_body_and_path
+from .moving_body import BY_JOINTS, check_motion, drive, needed_body_and_path
 
-# Rows of a table.
-_ROWS = 201
-_UNITS = {"rad": "N_m", "m": "N"}
-"""Of efforts, as names of columns have them."""
+_ROWS = 201  # of a table without given times
+_UNITS = {"rad": "N_m", "m": "N"}  # of efforts, in names of columns
 
 
 @dataclass(frozen=True, eq=False)
 class JointTorques:
-    """What the joints do at some times; results are batch + t.shape + (n,), joints in the order of the body's.
+    """Efforts of the joints at some times; results are batch + t.shape + (n,), joints in the order of the body's.
 
     Attributes
     ----------
@@ -73,7 +70,7 @@ class JointTorques:
 
     @cached_property
     def error_estimate(self) -> Array:
-        """How far the torques may be off by the error of the attitudes: batch + t.shape + (n,) [N m or N].
+        """Error of the torques by the error of the attitudes: batch + t.shape + (n,) [N m or N].
 
         To first order, for an attitude that is off by the motion's `error_estimate` about the worst axis.
         """
@@ -88,7 +85,7 @@ class JointTorques:
 
     @property
     def torque_per_mass(self) -> Array:
-        """Of the mass of the body, as biomechanists compare them [N m/kg or N/kg]."""
+        """Torque per mass of the body, the figure that biomechanics compares [N m/kg or N/kg]."""
         return self.torque / self.mass
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
@@ -164,14 +161,13 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
     >>> print(float(found.loads.energy_defect) < 1e-9)  # work of the joints against the change of energy
     True
     """
-    if not isinstance(motion, ForcedMotion):
-        check_object(motion, "Motion", "motion")
+    check_motion(motion)
     body, _ = needed_body_and_path(motion, BY_JOINTS)
     if not body.n_shape:
-        raise WrongObjectError(f"{body.name} has no joints, and so no torques of joints; `split` says how it turns")
+        raise WrongObjectError(f"{body.name} has no joints, and so no torques of joints; `split` analyses its turn")
     given = np.linspace(0.0, motion.duration, _ROWS) if t is None else t
     times = times_argument(given, motion.duration)
-    found = drive(motion, times.ravel())
+    efforts = drive(motion, times.ravel())
     whole = (*motion.batch, *times.shape)
     return JointTorques(
         motion=motion,
@@ -179,8 +175,8 @@ def joint_torques(motion: Motion | ForcedMotion, t: ArrayLike | None = None) -> 
         joint_names=body.rate_names,
         joint_units=body.rate_units,
         mass=body.mass,
-        torque=found.torque.reshape(*whole, body.n_rates),
-        rate=found.rate.reshape(*times.shape, body.n_rates),
-        power=found.power.reshape(*whole, body.n_rates),
-        base_wrench=found.wrench.reshape(*whole, 6),
+        torque=efforts.torque.reshape(*whole, body.n_rates),
+        rate=efforts.rate.reshape(*times.shape, body.n_rates),
+        power=efforts.power.reshape(*whole, body.n_rates),
+        base_wrench=efforts.wrench.reshape(*whole, 6),
     )

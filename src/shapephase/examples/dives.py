@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arguments import positive_argument
-from ..body.catalog import load_body
+from ..body.loading import load_body
 from ..deformation.deformation import articulated
 from ..shape_space.shape_path import ShapePath
 from ._closed_form_motions import Example

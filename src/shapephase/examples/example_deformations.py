@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import check_flag, check_object, moments_argument, number_argument
 from ..arrays import Array
-from ..body.catalog import load_body
+from ..body.loading import load_body
 from ..deformation.assemblies import assembly, moving_mass, rigid_part
 from ..deformation.deformation import articulated, prescribed, rigid
 from ..errors import ShapeError, TrajectoryError, unknown_name

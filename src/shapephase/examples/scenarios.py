@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arguments import check_choice, number_argument, positive_argument
 from ..arrays import Array
-from ..body.catalog import load_body
+from ..body.loading import load_body
 from ..deformation.deformation import articulated
 from ..deformation.gauge import horizontal_gauge
 from ..display import short_repr

@@ -1,4 +1,4 @@
-"""At which times an attitude is recorded, so that what a reader has between the records is as near as is asked for."""
+"""Times at which an attitude is recorded, so that interpolation between the records is within a requested error."""
 
 from __future__ import annotations
 
@@ -12,18 +12,13 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ._whole_motion import base_attitude, checked_times, continued_quaternions
 
-# Records of a file; each takes some hundred bytes.
-_MOST_RECORDS = 2_000_000
-# Of the error that is asked for, what is used up at the places where it is looked at: between these it may be larger.
-_USED = 0.5
-# Places between two records at which the error is looked at; a constant rate is farthest off in the middle.
+_MOST_RECORDS = 2_000_000  # of a file: 100 to 200 bytes each
+_USED = 0.5  # of the error, where it is measured: between these places it may be larger
+# between two records, where errors are measured; a constant rate is farthest off in the middle
 _PLACES = np.array([0.25, 0.5, 0.75])
-# Of the pieces that the motion itself stands on, how many a first guess makes.
-_PARTS = 4
-# Of a motion with a torque, whose own steps are not known.
-_EVEN = 257
-# Records that polynomials go through, two at least on both sides of a time but at the ends.
-WINDOW = 8
+_PARTS = 4  # records of the first guess for a piece of the motion's own solution
+_EVEN = 257  # records of the first guess for a motion with a torque, whose steps are unknown
+WINDOW = 8  # records that polynomials go through: degree 7, two records at least on both sides but at the ends
 
 
 def error_argument(error: float) -> float:
@@ -34,12 +29,7 @@ def error_argument(error: float) -> float:
 def slerp_times(motion: Motion | ForcedMotion, error: float) -> Array:
     """Times between which a turn at a constant rate is within an error of the motion: (N,) [s].
 
-    Raises
-    ------
-    ShapeError
-        If the motion is a batch.
-    AccuracyNotReached
-        If that takes millions of records.
+    Raises ShapeError if the motion is a batch; AccuracyNotReached if that takes millions of records.
     """
     checked_times(motion, [0.0])
     if isinstance(motion, ForcedMotion):
@@ -81,8 +71,6 @@ def even_times(motion: Motion | ForcedMotion, error: float) -> Array:
 def interpolated(quaternions: Array, place: Array) -> Array:
     """Quaternions of length 1 between even records, by Lagrange's polynomials: (N, 4), (M,) -> (M, 4).
 
-    Parameters
-    ----------
     place : in steps from the first record
     """
     first = np.clip(np.floor(place).astype(np.int64) - WINDOW // 2 + 1, 0, len(quaternions) - WINDOW)
@@ -92,18 +80,18 @@ def interpolated(quaternions: Array, place: Array) -> Array:
     for k in nodes:
         others = nodes[nodes != k]
         weights[:, k] = np.prod((at - others) / (k - others), axis=1)
-    found = np.einsum("mk,mkd->md", weights, quaternions[first[:, None] + nodes])
-    return found / np.linalg.norm(found, axis=1, keepdims=True)
+    between = np.einsum("mk,mkd->md", weights, quaternions[first[:, None] + nodes])
+    return between / np.linalg.norm(between, axis=1, keepdims=True)
 
 
 def _off_at_constant_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
-    """How far a turn at a constant rate is from the motion, at most, in each step: (N - 1,) [rad]."""
+    """Largest distance of a turn at a constant rate from the motion, in each step: (N - 1,) [rad]."""
     ends = base_attitude(motion, times)
     turns = so3.log(so3.transpose(ends[:-1]) @ ends[1:])
     inside = times[:-1, None] + np.diff(times)[:, None] * _PLACES
     truth = base_attitude(motion, inside.ravel()).reshape(*inside.shape, 3, 3)
-    there = ends[:-1, None] @ so3.exp(turns[:, None] * _PLACES[:, None])
-    return so3.angle(so3.transpose(truth) @ there).max(axis=1)
+    turned = ends[:-1, None] @ so3.exp(turns[:, None] * _PLACES[:, None])
+    return so3.angle(so3.transpose(truth) @ turned).max(axis=1)
 
 
 def _check_count(count: int, error: float) -> None:

@@ -1,4 +1,4 @@
-"""What other programs ask of one motion at some times: base, joints, their rates, and accelerations where needed."""
+"""A motion at some times for other programs: base, joints, their rates, and accelerations where needed."""
 
 from __future__ import annotations
 
@@ -8,38 +8,32 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, times_argument, vector_argument
+from ..arguments import times_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.inverse_dynamics import floating_states, floating_velocities
-from ..dynamics.moving_body import body_and_path, moving_body, needed_body_and_path
+from ..dynamics.moving_body import body_and_path, check_motion, moving_body, needed_body_and_path
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 
-ORIGIN = {"start": (0.0, 0.0, 0.0), "velocity": (0.0, 0.0, 0.0), "gravity": (0.0, 0.0, 0.0)}
-"""Of a centre of mass that rests: what nobody has said otherwise."""
-# Of a table, where no times are given.
-_ROWS = 201
+_ROWS = 201  # of a table without given times
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fall:
-    """How the centre of mass moves: start + velocity t + gravity t^2 / 2, inertial axes [m], [m/s], [m/s^2]."""
+    """Motion of the centre of mass: start + velocity t + gravity t^2 / 2, inertial axes [m], [m/s], [m/s^2]."""
 
     start: Array
     velocity: Array
     gravity: Array
 
     @classmethod
-    def of(cls, start: ArrayLike, velocity: ArrayLike, gravity: ArrayLike) -> Fall:
-        """What a user has given. Raises ShapeError."""
-        return cls(
-            start=vector_argument(start, "start", unit="m"),
-            velocity=vector_argument(velocity, "velocity", unit="m/s"),
-            gravity=vector_argument(gravity, "gravity", unit="m/s^2"),
-        )
+    def of(cls, **given: ArrayLike) -> Fall:
+        """The fall by a user's vectors, zero where none is given. Raises ShapeError."""
+        units = {"start": "m", "velocity": "m/s", "gravity": "m/s^2"}
+        return cls(**{name: vector_argument(given.get(name, np.zeros(3)), name, unit=units[name]) for name in units})
 
     def centre(self, times: Array) -> Array:
         """(N,) -> (N, 3) [m]."""
@@ -54,8 +48,6 @@ class Fall:
 class WholeMotion:
     """A floating body with joints at N times.
 
-    Attributes
-    ----------
     body : whose joints these are
     times : (N,) [s]
     attitude : (N, 3, 3) base axes to inertial axes
@@ -100,8 +92,7 @@ class WholeMotion:
 
 def checked_times(motion: Motion | ForcedMotion, times: ArrayLike | None) -> Array:
     """The times of a table of one motion: (N,) [s]; None: 201 even ones. Raises ShapeError, TrajectoryError."""
-    if not isinstance(motion, ForcedMotion):
-        check_object(motion, "Motion", "motion")
+    check_motion(motion)
     if motion.batch:
         raise ShapeError(f"one motion can be exported, this is a batch of {motion.batch}; reconstruct one of them")
     given = (
@@ -115,10 +106,7 @@ def checked_times(motion: Motion | ForcedMotion, times: ArrayLike | None) -> Arr
 def whole_motion(motion: Motion | ForcedMotion, times: Array, fall: Fall) -> WholeMotion:
     """Base and joints at (N,) times, in whatever gauge the motion is: seen from the base of its body.
 
-    Raises
-    ------
-    WrongObjectError
-        If the body has no joints along a path.
+    Raises WrongObjectError if the body has no joints along a path.
     """
     body, path = needed_body_and_path(motion, "this export needs")
     shapes, rates = path.curve(times)
@@ -146,23 +134,20 @@ def whole_motion(motion: Motion | ForcedMotion, times: Array, fall: Fall) -> Who
 def whole_accelerations(motion: Motion | ForcedMotion, whole: WholeMotion, fall: Fall) -> tuple[Array, Array]:
     """The derivatives of its velocities, (N, nv), and of the rates of its joints, (N, k).
 
-    Raises
-    ------
-    ShapeError
-        If joints follow others with kinks.
+    Raises ShapeError if joints follow others with kinks.
     """
     body, path = needed_body_and_path(motion, "this export needs")
     moving = moving_body(motion, body, path, whole.times)
     shapes, rates, spins = moving.shapes, moving.rates, moving.spins[0]
-    found = floating_states(body, shapes, rates, moving.accelerations, spins, moving.spin_rates[0])[2]
+    accelerations = floating_states(body, shapes, rates, moving.accelerations, spins, moving.spin_rates[0])[2]
     backwards = so3.transpose(whole.attitude)
     speed = so3.apply(backwards, fall.speed(whole.times))
-    found[:, :3] += so3.apply(backwards, np.broadcast_to(fall.gravity, speed.shape)) - np.cross(spins, speed)
+    accelerations[:, :3] += so3.apply(backwards, np.broadcast_to(fall.gravity, speed.shape)) - np.cross(spins, speed)
     follows = body.chain.follows
     slopes = follows.with_rates(shapes, moving.accelerations)[1]
     if not follows.is_linear:
         slopes = slopes + (follows.slope_rates(shapes, rates) @ rates[..., None])[..., 0]
-    return found, slopes
+    return accelerations, slopes
 
 
 def _spins(motion: Motion | ForcedMotion, body: Body, times: Array, shapes: Array, rates: Array) -> Array:
@@ -173,17 +158,17 @@ def _spins(motion: Motion | ForcedMotion, body: Body, times: Array, shapes: Arra
 
 
 def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
-    """Of the base of the body, in whatever gauge the motion is: (N,) -> (N, 3, 3)."""
+    """Attitude of the base of the body, in whatever gauge the motion is: (N,) -> (N, 3, 3)."""
     turned = motion.attitude(times)
     return turned if body_and_path(motion) is None else turned @ motion.deformation.frame(times)
 
 
 def base_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
     """Angular velocity of the base of the body, base axes, in whatever gauge the motion is: (N,) -> (N, 3) [rad/s]."""
-    found = body_and_path(motion)
-    if found is None:
+    pair = body_and_path(motion)
+    if pair is None:
         return motion.angular_velocity(times)
-    return _spins(motion, found[0], times, *found[1].curve(times))
+    return _spins(motion, pair[0], times, *pair[1].curve(times))
 
 
 def continued_quaternions(attitudes: Array) -> Array:

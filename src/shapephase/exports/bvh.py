@@ -19,20 +19,19 @@ from ..files import write_whole
 from ..reconstruction.attitude_angles import euler_angles
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import ORIGIN, Fall, WholeMotion, checked_times, whole_motion
+from ._whole_motion import Fall, WholeMotion, checked_times, whole_motion
 
-# Places first, then angles about z, x and y, one after the other: what all readers take.
+# Places first, then angles about z, x and y, one after the other: all readers take this order.
 _PLACES = "Xposition Yposition Zposition"
 _TURNS = "Zrotation Xrotation Yrotation"
 _ORDER = "ZXY"
-# Inertial and base axes to those of a skeleton, whose y is up.
+# From inertial and base axes to those of a skeleton, whose y is up.
 _UPWARD = {
     "x": np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
     "y": np.eye(3),
     "z": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
 }
-# A link whose centre of mass is nearer to its joint ends there [m]: some readers drop bones of no length.
-_SHORTEST = 1e-3
+_SHORTEST = 1e-3  # [m] from a joint to its link's centre of mass: some readers drop bones of no length
 _MOST_FRAMES = 1_000_000
 
 
@@ -89,9 +88,9 @@ def write_bvh(
     checked_times(motion, [0.0])
     frames = int(np.floor(motion.duration * often * (1.0 + np.finfo(float).eps))) + 1
     if frames > _MOST_FRAMES:
-        raise ShapeError(f"rate: {frames} frames are more than {_MOST_FRAMES}; ask for fewer in a second")
+        raise ShapeError(f"rate: {frames} frames are more than {_MOST_FRAMES}; give fewer in a second")
     times = np.minimum(np.arange(frames) / often, motion.duration)
-    whole = whole_motion(motion, times, Fall.of(**(ORIGIN | fall)))
+    whole = whole_motion(motion, times, Fall.of(**fall))
     chain, axes = whole.body.chain, _UPWARD[up]
     rest = _rest_orientations(chain)
     lines = ["HIERARCHY", *_skeleton(whole, rest, axes, longer), "MOTION", f"Frames: {frames}"]
@@ -101,16 +100,16 @@ def write_bvh(
 
 
 def _rest_orientations(chain: JointChain) -> Array:
-    """Of all frames at zero coordinates, base axes: (k + 1, 3, 3)."""
-    found = np.empty((len(chain.names) + 1, 3, 3))
-    found[0] = np.eye(3)
+    """Orientations of all frames at zero coordinates, base axes: (k + 1, 3, 3)."""
+    orientations = np.empty((len(chain.names) + 1, 3, 3))
+    orientations[0] = np.eye(3)
     for joint, parent in enumerate(chain.parents):
-        found[joint + 1] = found[parent] @ chain.turns[joint]
-    return found
+        orientations[joint + 1] = orientations[parent] @ chain.turns[joint]
+    return orientations
 
 
 class _Bone(NamedTuple):
-    """What one joint of a skeleton moves: joints of the chain from `first` to `last`, of a ball joint its three."""
+    """A bone and the joint that moves it: joints `first` to `last` of the chain, three for a ball joint."""
 
     name: str
     first: int
@@ -119,17 +118,17 @@ class _Bone(NamedTuple):
 
 
 def _bones(chain: JointChain) -> list[_Bone]:
-    """As a skeleton lists them: each before what hangs on it, and that before the next."""
+    """Bones in the order of a skeleton: each before those that hang on it, and these before the next."""
     balls = {ball.row: ball for ball in chain.follows.balls}
-    found: list[_Bone] = []
+    bones: list[_Bone] = []
     waiting = [(joint, 1) for joint, parent in enumerate(chain.parents) if parent == 0][::-1]
     while waiting:
         joint, depth = waiting.pop()
         ball = balls.get(joint)
         name, last = (chain.names[joint], joint) if ball is None else (ball.name, ball.rows.stop - 1)
-        found.append(_Bone(re.sub(r"\s", "_", name), joint, last, depth))
+        bones.append(_Bone(re.sub(r"\s", "_", name), joint, last, depth))
         waiting += [(below, depth + 1) for below, parent in enumerate(chain.parents) if parent == last + 1][::-1]
-    return found
+    return bones
 
 
 def _skeleton(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> list[str]:
@@ -156,17 +155,17 @@ def _channels(whole: WholeMotion, rest: Array, axes: Array, scale: float) -> lis
     """Columns of all bones in the order of the skeleton."""
     chain = whole.body.chain
     balls = {ball.row: ball.turns(whole.shapes) for ball in chain.follows.balls}
-    found = [scale * whole.position @ axes.T, _degrees(axes @ whole.attitude @ axes.T)]
+    columns = [scale * whole.position @ axes.T, _degrees(axes @ whole.attitude @ axes.T)]
     for bone in _bones(chain):
         joint = bone.first
         coordinate, parent = whole.joints[:, joint], rest[chain.parents[joint]]
         if chain.slides[joint].any():
             along = chain.places[joint] + coordinate[:, None] * (chain.turns[joint] @ chain.slides[joint])
-            found.append(scale * along @ (axes @ parent).T)
+            columns.append(scale * along @ (axes @ parent).T)
         about = axes @ rest[joint + 1]
         turned = so3.exp(coordinate[:, None] * (about @ chain.axes[joint]))
-        found.append(_degrees(about @ balls[joint] @ about.T if joint in balls else turned))
-    return found
+        columns.append(_degrees(about @ balls[joint] @ about.T if joint in balls else turned))
+    return columns
 
 
 def _degrees(rotations: Array) -> Array:

@@ -20,10 +20,8 @@ from ..reconstruction.reconstruction import Motion
 from ._attitude_records import WINDOW, error_argument, even_times
 from ._whole_motion import base_attitude, continued_quaternions
 
-TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")
-"""In which the epochs of a message may be."""
-# Digits of a second: a body that turns at 100 rad/s does not notice the next.
-_DIGITS = 15
+TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")  # of the epochs of a message
+_DIGITS = 15  # of a second: a turn at 100 rad/s within the last one is below rounding
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -66,8 +64,8 @@ def write_aem(
     """Write the attitude of the base as an Attitude Ephemeris Message (CCSDS 504.0-B-1), in keywords and values.
 
     Quaternions turn the inertial axes into those of the base, scalar part last, every digit kept. Records are at even
-    times, as near to each other as the error asks for of a reader that interpolates as the message says: each part of
-    the quaternion by Lagrange's polynomial of degree 7 through the eight records nearest to a time.
+    times, near enough for the error where a reader interpolates as the message states: each part of the quaternion by
+    Lagrange's polynomial of degree 7 through the eight records nearest to a time.
 
     Parameters
     ----------
@@ -87,7 +85,7 @@ def write_aem(
     AccuracyNotReached
         If millions of records were needed: the polynomials do not take kinks well.
     UnknownNameError
-        For another time system, an epoch that is none.
+        For another time system, an invalid epoch.
     OutputFileError
         If it cannot be written.
 
@@ -146,20 +144,20 @@ def _epoch(text: str) -> tuple[datetime.datetime, Decimal]:
     try:
         if rest and not (rest.isascii() and rest.isdigit()):
             raise ValueError
-        found = datetime.datetime.fromisoformat(whole)
+        epoch = datetime.datetime.fromisoformat(whole)
     except ValueError:
-        found = None
-    if found is None or found.tzinfo is not None:
+        epoch = None
+    if epoch is None or epoch.tzinfo is not None:
         raise UnknownNameError(f"epoch: a date and time as 2026-11-23T10:00:00.5 are needed, got {text!r}")
-    return found, Decimal(f"0.{rest or 0}")
+    return epoch, Decimal(f"0.{rest or 0}")
 
 
 def _epochs(begin: tuple[datetime.datetime, Decimal], times: Array) -> list[str]:
     """The epochs of times after the start."""
-    found, step = [], Decimal(1).scaleb(-_DIGITS)
+    epochs, step = [], Decimal(1).scaleb(-_DIGITS)
     for time in times.tolist():
         after = (begin[1] + Decimal(time)).quantize(step)
         whole = int(after)
         fraction = f"{after - whole:.{_DIGITS}f}".removeprefix("0.")
-        found.append(f"{(begin[0] + datetime.timedelta(seconds=whole)).isoformat()}.{fraction}")
-    return found
+        epochs.append(f"{(begin[0] + datetime.timedelta(seconds=whole)).isoformat()}.{fraction}")
+    return epochs

@@ -18,12 +18,12 @@ from ..files import write_whole
 from ..reconstruction.attitude_angles import euler_angles
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import ORIGIN, Fall, checked_times, whole_motion
+from ._whole_motion import Fall, checked_times, whole_motion
 
 # Coordinates of the pelvis in OpenSim's models of walking: angles about z, x and y, one after the other; places.
 _ANGLES = (("pelvis_tilt", "pelvis_list", "pelvis_rotation"), "zxy")
 _PLACES = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
-# Base axes to those of a pelvis (x forward, y up, z right) of a body with x forward, y left and z up.
+# From a base with x forward, y left, z up to a pelvis with x forward, y up, z right.
 _TO_PELVIS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 _ENDINGS = (".mot", ".sto")
 
@@ -74,7 +74,7 @@ def write_opensim_motion(
     where = Path(path)
     if where.suffix.lower() not in _ENDINGS:
         raise UnknownNameError(f"{where}: the name of OpenSim's motions ends in {' or '.join(_ENDINGS)}")
-    whole = whole_motion(motion, checked_times(motion, times), Fall.of(**(ORIGIN | fall)))
+    whole = whole_motion(motion, checked_times(motion, times), Fall.of(**fall))
     check_no_balls(whole.body.chain.follows, "motions of OpenSim need")
     angles, order = whole.body.base_angles or _ANGLES
     turned = whole.attitude @ so3.transpose(_axes(whole.body, base_axes))
@@ -99,10 +99,10 @@ def write_opensim_motion(
 def _axes(body: Body, given: ArrayLike | None) -> Array:
     if given is None:
         return _TO_PELVIS if body.base_angles is None else np.eye(3)
-    found = so3.rotation_argument(given, "base_axes")
-    if found.shape != (3, 3):
-        raise ShapeError(f"base_axes: one rotation (3, 3) is needed, got shape {found.shape}")
-    return found
+    rotation = so3.rotation_argument(given, "base_axes")
+    if rotation.shape != (3, 3):
+        raise ShapeError(f"base_axes: one rotation (3, 3) is needed, got shape {rotation.shape}")
+    return rotation
 
 
 def _places(body: Body) -> tuple[str, ...]:

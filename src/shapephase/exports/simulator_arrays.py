@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object
+from ..arguments import check_keywords, check_object
 from ..arrays import Array, lock_arrays
 from ..body.couplings.coordinate_map import check_no_balls
+from ..body.formats.xml_text import listed
 from ..body.joint_orders import MUJOCO, simulator_order
 from ..display import short_repr
 from ..errors import UnknownNameError
@@ -18,15 +19,10 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ._whole_motion import Fall, WholeMotion, checked_times, whole_accelerations, whole_motion
 
-# Numbers of a free joint among the configurations, and among the velocities.
 _FREE_Q = 7
-_FREE_V = 6
-# Entries w, x, y, z of a quaternion x y z w.
-_SCALAR_FIRST = [3, 0, 1, 2]
-# MuJoCo's number of a free joint among the kinds of joints.
-_MUJOCO_FREE = 0
-_MOST_NAMED = 8
-_ORIGIN = (0.0, 0.0, 0.0)
+_FREE_V = 6  # numbers of a free joint among configurations, and among velocities
+_SCALAR_FIRST = [3, 0, 1, 2]  # w, x, y, z from x y z w
+_MUJOCO_FREE = 0  # MuJoCo's number of free joints among the kinds
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,9 +88,7 @@ def mujoco_arrays(
     times: ArrayLike | None = None,
     *,
     model: Any = None,
-    start: ArrayLike = _ORIGIN,
-    velocity: ArrayLike = _ORIGIN,
-    gravity: ArrayLike = _ORIGIN,
+    **fall: ArrayLike,
 ) -> MujocoArrays:
     """The motion as MuJoCo's `qpos` and `qvel`.
 
@@ -104,7 +98,7 @@ def mujoco_arrays(
     times : (N,) [s]; None: 201 even times
     model : a `mujoco.MjModel` with one free joint, in whose order the joints are put by their names; None: all joints
         in the order in which MuJoCo compiles the body's file, behind a free joint
-    start, velocity, gravity : (3,) of the centre of mass, inertial axes [m], [m/s], [m/s^2]
+    fall : start, velocity, gravity as in `Motion.base_position`
 
     Raises
     ------
@@ -122,7 +116,8 @@ def mujoco_arrays(
     >>> print(found.qpos[0, 3:7])  # the identity, w first
     [1. 0. 0. 0.]
     """
-    whole = whole_motion(motion, checked_times(motion, times), Fall.of(start, velocity, gravity))
+    check_keywords(fall, mujoco_arrays)
+    whole = whole_motion(motion, checked_times(motion, times), Fall.of(**fall))
     check_no_balls(whole.body.chain.follows, "arrays of MuJoCo need")
     quaternions = whole.quat_xyzw[:, _SCALAR_FIRST]
     base = np.hstack([whole.position, quaternions]), np.hstack([whole.world_velocity, whole.angular_velocity])
@@ -149,9 +144,7 @@ def pinocchio_arrays(
     times: ArrayLike | None = None,
     *,
     model: Any = None,
-    start: ArrayLike = _ORIGIN,
-    velocity: ArrayLike = _ORIGIN,
-    gravity: ArrayLike = _ORIGIN,
+    **fall: ArrayLike,
 ) -> PinocchioArrays:
     """The motion as Pinocchio's `q`, `v` and `a`, as Crocoddyl has them.
 
@@ -161,12 +154,12 @@ def pinocchio_arrays(
     times : (N,) [s]; None: 201 even times
     model : a `pinocchio.Model` whose first joint is a free-flyer, in whose order the joints are put by their names;
         None: all joints in the body's order
-    start, velocity, gravity : (3,) of the centre of mass, inertial axes [m], [m/s], [m/s^2]
+    fall : start, velocity, gravity as in `Motion.base_position`
 
     Raises
     ------
     ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it; if joints follow others with kinks, where there is no `a`.
+        If the motion is a batch, for times outside of it; if joints follow others with kinks, which have no `a`.
     WrongObjectError
         If the body has no joints along a path.
     UnknownNameError
@@ -179,17 +172,13 @@ def pinocchio_arrays(
     >>> print(found.q[0, 3:7])  # the identity, w last
     [0. 0. 0. 1.]
     """
-    fall = Fall.of(start, velocity, gravity)
-    whole = whole_motion(motion, checked_times(motion, times), fall)
-    accelerations, slopes = whole_accelerations(motion, whole, fall)
+    check_keywords(fall, pinocchio_arrays)
+    falling = Fall.of(**fall)
+    whole = whole_motion(motion, checked_times(motion, times), falling)
+    a, slopes = whole_accelerations(motion, whole, falling)
+    q, v = whole.configurations, whole.velocities
     if model is None:
-        return PinocchioArrays(
-            time=whole.times,
-            q=whole.configurations,
-            v=whole.velocities,
-            a=accelerations,
-            joint_names=whole.names,
-        )
+        return PinocchioArrays(time=whole.times, q=q, v=v, a=a, joint_names=whole.names)
     check_no_balls(whole.body.chain.follows, "arrays by the order of another model need")
     check_object(model, "Model", "model", call="pinocchio.buildModelFromUrdf(file, pinocchio.JointModelFreeFlyer())")
     kinds = list(model.joints)
@@ -197,10 +186,10 @@ def pinocchio_arrays(
     names = list(model.names)[2:]
     order = _order(whole, names, "Pinocchio", int(free))
     count = len(whole.times)
-    q, v, a = np.zeros((count, model.nq)), np.zeros((count, model.nv)), np.zeros((count, model.nv))
-    _fill(q, whole.configurations[:, :_FREE_Q], kinds[1].idx_q)
-    _fill(v, whole.velocities[:, :_FREE_V], kinds[1].idx_v)
-    _fill(a, accelerations[:, :_FREE_V], kinds[1].idx_v)
+    own = q[:, :_FREE_Q], v[:, :_FREE_V], a[:, :_FREE_V]
+    q, v, a = (np.zeros((count, size)) for size in (model.nq, model.nv, model.nv))
+    for array, base, first in zip((q, v, a), own, (kinds[1].idx_q, kinds[1].idx_v, kinds[1].idx_v), strict=True):
+        _fill(array, base, first)
     for place, kind in zip(order, kinds[2:], strict=True):
         column = whole.joints[:, [place]]
         _fill(q, np.hstack([np.cos(column), np.sin(column)]) if kind.nq == 2 else column, kind.idx_q)
@@ -214,15 +203,14 @@ def _fill(array: Array, columns: Array, first: int) -> None:
 
 
 def _order(whole: WholeMotion, names: list[str], program: str, free: int) -> list[int]:
-    """Where each joint of a model stands among those of the body. Raises UnknownNameError."""
+    """Places of a model's joints among those of the body. Raises UnknownNameError."""
     if free != 1:
         raise UnknownNameError(f"model: a model of {program} with one free joint, the base, is needed; it has {free}")
-    for given, others, said in (
+    for given, others, fault in (
         (whole.names, names, f"the model of {program} lacks joints of {whole.body.name}"),
         (names, whole.names, f"the model of {program} has joints that {whole.body.name} has not"),
     ):
         lacking = [name for name in given if name not in others]
         if lacking:
-            more = f" and {len(lacking) - _MOST_NAMED} more" if len(lacking) > _MOST_NAMED else ""
-            raise UnknownNameError(f"model: {said}: {', '.join(lacking[:_MOST_NAMED])}{more}")
+            raise UnknownNameError(f"model: {fault}: {listed(lacking, 8)}")
     return [whole.names.index(name) for name in names]

@@ -24,14 +24,10 @@ from ..reconstruction.reconstruction import Motion
 from ._attitude_records import error_argument, slerp_times
 from ._whole_motion import base_attitude, base_rate, continued_quaternions
 
-# Ticks of the clock in a second. Times of a C-kernel are counted in them, as floating-point numbers.
-_TICKS = 10**9
-# Seconds that the clock counts.
-_LONGEST = 10**6
-# Identifiers of a clock stand for this many of instruments.
-_OF_A_CLOCK = 1000
-# Of a line of comments, of which SPICE takes up to 255.
-_COMMENT = 100
+_TICKS = 10**9  # of the clock in a second
+_LONGEST = 10**6  # [s] that the clock counts
+_OF_A_CLOCK = 1000  # SPICE numbers the instruments of clock N from -1000 N on
+_COMMENT = 100  # characters of a line; SPICE takes up to 255
 _SEGMENT = "shapephase"
 _CLOCK = """\
 KPL/SCLK
@@ -105,7 +101,7 @@ def write_spice_ck(
     """Write the attitude of the base as a C-kernel (`.bc`), and beside it clock and frame as a text kernel (`.tsc`).
 
     The C-kernel is of type 3: SPICE turns at a constant rate from one record to the next. Records are as near to each
-    other as the error asks for. The angular velocities are those of the records, and linear between them.
+    other as the error requires. The angular velocities are those of the records, and linear between them.
 
     Parameters
     ----------
@@ -212,8 +208,8 @@ def _c_kernel(spiceypy: Any, motion: Motion | ForcedMotion, times: Array, instru
             spiceypy.dafac(handle, comments)
             spiceypy.ckcls(handle)
         except spiceypy.utils.exceptions.SpiceyError as fault:
-            said = str(getattr(fault, "short", "") or fault).strip()
-            if "FRAME" in said:
+            reason = str(getattr(fault, "short", "") or fault).strip()
+            if "FRAME" in reason:
                 raise UnknownNameError(f"reference: SPICE knows no inertial frame {reference!r}") from None
-            raise OutputFileError(f"SPICE cannot write the kernel: {said}") from None
+            raise OutputFileError(f"SPICE cannot write the kernel: {reason}") from None
         return Path(file).read_bytes()

@@ -7,6 +7,7 @@ import io
 import json
 import os
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -22,21 +23,19 @@ from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import ORIGIN, Fall, WholeMotion, checked_times, continued_quaternions, whole_motion
+from ._whole_motion import Fall, checked_times, continued_quaternions, whole_motion
 
 _AXES = ("x", "y", "z")
 _QUATERNION = ("qx", "qy", "qz", "qw")
 _MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
-# Bytes of text that a MATLAB file begins with.
-_MATLAB_TEXT = 116
-_DATA_SET = "a data set needs xarray; install it with: pip install 'shapephase[study]'"
+_MATLAB_TEXT = 116  # bytes of text at the beginning of a MATLAB file
 
 
 class _Samples(dict[str, tuple[Array, str, str]]):
     """Arrays by name, each with the dimension of its columns ("" for none) and its unit."""
 
-    joint_names: tuple[str, ...]
-    joint_units: tuple[str, ...]
+    joint_names: tuple[str, ...] = ()
+    joint_units: tuple[str, ...] = ()
     attributes: dict[str, Any]
 
 
@@ -68,10 +67,7 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     [2. 2.] rad/s
     """
     check_keywords(fall, motion_dataset)
-    try:
-        import xarray
-    except ImportError:
-        raise MissingExtraError(_DATA_SET) from None
+    xarray = _extra("xarray", "a data set needs xarray", "study")
     samples = _samples(motion, times, fall)
     labels = {"quaternion": _QUATERNION, "axis": _AXES, "joint": samples.joint_names}
     variables = {
@@ -81,7 +77,9 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     }
     coordinates: dict[str, Any] = {"time": ("time", samples["time"][0], {"units": "s"})}
     coordinates |= {
-        name: list(entries) for name, entries in labels.items() if any(name == one[0][1] for one in variables.values())
+        name: list(entries)
+        for name, entries in labels.items()
+        if any(name == variable[0][1] for variable in variables.values())
     }
     if "joint" in coordinates:
         coordinates["joint_unit"] = ("joint", list(samples.joint_units))
@@ -91,14 +89,14 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 def export_motion(
     motion: Motion | ForcedMotion, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike
 ) -> None:
-    """Write samples of one motion, base and joints, to a file whose ending says the format.
+    """Write samples of one motion, base and joints, to a file in the format of its ending.
 
-    - `.csv`, `.parquet`: one row a sample; labels of joints say their units, in Parquet as metadata `unit`.
+    - `.csv`, `.parquet`: one row a sample; labels of joints contain their units, in Parquet as metadata `unit`.
     - `.nc`: the data set of `Motion.to_xarray` as NetCDF.
     - `.mat`, `.h5`: the same as arrays by their names, with `joint_names`.
 
-    All hold every digit, and all but `.nc` are read by `read_recorded_motion`. For the whole motion, to be asked at any
-    time, there is `Motion.save`.
+    All hold every digit, and all but `.nc` are read by `read_recorded_motion`. `Motion.save` keeps
+    the whole motion, to be evaluated at any time.
 
     Parameters
     ----------
@@ -134,41 +132,41 @@ def export_motion(
     write_whole(where, lambda stream: stream.write(content))
 
 
+def _extra(name: str, needed: str, extra: str = "data") -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise MissingExtraError(f"{needed}; install it with: pip install 'shapephase[{extra}]'") from None
+
+
 def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike]) -> _Samples:
-    at = checked_times(motion, times)
-    falling = Fall.of(**(ORIGIN | fall))
-    whole = None if body_and_path(motion) is None else whole_motion(motion, at, falling)
-    found = _Samples() if whole is None else _of_joints(whole)
-    attitude = motion.attitude(at) if whole is None else whole.attitude
-    found["time"] = at, "", "s"
-    if whole is None:
+    at, falling, samples = checked_times(motion, times), Fall.of(**fall), _Samples()
+    samples["time"] = at, "", "s"
+    if body_and_path(motion) is None:
+        attitude = motion.attitude(at)
         centre = so3.apply(attitude, motion.deformation.centre_of_mass(at))
-        found["base_quat_xyzw"] = continued_quaternions(attitude), "quaternion", ""
-        found["angular_velocity"] = motion.angular_velocity(at), "axis", "rad/s"
-        found["base_position"] = falling.centre(at) - centre, "axis", "m"
-        found.joint_names, found.joint_units = (), ()
+        samples["base_quat_xyzw"] = continued_quaternions(attitude), "quaternion", ""
+        samples["angular_velocity"] = motion.angular_velocity(at), "axis", "rad/s"
+        samples["base_position"] = falling.centre(at) - centre, "axis", "m"
+    else:
+        whole = whole_motion(motion, at, falling)
+        samples.joint_names, samples.joint_units = whole.body.joint_names, whole.body.joint_units
+        angles = set(samples.joint_units) == {"rad"}
+        samples["base_quat_xyzw"] = whole.quat_xyzw, "quaternion", ""
+        samples["angular_velocity"] = whole.angular_velocity, "axis", "rad/s"
+        samples["base_position"] = whole.position, "axis", "m"
+        samples["base_velocity"] = whole.world_velocity, "axis", "m/s"
+        samples["shapes"] = whole.shapes, "joint", "rad" * angles
+        samples["shape_rates"] = whole.shape_rates, "joint", "rad/s" * angles
     momentum = motion.momentum(at) if isinstance(motion, ForcedMotion) else motion.momentum
-    found.attributes = {
+    samples.attributes = {
         "momentum": np.asarray(momentum).reshape(-1, 3)[0].tolist(),
         "momentum_units": "kg m^2/s",
         "provenance": json.dumps(provenance(motion.deformation.made_from)),
     }
     if isinstance(motion, Motion):
-        found.attributes["error_estimate"] = float(motion.error_estimate)
-        found.attributes["error_estimate_units"] = "rad"
-    return found
-
-
-def _of_joints(whole: WholeMotion) -> _Samples:
-    found = _Samples()
-    found.joint_names, found.joint_units = whole.body.joint_names, whole.body.joint_units
-    found["base_quat_xyzw"] = whole.quat_xyzw, "quaternion", ""
-    found["angular_velocity"] = whole.angular_velocity, "axis", "rad/s"
-    found["base_position"] = whole.position, "axis", "m"
-    found["base_velocity"] = whole.world_velocity, "axis", "m/s"
-    found["shapes"] = whole.shapes, "joint", "rad" if set(found.joint_units) == {"rad"} else ""
-    found["shape_rates"] = whole.shape_rates, "joint", "rad/s" if set(found.joint_units) == {"rad"} else ""
-    return found
+        samples.attributes |= {"error_estimate": float(motion.error_estimate), "error_estimate_units": "rad"}
+    return samples
 
 
 def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
@@ -181,16 +179,16 @@ def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
         "shapes": samples.joint_names,
     }
     units = {"shapes": samples.joint_units}
-    found: dict[str, tuple[Array, str]] = {"time": (samples["time"][0], "s")}
+    table: dict[str, tuple[Array, str]] = {"time": (samples["time"][0], "s")}
     for name, columns in labels.items():
         if name in samples:
             values, _, unit = samples[name]
-            each = units.get(name, (unit,) * len(columns))
-            found |= {
-                label: (np.ascontiguousarray(column), one)
-                for label, column, one in zip(columns, values.T, each, strict=True)
+            column_units = units.get(name, (unit,) * len(columns))
+            table |= {
+                label: (np.ascontiguousarray(column), own_unit)
+                for label, column, own_unit in zip(columns, values.T, column_units, strict=True)
             }
-    return found
+    return table
 
 
 def _csv(motion: Any, times: Any, fall: Any) -> bytes:
@@ -204,11 +202,7 @@ def _csv(motion: Any, times: Any, fall: Any) -> bytes:
 
 
 def _parquet(motion: Any, times: Any, fall: Any) -> bytes:
-    try:
-        import pyarrow
-        from pyarrow import parquet
-    except ImportError:
-        raise MissingExtraError("Parquet files need pyarrow; install it with: pip install 'shapephase[data]'") from None
+    pyarrow, parquet = (_extra(name, "Parquet files need pyarrow") for name in ("pyarrow", "pyarrow.parquet"))
     samples = _samples(motion, times, fall)
     columns = _columns(samples)
     fields = [
@@ -240,10 +234,7 @@ def _matlab(motion: Any, times: Any, fall: Any) -> bytes:
 
 
 def _hdf5(motion: Any, times: Any, fall: Any) -> bytes:
-    try:
-        import h5py
-    except ImportError:
-        raise MissingExtraError("HDF5 files need h5py; install it with: pip install 'shapephase[data]'") from None
+    h5py = _extra("h5py", "HDF5 files need h5py")
     samples, stream = _samples(motion, times, fall), io.BytesIO()
     with h5py.File(stream, "w") as file:
         for name, (values, _, unit) in samples.items():
@@ -265,5 +256,4 @@ _WRITERS: dict[str, Callable[[Any, Any, Any], bytes]] = {
     ".mat": _matlab,
     ".h5": _hdf5,
 }
-ENDINGS = tuple(_WRITERS)
-"""Of the files that `export_motion` writes."""
+ENDINGS = tuple(_WRITERS)  # of the files that `export_motion` writes

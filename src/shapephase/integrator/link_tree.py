@@ -13,7 +13,7 @@ from .machine_code import plain
 
 
 class LinkRows(Protocol):
-    """A tree of links as plain numbers: `shapephase.body.link_rows` defines them."""
+    """A tree of links as plain numbers: `shapephase.body.joint_chain` defines them."""
 
     @property
     def parents(self) -> Any:

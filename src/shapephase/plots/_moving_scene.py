@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_keywords, check_object
 from ..arrays import Array
-from ..body.appearance import BOX_COLOUR, Visual, visuals
 from ..body.body import Body
-from ..body.drawing_limits import hull, outermost
+from ..body.drawing.appearance import visuals
+from ..body.drawing.limits import hull, outermost
+from ..body.drawing.visual import BOX_COLOUR, Visual
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription, Description, ParticleDescription
 from ..deformation.frames import principal_frames

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_object
 from ..arrays import Array, finite_array
-from ..body.appearance import visuals
 from ..body.body import Body
+from ..body.drawing.appearance import visuals
 from ..errors import ShapeError
 from ..letters import what_came
 from ..shape_space.curvature_field import curvature_on_plane

@@ -18,7 +18,7 @@ from .. import examples
 from ..arguments import inertia_argument, positive_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
-from ..body.catalog import load_body
+from ..body.loading import load_body
 from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError, WrongObjectError, unknown_name
 from ..examples.scenarios import MOTIONS

@@ -18,7 +18,7 @@ from .. import so3
 from ..arguments import number_argument, tolerance_argument, vector_argument
 from ..arrays import Array, Integers, lock_arrays
 from ..body.body import Body
-from ..body.catalog import load_body, loading_options
+from ..body.loading import load_body, loading_options
 from ..deformation.frames import gauge_link
 from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError, WrongObjectError

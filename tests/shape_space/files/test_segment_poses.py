@@ -239,9 +239,9 @@ def test_a_segment_by_another_name_and_lengths_that_are_allowed(tmp_path, body):
         (lambda text: text.replace("<mvnx", '<!DOCTYPE mvnx [<!ENTITY a "b">]><mvnx', 1), "entities"),
         (lambda text: text[: len(text) // 2], "cut off"),
         (lambda text: text.replace("<position>", "<position>1 ", 1), "22 numbers, and 21"),
-        (lambda text: text.replace("<orientation>", "<orientation>x", 1), "no number"),
+        (lambda text: text.replace("<orientation>", "<orientation>x", 1), "not a number"),
         (lambda text: re.sub("<orientation>[^ ]* ", "<orientation>9 ", text, count=1), "off length 1"),
-        (lambda text: text.replace("mvnx", "other"), "this is no MVNX"),
+        (lambda text: text.replace("mvnx", "other"), "this is not an MVNX"),
         (lambda text: text.replace("orientation", "sensorOrientation"), "no <orientation>"),
     ],
 )

@@ -18,17 +18,13 @@ from ... import so3
 from ...arrays import Array
 from ...errors import ShapeError
 
-COORDINATES = ("x", "y", "z", "w")
-"""What follows the name of a ball joint in the names of its four numbers."""
-RATES = ("wx", "wy", "wz")
-"""The same of its rates."""
+COORDINATES = ("x", "y", "z", "w")  # endings of the names of a ball joint's four numbers
+RATES = ("wx", "wy", "wz")  # endings of the names of its rates
 
 
 class BallJoint(NamedTuple):
-    """Where a ball joint stands.
+    """Place of a ball joint among rates and coordinates.
 
-    Attributes
-    ----------
     name : of the joint
     row : of the first of its three rates among those of all joints
     column : of the first of its four numbers in the shape
@@ -40,7 +36,7 @@ class BallJoint(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Of its four numbers."""
+        """Names of its four numbers."""
         return coordinate_names(self.name)
 
     @property
@@ -54,12 +50,9 @@ class BallJoint(NamedTuple):
         return slice(self.column, self.column + len(COORDINATES))
 
     def quaternions(self, shapes: Array) -> Array:
-        """Of length one: (N, n) -> (N, 4).
+        """Unit quaternions: (N, n) -> (N, 4).
 
-        Raises
-        ------
-        ShapeError
-            If the four numbers are all zero.
+        Raises ShapeError if the four numbers are all zero.
         """
         numbers = shapes[:, self.columns]
         lengths = np.sqrt((numbers * numbers).sum(axis=1))
@@ -71,7 +64,7 @@ class BallJoint(NamedTuple):
         return numbers / lengths[:, None]
 
     def turns(self, shapes: Array) -> Array:
-        """Of the child in axes of the parent: (N, n) -> (N, 3, 3)."""
+        """Rotations of the child in axes of the parent: (N, n) -> (N, 3, 3)."""
         return so3.matrix_from_quat(self.quaternions(shapes))
 
     def slopes(self, shapes: Array) -> Array:
@@ -84,7 +77,7 @@ class BallJoint(NamedTuple):
         return so3.apply(self.slopes(shapes), derivatives[:, self.columns])
 
     def slope_rates(self, shapes: Array, derivatives: Array) -> Array:
-        """How W changes along a motion: (N, n), (N, n) -> (N, 3, 4)."""
+        """Rate of W along a motion: (N, n), (N, n) -> (N, 3, 4)."""
         swing, stretch = self._changes(shapes, derivatives)
         return swing - stretch[:, None, None] * self.slopes(shapes)
 
@@ -97,12 +90,12 @@ class BallJoint(NamedTuple):
         return -swing - 2.0 * rates[:, :, None] * numbers[:, None, :] / lengths
 
     def hinge_slope_rates(self, shapes: Array, derivatives: Array) -> Array:
-        """How the derivatives of the three hinges' angles by the four numbers change along a motion, which are at the
+        """Rate, along a motion, of the derivatives of the three hinges' angles by the four numbers, which are at the
         same time those of their rates: (N, n), (N, n) -> (N, 3, 4)."""
         slopes, (x, y, z) = self.slopes(shapes), self.rates(shapes, derivatives).T[:, :, None]
         even = 0.5 * (self.slope_rates(shapes, derivatives) + self.rates_by_shape(shapes, derivatives))
         by_x, by_y, by_z = np.moveaxis(slopes, 1, 0)
-        # Of the vector part of three half turns one after the other: (yz, -xz, xy)/4.
+        # The vector part of three half turns one after the other: (yz, -xz, xy)/4.
         bend = np.stack([y * by_z + z * by_y, -(x * by_z + z * by_x), x * by_y + y * by_x], axis=1)
         return even - 0.5 * bend
 
@@ -125,10 +118,10 @@ def vector_part(numbers: Array) -> Array:
 
 
 def coordinate_names(ball: str) -> list[str]:
-    """Of the four numbers of a ball joint."""
+    """Names of the four numbers of a ball joint."""
     return [f"{ball}.{part}" for part in COORDINATES]
 
 
 def rate_names(ball: str) -> list[str]:
-    """Of its three rates."""
+    """Names of the three rates of a ball joint."""
     return [f"{ball}.{part}" for part in RATES]

@@ -1,4 +1,4 @@
-"""From the independent coordinates of a body to those of all its joints, with two derivatives."""
+"""The map from the independent coordinates of a body to those of all its joints, with two derivatives."""
 
 from __future__ import annotations
 
@@ -21,8 +21,6 @@ from .functions import JointFunction
 class CurvedJoint(NamedTuple):
     """A joint whose coordinate is `start` plus functions of those of other joints; known by their places.
 
-    Attributes
-    ----------
     row : its place among all joints
     start : [rad or m]
     terms : place of the joint that is followed, and the function
@@ -39,8 +37,6 @@ class CoordinateMap:
 
     A ball joint stands for three hinges behind a turn that differs from shape to shape, so that they are at zero.
 
-    Attributes
-    ----------
     names : (k,) of all joints, of a ball joint those of its rates
     independent : (n,) of those that follow no other, of a ball joint those of its four numbers
     matrix, offset : (k, n), (k,) of the joints that depend on the shape by matrix @ shape + offset; other rows are zero
@@ -61,19 +57,19 @@ class CoordinateMap:
 
     @property
     def is_linear(self) -> bool:
-        """Whether all joints depend on the shape by matrix and offset."""
+        """True where all joints depend on the shape by matrix and offset."""
         return not self.curved and not self.balls
 
     @cached_property
     def is_identity(self) -> bool:
-        """Whether no joint follows another."""
+        """True where no joint follows another."""
         count = len(self.names)
         whole = self.matrix.shape == (count, count) and np.array_equal(self.matrix, np.eye(count))
         return self.is_linear and whole and not self.offset.any()
 
     @cached_property
     def drivers(self) -> tuple[str, ...]:
-        """The joints that a curved one follows, by a function that is no straight line or after others."""
+        """The joints that a curved one follows, by a function that is not a straight line or after others."""
         return tuple(dict.fromkeys(self.names[source] for joint in self.curved for source, _ in joint.terms))
 
     @cached_property
@@ -83,22 +79,22 @@ class CoordinateMap:
         order = [*range(len(self.names))]
         depth = {joint.row: place for place, joint in enumerate(self.curved)}
         order.sort(key=lambda row: depth.get(row, -1))
-        found = []
+        knotted = []
         for row in order:
             own = [f for joint in self.curved for source, f in joint.terms if source == row and len(f.knots)]
             if own:
                 knots = np.unique(np.concatenate([function.knots for function in own]))
-                found.append((row, knots, any(len(function.kinks) for function in own)))
-        return tuple(found)
+                knotted.append((row, knots, any(len(function.kinks) for function in own)))
+        return tuple(knotted)
 
     @property
     def is_smooth(self) -> bool:
-        """Whether no function has knots."""
+        """True where no function has knots."""
         return not self.knotted
 
     @property
     def has_kinks(self) -> bool:
-        """Whether a slope jumps at some knot."""
+        """True where a slope jumps at some knot."""
         return any(kinked for _, _, kinked in self.knotted)
 
     def coordinates(self, shapes: Array) -> Array:
@@ -118,9 +114,9 @@ class CoordinateMap:
         for joint in self.curved:
             full[:, joint.row] = joint.start
             for source, function in joint.terms:
-                there = function(full[:, source])
-                full[:, joint.row] += there.value
-                speeds[:, joint.row] += there.slope * speeds[:, source]
+                values = function(full[:, source])
+                full[:, joint.row] += values.value
+                speeds[:, joint.row] += values.slope * speeds[:, source]
         for ball in self.balls:
             speeds[:, ball.rows] = ball.rates(shapes, rates)
         return full, speeds
@@ -130,7 +126,7 @@ class CoordinateMap:
         return self._slopes_and_rates(shapes, np.zeros_like(shapes))[0]
 
     def slope_rates(self, shapes: Array, rates: Array) -> Array:
-        """How those change along rates, which are at the same time the derivatives of all rates by the shape while the
+        """Rates of these derivatives along a motion, which are also the derivatives of all rates by the shape while the
         rates of the shape stay: (N, n), (N, n) -> (N, k, n)."""
         return self._slopes_and_rates(shapes, rates)[1]
 
@@ -149,10 +145,10 @@ class CoordinateMap:
         changes = np.zeros_like(slopes)
         for joint in self.curved:
             for source, function in joint.terms:
-                there = function(full[:, source])
-                slopes[:, joint.row] += there.slope[:, None] * slopes[:, source]
-                bent = (there.bend * speeds[:, source])[:, None] * slopes[:, source]
-                changes[:, joint.row] += bent + there.slope[:, None] * changes[:, source]
+                values = function(full[:, source])
+                slopes[:, joint.row] += values.slope[:, None] * slopes[:, source]
+                bent = (values.bend * speeds[:, source])[:, None] * slopes[:, source]
+                changes[:, joint.row] += bent + values.slope[:, None] * changes[:, source]
         for ball in self.balls:
             slopes[:, ball.rows, ball.columns] = ball.slopes(shapes)
             changes[:, ball.rows, ball.columns] = ball.hinge_slope_rates(shapes, rates)
@@ -164,22 +160,20 @@ def coordinate_map(
 ) -> CoordinateMap:
     """The map of joints of which some follow others, and some are ball joints.
 
-    Raises
-    ------
-    ModelFileError
-        If joints follow each other in a circle, or one that is not among them; if a ball joint takes part.
+    Raises ModelFileError if joints follow each other in a circle, or one that is not among them; if a ball joint takes
+    part.
     """
     for name, coupling in couplings.items():
         for ball in {name, *coupling.drivers} & set(balls):
             raise ModelFileError(
-                f"joint {name!r}: {ball!r} is a ball joint, whose turn is no one number that follows or leads another"
+                f"joint {name!r}: {ball!r} is a ball joint, whose turn is not one number that follows or leads another"
             )
     names = tuple(row for name in joints for row in (rate_names(name) if name in balls else [name]))
     free = [name for name in joints if name not in couplings]
     independent = tuple(part for name in free for part in (coordinate_names(name) if name in balls else [name]))
-    for each in (names, independent):
-        for name in each:
-            if balls and each.count(name) > 1:
+    for group in (names, independent):
+        for name in group:
+            if balls and group.count(name) > 1:
                 raise ModelFileError(f"joint {name!r} has the name of a part of a ball joint; rename one of them")
     place = {name: row for row, name in enumerate(names)}
     columns = {name: column for column, name in enumerate(independent)}
@@ -211,7 +205,7 @@ def _ordered(names: tuple[str, ...], couplings: Mapping[str, Coupling]) -> list[
     """The joints that follow others, each behind those that it follows."""
     waiting = [name for name in names if name in couplings]
     known = set(names) - set(waiting)
-    found: list[str] = []
+    ordered: list[str] = []
     for name in waiting:
         for driver in couplings[name].drivers:
             if driver not in names:
@@ -220,10 +214,10 @@ def _ordered(names: tuple[str, ...], couplings: Mapping[str, Coupling]) -> list[
         ready = [name for name in waiting if known.issuperset(couplings[name].drivers)]
         if not ready:
             raise ModelFileError(f"joints follow each other in a circle: {', '.join(map(repr, waiting))}")
-        found += ready
+        ordered += ready
         known.update(ready)
         waiting = [name for name in waiting if name not in known]
-    return found
+    return ordered
 
 
 def _straight(function: JointFunction) -> bool:
@@ -256,7 +250,7 @@ def check_smooth(follows: CoordinateMap, what: str, *, kinks_only: bool = False)
 
 
 def check_no_balls(follows: CoordinateMap, what: str) -> None:
-    """Raise ShapeError where a joint is a ball joint, whose rates are no derivatives of coordinates.
+    """Raise ShapeError for a ball joint, whose rates are not derivatives of coordinates.
 
     what : that needs such coordinates, with its verb: "extremals need"
     """

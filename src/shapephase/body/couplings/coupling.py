@@ -1,7 +1,8 @@
-"""What a user or a file says of a joint that follows others."""
+"""Joints that follow others, by functions that a user or a file states."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,12 +105,42 @@ class Coupling:
     def at(self, coordinates: dict[str, float]) -> float:
         """The coordinate where those of the drivers are known [rad or m]."""
         check_mapping(coordinates, "coordinates", "joint -> coordinate")
-        found = (float(function(np.array(coordinates[name])).value) for name, function in self.terms)
-        return self.start + sum(found)
+        values = (float(function(np.array(coordinates[name])).value) for name, function in self.terms)
+        return self.start + sum(values)
 
     def rate(self, coordinates: dict[str, float], rates: dict[str, float]) -> float:
         """The rate where coordinates and rates of the drivers are known [rad/s or m/s]."""
         return sum(float(function(np.array(coordinates[name])).slope) * rates[name] for name, function in self.terms)
+
+
+def circular(couplings: Mapping[str, Coupling]) -> str | None:
+    """The first joint that follows itself, by way of others or not; None without any."""
+    for name in couplings:
+        reached, ahead = set[str](), {name}
+        while ahead:
+            ahead = {driver for joint in ahead & couplings.keys() for driver in couplings[joint].drivers} - reached
+            reached |= ahead
+        if name in reached:
+            return name
+    return None
+
+
+def with_followers(
+    couplings: Mapping[str, Coupling], shape: Mapping[str, float], rate: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Coordinates and rates of independent joints and of those that follow them, none in a circle."""
+    coordinates, rates = dict(shape), dict(rate)
+
+    def add(name: str) -> None:
+        if name in coordinates or name not in couplings:
+            return
+        for driver in couplings[name].drivers:
+            add(driver)
+        coordinates[name], rates[name] = couplings[name].at(coordinates), couplings[name].rate(coordinates, rates)
+
+    for name in couplings:
+        add(name)
+    return coordinates, rates
 
 
 def described(coupling: Coupling) -> str:

@@ -12,12 +12,9 @@ from ...arrays import Array, Integers, finite_array, lock_arrays
 from ...display import short_repr
 from ...errors import ShapeError
 
-_GAP = 1e-9
-"""Of the size of what is left of a knot and right of it: more is a jump, in the value or in the slope."""
-MOST_DEGREE = 30
-"""Of a polynomial: powers of coordinates in radians or metres that are higher say nothing."""
-MOST_KNOTS = 10_000
-"""Of one function; measured ones have some ten."""
+_GAP = 1e-9  # of the sizes on both sides of a knot: more is a jump in the value or the slope
+MOST_DEGREE = 30  # of a polynomial: higher powers of radians or metres are noise
+MOST_KNOTS = 10_000  # of one function: measured ones have about ten
 
 
 class Expansion(NamedTuple):
@@ -32,8 +29,6 @@ class Expansion(NamedTuple):
 class JointFunction:
     """sum_p coefficients[p, i] (q - centres[i])^p between the knots i - 1 and i; the first and last piece have no end.
 
-    Attributes
-    ----------
     knots : (m,) ascending, at which one piece ends and the next begins; none for a polynomial
     centres : (m + 1,) of the pieces
     coefficients : (order, m + 1)
@@ -88,7 +83,7 @@ class JointFunction:
             raise ShapeError(f"the function jumps by {jumps[worst]:.6g} at {self.knots[worst]:.6g}; it must go on")
 
     def _sides(self) -> tuple[Array, Array, Array]:
-        """At the knots: by how much the value jumps, and the slopes before and behind."""
+        """Jumps of the value at the knots, and the slopes before and behind."""
         before, behind = (self._on(np.arange(len(self.knots)) + side, self.knots) for side in (0, 1))
         return behind.value - before.value, before.slope, behind.slope
 
@@ -153,7 +148,7 @@ def hermite(knots: Array, values: Array, slopes: Array | None) -> JointFunction:
 
 
 def _four_point_slopes(x: Array, y: Array) -> Array:
-    """Of the spline whose third derivative at both ends is that of the cubic through four points, with fewer none."""
+    """Slopes of the spline whose third derivative at both ends is that of the cubic through four points, or zero."""
     widths, rise = np.diff(x), np.diff(y) / np.diff(x)
     if len(x) == 2:
         return np.array([rise[0], rise[0]])

@@ -1,4 +1,4 @@
-"""From the independent joints of a body to the configuration and velocity vectors of its Pinocchio model."""
+"""The map from the independent joints of a body to configurations and velocities of its Pinocchio model."""
 
 from __future__ import annotations
 
@@ -13,22 +13,16 @@ from .ball_joints import COORDINATES, RATES
 from .coordinate_map import coordinate_map
 from .coupling import Coupling
 
-# Velocities of the free-flyer, which come first in Pinocchio's order: three of translation, three of rotation.
-_BASE = 6
-# Rates of a ball joint.
-_BALL = 3
-# [rad/s, m/s, N m or N]; what is stated above stands for no limit.
-_NO_LIMIT = 1e30
+BASE = 6  # velocities of the free-flyer, which come first in Pinocchio's order
+_NO_LIMIT = 1e30  # [rad/s, m/s, N m or N] a larger stated limit means none
 
 
 class JointMap:
-    """Where each joint stands in Pinocchio's vectors, joints that follow others and joints kept as (cos, sin) included.
+    """Places of joints in Pinocchio's vectors, joints that follow others and joints kept as (cos, sin) included.
 
     Pinocchio's rates of a ball joint are the angular velocity in axes of the child, as ours; its coordinates a unit
     quaternion.
 
-    Attributes
-    ----------
     follows : the coordinates of all joints from those of the independent ones
     names : tuple of the independent joints
     continuous : (n,) True for a joint that turns without end, and that no other follows by a curve
@@ -44,17 +38,17 @@ class JointMap:
 
     def __init__(self, model: Any, neutral: Array, couplings: Mapping[str, Coupling]) -> None:
         moving = {name: model.joints[number] for name, number in moving_joints(model).items()}
-        balls = [name for name, kind in moving.items() if kind.nv == _BALL]
+        balls = [name for name, kind in moving.items() if kind.nv == len(RATES)]
         self.follows = coordinate_map(tuple(moving), couplings, balls)
         self.names = self.follows.independent
-        # Of each row; the coordinates of a ball joint have places of their own.
+        # By row; the coordinates of a ball joint have places of their own.
         kinds = [kind for kind in moving.values() for _ in range(kind.nv)]
-        self._round = np.array([kind.nv == _BALL for kind in kinds], dtype=bool)
+        self._round = np.array([kind.nv == len(RATES) for kind in kinds], dtype=bool)
         turning = np.array([kind.nq == 2 for kind in kinds], dtype=bool)
         self._configuration_index = np.array([kind.idx_q for kind in kinds], dtype=int)
         self._velocity_index = np.array(
             [kind.idx_v + place for kind in moving.values() for place in range(kind.nv)], dtype=int
-        ) - _BASE  # fmt: skip
+        ) - BASE  # fmt: skip
         self._turning = turning
         self._any_turning = bool(turning.any())
         self._ball_places = [moving[ball.name].idx_q for ball in self.follows.balls]
@@ -77,8 +71,8 @@ class JointMap:
         self.limits.setflags(write=False)
         # What follows by a curve is elsewhere after a whole turn.
         self.continuous = endless & ~np.isin(np.array(self.names, dtype=str), self.follows.drivers)
-        self.rate_limits = self._slowest(np.array(model.velocityLimit)[_BASE + self._velocity_index])
-        efforts = np.array(model.effortLimit)[_BASE + self._velocity_index[independent]]
+        self.rate_limits = self._slowest(np.array(model.velocityLimit)[BASE + self._velocity_index])
+        efforts = np.array(model.effortLimit)[BASE + self._velocity_index[independent]]
         known = (efforts > 0.0) & (efforts < _NO_LIMIT) & ~spherical
         self.effort_limits = np.where(known, efforts, np.inf)
         self.effort_limits.setflags(write=False)
@@ -90,12 +84,12 @@ class JointMap:
         self.units = tuple("1" if self._round[i] else "m" if sliding[i] else "rad" for i in independent)
 
     def _slowest(self, stated: Array) -> Array:
-        """Of each independent joint, so that its followers keep theirs, too; a limit of zero says nothing: (n,)."""
+        """Rate limits of the independent joints that their followers' limits allow; zero means none: (n,)."""
         stated = np.where((stated > 0.0) & (stated < _NO_LIMIT), stated, np.inf)
         factors = np.abs(self.follows.matrix)
-        each = np.full(factors.shape, np.inf)
-        np.divide(stated[:, None], factors, out=each, where=factors > 0.0)
-        least = each.min(axis=0, initial=np.inf)
+        allowed = np.full(factors.shape, np.inf)
+        np.divide(stated[:, None], factors, out=allowed, where=factors > 0.0)
+        least = allowed.min(axis=0, initial=np.inf)
         place = {name: column for column, name in enumerate(self.names)}
         for joint in self.follows.curved:
             for source, function in joint.terms:
@@ -126,48 +120,48 @@ class JointMap:
     def velocities(self, shapes: Array, rates: Array) -> Array:
         """Pinocchio's velocities with the base at rest: (N, n), (N, n) -> (N, nv)."""
         v = np.zeros((len(rates), self._nv))
-        v[:, _BASE + self._velocity_index] = self.follows.with_rates(shapes, rates)[1]
+        v[:, BASE + self._velocity_index] = self.follows.with_rates(shapes, rates)[1]
         return v
 
     def accelerations(self, shapes: Array, rates: Array, accelerations: Array) -> Array:
         """Pinocchio's accelerations with the base at rest: (N, n), (N, n), (N, n) -> (N, nv)."""
-        found = self.velocities(shapes, accelerations)
+        slopes = self.velocities(shapes, accelerations)
         if not self.follows.is_linear:
             bent = (self._slope_rates(shapes, rates) @ rates[..., None])[..., 0]
-            found[:, _BASE + self._velocity_index] += bent
-        return found
+            slopes[:, BASE + self._velocity_index] += bent
+        return slopes
 
     def independent_rates(self, shapes: Array, rates: Array) -> Array:
-        """Of the independent joints, of ball joints the angular velocity: (N, n), (N, n) -> (N, m)."""
+        """Rates of the independent joints, for ball joints the angular velocity: (N, n), (N, n) -> (N, m)."""
         return self.follows.with_rates(shapes, rates)[1][:, self._own_rows]
 
     def frames(self, shapes: Array) -> Array:
         """Derivatives of the shape at unit rates of the independent joints: (N, n) -> (N, n, m)."""
-        found = np.repeat(self.follows.matrix[self._own_rows].T[None], len(shapes), axis=0)
+        frames = np.repeat(self.follows.matrix[self._own_rows].T[None], len(shapes), axis=0)
         place = {row: column for column, row in enumerate(self._own_rows.tolist())}
         for ball in self.follows.balls:
             first = place[ball.row]
-            found[:, ball.columns, first : first + len(RATES)] = ball.frame(shapes)
-        return found
+            frames[:, ball.columns, first : first + len(RATES)] = ball.frame(shapes)
+        return frames
 
     def columns(self, joints: Array, shapes: Array) -> Array:
         """Columns of Pinocchio's joints, base left out, folded into the independent: (N, ..., m) -> (N, ..., n)."""
         return self.follows.folded(joints[..., self._velocity_index], shapes)
 
     def bent_columns(self, joints: Array, shapes: Array, rates: Array) -> Array:
-        """The same, folded by how the fold changes along rates, as a second derivative needs it."""
+        """Columns of joints, folded by the rate of the fold along a motion: a second derivative needs it."""
         return joints[..., self._velocity_index] @ self._slope_rates(shapes, rates)
 
     def bent_rates(self, joints: Array, shapes: Array, rates: Array) -> Array:
-        """The same, folded by how Pinocchio's rates change with the shape while its own rates stay. The two differ for
-        ball joints only, whose rates are no derivatives of coordinates: by the bracket of the rates."""
+        """Columns of joints, folded by the change of Pinocchio's rates with the shape at constant own rates. Other for
+        ball joints only, whose rates are not derivatives of coordinates: by the bracket of the rates."""
         bent = self.follows.slope_rates(shapes, rates)
         for ball in self.follows.balls:
             bent[:, ball.rows, ball.columns] = ball.rates_by_shape(shapes, rates)
         return joints[..., self._velocity_index] @ bent
 
     def _slope_rates(self, shapes: Array, rates: Array) -> Array:
-        """How the derivatives of Pinocchio's rates by those of the shape change along a motion: (N, k, n)."""
+        """Rate, along a motion, of the derivatives of Pinocchio's rates by those of the shape: (N, k, n)."""
         bent = self.follows.slope_rates(shapes, rates)
         for ball in self.follows.balls:
             bent[:, ball.rows, ball.columns] = ball.slope_rates(shapes, rates)

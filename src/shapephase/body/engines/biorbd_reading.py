@@ -1,6 +1,6 @@
 """bioMod models of the acrobatics community, as biorbd (Michaud and Begon 2021) reads them.
 
-Segments, frames, masses and ranges come from biorbd; the text itself is looked at only for what biorbd passes over in
+Segments, frames, masses and ranges come from biorbd; the text itself is searched only for what biorbd ignores in
 silence. Coordinates of the root segment are the free base.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 import tempfile
-from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,47 +17,43 @@ import biorbd
 import numpy as np
 
 from ...arrays import Array
-from .chain import Chain, UnusableModelError, ball_names, check_name, locked_inertia
+from ..couplings.ball_joints import coordinate_names
+from ..formats.xml_text import listed, quoted
+from .chain import (
+    EXACT,
+    FRAME_ERRORS,
+    Chain,
+    UnusableModelError,
+    check_name,
+    inertia_and_momentum,
+    rates_by_differences,
+)
 
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
+# Words of a segment in lower case, by biorbd 1.12.
 _WORDS = (
     *("parent", "rt", "rtinmatrix", "translations", "rotations", "ranges", "rangesq", "rangesqdot", "rangesqddot"),
     *("jointdampings", "mass", "com", "centerofmass", "inertia", "inertiamatrix", "inertia_xxyyzz"),
     *("mesh", "meshfile", "meshcolor", "meshscale", "meshrt", "meshrtinmatrix", "patch"),
     *("externalforceindex", "forceplate"),
 )
-"""That a segment may have, in lower case, as biorbd 1.12 knows them."""
+# Numbers of values after a word: biorbd ignores further ones, and the last letters of `1,5`.
 _COUNTS = {
     **dict.fromkeys(("parent", "translations", "rotations", "rtinmatrix", "mass"), 1),
     **dict.fromkeys(("com", "centerofmass", "inertia_xxyyzz"), 3),
     **dict.fromkeys(("inertia", "inertiamatrix"), 9),
 }
-"""How many values follow a word; biorbd passes over those beyond, and over the last letters of `1,5`."""
-_FRAME = 16
-"""Values of a frame as a matrix; otherwise three angles, the order of their axes, and three coordinates."""
-_ONCE = (*_COUNTS, "rt", "rangesq")
-"""Words of which a second one takes the place of the first; meshes have many points."""
+_FRAME = 16  # values of a frame as a matrix; otherwise three angles, the order of their axes, three coordinates
+_ONCE = (*_COUNTS, "rt", "rangesq")  # a second one would replace the first; meshes have many points
 _OF_NUMBERS = ("rt", "rangesq", "mass", "com", "centerofmass", "inertia", "inertiamatrix", "inertia_xxyyzz")
 _OPERAND = r"(\$\w+|[Pp][Ii]|(\d+\.?\d*|\.\d+)(e[+-]?\d+)?|[+-]?(nan|NaN|inf|Infinity))"
+# What biorbd reads correctly: `5E-1` is 5 - 1 for it, `2^3` is 2, `5d1` is 5, and functions crash it.
 _VALUE = re.compile(rf"[+-]?(\(+[+-]?)?{_OPERAND}\)*([-+*/]\(*{_OPERAND}\)*)*", re.ASCII)
-"""What biorbd reads right: `5E-1` is 5 - 1 for it, `2^3` is 2, `5d1` is 5, and functions crash it."""
-_DROPPED = ("meshfile", "meshcolor", "meshscale", "meshrt")
-"""A model whose mesh is missing is refused, and meshes have no part in how a body turns."""
-_QUATERNION = "_Quat"
-"""Behind the name of a segment, that of its ball joint; biorbd calls its numbers so, with X, Y, Z, and Z again."""
-_STEP = 0.01
-"""[s] of the differences that give the rates of segments with quaternions: the eighth power is near rounding."""
-_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-"""Of the differences over so many steps to both sides (Fornberg 1988)."""
-_COARSE = 1e-9
-"""Share of the largest terms by which a momentum by differences may be off: short quaternions turn fast."""
+_DROPPED = ("meshfile", "meshcolor", "meshscale", "meshrt")  # biorbd refuses missing meshes, which do not affect turns
+_QUATERNION = "_Quat"  # ending of a ball joint after its segment's name; biorbd's numbers have X, Y, Z and Z behind it
+_COARSE = 1e-9  # share of the largest terms in a momentum by differences: short quaternions turn fast
 _NO_ROOT = ("root", "base")
-_MASSLESS = 1e-7
-"""[kg]; biorbd gives a segment without mass 1e-8 kg."""
-_EXACT = 1e-12
-"""Share of the largest terms by which the engine's numbers may differ from ours."""
-_FRAMES = 10.0
-"""Times what frames lack of being orthonormal: biorbd computes with them as they are."""
+_MASSLESS = 1e-7  # [kg] biorbd gives a segment without mass 1e-8 kg
 
 
 def chain_of(path: str, root_body: str | None = None) -> Chain:
@@ -93,8 +89,8 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
                 raise UnusableModelError(
                     f"segment {name!r}: the frame of a mirror is no base, and no joints move in it", line
                 )
-            said = "with the frame of a mirror, where mass is taken over as biorbd sees it"
-            notes.append(("segment", repr(name), said))
+            message = "with the frame of a mirror, where mass is taken over as biorbd sees it"
+            notes.append(("segment", repr(name), message))
         traits, flip = segment.characteristics(), flips[name]
         tensor = flip @ traits.inertia().to_array() @ flip
         chain.add_link(name, traits.mass(), flip @ traits.CoM().to_array(), tensor, line)
@@ -102,7 +98,7 @@ def chain_of(path: str, root_body: str | None = None) -> Chain:
             continue
         lack = max(lack, missing)
         chain.add_joints(parent, name, above @ frame[:3, 3], turn, _axes(segment, name), line)
-    if lack > _EXACT:
+    if lack > EXACT:
         notes.append(f"frames are orthonormal to {lack:.1g} only: the nearest rotations are taken")
     _add_poses(chain, model, segments, base, lack)
     return chain
@@ -115,7 +111,7 @@ def _model(path: str, notes: list[Any], starts: dict[str, int]) -> Any:
         text = content.decode("utf-8")
     except UnicodeDecodeError:
         text = content.decode("latin-1")
-    kept = _looked_through(text, notes, starts)
+    kept = _without_meshes(text, notes, starts)
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "model.bioMod"
         copy.write_text(kept, encoding="utf-8")
@@ -126,47 +122,104 @@ def _model(path: str, notes: list[Any], starts: dict[str, int]) -> Any:
             raise _refused(str(error), starts) from None
 
 
-def _refused(said: str, starts: dict[str, int]) -> UnusableModelError:
-    """What biorbd says, in one line, at the segment that it names."""
-    text = " ".join(said.split("Alternatively")[0].split())
-    named = re.search(r"Element: segment, named: (\S+)", " ".join(said.split()))
+def _refused(message: str, starts: dict[str, int]) -> UnusableModelError:
+    """The error of biorbd in one line, at the segment that it names."""
+    text = " ".join(message.split("Alternatively")[0].split())
+    named = re.search(r"Element: segment, named: (\S+)", " ".join(message.split()))
     reason = re.sub(r'^Reading of file "[^"]*" failed with the following error: ', "", text)
     segment = f"segment {named[1]!r}: " if named else ""
     return UnusableModelError(f"{segment}biorbd does not accept it: {reason}", starts.get(named[1], 1) if named else 1)
 
 
-def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
-    """The text without meshes. Raises UnusableModelError for what biorbd would pass over."""
+@dataclass
+class _Segment:
+    """A segment of the text on the way through it: words and values with their lines."""
+
+    name: str
+    entries: list[tuple[str, int]]
+
+    def fault(self, message: str, line: int) -> UnusableModelError:
+        return UnusableModelError(f"segment {self.name!r}: {message}", line)
+
+    def add_line(self, words: list[str], line: int) -> None:
+        """Add the words of a line. Raises UnusableModelError for an unknown word, or axes with blanks between."""
+        word = words[0].lower()
+        value = not re.match(r"[a-z]", word) or word.startswith(("pi", "nan", "inf"))
+        if word not in _WORDS and len(words) > 1 and not value:
+            near = difflib.get_close_matches(word, _WORDS, 1)
+            meant = f"; {near[0]!r} is near" if near else ""
+            raise self.fault(f"biorbd ignores the word {words[0]!r}{meant}", line)
+        if word in ("rotations", "translations") and len(words) > 2:
+            meant = f"{words[0]} {''.join(words[1:])}"
+            raise self.fault(f"of `{' '.join(words)}` biorbd reads {words[1]!r} alone; write `{meant}`", line)
+        self.entries += [(text, line) for text in words]
+
+    def check(self, end: int) -> None:
+        """Raise UnusableModelError for values that biorbd would ignore, or read in part."""
+        values: dict[str, list[str]] = {}
+        word, start = "", 1
+        for text, line in [*self.entries, ("", end)]:
+            named = text.lower() in _WORDS and not (word == "parent" and not values["parent"])
+            if text and not named:
+                if not word:
+                    raise self.fault(f"{text!r} follows no word; write `word values`", line)
+                values[word].append(text)
+                continue
+            self._check_count(word, values, start)
+            word, start = text.lower(), line
+            if values.setdefault(word, []) and word in _ONCE:
+                raise self.fault(f"{text!r} stands twice; keep one", line)
+
+    def _check_count(self, word: str, by_word: dict[str, list[str]], line: int) -> None:
+        numbers = values = by_word.get(word, [])
+        if word == "rt" and len(values) == 7:
+            numbers = values[:3] + values[4:]
+        elif word == "rt" and len(values) != _FRAME:
+            raise self.fault(
+                "RT is three angles, an order such as xyz and three coordinates, or a matrix of 16 numbers; got "
+                f"{len(values)} values",
+                line,
+            )
+        elif word in _COUNTS and len(values) != _COUNTS[word]:
+            raise self.fault(f"{word} has {len(values)} values, not {_COUNTS[word]}", line)
+        elif word == "rangesq":
+            axes = sum(len("".join(by_word.get(kind, ()))) for kind in ("translations", "rotations"))
+            if len(values) != 2 * axes:
+                raise self.fault(f"rangesQ has {len(values)} values of {axes} coordinates", line)
+        for text in numbers if word in _OF_NUMBERS else ():
+            if not _VALUE.fullmatch(text):
+                hint = "; write a small e" if re.fullmatch(r"[-+.\d]+E[-+\d]+", text) else ""
+                raise self.fault(f"{word}: {text!r:.40} is not a number that biorbd reads{hint}", line)
+
+
+def _without_meshes(text: str, notes: list[Any], starts: dict[str, int]) -> str:
+    """The text without meshes. Raises UnusableModelError for what biorbd would ignore."""
     kept, segment, meshes, constraints, number = [], None, 0, 0, 1
-    said: list[tuple[str, int]] = []
-    without_blocks = re.sub(r"/\*.*?\*/", lambda found: "\n" * found[0].count("\n"), text, flags=re.DOTALL)
+    without_blocks = re.sub(r"/\*.*?\*/", lambda block: "\n" * block[0].count("\n"), text, flags=re.DOTALL)
     for number, line in enumerate(without_blocks.splitlines(), 1):
         words = line.split("//")[0].split()
         word = words[0].lower() if words else ""
         if any(word.startswith("/*") for word in words):
             raise UnusableModelError("a comment that begins with /* has no end; close it by */", number)
+        kept.append("" if word in _DROPPED else line)
         if word in _DROPPED:
             meshes += word == "meshfile"
-            kept.append("")
-            said += [(text, number) for text in words[:1]]
-            continue
-        kept.append(line)
-        if word == "segment":
-            _check_closed(segment, number)
-            segment = words[1] if len(words) > 1 else ""
-            check_name(segment, f"segment {segment!r}", number)
-            if segment in starts:
-                raise UnusableModelError(f"two segments are named {segment!r}; give each a name of its own", number)
-            starts[segment], said = number, [(text, number) for text in words[2:]]
-        elif word == "endsegment":
             if segment is not None:
-                _check_values(segment, said)
+                segment.entries.append((words[0], number))
+        elif word == "segment":
+            _check_closed(segment, number)
+            segment = _Segment(words[1] if len(words) > 1 else "", [(text, number) for text in words[2:]])
+            check_name(segment.name, f"segment {segment.name!r}", number)
+            if segment.name in starts:
+                raise UnusableModelError(f"two segments are named {segment.name!r}; rename one", number)
+            starts[segment.name] = number
+        elif word == "endsegment" and segment is not None:
+            segment.check(number)
             segment = None
         elif word == "loopconstraint" and segment is None:
             constraints += 1
         elif segment is not None and word:
-            _check_word(words, word, segment, number)
-            said += [(text, number) for text in words]
+            segment.add_line(words, number)
     _check_closed(segment, number)
     if meshes:
         notes.append(f"{meshes} mesh files are not read: they have no part in how the body turns")
@@ -175,68 +228,10 @@ def _looked_through(text: str, notes: list[Any], starts: dict[str, int]) -> str:
     return "\n".join(kept) + "\n"
 
 
-def _check_closed(segment: str | None, line: int) -> None:
+def _check_closed(segment: _Segment | None, line: int) -> None:
     """Raise UnusableModelError where a segment goes on, as in a file that is cut off."""
     if segment is not None:
-        raise UnusableModelError(f"segment {segment!r} has no endsegment; add it", line)
-
-
-def _check_word(words: list[str], word: str, segment: str, line: int) -> None:
-    if re.match(r"[a-z]", word) and word not in _WORDS and len(words) > 1 and not word.startswith(("pi", "nan", "inf")):
-        near = difflib.get_close_matches(word, _WORDS, 1)
-        meant = f"; {near[0]!r} is near" if near else ""
-        raise UnusableModelError(f"segment {segment!r}: biorbd passes over the word {words[0]!r}{meant}", line)
-    if word in ("rotations", "translations") and len(words) > 2:
-        written, meant = " ".join(words), f"{words[0]} {''.join(words[1:])}"
-        raise UnusableModelError(
-            f"segment {segment!r}: of `{written}` biorbd reads {words[1]!r} alone; write `{meant}`", line
-        )
-
-
-def _check_values(segment: str, said: list[tuple[str, int]]) -> None:
-    """Raise UnusableModelError for values of a segment that biorbd would pass over, or read in part."""
-    found: dict[str, list[str]] = {}
-    word, start = "", 1
-    for text, line in [*said, ("", said[-1][1] if said else 1)]:
-        named = text.lower() in _WORDS and not (word == "parent" and not found["parent"])
-        if text and not named:
-            if not word:
-                raise UnusableModelError(f"segment {segment!r}: {text!r} follows no word; write `word values`", line)
-            found[word].append(text)
-            continue
-        _check_count(segment, word, found, start)
-        word, start = text.lower(), line
-        if found.setdefault(word, []) and word in _ONCE:
-            raise UnusableModelError(f"segment {segment!r}: {text!r} stands twice; keep one", line)
-
-
-def _check_count(segment: str, word: str, found: dict[str, list[str]], line: int) -> None:
-    """Raise UnusableModelError where a word has too few or too many values, or one that is no number."""
-    values = found.get(word, [])
-    numbers = values
-    if word == "rt" and len(values) == 7:
-        numbers = values[:3] + values[4:]
-    elif word == "rt" and len(values) != _FRAME:
-        raise UnusableModelError(
-            f"segment {segment!r}: RT is three angles, an order such as xyz and three coordinates, or a matrix of 16 "
-            f"numbers; got {len(values)} values",
-            line,
-        )
-    elif word in _COUNTS and len(values) != _COUNTS[word]:
-        raise UnusableModelError(f"segment {segment!r}: {word} has {len(values)} values, not {_COUNTS[word]}", line)
-    elif word == "rangesq":
-        axes = sum(len("".join(found.get(one, ()))) for one in ("translations", "rotations"))
-        if len(values) != 2 * axes:
-            raise UnusableModelError(
-                f"segment {segment!r}: rangesQ has {len(values)} values of {axes} coordinates", line
-            )
-    if word in _OF_NUMBERS:
-        for text in numbers:
-            if not _VALUE.fullmatch(text):
-                hint = "; write a small e" if re.fullmatch(r"[-+.\d]+E[-+\d]+", text) else ""
-                raise UnusableModelError(
-                    f"segment {segment!r}: {word}: {text!r:.40} is no number that biorbd reads{hint}", line
-                )
+        raise UnusableModelError(f"segment {segment.name!r} has no endsegment; add it", line)
 
 
 def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str, int]) -> dict[str, int]:
@@ -246,7 +241,7 @@ def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str,
     for name, parent in parents.items():
         if parent not in known and parent.lower() not in _NO_ROOT:
             raise UnusableModelError(
-                f"segment {name!r}: its parent {parent!r} does not exist; there is {', '.join(list(known)[:5])}",
+                f"segment {name!r}: its parent {parent!r} does not exist; there is {listed([*known])}",
                 starts.get(name, 1),
             )
     trees: dict[str, dict[str, int]] = {}
@@ -261,14 +256,14 @@ def _tree(model: Any, root_body: str | None, notes: list[Any], starts: dict[str,
         for root, tree in trees.items()
     }
     roots = [root for root, mass in masses.items() if mass > 0.0] or list(trees)
-    listed = ", ".join(map(repr, roots[:20])) or "none"
+    names = listed([*map(repr, roots)]) or "none"
     if root_body is not None and root_body not in trees:
-        raise UnusableModelError(f"root_body: {root_body[:60]!r} is no root segment; there is {listed}")
+        raise UnusableModelError(f"root_body: {quoted(root_body)!r} is not a root segment; there is {names}")
     if len(roots) != 1 and root_body is None:
         heaviest = max(roots, key=lambda root: masses[root], default="")
         way = f"; say which one by root_body={heaviest!r} (--root-body {heaviest})" if roots else ""
         raise UnusableModelError(
-            f"one root segment is needed, got {listed}{way}", starts.get(roots[1], 1) if roots else 1
+            f"one root segment is needed, got {names}{way}", starts.get(roots[1], 1) if roots else 1
         )
     root = root_body or roots[0]
     if masses[root] == 0.0:
@@ -327,7 +322,7 @@ def _add_way(chain: Chain, way: list[Any]) -> None:
 
 def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float] | None]]:
     """Slides, then hinges or a ball joint, each moved by those before it."""
-    ranges = [[found.min(), found.max()] for found in segment.QRanges()]
+    ranges = [[interval.min(), interval.max()] for interval in segment.QRanges()]
     kinds = [("prismatic", axis) for axis in segment.seqT().to_string()]
     kinds += [("revolute", axis) for axis in segment.seqR().to_string()]
     words = {"prismatic": "Trans", "revolute": "Rot"}
@@ -348,25 +343,26 @@ def _orthonormal(matrix: Array, name: str, line: int) -> tuple[Array, Array, flo
     left, values, right = np.linalg.svd(matrix)
     nearest = left @ right
     if not np.abs(values - 1.0).max() < 1e-2:
-        raise UnusableModelError(f"segment {name!r}: its frame {matrix.tolist()} is no rotation; correct its RT", line)
+        fault = f"its frame {matrix.tolist()} is not a rotation; correct its RT"
+        raise UnusableModelError(f"segment {name!r}: {fault}", line)
     flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(nearest))])
     return nearest @ flip, flip, float(np.abs(matrix - nearest).max())
 
 
 def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, lack: float) -> None:
-    """What biorbd computes with the base at rest."""
+    """Add inertia and momentum by biorbd with the base at rest."""
     names = [name.to_string() for name in model.nameDof()]
     still = np.zeros(model.nbQ())
     # The scalar parts of quaternions come last, in the order of the segments.
     still[model.nbQ() - model.nbQuat() :] = 1.0
     round_ones = [k for k in range(model.nbSegment()) if model.segment(k).isRotationAQuaternion()]
     scalars = {model.segment(k).name().to_string(): len(still) - len(round_ones) + n for n, k in enumerate(round_ones)}
-    tolerance = _EXACT + _FRAMES * lack
+    tolerance = EXACT + FRAME_ERRORS * lack
 
     def coordinates(shape: dict[str, float]) -> Array:
         q = still.copy()
         for joint in {name.rpartition(".")[0] for name in shape if name.rpartition(".")[0].endswith(_QUATERNION)}:
-            four = np.array([shape[part] for part in ball_names(joint)])
+            four = np.array([shape[part] for part in coordinate_names(joint)])
             segment, first = joint.removesuffix(_QUATERNION), names.index(f"{joint}X")
             four /= np.sqrt(four @ four)
             q[first : first + 3], q[scalars[segment]] = four[:3], four[3]
@@ -375,51 +371,33 @@ def _add_poses(chain: Chain, model: Any, segments: dict[str, int], base: str, la
                 q[names.index(name)] = value
         return q
 
-    def poses(shape: dict[str, float]) -> Array:
-        there = biorbd.GeneralizedCoordinates(coordinates(shape))
-        return np.array([frame.to_array() for frame in model.allGlobalJCS(there)])
-
     numbers = list(segments.values())
     traits = [model.segment(k).characteristics() for k in numbers]
     masses = np.array([part.mass() for part in traits])
     offsets = np.array([part.CoM().to_array() for part in traits])
     tensors = np.array([part.inertia().to_array() for part in traits])
+
+    def frames(shape: dict[str, float]) -> Array:
+        state = biorbd.GeneralizedCoordinates(coordinates(shape))
+        return np.array([frame.to_array() for frame in model.allGlobalJCS(state)])
+
+    def poses(shape: dict[str, float]) -> tuple[Array, Array]:
+        own = frames(shape)[numbers]
+        return own[:, :3, 3] + (own[:, :3, :3] @ offsets[:, :, None])[:, :, 0], own[:, :3, :3]
+
     for shape, rate in chain.random_shapes():
-        there, v = biorbd.GeneralizedCoordinates(coordinates(shape)), np.zeros(model.nbQdot())
+        state, v = biorbd.GeneralizedCoordinates(coordinates(shape)), np.zeros(model.nbQdot())
         for name in names[: len(v)]:
             v[names.index(name)] = rate.get(name, 0.0)
-        moves = biorbd.GeneralizedVelocity(v)
-        frames = poses(shape)
-        root, frames = frames[segments[base], :3, :3], frames[numbers]
-        turns = frames[:, :3, :3]
-        centres = frames[:, :3, 3] + (turns @ offsets[:, :, None])[:, :, 0]
-        turned = turns @ tensors @ np.swapaxes(turns, 1, 2)
-        inertia = locked_inertia(masses, centres, turned)
-        # Part by part: not all segments need belong to the body.
-        speeds = np.array([speed.to_array() for speed in model.CoMdotBySegment(there, moves, True)])[numbers]
-        omega = np.array([model.segmentAngularVelocity(there, moves, k, False).to_array() for k in numbers])
-        coarse = tolerance
+        velocities = biorbd.GeneralizedVelocity(v)
+        root, coarse = frames(shape)[segments[base], :3, :3], tolerance
         if any(name.endswith(f"{_QUATERNION}.w") for name in shape):
             # biorbd leaves the rates of quaternions out.
-            speeds, omega, coarse = *_by_differences(poses, shape, rate, numbers, offsets), max(tolerance, _COARSE)
-        apart = centres - masses @ centres / masses.sum()
-        momentum = masses @ np.cross(apart, speeds) + (turned @ omega[:, :, None])[:, :, 0].sum(axis=0)
+            speeds, omega = rates_by_differences(poses, shape, rate)
+            coarse = max(tolerance, _COARSE)
+        else:
+            # Part by part: not all segments need belong to the body.
+            speeds = np.array([s.to_array() for s in model.CoMdotBySegment(state, velocities, True)])[numbers]
+            omega = np.array([model.segmentAngularVelocity(state, velocities, k, False).to_array() for k in numbers])
+        inertia, momentum = inertia_and_momentum(masses, tensors, *poses(shape), speeds, omega)
         chain.add_pose(shape, rate, root.T @ inertia @ root, root.T @ momentum, (tolerance, coarse))
-
-
-def _by_differences(
-    poses: Callable[[dict[str, float]], Array],
-    shape: dict[str, float],
-    rate: dict[str, float],
-    numbers: list[int],
-    offsets: Array,
-) -> tuple[Array, Array]:
-    """Velocities of the centres and angular velocities of segments, from where they are a little earlier and later."""
-    slopes = np.zeros((len(numbers), 4, 4))
-    for steps, weight in _WEIGHTS:
-        for side in (1.0, -1.0):
-            moved = {name: value + side * steps * _STEP * rate[name] for name, value in shape.items()}
-            slopes += side * weight / _STEP * poses(moved)[numbers]
-    spins = slopes[:, :3, :3] @ np.swapaxes(poses(shape)[numbers, :3, :3], 1, 2)
-    omega = 0.5 * np.stack([spins[:, i, j] - spins[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=1)
-    return slopes[:, :3, 3] + (slopes[:, :3, :3] @ offsets[:, :, None])[:, :, 0], omega

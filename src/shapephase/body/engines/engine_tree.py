@@ -1,4 +1,4 @@
-"""A body that an engine reads: asked in a process of its own, and compared with what the engine computes."""
+"""A body that another program's engine reads, in a process of its own."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ import numpy as np
 
 from ...child_process import run_alone
 from ...errors import MissingExtraError, ModelFileError
-from .._cross_check import inertia_and_momentum
-from ..body import Body
 from ..couplings.coupling import Coupling
 from ..couplings.functions import JointFunction
 from ..formats.xml_text import Node, xml_tree
@@ -22,148 +20,97 @@ from ..link_tree import Joint, Link, LinkTree, from_the_root, grouped
 from .formats import FORMATS, XACRO
 from .reading import BODY, MEMORY, MISSING, NO_MEMORY, REFUSED, SHAPES, TEXT
 
-_SECONDS = 60
-"""[s] for the imports and the file; it only ends what would never end."""
+_SECONDS = 60  # for the imports and the file: it only ends what would never end
+_PROGRAM = "from shapephase.body.engines.reading import read_in_this_process as read; read()"
 
 
 def engine_tree(path: Path, name: str, options: Mapping[str, str]) -> tuple[LinkTree, list[dict[str, Any]]]:
-    """Links and joints of a file in a format that an engine owns, and what the engine has at some shapes.
+    """Links and joints of a file in an engine's format, and the engine's numbers at some shapes.
 
     options : arguments of the reader's `chain_of`
 
-    Raises
-    ------
-    MissingExtraError
-        If the engine is not installed.
-    ModelFileError
-        If it does not accept the file, crashes on it or hangs.
+    Raises MissingExtraError if the engine is not installed, ModelFileError if it refuses the file, crashes or hangs.
     """
-    return _tree_of(_answer(path, name, BODY, json.dumps(dict(options))), str(path))
+    return _tree_of(_result(path, name, BODY, json.dumps(dict(options))), str(path))
 
 
 def expanded(path: Path, packages: Sequence[str], arguments: Mapping[str, str]) -> Node:
-    """The root element of the URDF that a xacro file stands for; its lines are those of that.
+    """The root element of the URDF that a xacro file expands to; its lines are those of the expanded text.
 
     arguments : values of the file's arguments, by name
 
     Raises what `engine_tree` raises.
     """
     options = json.dumps({"packages": list(map(os.path.abspath, packages)), "xacro_args": dict(arguments)})
-    return xml_tree(_answer(path, XACRO, TEXT, options).encode(), f"{path} (expanded)")
+    return xml_tree(_result(path, XACRO, TEXT, options).encode(), f"{path} (expanded)")
 
 
 def engine_shapes(path: Path, name: str) -> dict[str, Any]:
-    """What can be drawn of such a file, as its reader says it. Raises what `engine_tree` raises."""
-    return _answer(path, name, SHAPES)
+    """Shapes to draw of such a file, as plain numbers. Raises what `engine_tree` raises."""
+    return _result(path, name, SHAPES)
 
 
-def _answer(path: Path, name: str, *words: str) -> Any:
+def _result(path: Path, name: str, *words: str) -> Any:
     known, where = FORMATS[name], str(path)
-    source = "from shapephase.body.engines.reading import read_in_this_process as read; read()"
     try:
-        child = run_alone(source, (str(path.absolute()), name, *words), b"", _SECONDS)
+        child = run_alone(_PROGRAM, (str(path.absolute()), name, *words), b"", _SECONDS)
     except subprocess.TimeoutExpired:
-        raise ModelFileError(
-            f"{where}:1: {known.engine} took more than {_SECONDS} s and was stopped; a smaller model is needed"
-        ) from None
+        fault = f"took more than {_SECONDS} s and was stopped; a smaller model is needed"
+        raise ModelFileError(f"{where}:1: {known.engine} {fault}") from None
+    if child.returncode == 0:
+        return json.loads(child.stdout)
     if child.returncode == MISSING:
         raise MissingExtraError(
             f"{where} is {known.title}, which {known.engine} reads: pip install 'shapephase[{known.extra}]'"
         )
-    if child.returncode < 0:
-        raise ModelFileError(
-            f"{where}:1: {known.engine} crashed on it, signal {-child.returncode}; open it in {known.engine} itself"
-        )
-    if child.returncode == NO_MEMORY:
-        raise ModelFileError(
-            f"{where}:1: {known.engine} took more than {MEMORY >> 20} MiB and was stopped; a smaller model is needed"
-        )
     if child.returncode == REFUSED:
         refused = json.loads(child.stdout)
         raise ModelFileError(f"{where}:{refused['line']}: {refused['message']}")
-    if child.returncode:
-        said = child.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise ModelFileError(f"{where}:1: {known.engine} does not read it: {''.join(said) or 'it says nothing'}")
-    return json.loads(child.stdout)
+    if child.returncode == NO_MEMORY:
+        fault = f"took more than {MEMORY >> 20} MiB and was stopped; a smaller model is needed"
+    elif child.returncode < 0:
+        fault = f"crashed on it, signal {-child.returncode}; open it in {known.engine} itself"
+    else:
+        last = child.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        fault = f"does not read it: {''.join(last) or 'no reason given'}"
+    raise ModelFileError(f"{where}:1: {known.engine} {fault}")
 
 
-def _tree_of(said: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str, Any]]]:
-    links = {
-        entry["name"]: Link(
-            entry["name"], f"{where}:{entry['line']}", entry["mass"], np.array(entry["centre"]),
-            np.array(entry["inertia"]).reshape(3, 3),
-        )
-        for entry in said["links"]
-    }  # fmt: skip
-    joints = [_joint(entry, where) for entry in said["joints"]]
+def _tree_of(chain: dict[str, Any], where: str) -> tuple[LinkTree, list[dict[str, Any]]]:
+    """The tree of links of a `Chain` in JSON, and its poses."""
+    links = {name: Link(**_fields(entry, where)) for name, entry in chain["links"].items()}
+    joints = [Joint(**_fields(entry, where)) for entry in chain["joints"]]
     first, ordered = from_the_root(links, joints, where)
     reached = {first}
-    # The engine's own order, where it has parents before children, as every tree of links has them.
+    # The engine's own order is kept where parents come before children.
     if all(joint.parent in reached and not reached.add(joint.child) for joint in joints):
         ordered = tuple(joints)
-    sorted_links = {name: links[name] for name in (first, *(joint.child for joint in ordered))}
-    single = (f"{where}:1: {note}" for note in said["notes"] if isinstance(note, str))
-    notes = (*single, *grouped((f"{where}:1", *note) for note in said["notes"] if not isinstance(note, str)))
-    couplings = {name: _coupling(rule) for name, rule in said["couplings"].items()}
-    frames = frozenset(said["frames"])
-    base, slides = said["base_angles"], said["base_slides"]
+    single = (f"{where}:1: {note}" for note in chain["notes"] if isinstance(note, str))
+    kinds = grouped((f"{where}:1", *note) for note in chain["notes"] if not isinstance(note, str))
+    angles, slides = chain["base_angles"], chain["base_slides"]
     tree = LinkTree(
-        said["name"],
-        sorted_links,
+        chain["name"],
+        {name: links[name] for name in (first, *(joint.child for joint in ordered))},
         ordered,
-        couplings,
-        frames,
-        notes,
-        base_joints=tuple(_joint(entry, where) for entry in said["base_joints"]),
-        base_angles=None if base is None else (tuple(base[0]), base[1]),
+        {name: _coupling(rule) for name, rule in chain["couplings"].items()},
+        frozenset(chain["frames"]),
+        (*single, *kinds),
+        base_joints=tuple(Joint(**_fields(entry, where)) for entry in chain["base_joints"]),
+        base_angles=None if angles is None else (tuple(angles[0]), angles[1]),
         base_slides=None if slides is None else tuple(slides),
     )
-    return tree, said["poses"]
+    return tree, chain["poses"]
 
 
-def _joint(entry: dict[str, Any], where: str) -> Joint:
-    return Joint(
-        name=entry["name"],
-        where=f"{where}:{entry['line']}",
-        kind=entry["kind"],
-        parent=entry["parent"],
-        child=entry["child"],
-        place=np.array(entry["place"]),
-        turn=np.array(entry["turn"]).reshape(3, 3),
-        axis=np.array(entry["axis"]),
-        after=np.array(entry["after"]),
-        limits=(-np.inf, np.inf) if entry["limits"] is None else (entry["limits"][0], entry["limits"][1]),
-    )
+def _fields(entry: dict[str, Any], where: str) -> dict[str, Any]:
+    """Fields of a link or joint, their arrays and their place in the file restored."""
+    pairs = {name: tuple(entry[name]) for name in ("limits", "most") if name in entry}
+    arrays = {name: np.array(value) for name, value in entry.items() if isinstance(value, list)}
+    return entry | arrays | pairs | {"where": f"{where}:{entry['where']}"}
 
 
 def _coupling(rule: dict[str, Any]) -> Coupling:
-    terms = ((driver, JointFunction(*map(np.array, numbers))) for driver, *numbers in rule["terms"])
+    terms = (
+        (driver, JointFunction(**{k: np.array(v) for k, v in function.items()})) for driver, function in rule["terms"]
+    )
     return Coupling(rule["start"], tuple(terms))
-
-
-def check_against_engine(body: Body, tree: LinkTree, poses: list[dict[str, Any]], where: str) -> None:
-    """Compare a body with what the engine that owns its format computes.
-
-    Raises
-    ------
-    ModelFileError
-        If mass, centre, inertia or momentum at a random shape and rate differ by more than rounding.
-    """
-    for pose in poses:
-        shape = np.array([pose["shape"][name] for name in body.joint_names])
-        rate = np.array([pose["rate"][name] for name in body.joint_names])
-        *_, extent, motion = inertia_and_momentum(tree, pose["shape"], pose["rate"])
-        exact, coarse = pose["tolerance"]
-        allowed = {"inertia": exact * extent, "momentum": coarse * motion}
-        found = {"inertia": body.locked_inertia(shape).ravel(), "momentum": body.internal_momentum(shape, rate)}
-        if pose["mass"] is not None:
-            # The centre is off by its share of the size of the body.
-            allowed |= {"mass": exact * body.mass, "centre": exact * np.sqrt(extent / body.mass)}
-            found |= {"mass": np.array(body.mass), "centre": body.centre_of_mass(shape)}
-        for what, got in found.items():
-            # A comparison that NaN fails.
-            if not np.all(np.abs(got - np.array(pose[what])) <= allowed[what]):
-                raise ModelFileError(
-                    f"{where}:1: the engine has another {what} at a random shape: {pose[what]} against {got.tolist()}; "
-                    "please report this file"
-                )

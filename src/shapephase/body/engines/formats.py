@@ -1,4 +1,4 @@
-"""Which formats other programs own, how they are told by their content, and which extra brings the engine."""
+"""Formats of bodies: how each is recognised by its content, the engine that reads it, and options of `load_body`."""
 
 from __future__ import annotations
 
@@ -7,27 +7,15 @@ from typing import NamedTuple
 
 from ..formats.bvh_text import is_bvh
 
-_HEAD = 65536
-"""[bytes] of a file that are looked at to tell its format."""
+_HEAD = 65536  # bytes that are searched: comments of bioMod files fill some thousand
 
-MJCF = "mjcf"
-"""The one of these formats that is XML throughout, and drawn."""
-
-
-XACRO = "xacro"
-"""The one whose engine makes a URDF of it."""
-
-
-BVH = "bvh"
-"""A skeleton in motion, which no engine owns, and no XML: it is read here."""
-
-
-MVNX = "mvnx"
-"""The poses of a suit's segments, which no engine owns, either."""
+# Read by engines, the first throughout XML and drawn, the second expanded to a URDF; and two that are read here.
+MJCF, XACRO = "mjcf", "xacro"
+BVH, MVNX = "bvh", "mvnx"
 
 
 class Format(NamedTuple):
-    """A format that an engine owns."""
+    """A format that another program owns."""
 
     title: str
     engine: str  # the module to import
@@ -44,7 +32,12 @@ FORMATS = {
     XACRO: Format("a xacro file", "xacrodoc", "bodies", ".xacro_reading", options=("packages", "root", "xacro_args")),
     "yeadon": Format("measurements for Yeadon's model", "yeadon", "bodies", ".yeadon_reading"),
 }
-"""By our name."""
+OPTIONS: dict[str | None, tuple[str, ...]] = {
+    None: ("packages", "root"),  # a URDF
+    BVH: ("length_unit", "person_mass"),
+    MVNX: ("person_mass",),
+    **{name: known.options for name, known in FORMATS.items()},
+}
 _COMMENT = re.compile(rb"//[^\n]*|/\*.*?\*/|\s+", re.DOTALL)
 _BEFORE_XML = re.compile(rb"<!--.*?-->|<\?.*?\?>|<!DOCTYPE[^>\[]*(?:\[.*?\])?\s*>|\s+", re.DOTALL)
 
@@ -54,10 +47,8 @@ def format_of(content: bytes) -> str | None:
     if is_bvh(content):
         return BVH
     head = content[:_HEAD].removeprefix(b"\xef\xbb\xbf")
-    if re.match(rb"<mujoco[\s/>]", _after(_BEFORE_XML, head)):
-        return MJCF
-    if re.match(rb"<mvnx[\s/>]", _after(_BEFORE_XML, head)):
-        return MVNX
+    if root := re.match(rb"<(mujoco|mvnx)[\s/>]", _after(_BEFORE_XML, head)):
+        return MJCF if root[1] == b"mujoco" else MVNX
     if re.match(rb"version\s+\d", _after(_COMMENT, head), re.IGNORECASE):
         return "biomod"
     if re.search(rb"<OpenSimDocument[\s>]", head):
@@ -67,8 +58,8 @@ def format_of(content: bytes) -> str | None:
     return None
 
 
-def _after(passed: re.Pattern[bytes], head: bytes) -> bytes:
+def _after(skipped: re.Pattern[bytes], head: bytes) -> bytes:
     start = 0
-    while found := passed.match(head, start):
-        start = found.end()
+    while match := skipped.match(head, start):
+        start = match.end()
     return head[start:]

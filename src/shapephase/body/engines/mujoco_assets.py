@@ -11,27 +11,21 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ..formats.xml_text import listed
 from .chain import UnusableModelError
 
 _CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-_FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-"""Faces of the tetrahedron that stands for a mesh, each by three corners."""
-_EDGES = ((0.01, 0.01, 0.01), (0.3, 0.2, 0.1))
-"""[m] Two tetrahedra: a body whose mass or inertia they share in has it from the mesh."""
+_FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # of the tetrahedron that replaces a mesh
+_EDGES = ((0.01, 0.01, 0.01), (0.3, 0.2, 0.1))  # [m] two tetrahedra: masses that differ come from the mesh
 _OF_MASS = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 _KINDS = {"meshes": "mesh", "textures": "texture", "hfields": "height field", "skins": "skin"}
-_MOST_NAMED = 20
 
 
 def compiled_without(written: mujoco.MjSpec) -> tuple[Any, frozenset[int], list[str]]:
     """The model of a specification, numbers of geoms whose shape is not known, and notes on what is left out.
 
-    Raises
-    ------
-    UnusableModelError
-        If a body has mass or inertia from a mesh that cannot be read.
-    ValueError
-        For what else MuJoCo does not accept.
+    Raises UnusableModelError if a body has mass or inertia from a mesh that cannot be read; ValueError for what else
+    MuJoCo does not accept.
     """
     left: dict[str, tuple[str, str]] = {}
     meshes: list[Any] = []
@@ -59,20 +53,23 @@ def compiled_without(written: mujoco.MjSpec) -> tuple[Any, frozenset[int], list[
     if not left:
         return model, shapeless, []
     names = [f"{what} ({file})" for what, (_, file) in left.items()]
-    shown = ", ".join(names[:_MOST_NAMED]) + (f" and {len(names) - _MOST_NAMED} more" * (len(names) > _MOST_NAMED))
-    return model, shapeless, [f"not found or not readable, and left out, as no mass comes from them: {shown}"]
+    return (
+        model,
+        shapeless,
+        [f"not found or not readable, and left out, as no mass comes from them: {listed(names)}"],
+    )
 
 
-def _asset_of(written: mujoco.MjSpec, said: str, left: dict[str, tuple[str, str]]) -> tuple[str, Any]:
+def _asset_of(written: mujoco.MjSpec, message: str, left: dict[str, tuple[str, str]]) -> tuple[str, Any]:
     """The kind and the asset that an error is about; None where it is about something else."""
-    missing = re.search(r"[Oo]pening file '([^']*)'", said)
-    element = re.search(r"Element name '([^']*)'", said)
+    missing = re.search(r"[Oo]pening file '([^']*)'", message)
+    element = re.search(r"Element name '([^']*)'", message)
     for group, kind in _KINDS.items():
         for asset in getattr(written, group):
             file = _file_of(asset)
             if not file or f"{kind} {asset.name!r}" in left:
                 continue
-            if missing and PurePath(missing[1]).name in {PurePath(one).name for one in _files_of(asset)}:
+            if missing and PurePath(missing[1]).name in {PurePath(path).name for path in _files_of(asset)}:
                 return kind, asset
             if element and element[1] == asset.name:
                 return kind, asset
@@ -118,10 +115,10 @@ def _check_masses(
     masses = [np.array(getattr(model, name)) for name in _OF_MASS]
     for mesh in meshes:
         _shape(mesh, _EDGES[1])
-    other = written.compile()
+    larger = written.compile()
     changed = np.zeros(model.nbody, dtype=bool)
     for name, before in zip(_OF_MASS, masses, strict=True):
-        changed |= (np.array(getattr(other, name)) != before).reshape(model.nbody, -1).any(axis=1)
+        changed |= (np.array(getattr(larger, name)) != before).reshape(model.nbody, -1).any(axis=1)
     if not changed.any():
         return
     body = int(np.argmax(changed))

@@ -1,4 +1,4 @@
-"""What MuJoCo's own viewer would show of a body: geoms and meshes, as plain numbers."""
+"""Geoms and meshes that MuJoCo's own viewer would show of a body, as plain numbers."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from .mujoco_model import Compiled, compiled_model, rotation
 
+# Names of the kinds, and factors of their sizes: MuJoCo has half lengths.
 _KINDS = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", (1.0,)),
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", (1.0, 2.0)),
@@ -20,11 +21,8 @@ _KINDS = {
     int(mujoco.mjtGeom.mjGEOM_BOX): ("box", (2.0, 2.0, 2.0)),
     int(mujoco.mjtGeom.mjGEOM_MESH): ("mesh", ()),
 }
-"""What each kind is called, and what its sizes are multiplied by: MuJoCo has half lengths."""
-_SHOWN_GROUPS = (0, 1, 2)
-"""Of geoms, that MuJoCo's viewer shows; the others are for collisions."""
-_GREY = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
-"""The colour of a geom that states none, which its material then has."""
+_SHOWN_GROUPS = (0, 1, 2)  # of geoms in MuJoCo's viewer; the others are for collisions
+_GREY = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)  # of a geom without a colour: its material's counts
 
 
 def shapes_of(path: str) -> dict[str, Any]:
@@ -44,7 +42,7 @@ def shapes_of(path: str) -> dict[str, Any]:
 
 
 def _drawn(compiled: Compiled, body: int) -> list[int]:
-    """Of the geoms of a body, those that the viewer shows, or all if it shows none."""
+    """The geoms of a body that the viewer shows, or all if it shows none."""
     model = compiled.model
     first = int(model.body_geomadr[body])
     geoms = range(first, first + int(model.body_geomnum[body]))

@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from ...arrays import Array
-from ..formats.xml_text import xml_tree
+from ..formats.xml_text import listed, quoted, xml_tree
 from ..virtual_base import way_words
 from .chain import UnusableModelError
 from .mujoco_assets import compiled_without
@@ -27,30 +27,24 @@ FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 BALL = int(mujoco.mjtJoint.mjJNT_BALL)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
 """Kinds of joints; the fourth is a hinge."""
+# Attributes of elements whose other attributes MuJoCo ignores in silence.
 _PASSED_OVER = {
     "frame": ("name", "childclass", "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
     "replicate": ("count", "sep", "offset", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
 }
-"""The attributes of elements whose other attributes MuJoCo passes over in silence."""
+# Attributes that masses and places depend on; MuJoCo replaces NaN by its default.
 _NUMBERS = {
     *("mass", "density", "diaginertia", "fullinertia", "size", "fromto", "axis", "range", "ref", "polycoef"),
     *("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
 }
-"""Attributes from which masses and places follow; MuJoCo takes its default where one is NaN."""
-_MEMORY = 64 * 2**20
-"""[bytes] for what MuJoCo computes with, the squares of two thousand coordinates."""
-_MOST_SAID = 20
-"""Names that a message lists."""
-_TAG_LINES = 3
-"""Lines over which the tag of an element may run before its name."""
+_MEMORY = 64 * 2**20  # [bytes] of MuJoCo's work space: the squares of two thousand coordinates
+_TAG_LINES = 3  # lines from an element's tag to its name
 
 
 @dataclass(frozen=True)
 class Compiled:
     """A model, the names that its bodies have as links, and their lines where the file itself has them.
 
-    Attributes
-    ----------
     shapeless : geoms whose mesh could not be read
     notes : what is left out
     """
@@ -63,11 +57,11 @@ class Compiled:
 
     def below(self, base: int) -> list[int]:
         """A body and all that hang on it, parents first."""
-        found = {base}
+        reached = {base}
         for body in range(base + 1, self.model.nbody):
-            if int(self.model.body_parentid[body]) in found:
-                found.add(body)
-        return sorted(found)
+            if int(self.model.body_parentid[body]) in reached:
+                reached.add(body)
+        return sorted(reached)
 
     def joints_of(self, body: int) -> range:
         """Numbers of the joints between a body and the one it hangs on."""
@@ -80,12 +74,12 @@ class Compiled:
         return self.model.joint(joint).name or f"{self.names[body]}_joint{joint - self.joints_of(body)[0] + 1}"
 
     def line(self, number: int, kind: str = "body") -> int:
-        """Where a body or joint begins; 1 where that is in another file."""
+        """Line at which a body or joint begins; 1 for one in another file."""
         return self.lines.get((kind, number), 1)
 
 
 def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
-    """What MuJoCo makes of a file, with shapes that are drawn only or not.
+    """The model that MuJoCo compiles from a file, with or without shapes that are only drawn.
 
     Raises UnusableModelError for what it does not accept.
     """
@@ -121,39 +115,39 @@ def _check_passed_over(content: bytes, path: str) -> None:
         for name in _NUMBERS & set(node.attributes):
             if any(word.lower().lstrip("+-") == "nan" for word in node.attributes[name].split()):
                 raise UnusableModelError(
-                    f"<{node.tag}>: {name}={node.attributes[name][:60]!r} is not a number, and MuJoCo would take its "
-                    f"default; give a number, or leave {name} out",
+                    f"<{node.tag}>: {name}={quoted(node.attributes[name])!r} is not a number, and MuJoCo would take "
+                    f"its default; give a number, or leave {name} out",
                     node.line,
                 )
         for name in set(node.attributes) - set(_PASSED_OVER.get(node.tag, node.attributes)):
             near = difflib.get_close_matches(name, _PASSED_OVER[node.tag], 1)
             meant = f"; did you mean {near[0]}=?" if near else ""
-            raise UnusableModelError(f"<{node.tag}>: MuJoCo passes over {name[:60]!r}{meant}", node.line)
+            raise UnusableModelError(f"<{node.tag}>: MuJoCo ignores {quoted(name)!r}{meant}", node.line)
 
 
-def _line(said: str, name: str, lines: list[str]) -> int:
-    """Where the element of this name begins; 1 if that is not in these lines."""
-    found = re.search(r"line (\d+)", said)
-    number = int(found[1]) if found else 1
-    here = 0 < number <= len(lines) and name in "\n".join(lines[number - 1 : number - 1 + _TAG_LINES])
-    return number if here else 1
+def _line(message: str, name: str, lines: list[str]) -> int:
+    """Line at which the element of this name begins; 1 if it is not in these lines."""
+    match = re.search(r"line (\d+)", message)
+    number = int(match[1]) if match else 1
+    inside = 0 < number <= len(lines) and name in "\n".join(lines[number - 1 : number - 1 + _TAG_LINES])
+    return number if inside else 1
 
 
-def _refused(said: str, text: str) -> UnusableModelError:
-    """What MuJoCo says, in one line, with the element and its line."""
-    words = " ".join(said.split())
+def _refused(message: str, text: str) -> UnusableModelError:
+    """The error of MuJoCo in one line, with the element and its line."""
+    words = " ".join(message.split())
     at = re.search(r"\s*Element (name )?'([^']*)'(?:, id \d+)?(?:, line (\d+))?\.?$", words)
     reason = re.sub(r"^(XML )?(Error: )+", "", words[: at.start()] if at else words)
     reason += " (it may have run out of memory)" if "unknown exception" in reason else ""
     element, number = "<mujoco>", 1
     if at:
         number = int(at[3] or 1)
-        here = "\n".join(text.splitlines()[number - 1 : number - 1 + _TAG_LINES])
-        tag = re.search(rf"<(\w+)[^<>]*\bname\s*=\s*[\"']{re.escape(at[2])}[\"']", here)
+        lines = "\n".join(text.splitlines()[number - 1 : number - 1 + _TAG_LINES])
+        tag = re.search(rf"<(\w+)[^<>]*\bname\s*=\s*[\"']{re.escape(at[2])}[\"']", lines)
         named = f"{tag[1]} {at[2]!r}" if tag else f"<mujoco>, element {at[2]!r}"
         element = f"<{at[2]}>" if not at[1] else named if at[2] else element
     if number == 0:
-        # Of what is included MuJoCo keeps no lines.
+        # MuJoCo keeps no lines of included files.
         reason += "; in a file that is included"
     return UnusableModelError(f"{element}: MuJoCo does not accept it: {reason}", max(number, 1))
 
@@ -173,7 +167,8 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
     else:
         near = difflib.get_close_matches(root_body, names[1:], 1) or names[1:]
         raise UnusableModelError(
-            f"<worldbody>: root_body: no body is named {root_body[:60]!r}; there is {listed(near)}", compiled.line(0)
+            f"<worldbody>: root_body: no body is named {quoted(root_body)!r}; there is {listed([*map(repr, near)])}",
+            compiled.line(0),
         )
     base = way[-1]
     if model.body_mocapid[base] >= 0:
@@ -184,7 +179,7 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
     above = int(model.body_parentid[way[0]])
     if above and joints and root is None:
         raise UnusableModelError(
-            f"body {names[base]!r}: {listed([compiled.joint_name(joint) for joint in joints])} between "
+            f"body {names[base]!r}: {listed([repr(compiled.joint_name(joint)) for joint in joints])} between "
             f'{names[above]!r} and the body that floats; a free body has none: root="free" (--root free) removes it',
             compiled.line(base),
         )
@@ -193,12 +188,12 @@ def base_of(compiled: Compiled, root: str | None, root_body: str | None) -> tupl
         raise UnusableModelError(
             f"joint {compiled.joint_name(joints[0])!r}: {fault}", compiled.line(joints[0], "joint")
         )
-    # Behind what has mass nobody knows where the world is.
+    # The world's place relative to something with mass in between is unknown.
     return base, [] if above else way, notes + [note] * bool(note)
 
 
 def _way_to_mass(compiled: Compiled, top: int) -> list[int]:
-    """From a body in the world to the first that has mass, or on which several move, each the only one on the last."""
+    """Bodies from one in the world to the first with mass, or on which several move, each alone on the last."""
     model, way = compiled.model, [top]
     while not any(model.jnt_type[joint] == FREE for joint in compiled.joints_of(way[-1])):
         fixed, moving = _rigid_part(compiled, way[-1])
@@ -209,7 +204,7 @@ def _way_to_mass(compiled: Compiled, top: int) -> list[int]:
 
 
 def _way_from_world(compiled: Compiled, base: int) -> list[int]:
-    """From a body in the world to another where nothing on the way has mass; else the last alone."""
+    """Bodies from one in the world to another where nothing on the way has mass; else the last alone."""
     model, way = compiled.model, [*_between(compiled, 0, base), base]
     clear = all(not model.body_mass[body] for step in way[:-1] for body in _rigid_part(compiled, step)[0])
     return way if clear else [base]
@@ -226,10 +221,10 @@ def _rigid_part(compiled: Compiled, body: int) -> tuple[list[int], list[int]]:
 
 def _between(compiled: Compiled, above: int, below: int) -> list[int]:
     """The bodies between one and another that hangs on it, from above; without both."""
-    found = [int(compiled.model.body_parentid[below])]
-    while found[-1] != above:
-        found.append(int(compiled.model.body_parentid[found[-1]]))
-    return found[-2::-1]
+    bodies = [int(compiled.model.body_parentid[below])]
+    while bodies[-1] != above:
+        bodies.append(int(compiled.model.body_parentid[bodies[-1]]))
+    return bodies[-2::-1]
 
 
 def _only_tree(compiled: Compiled, notes: list[str]) -> int:
@@ -241,26 +236,20 @@ def _only_tree(compiled: Compiled, notes: list[str]) -> int:
     moving = [body for body in tops if any(len(compiled.joints_of(part)) for part in compiled.below(body))]
     trees = moving or tops
     if len(trees) > 1:
-        found = [names[body] for body in trees]
+        moved = [repr(names[body]) for body in trees]
         raise UnusableModelError(
-            f"body {found[1]!r}: {len(trees)} bodies in the world, one is a free body: {listed(found)}; say which one "
-            f"by root_body={found[0]!r} (--root-body {found[0]})",
+            f"body {moved[1]}: {len(trees)} bodies in the world, one is a free body: {listed(moved)}; choose one "
+            f"by root_body={moved[0]} (--root-body {names[trees[0]]})",
             compiled.line(trees[1]),
         )
-    left = [names[body] for body in tops if body != trees[0] and model.body_subtreemass[body] > 0.0]
+    left = [repr(names[body]) for body in tops if body != trees[0] and model.body_subtreemass[body] > 0.0]
     if left:
         notes.append(f"what stands still in the world is left out: {listed(left)}")
     return trees[0]
 
 
-def listed(names: list[str]) -> str:
-    """Names for a message, the first of many."""
-    shown = ", ".join(map(repr, names[:_MOST_SAID]))
-    return shown if len(names) <= _MOST_SAID else f"{shown} and {len(names) - _MOST_SAID} more"
-
-
 def rotation(quaternion: Array) -> Array:
-    """Of a quaternion w x y z of length one, or nearly: (3, 3)."""
+    """Rotation of a quaternion w x y z, made of length one: (3, 3)."""
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew)

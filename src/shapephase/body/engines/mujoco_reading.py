@@ -8,41 +8,28 @@ joints (`armature`) belongs to no link and is left out.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 # What its compiled part brings, a type checker does not see.
 # pyright: reportAttributeAccessIssue=false
 import mujoco
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import FARTHEST, Array
+from ..couplings.ball_joints import BallJoint, coordinate_names
+from ..couplings.coupling import Coupling, circular, with_followers
+from ..couplings.functions import polynomial
+from ..formats.xml_text import listed
 from ..link_tree import MOST_LINKS, MOST_MASS
-from .chain import Chain, UnusableModelError, ball_names, ball_state, check_name, locked_inertia
-from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, listed, rotation
+from .chain import EXACT, FRAME_ERRORS, Chain, UnusableModelError, check_name, locked_inertia
+from .mujoco_model import BALL, FREE, SLIDE, Compiled, base_of, compiled_model, rotation
 
 _COUPLED = int(mujoco.mjtEq.mjEQ_JOINT)
 _CONNECT = int(mujoco.mjtEq.mjEQ_CONNECT)
 _WELD = int(mujoco.mjtEq.mjEQ_WELD)
-"""Kinds of equalities."""
 _BY_JOINT = int(mujoco.mjtWrap.mjWRAP_JOINT)
-_BY_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)
-"""Of what tendons are led over, that which says to which body it belongs."""
+_BY_SITE = int(mujoco.mjtWrap.mjWRAP_SITE)  # of a tendon's path, what belongs to a body
 _OF_SITES = int(mujoco.mjtObj.mjOBJ_SITE)
-_EXACT = 1e-12
-"""Share of the largest terms by which MuJoCo's numbers may differ from ours."""
-_FRAMES = 10.0
-"""Times what quaternions and axes lack of length one."""
-_MOST_LENGTH = 1e6
-"""[m] of places: farther away, differences are lost."""
-
-
-class Rule(NamedTuple):
-    """Of a joint that follows one other or none: `start` + sum of powers[p] (coordinate of the other - about)^p."""
-
-    leaders: tuple[int, ...]
-    start: float
-    powers: list[float]
-    about: float
 
 
 def chain_of(path: str, root: str | None = None, root_body: str | None = None) -> Chain:
@@ -58,7 +45,7 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
         raise UnusableModelError(f"<mujoco>: the body has {len(bodies)} links; up to {MOST_LINKS} are supported")
     own = set(bodies)
     chain = Chain(_model_name(compiled.model) or Path(path).stem, notes=[*compiled.notes, *notes])
-    rules = _rules(compiled, own, base)
+    chain.couplings = _couplings(compiled, own, base)
     _check_carried(compiled, own)
     for body in bodies:
         _add_link(chain, compiled, body)
@@ -66,19 +53,13 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
             _add_joints(chain, compiled, body)
     moved = Chain("")
     for body in way:
-        # Of a free joint, or without one, nothing leads to the body.
+        # A free joint does not lead to the body.
         if all(compiled.model.jnt_type[joint] != FREE for joint in compiled.joints_of(body)):
             _add_joints(moved, compiled, body)
     chain.base_joints = moved.joints if moved.moving() else []
-    for joint, rule in rules.items():
-        terms = [
-            (compiled.joint_name(leader), np.zeros(0), np.array([rule.about]), np.array(rule.powers)[:, None])
-            for leader in rule.leaders
-        ]
-        chain.couple(compiled.joint_name(joint), rule.start, terms)
     chain.notes += _ignored(compiled, own)
     if compiled.model.body_subtreemass[base] > 0.0:
-        _add_poses(chain, compiled, bodies, rules)
+        _add_poses(chain, compiled, bodies)
     return chain
 
 
@@ -106,8 +87,8 @@ def _add_link(chain: Chain, compiled: Compiled, body: int) -> None:
 def _check_places(places: Array, directions: Array, owner: str, line: int) -> None:
     if not np.isfinite(directions).all():
         raise UnusableModelError(f"{owner}: it is turned by {directions.tolist()}: finite numbers are needed", line)
-    if not np.abs(places).max() < _MOST_LENGTH:
-        raise UnusableModelError(f"{owner}: its places {places.tolist()} m: less than {_MOST_LENGTH:g} is needed", line)
+    if not np.abs(places).max() < FARTHEST:
+        raise UnusableModelError(f"{owner}: its places {places.tolist()} m: less than {FARTHEST:g} is needed", line)
 
 
 def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
@@ -143,9 +124,8 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         last = joint == joints[-1]
         below = child if last else f"{child}\0{name}"
         if not last:
-            # Between two joints of a body lie axes that are no link.
-            chain.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
-            chain.frames.append(below)
+            # A step between two joints of a body.
+            chain.add_frame(below)
         after = -anchor if last else np.zeros(3)
         chain.add_joint(name, kind, parent, below, place, turn, axis, limits, after, line)
         parent, place, turn = below, np.zeros(3), np.eye(3)
@@ -158,63 +138,41 @@ def _about(axis: Array, angle: float) -> Array:
 # ---- Equalities and what else holds parts together ------------------------------------------------------------------
 
 
-def _rules(compiled: Compiled, own: set[int], base: int) -> dict[int, Rule]:
+def _couplings(compiled: Compiled, own: set[int], base: int) -> dict[str, Coupling]:
     """The joints of the body that follow others, by equalities of joints; those at the root are gone."""
     model = compiled.model
     joints = {joint for body in own - {base} for joint in compiled.joints_of(body)}
-    rules: dict[int, Rule] = {}
+    couplings: dict[str, Coupling] = {}
+    lines: dict[str, int] = {}
     for number in _active(model, _COUPLED):
         follower, leader = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
         if follower not in joints:
             continue
-        owner, line = f"joint {compiled.joint_name(follower)!r}", compiled.line(follower, "joint")
-        if follower in rules:
-            raise UnusableModelError(f"{owner}: two equalities hold it; keep one", line)
-        here, powers = _reference(model, follower), model.eq_data[number, :5].tolist()
+        name, line = compiled.joint_name(follower), compiled.line(follower, "joint")
+        if name in couplings:
+            raise UnusableModelError(f"joint {name!r}: two equalities hold it; keep one", line)
+        start, powers, lines[name] = _reference(model, follower), model.eq_data[number, :5], line
         if leader < 0:
-            rules[follower] = Rule((), here + powers[0], [], 0.0)
+            couplings[name] = Coupling(start + float(powers[0]))
             continue
         if leader not in joints:
             raise UnusableModelError(
-                f"{owner}: it follows {compiled.joint_name(leader)!r}, which does not belong to the free body; remove "
-                "the equality",
+                f"joint {name!r}: it follows {compiled.joint_name(leader)!r}, which does not belong to the free body; "
+                "remove the equality",
                 line,
             )
-        rules[follower] = Rule((leader,), here, powers, _reference(model, leader))
-    for joint in rules:
-        _check_no_circle(compiled, joint, rules)
-    return rules
+        function = polynomial(np.array(powers), _reference(model, leader))
+        couplings[name] = Coupling(start, ((compiled.joint_name(leader), function),))
+    if (name := circular(couplings)) is not None:
+        raise UnusableModelError(
+            f"joint {name!r}: by equalities joints follow each other in a circle; remove one", lines[name]
+        )
+    return couplings
 
 
 def _reference(model: Any, joint: int) -> float:
     """The coordinate at which the body is where the file has it."""
     return float(model.qpos0[model.jnt_qposadr[joint]])
-
-
-def _check_no_circle(compiled: Compiled, joint: int, rules: dict[int, Rule]) -> None:
-    seen, leader = {joint}, joint
-    while leader in rules and rules[leader].leaders:
-        (leader,) = rules[leader].leaders
-        if leader in seen:
-            raise UnusableModelError(
-                f"joint {compiled.joint_name(joint)!r}: by equalities joints follow each other in a circle; remove one",
-                compiled.line(joint, "joint"),
-            )
-        seen.add(leader)
-
-
-def _coordinate(joint: int, rules: dict[int, Rule], own: dict[int, tuple[float, float]]) -> tuple[float, float]:
-    """Coordinate and rate of a joint, where those that follow no other have their own."""
-    rule = rules.get(joint)
-    if rule is None:
-        return own[joint]
-    value, speed = rule.start, 0.0
-    for leader in rule.leaders:
-        at, rate = _coordinate(leader, rules, own)
-        polynomial = np.polynomial.Polynomial(rule.powers)
-        value += float(polynomial(at - rule.about))
-        speed += float(polynomial.deriv()(at - rule.about)) * rate
-    return value, speed
 
 
 def _active(model: Any, *kinds: int) -> list[int]:
@@ -230,13 +188,13 @@ def _held(model: Any, number: int) -> tuple[int, int]:
 
 
 def _check_carried(compiled: Compiled, own: set[int]) -> None:
-    """That what is left out and moves is not tied to the body, and that no soft part is among its own."""
+    """Raise UnusableModelError where parts outside the body are tied to it, or soft parts are among its own."""
     model = compiled.model
     for number in _active(model, _CONNECT, _WELD):
-        one, other = _held(model, number)
-        outside = other if one in own else one
-        if (one in own) != (other in own) and model.body_treeid[outside] >= 0:
-            inside = one if one in own else other
+        first_body, second_body = _held(model, number)
+        outside = second_body if first_body in own else first_body
+        if (first_body in own) != (second_body in own) and model.body_treeid[outside] >= 0:
+            inside = first_body if first_body in own else second_body
             raise UnusableModelError(
                 f"body {compiled.names[inside]!r}: the equality {_equality(model, number)} makes it carry "
                 f"{compiled.names[outside]!r}, which is not part of the free body; remove one of them",
@@ -248,7 +206,7 @@ def _check_carried(compiled: Compiled, own: set[int]) -> None:
         if soft:
             body = min(soft)
             raise UnusableModelError(
-                f"body {compiled.names[body]!r}: soft bodies (flex) are no rigid links; remove them",
+                f"body {compiled.names[body]!r}: soft bodies (flex) are not rigid links; remove them",
                 compiled.line(body),
             )
 
@@ -259,27 +217,27 @@ def _equality(model: Any, number: int) -> str:
 
 
 def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, str]]:
-    """What holds or drives joints of the body, of which a free body with given joints knows nothing."""
+    """Notes on what holds or drives joints of the body, which are free here."""
     model = compiled.model
     notes: list[str | tuple[str, str, str]] = []
     for number in _active(model, _CONNECT, _WELD):
-        one, other = _held(model, number)
-        pair = f"{compiled.names[one]!r} and {compiled.names[other]!r}"
+        first_body, second_body = _held(model, number)
+        pair = f"{compiled.names[first_body]!r} and {compiled.names[second_body]!r}"
         named = _equality(model, number)
-        if one in own and other in own:
+        if first_body in own and second_body in own:
             notes.append(("equality", f"{named} of {pair}", "ignored, every joint moves on its own"))
-        elif one in own or other in own:
+        elif first_body in own or second_body in own:
             notes.append(("equality", f"{named} of {pair}", "ignored, the body is free"))
     tendons = [tendon for tendon in range(model.ntendon) if _led_over(model, tendon) & own]
     if tendons:
-        named = listed([model.tendon(tendon).name or str(tendon) for tendon in tendons])
+        named = listed([repr(model.tendon(tendon).name or str(tendon)) for tendon in tendons])
         notes.append(f"tendons are ignored, every joint moves on its own: {named}")
     pairs = [
         pair for pair in range(model.npair)
         if {int(model.geom_bodyid[geom]) for geom in (model.pair_geom1[pair], model.pair_geom2[pair])} & own
     ]  # fmt: skip
     if pairs:
-        named = listed([model.pair(pair).name or str(pair) for pair in pairs])
+        named = listed([repr(model.pair(pair).name or str(pair)) for pair in pairs])
         notes.append(f"contacts are ignored: {named}")
     return notes
 
@@ -287,26 +245,26 @@ def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, st
 def _led_over(model: Any, tendon: int) -> set[int]:
     """The bodies of its joints and sites."""
     first = int(model.tendon_adr[tendon])
-    found = set()
+    bodies = set()
     for wrap in range(first, first + int(model.tendon_num[tendon])):
         kind, number = int(model.wrap_type[wrap]), int(model.wrap_objid[wrap])
         if kind == _BY_JOINT:
-            found.add(int(model.jnt_bodyid[number]))
+            bodies.add(int(model.jnt_bodyid[number]))
         elif kind == _BY_SITE:
-            found.add(int(model.site_bodyid[number]))
-    return found
+            bodies.add(int(model.site_bodyid[number]))
+    return bodies
 
 
 # ---- What MuJoCo computes -------------------------------------------------------------------------------------------
 
 
-def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[int, Rule]) -> None:
+def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int]) -> None:
     """Mass, centre, inertia and momentum with the body that floats at rest."""
     model, base = compiled.model, bodies[0]
     names = {joint: compiled.joint_name(joint) for body in bodies[1:] for joint in compiled.joints_of(body)}
     quaternions = np.concatenate([model.body_quat[bodies], model.body_iquat[bodies]])
     lengths = np.concatenate([np.linalg.norm(quaternions, axis=1), np.linalg.norm(model.jnt_axis, axis=1)])
-    tolerance = _EXACT + _FRAMES * float(np.abs(lengths - 1.0).max())
+    tolerance = EXACT + FRAME_ERRORS * float(np.abs(lengths - 1.0).max())
     # Near the origin nothing is lost by where the file puts the body.
     above = base
     while above:
@@ -318,15 +276,16 @@ def _add_poses(chain: Chain, compiled: Compiled, bodies: list[int], rules: dict[
             first = int(model.jnt_qposadr[joint])
             data.qpos[first : first + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     for shape, rate in chain.random_shapes():
-        own = {joint: (shape[name], rate[name]) for joint, name in names.items() if name in shape}
+        coordinates, rates = with_followers(chain.couplings, shape, rate)
         for joint, name in names.items():
             if model.jnt_type[joint] == BALL:
-                four = [np.array([one[part] for part in ball_names(name)]) for one in (shape, rate)]
-                where, first = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-                data.qpos[where : where + 4], data.qvel[first : first + 3] = ball_state(*four)
+                ball, where, first = BallJoint(name, 0, 0), int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+                four = [np.array([[values[part] for part in coordinate_names(name)]]) for values in (shape, rate)]
+                data.qpos[where : where + 4] = np.roll(ball.quaternions(four[0])[0], 1)
+                data.qvel[first : first + 3] = ball.rates(*four)[0]
                 continue
-            value, speed = _coordinate(joint, rules, own)
-            data.qpos[model.jnt_qposadr[joint]], data.qvel[model.jnt_dofadr[joint]] = value, speed
+            data.qpos[model.jnt_qposadr[joint]] = coordinates[name]
+            data.qvel[model.jnt_dofadr[joint]] = rates[name]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)

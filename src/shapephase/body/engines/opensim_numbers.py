@@ -1,4 +1,4 @@
-"""What OpenSim's objects hold, as plain numbers; in the reading process alone."""
+"""Contents of OpenSim's objects as plain numbers; in the reading process alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .chain import UnusableModelError
 
 @lru_cache(maxsize=1)
 def engine() -> Any:
-    """OpenSim, imported by the first use: whoever looks through all modules may have another CasADi to load."""
+    """OpenSim, imported by the first use: importing it with all modules would load another CasADi."""
     return import_module("opensim")
 
 
@@ -29,9 +29,9 @@ def loaded(path: str) -> Any:
 
 
 def refused(error: Exception) -> UnusableModelError:
-    """What OpenSim says, in one line."""
-    said = " ".join(str(error).split("Thrown at")[0].split())
-    return UnusableModelError(f"OpenSim does not accept it: {said.removeprefix('std::exception in ')}")
+    """The error of OpenSim in one line."""
+    message = " ".join(str(error).split("Thrown at")[0].split())
+    return UnusableModelError(f"OpenSim does not accept it: {message.removeprefix('std::exception in ')}")
 
 
 def ends(joint: Any) -> tuple[str, str]:
@@ -46,12 +46,12 @@ def value_and_slope(function: Any, places: list[float]) -> list[float]:
     where = engine().Vector(len(places), 0.0)
     for k, place in enumerate(places):
         where.set(k, place)
-    found = [function.calcValue(where)]
+    results = [function.calcValue(where)]
     for k in range(len(places)):
         which = engine().StdVectorInt()
         which.append(k)
-        found.append(function.calcDerivative(which, where))
-    return found
+        results.append(function.calcDerivative(which, where))
+    return results
 
 
 def pose_of(transform: Any) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""What OpenSim itself computes of a model at some shapes; in the reading process alone."""
+"""Inertia and momentum by OpenSim itself at some shapes; in the reading process alone."""
 
 from __future__ import annotations
 
@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array
-from .chain import Chain, locked_inertia
+from .chain import Chain, inertia_and_momentum
 from .opensim_numbers import engine, loaded, pose_of, refused, tensor_of, value_and_slope, vector_of
-
-_EXACT = 1e-12
-"""Share of the largest terms by which the engine's numbers may differ from ours."""
 
 
 def add_poses(
@@ -27,8 +24,8 @@ def add_poses(
     rules = _rules(bare)
     for components in (bare.updForceSet(), bare.updControllerSet(), bare.updConstraintSet(), bare.updProbeSet()):
         components.clearAndDestroy()
-    found = bare.updCoordinateSet()
-    known = {found.get(k).getName(): found.get(k) for k in range(found.getSize())}
+    coordinate_set = bare.updCoordinateSet()
+    known = {coordinate_set.get(k).getName(): coordinate_set.get(k) for k in range(coordinate_set.getSize())}
     for coordinate in known.values():
         coordinate.setDefaultLocked(False)
         coordinate.setDefaultClamped(False)
@@ -50,22 +47,19 @@ def add_poses(
         turn, _ = pose_of(root.getTransformInGround(state))
         turns = np.array([pose_of(part.getTransformInGround(state))[0] for part in parts])
         centres, speeds, omega = np.swapaxes([_moving(part, state) for part in parts], 0, 1)
-        turned = turns @ tensors @ np.swapaxes(turns, 1, 2)
-        apart = centres - masses @ centres / masses.sum()
-        momentum = masses @ np.cross(apart, speeds) + (turned @ omega[:, :, None])[:, :, 0].sum(axis=0)
-        inertia = turn.T @ locked_inertia(masses, centres, turned) @ turn
-        chain.add_pose(shape, rate, inertia, turn.T @ momentum, (_EXACT, _EXACT))
+        inertia, momentum = inertia_and_momentum(masses, tensors, centres, turns, speeds, omega)
+        chain.add_pose(shape, rate, turn.T @ inertia @ turn, turn.T @ momentum)
 
 
 def _moving(part: Any, state: Any) -> tuple[Array, Array, Array]:
-    """Of a body the centre of mass, its velocity, and the angular velocity, in the ground's axes."""
+    """Centre of mass of a body, its velocity and the angular velocity, in the ground's axes."""
     station = part.getMassCenter()
     centre, speed = part.findStationLocationInGround(state, station), part.findStationVelocityInGround(state, station)
     return vector_of(centre), vector_of(speed), vector_of(part.getAngularVelocityInGround(state))
 
 
 def _rules(model: Any) -> dict[str, tuple[Any, list[str]]]:
-    """Of coordinates that follow others a copy of OpenSim's function, and whom they follow."""
+    """OpenSim's functions of the coordinates that follow others, copied, and the coordinates that each follows."""
     rules, constraints = {}, model.getConstraintSet()
     for k in range(constraints.getSize()):
         coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraints.get(k))
@@ -83,22 +77,22 @@ def _of_all(
     rules: Mapping[str, tuple[Any, list[str]]],
 ) -> dict[str, tuple[float, float]]:
     """Values and speeds of all coordinates but the base's; dependent ones by OpenSim's own functions."""
-    found: dict[str, tuple[float, float]] = {}
+    states: dict[str, tuple[float, float]] = {}
 
     def find(name: str) -> tuple[float, float]:
-        if name not in found:
+        if name not in states:
             locked = coordinates[name]
             if locked is not None:
-                found[name] = locked, 0.0
+                states[name] = locked, 0.0
             elif name in rules:
                 function, drivers = rules[name]
-                there = [find(driver) for driver in drivers]
-                value, *slopes = value_and_slope(function, [value for value, _ in there])
-                found[name] = value, sum(s * speed for s, (_, speed) in zip(slopes, there, strict=True))
+                leaders = [find(driver) for driver in drivers]
+                value, *slopes = value_and_slope(function, [value for value, _ in leaders])
+                states[name] = value, sum(s * speed for s, (_, speed) in zip(slopes, leaders, strict=True))
             else:
-                found[name] = shape.get(name, 0.0), rate.get(name, 0.0)
-        return found[name]
+                states[name] = shape.get(name, 0.0), rate.get(name, 0.0)
+        return states[name]
 
     for name in coordinates:
         find(name)
-    return found
+    return states

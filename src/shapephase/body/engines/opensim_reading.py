@@ -14,20 +14,21 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import ShapeError
+from ..couplings.coupling import Coupling, circular
 from ..couplings.functions import JointFunction, hermite, piecewise_linear, polynomial
+from ..formats.xml_text import listed, quoted
+from ..link_tree import Joint
 from .chain import Chain, UnusableModelError, check_name
 from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, tensor_of, value_and_slope, vector_of
 from .opensim_poses import add_poses
 
 _CUBIC = 3
-_FREE = 6
-"""Coordinates of a body that floats."""
-_X = np.array([1.0, 0.0, 0.0])
-_Y = np.array([0.0, 1.0, 0.0])
-_Z = np.array([0.0, 0.0, 1.0])
+_FREE = 6  # coordinates of a body that floats
+_X, _Y, _Z = np.eye(3)
 _NAMED = {"x": _X, "y": _Y, "z": _Z}
 _TURN = "revolute"
 _SLIDE = "prismatic"
+# Axes of OpenSim's joints in order, and the coordinate of each.
 _KNOWN = {
     "WeldJoint": (),
     "PinJoint": ((_TURN, _Z, 0),),
@@ -36,14 +37,6 @@ _KNOWN = {
     "GimbalJoint": ((_TURN, _X, 0), (_TURN, _Y, 1), (_TURN, _Z, 2)),
     "PlanarJoint": ((_SLIDE, _X, 1), (_SLIDE, _Y, 2), (_TURN, _Z, 0)),
 }
-"""Of OpenSim's joints their axes in order, and which coordinate each has."""
-
-
-class _Rule(NamedTuple):
-    """start + the sum of functions of one coordinate each."""
-
-    start: float
-    terms: tuple[tuple[str, JointFunction], ...]
 
 
 class _Axis(NamedTuple):
@@ -52,16 +45,16 @@ class _Axis(NamedTuple):
     name: str
     kind: str
     direction: Array
-    rule: _Rule
+    rule: Coupling
 
 
 class _Coordinate(NamedTuple):
-    """Of the shape: with its limits; locked at a value; or as it follows others."""
+    """A coordinate of the shape: with its limits; locked at a value; or following others."""
 
     kind: str
     limits: tuple[float, float]
     locked: float | None
-    rule: _Rule | None
+    rule: Coupling | None
 
 
 def chain_of(path: str, root_body: str | None = None) -> Chain:
@@ -99,7 +92,7 @@ class _Reading:
             if joint is not self._base:
                 self._add_joint(joint, axes[joint.getName()], carriers)
         for name, coordinate in self._coordinates.items():
-            if coordinate.rule is not None and any(name == joint["name"] for joint in self._chain.joints):
+            if coordinate.rule is not None and any(name == joint.name for joint in self._chain.joints):
                 self._couple(name, coordinate.rule)
         self._chain.base_angles = self._base_angles()
         if self._chain.base_angles is None:
@@ -110,18 +103,20 @@ class _Reading:
 
     def _fault(self, message: str, name: str) -> UnusableModelError:
         """A fault at the first line that has an object of this name."""
-        before, found, _ = self._text.partition(f'name="{name}"')
-        return UnusableModelError(message, before.count("\n") + 1 if found else 1)
+        before, match, _ = self._text.partition(f'name="{name}"')
+        return UnusableModelError(message, before.count("\n") + 1 if match else 1)
 
     def _base_joint(self, root_body: str | None) -> Any:
         """The one joint to the ground. Raises UnusableModelError where there are several or none."""
         grounded = [joint for joint in self._joints if "ground" in ends(joint)]
         bodies = [ends(joint)[1] for joint in grounded]
         if root_body is not None and root_body not in bodies:
-            there = ", ".join(map(repr, bodies[:20])) or "none"
-            raise self._fault(f"root_body: {root_body[:60]!r} is not joined to the ground; there is {there}", "ground")
+            names = listed([*map(repr, bodies)]) or "none"
+            raise self._fault(
+                f"root_body: {quoted(root_body)!r} is not joined to the ground; there is {names}", "ground"
+            )
         if len(grounded) != 1 and root_body is None:
-            named = ", ".join(repr(joint.getName()) for joint in grounded[:20]) or "none"
+            named = listed([repr(joint.getName()) for joint in grounded]) or "none"
             most = max(bodies, key=lambda name: len(self._below(name)), default="")
             way = f"; say which by root_body={most!r} (--root-body {most})" if bodies else ""
             raise self._fault(
@@ -140,14 +135,14 @@ class _Reading:
         joint = grounded[0 if root_body is None else bodies.index(root_body)]
         name, count, body = joint.getName(), joint.numCoordinates(), ends(joint)[1]
         if count < _FREE:
-            said = f"joint {name!r} to the ground has {count} coordinates: {body!r} floats freely instead"
-            self._chain.notes.append(said)
+            text = f"joint {name!r} to the ground has {count} coordinates: {body!r} floats freely instead"
+            self._chain.notes.append(text)
         return joint
 
     def _below(self, root: str) -> set[str]:
         """Names of the bodies that hang on one, and its own."""
         reached, more = {root}, {root}
-        while more := {ends(one)[1] for one in self._joints if ends(one)[0] in more} - reached:
+        while more := {ends(joint)[1] for joint in self._joints if ends(joint)[0] in more} - reached:
             reached |= more
         return reached
 
@@ -157,14 +152,14 @@ class _Reading:
         reached = self._below(ends(self._base)[1])
         if len(reached) < len(bodies):
             self._chain.notes.append(f"{len(bodies) - len(reached)} bodies that hang elsewhere are left out")
-        self._joints = [one for one in self._joints if ends(one)[1] in reached]
+        self._joints = [joint for joint in self._joints if ends(joint)[1] in reached]
         return [body for body in bodies if body.getName() in reached]
 
     def _base_angles(self) -> tuple[list[str], str] | None:
         """The angles of the base, where each turns about one of the ground's axes as the others have turned it."""
         joint = engine().CustomJoint.safeDownCast(self._base)
         frames = (self._base.getParentFrame(), self._base.getChildFrame())
-        if joint is None or any(np.any(pose_of(one.findTransformInBaseFrame())[0] != np.eye(3)) for one in frames):
+        if joint is None or any(np.any(pose_of(frame.findTransformInBaseFrame())[0] != np.eye(3)) for frame in frames):
             return None
         names, turned = [], ""
         for k in range(3):
@@ -180,7 +175,7 @@ class _Reading:
             turned += place[0]
         return (names, turned) if len(set(names)) == len(set(turned)) == len(names) else None
 
-    def _way(self) -> list[dict[str, Any]]:
+    def _way(self) -> list[Joint]:
         """The joints that move the base, as in a plane; none where one of its axes is a curve of a coordinate."""
         try:
             axes = self._own_axes(self._base)
@@ -197,14 +192,14 @@ class _Reading:
 
     def _known_coordinates(self) -> dict[str, _Coordinate]:
         """By name; those of the base are not among them."""
-        found: dict[str, _Coordinate] = {}
+        coordinates: dict[str, _Coordinate] = {}
         couplers = self._couplers()
         for joint in self._joints:
             for k in range(joint.numCoordinates() if joint is not self._base else 0):
                 coordinate = joint.get_coordinates(k)
                 name = coordinate.getName()
                 check_name(name, f"coordinate {name!r}", self._fault("", name).line)
-                if name in found:
+                if name in coordinates:
                     raise self._fault(f"two coordinates are named {name!r}; give each a name of its own", name)
                 if coordinate.getDefaultIsPrescribed():
                     self._chain.notes.append(("coordinate", repr(name), "prescribed in the file, free to move here"))
@@ -213,28 +208,20 @@ class _Reading:
                 locked = coordinate.getDefaultValue() if coordinate.getDefaultLocked() else None
                 sliding = coordinate.getMotionType() == engine().Coordinate.Translational
                 rule = None if locked is not None else couplers.get(name)
-                found[name] = _Coordinate(_SLIDE if sliding else _TURN, limits, locked, rule)
+                coordinates[name] = _Coordinate(_SLIDE if sliding else _TURN, limits, locked, rule)
         for name, rule in couplers.items():
-            if name not in found:
+            if name not in coordinates:
                 continue
             for driver, _ in rule.terms:
-                if driver not in found:
+                if driver not in coordinates:
                     raise self._fault(f"coordinate {name!r} follows {driver!r}, which is the base's or unknown", name)
-            self._check_circle(name, couplers)
-        return found
-
-    def _check_circle(self, name: str, couplers: dict[str, _Rule]) -> None:
-        """Raise UnusableModelError where a coordinate follows itself in the end."""
-        reached, ahead = set(), {name}
-        while ahead:
-            ahead = {driver for one in ahead if one in couplers for driver, _ in couplers[one].terms} - reached
-            reached |= ahead
-        if name in reached:
+        if (name := circular({name: rule for name, rule in couplers.items() if name in coordinates})) is not None:
             raise self._fault(f"coordinate {name!r} follows itself, by way of others; remove a coupler", name)
+        return coordinates
 
-    def _couplers(self) -> dict[str, _Rule]:
-        """How coordinates follow others."""
-        found = {}
+    def _couplers(self) -> dict[str, Coupling]:
+        """Couplings of coordinates that follow others."""
+        couplers = {}
         constraints = self._model.getConstraintSet()
         for k in range(constraints.getSize()):
             constraint = constraints.get(k)
@@ -243,47 +230,49 @@ class _Reading:
             coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraint)
             if coupler is None:
                 kind = constraint.getConcreteClassName()
-                said = "not taken up: its joints are free to move"
-                self._chain.notes.append((kind, repr(constraint.getName()), said))
+                text = "ignored, its joints are free to move"
+                self._chain.notes.append((kind, repr(constraint.getName()), text))
                 continue
             names = coupler.getIndependentCoordinateNames()
             drivers = [names.get(place) for place in range(names.getSize())]
-            found[coupler.getDependentCoordinateName()] = self._rule(coupler.getFunction(), drivers, coupler.getName())
-        return found
+            couplers[coupler.getDependentCoordinateName()] = self._rule(
+                coupler.getFunction(), drivers, coupler.getName()
+            )
+        return couplers
 
     def _own_axes(self, joint: Any) -> list[_Axis]:
         """The axes of a joint in the order in which they move what is behind them."""
         name, kind = joint.getName(), joint.getConcreteClassName()
         if kind == "CustomJoint":
             transform = engine().CustomJoint.safeDownCast(joint).getSpatialTransform()
-            found = [self._custom_axis(name, transform.getTransformAxis(k), k) for k in (3, 4, 5, 0, 1, 2)]
+            axes = [self._custom_axis(name, transform.getTransformAxis(k), k) for k in (3, 4, 5, 0, 1, 2)]
         elif kind in _KNOWN:
-            found = [
-                _Axis(f"{name}_{k}", moves, axis, _Rule(0.0, ((joint.get_coordinates(place).getName(), _SAME),)))
+            axes = [
+                _Axis(f"{name}_{k}", moves, axis, Coupling(0.0, ((joint.get_coordinates(place).getName(), _SAME),)))
                 for k, (moves, axis, place) in enumerate(_KNOWN[kind])
             ]
         else:
             raise self._fault(f"joint {name!r} is a {kind}; {', '.join(_KNOWN)} and CustomJoint are supported", name)
-        return found
+        return axes
 
     def _axes(self, joint: Any) -> list[_Axis]:
         """The axes of a joint of the body, with the values of locked coordinates."""
-        found = self._own_axes(joint)
-        for driver in (driver for axis in found for driver, _ in axis.rule.terms):
+        axes = self._own_axes(joint)
+        for driver in (driver for axis in axes for driver, _ in axis.rule.terms):
             if driver not in self._coordinates:
                 name = joint.getName()
                 raise self._fault(f"joint {name!r} follows coordinate {driver!r}, which is the base's or unknown", name)
-        return [axis._replace(rule=self._unlocked(axis.rule)) for axis in found]
+        return [axis._replace(rule=self._unlocked(axis.rule)) for axis in axes]
 
     def _custom_axis(self, joint: str, axis: Any, number: int) -> _Axis:
         names = axis.getCoordinateNames()
         drivers = [names.getValue(place) for place in range(names.size())]
         label = f"{joint}_{axis.getName() or number}"
-        rule = _Rule(0.0, ()) if not axis.hasFunction() else self._rule(axis.getFunction(), drivers, joint)
+        rule = Coupling(0.0, ()) if not axis.hasFunction() else self._rule(axis.getFunction(), drivers, joint)
         return _Axis(label, _SLIDE if number > 2 else _TURN, vector_of(axis.getAxis()), rule)
 
-    def _unlocked(self, rule: _Rule) -> _Rule:
-        """With the values of locked coordinates."""
+    def _unlocked(self, rule: Coupling) -> Coupling:
+        """The coupling with the values of locked coordinates."""
         start, kept = rule.start, []
         for driver, function in rule.terms:
             locked = self._coordinates[driver].locked
@@ -291,27 +280,27 @@ class _Reading:
                 kept.append((driver, function))
             else:
                 start += float(function(np.array(locked)).value)
-        return _Rule(start, tuple(kept))
+        return Coupling(start, tuple(kept))
 
-    def _rule(self, function: Any, drivers: list[str], owner: str) -> _Rule:
+    def _rule(self, function: Any, drivers: list[str], owner: str) -> Coupling:
         """A function of OpenSim as functions of one coordinate each."""
         kind = function.getConcreteClassName()
         if kind == "MultiplierFunction":
             multiplier = engine().MultiplierFunction.safeDownCast(function)
             inner, factor = self._rule(multiplier.getFunction(), drivers, owner), multiplier.getScale()
-            return _Rule(factor * inner.start, tuple((name, one.scaled(factor)) for name, one in inner.terms))
+            return inner.scaled(factor)
         if kind == "Constant":
-            return _Rule(engine().Constant.safeDownCast(function).getValue(), ())
+            return Coupling(engine().Constant.safeDownCast(function).getValue(), ())
         if kind == "LinearFunction":
             numbers = numbers_of(engine().LinearFunction.safeDownCast(function).getCoefficients())
             if len(numbers) != len(drivers) + 1:
                 raise self._fault(f"{owner!r}: {len(numbers)} coefficients for {len(drivers)} coordinates", owner)
             slopes = zip(drivers, numbers, strict=False)
-            return _Rule(numbers[-1], tuple((name, polynomial(np.array([0.0, slope]))) for name, slope in slopes))
+            return Coupling(numbers[-1], tuple((name, polynomial(np.array([0.0, slope]))) for name, slope in slopes))
         if len(drivers) != 1:
             raise self._fault(f"{owner!r}: a {kind} of one coordinate is supported, not of {len(drivers)}", owner)
         try:
-            return _Rule(0.0, ((drivers[0], self._single(function, kind, owner)),))
+            return Coupling(0.0, ((drivers[0], self._single(function, kind, owner)),))
         except ShapeError as error:
             raise self._fault(f"{owner!r}: its {kind}: {error}", owner) from None
 
@@ -337,13 +326,13 @@ class _Reading:
 
     def _carriers(self, axes: dict[str, list[_Axis]]) -> dict[str, str]:
         """The axis, by its name, that is the joint of a coordinate: the first that goes as it does, or against it."""
-        found: dict[str, str] = {}
+        carriers: dict[str, str] = {}
         for axis in (axis for own in axes.values() for axis in own):
             terms = axis.rule.terms
             kind = self._coordinates[terms[0][0]].kind if len(terms) == 1 else ""
-            if kind == axis.kind and _sign(terms[0][1]) and terms[0][0] not in found:
-                found[terms[0][0]] = axis.name
-        return found
+            if kind == axis.kind and _sign(terms[0][1]) and terms[0][0] not in carriers:
+                carriers[terms[0][0]] = axis.name
+        return carriers
 
     def _add_bare_coordinates(self, base: str, axes: dict[str, list[_Axis]], carriers: dict[str, str]) -> None:
         """Joints that move nothing, on the base, of coordinates that others follow by curves alone."""
@@ -371,7 +360,7 @@ class _Reading:
             if carriers.get(driver) == axis.name:
                 function = rule.terms[0][1]
                 name, sign = driver, _sign(function)
-                rule = _Rule(rule.start + float(function(np.zeros(())).value), ())
+                rule = Coupling(rule.start + float(function(np.zeros(())).value), ())
             if not rule.terms:
                 # Along the same axis, so that it does not matter which comes first.
                 pose = _after(pose, *_moved(axis.kind, direction, rule.start))
@@ -387,16 +376,13 @@ class _Reading:
         self._chain.add_joints(above, child, place, turn, [])
 
     def _step(self, above: str, below: str, pose: tuple[Array, Array], name: str, kind: str, axis: Array) -> None:
-        self._chain.add_link(below, 0.0, np.zeros(3), np.zeros((3, 3)))
-        self._chain.frames.append(below)
+        self._chain.add_frame(below)
         known = self._coordinates.get(name)
         limits = (-np.inf, np.inf) if known is None else known.limits
         self._chain.add_joints(above, below, pose[1], pose[0], [(name, kind, axis, list(limits))])
 
-    def _couple(self, name: str, rule: _Rule) -> None:
-        plain = self._unlocked(rule)
-        terms = [(driver, one.knots, one.centres, one.coefficients) for driver, one in plain.terms]
-        self._chain.couple(name, plain.start, terms)
+    def _couple(self, name: str, rule: Coupling) -> None:
+        self._chain.couplings[name] = self._unlocked(rule)
 
 
 _SAME = polynomial(np.array([0.0, 1.0]))

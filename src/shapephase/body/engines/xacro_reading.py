@@ -11,7 +11,7 @@ import xacro
 from xacrodoc import XacroDoc
 from xacrodoc import packages as finder
 
-from ..formats.xml_text import xml_text
+from ..formats.xml_text import quoted, xml_text
 from .chain import UnusableModelError
 
 _USED = re.compile(r"\$\(\s*arg\s+([^\s)]+)\s*\)")
@@ -23,14 +23,16 @@ _UNDEFINED = re.compile(r"Undefined substitution argument (\S+)")
 def text_of(path: str, packages: Sequence[str] = (), xacro_args: Mapping[str, str] | None = None) -> str:
     """The URDF of a file.
 
-    packages : folders in which packages are looked for, by the names of their folders or by their `package.xml`
+    packages : folders that are searched for packages, by the names of their folders or by their `package.xml`
     xacro_args : values of arguments, by name
     """
     given = dict(xacro_args or {})
     folders = [Path(folder) for folder in packages]
     for folder in folders:
         if not folder.is_dir():
-            raise UnusableModelError(f"<robot>: packages: {str(folder)[:60]!r} is no folder; name one that exists")
+            raise UnusableModelError(
+                f"<robot>: packages: {quoted(str(folder))!r} is not a folder; name one that exists"
+            )
     finder.look_in([str(folder) for folder in folders])
     inside = {part.name: part for folder in folders for part in (folder.absolute(), *folder.iterdir()) if part.is_dir()}
     finder.update_package_cache(inside)
@@ -39,22 +41,22 @@ def text_of(path: str, packages: Sequence[str] = (), xacro_args: Mapping[str, st
     # Files that are included are named as seen from it.
     with contextlib.chdir(Path(path).parent):
         try:
-            found = XacroDoc.from_string(text, subargs=given, resolve_packages=False).dom.toxml()
+            expanded = XacroDoc.from_string(text, subargs=given, resolve_packages=False).dom.toxml()
         except MemoryError:
             raise
         except Exception as error:
-            # Of an expression anything may be thrown.
-            said = " ".join(str(error).split()) or type(error).__name__
-            undefined = _UNDEFINED.search(said)
+            # An expression may raise anything.
+            message = " ".join(str(error).split()) or type(error).__name__
+            undefined = _UNDEFINED.search(message)
             hint = _arguments_to_give(undefined[1], text, given) if undefined else ""
-            raise UnusableModelError(f"<robot>: xacro does not accept it: {said[:400]}{hint}") from None
+            raise UnusableModelError(f"<robot>: xacro does not accept it: {message[:400]}{hint}") from None
     unknown = sorted(set(given) - set(_declared(text)) - _named_in(text))
     if unknown:
         raise UnusableModelError(
             f"<robot>: the file has no argument {unknown[0]!r}; it has {_listed(text)}. Type --xacro NAME:=VALUE "
             "with one of them (Python: xacro_args)"
         )
-    return found
+    return expanded
 
 
 def _texts(text: str) -> list[str]:
@@ -68,18 +70,18 @@ def _texts(text: str) -> list[str]:
 
 def _declared(text: str) -> dict[str, str | None]:
     """The arguments that the files declare, with their defaults."""
-    found: dict[str, str | None] = {}
-    for one in _texts(text):
-        for tag in _TAG.findall(one):
+    defaults: dict[str, str | None] = {}
+    for content in _texts(text):
+        for tag in _TAG.findall(content):
             attributes = {name: first or second for name, first, second in _ATTRIBUTE.findall(tag)}
             if "name" in attributes:
-                found.setdefault(attributes["name"], attributes.get("default"))
-    return found
+                defaults.setdefault(attributes["name"], attributes.get("default"))
+    return defaults
 
 
 def _named_in(text: str) -> set[str]:
     """The arguments that the files use, declared or not."""
-    return {name for one in _texts(text) for name in _USED.findall(one)}
+    return {name for content in _texts(text) for name in _USED.findall(content)}
 
 
 def _listed(text: str) -> str:
@@ -89,7 +91,7 @@ def _listed(text: str) -> str:
 
 
 def _arguments_to_give(undefined: str, text: str, given: Mapping[str, str]) -> str:
-    """What to type for an argument without a value, and for others that would be missed next."""
+    """A hint what to type for an argument without a value, and for others that would be missed next."""
     declared = _declared(text)
     valued = set(given) | {name for name, default in declared.items() if default is not None}
     missing = list(dict.fromkeys([undefined, *sorted((_named_in(text) | set(declared)) - valued)]))

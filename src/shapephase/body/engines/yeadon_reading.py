@@ -11,6 +11,7 @@ import io
 import math
 import re
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +20,12 @@ import yaml
 import yeadon
 
 from ...arrays import Array
-from .chain import Chain, UnusableModelError, locked_inertia
+from ..formats.xml_text import quoted
+from .chain import EXACT, Chain, UnusableModelError, inertia_and_momentum, rates_by_differences
 
-_X = np.array([1.0, 0.0, 0.0])
-"""To the left, as the package has it; it turns forwards and back."""
-_Y = np.array([0.0, 1.0, 0.0])
-"""To the back."""
-_Z = np.array([0.0, 0.0, 1.0])
-"""Up, of a person who stands."""
+_X, _Y, _Z = np.eye(3)  # to the left (turns forwards and back), to the back, and up for a person who stands
 _ROOT = "P"
+# For each segment the one it hangs on, and the package's names of the turns between them, in their order.
 _JOINTS = {
     "T": ("P", (("PTsagittalFlexion", _X), ("PTbending", _Y))),
     "C": ("T", (("TCsagittalSpinalFlexion", _X), ("TCspinalTorsion", _Z))),
@@ -40,24 +38,13 @@ _JOINTS = {
     "K1": ("P", (("PK1extension", _X), ("PK1abduction", _Y))),
     "K2": ("K1", (("K1K2flexion", _X),)),
 }
-"""Of each segment the one it hangs on, and the package's names of the turns between them, in their order."""
-_STEP = 0.02
-"""[rad] of the differences that give rates: the eighth power is at rounding."""
-_WEIGHTS = ((1, 4.0 / 5.0), (2, -1.0 / 5.0), (3, 4.0 / 105.0), (4, -1.0 / 280.0))
-"""Of the differences over so many steps to both sides (Fornberg 1988)."""
-_EXACT = 1e-12
-"""Share of the largest terms that rounding leaves of an inertia."""
-_BY_DIFFERENCES = 1e-11
-"""The same of a momentum by differences."""
+_BY_DIFFERENCES = 1e-11  # share of the largest terms in a momentum by differences
+# factor off the perimeters possible for a width, 2 to pi times; sample female1 is off by 1.46, a slipped point by more
 _TYPO = 2.0
-"""Factor by which a perimeter may miss what is possible for its width (2 to pi times): the package then takes a circle
-of this perimeter; its own sample female1 is off by 1.46. A slip of the decimal point is off by more."""
 _STADIUM = re.compile(r"Stadium '(.*?)'.*this ratio is ([-+.\deE]+?)\.?$", re.DOTALL)
+# as people write them; YAML reads `1:30` as 90, `012` as 10 and `1e3` as a text
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
-"""As people write them; for YAML `1:30` is 90, `1_0` and `012` are 10, and `1e3` is a text."""
 _OF_NUMBERS = ("tag:yaml.org,2002:float", "tag:yaml.org,2002:int")
-_LONGEST = 60
-"""Letters of an entry in a message."""
 
 
 def chain_of(path: str) -> Chain:
@@ -80,7 +67,7 @@ def chain_of(path: str) -> Chain:
         axes = [(name, "revolute", axis, list(limits[name])) for name, axis in turns]
         chain.add_joints(_link(parent), _link(part), place, turn, axes)
     for shape, rate in chain.random_shapes():
-        chain.add_pose(shape, rate, *_seen(human, shape, rate), (_EXACT, _BY_DIFFERENCES))
+        chain.add_pose(shape, rate, *_seen(human, shape, rate), (EXACT, _BY_DIFFERENCES))
     return chain
 
 
@@ -94,8 +81,8 @@ def _human(path: str, notes: list[str]) -> Any:
     except Exception as error:
         # The package raises bare exceptions.
         raise UnusableModelError(f"yeadon does not accept it: {' '.join(map(str, error.args))}") from None
-    found = (_STADIUM.search(str(doubt.message)) for doubt in doubts)
-    ratios = {one[1]: float(one[2]) for one in found if one}
+    matches = (_STADIUM.search(str(doubt.message)) for doubt in doubts)
+    ratios = {match[1]: float(match[2]) for match in matches if match}
     for level, ratio in ratios.items():
         if not 2.0 / _TYPO < ratio < _TYPO * math.pi:
             raise UnusableModelError(
@@ -112,18 +99,18 @@ def _human(path: str, notes: list[str]) -> Any:
 
 
 def _check_numbers(content: bytes) -> None:
-    """That every entry stands once, and is a number as it is written; the package multiplies what it gets."""
+    """Raise UnusableModelError unless every entry stands once and is a number: the package multiplies anything."""
     try:
         root = yaml.compose(content.decode("utf-8"), Loader=yaml.SafeLoader)
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         line = mark.line + 1 if mark is not None else 1
-        raise UnusableModelError("it is no YAML file of measurements, `name: number` a line", line) from None
+        raise UnusableModelError("it is not a YAML file of measurements, `name: number` a line", line) from None
     if not isinstance(root, yaml.MappingNode):
-        raise UnusableModelError("it is no YAML file of measurements, `name: number` a line")
+        raise UnusableModelError("it is not a YAML file of measurements, `name: number` a line")
     read: dict[str, float] = {}
     for key, value in root.value:
-        name, line = str(key.value)[:_LONGEST], key.start_mark.line + 1
+        name, line = quoted(str(key.value)), key.start_mark.line + 1
         if name in read:
             raise UnusableModelError(f"{name} stands twice", line)
         text = value.value if isinstance(value, yaml.ScalarNode) and value.style is None else ""
@@ -132,18 +119,18 @@ def _check_numbers(content: bytes) -> None:
             raise UnusableModelError(f"{name}: for YAML {text} is not this number; write {number!r}", line)
         if not math.isfinite(number) or (number <= 0.0 and not (name == "totalmass" and number == -1.0)):
             shown = value.value if value.tag in _OF_NUMBERS else repr(value.value)
-            raise UnusableModelError(f"{name}: a number above zero is needed, got {shown:.{_LONGEST}}", line)
+            raise UnusableModelError(f"{name}: a number above zero is needed, got {quoted(shown)}", line)
         read[name] = number
     names = {*yeadon.Human.measnames, "measurementconversionfactor"}
     missing, unknown = sorted(names - set(read)), sorted(map(str, set(read) - names - {"totalmass"}))
     if missing or unknown:
         lacks = f"lacks {', '.join(missing)}" if missing else ""
-        has = f"has {', '.join(unknown)}, which are no measurements" if unknown else ""
+        has = f"has {', '.join(unknown)}, which are not measurements" if unknown else ""
         raise UnusableModelError(f"the file {' and '.join(text for text in (lacks, has) if text)}")
 
 
 def _link(part: Any) -> str:
-    """As the package calls it, without its key: 'A1: Left upper arm' -> 'left_upper_arm'."""
+    """The package's label without its key: 'A1: Left upper arm' -> 'left_upper_arm'."""
     return part.label.split(":")[1].strip().lower().replace(" ", "_").replace("-", "_")
 
 
@@ -164,19 +151,5 @@ def _seen(human: Any, shape: dict[str, float], rate: dict[str, float]) -> tuple[
     """Locked inertia and internal momentum from the package's poses, the pelvis at rest."""
     masses = np.array([part.mass for part in human.segments])
     tensors = np.array([part.rel_inertia for part in human.segments])
-    centres, turns = _placed(human, shape)
-    speeds, slopes = np.zeros_like(centres), np.zeros_like(turns)
-    for steps, weight in _WEIGHTS:
-        for side in (1.0, -1.0):
-            moved = {name: value + side * steps * _STEP * rate[name] for name, value in shape.items()}
-            there, turned = _placed(human, moved)
-            speeds += side * weight / _STEP * there
-            slopes += side * weight / _STEP * turned
-    spins = slopes @ np.swapaxes(turns, 1, 2)
-    omega = 0.5 * np.stack(
-        [spins[:, 2, 1] - spins[:, 1, 2], spins[:, 0, 2] - spins[:, 2, 0], spins[:, 1, 0] - spins[:, 0, 1]], axis=1
-    )
-    tensors = turns @ tensors @ np.swapaxes(turns, 1, 2)
-    apart = centres - masses @ centres / masses.sum()
-    momentum = (masses[:, None] * np.cross(apart, speeds)).sum(axis=0) + np.einsum("nij,nj->i", tensors, omega)
-    return locked_inertia(masses, centres, tensors), momentum
+    moving = rates_by_differences(partial(_placed, human), shape, rate)
+    return inertia_and_momentum(masses, tensors, *_placed(human, shape), *moving)

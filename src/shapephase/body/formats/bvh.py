@@ -14,12 +14,10 @@ from .bvh_text import Bone, BvhFaultError, Skeleton, bvh_skeleton, check_base, c
 from .human_segments import Person, Segment, person_of
 from .mvnx_text import read_suit, suit_skeleton
 
-_MASS = 70.0
-"""[kg] of a person of whom nobody has said it: a usual one of reference persons."""
+_MASS = 70.0  # [kg] a usual reference person
+# Lengths of usual units [m]; the last is an inch by 0.45.
 _LIKELY = {"m": 1.0, "cm": 0.01, "in": 0.0254, "of the motion capture library of Carnegie Mellon": 0.056444}
-"""Lengths of units [m] that are met; the last is an inch by 0.45."""
-_HEIGHTS = (0.5, 2.5)
-"""[m] Between which people are tall, of whatever age; puppets and giants are made by another unit."""
+_HEIGHTS = (0.5, 2.5)  # [m] of people of any age; puppets and giants come from another unit
 _WRONG_SIZE = ": is the unit of length another (--length-unit)?"
 _AXES = dict(zip("xyz", np.eye(3), strict=True))
 
@@ -29,15 +27,12 @@ def bvh_tree(
 ) -> LinkTree:
     """Links and joints of a skeleton, in the order of its file.
 
-    What the base hangs on moves it, and is no part of the tree.
+    The tree begins at the base; bones above it only move it.
 
     length_unit : length of a unit of the file [m]; needed
     person_mass : [kg]; None: 70 kg, with a note
 
-    Raises
-    ------
-    ModelFileError
-        For faults of the file, for bones that are not known by their names, without `length_unit`.
+    Raises ModelFileError for faults of the file, for bones that are not known by their names, without `length_unit`.
     """
     try:
         skeleton = bvh_skeleton(content)
@@ -56,10 +51,7 @@ def mvnx_tree(content: bytes, name: str, where: str, person_mass: float | None =
 
     person_mass : [kg]; None: 70 kg, with a note
 
-    Raises
-    ------
-    ModelFileError
-        For faults of the file, and for segments that are not those of a person.
+    Raises ModelFileError for faults of the file, and for segments that are not those of a person.
     """
     try:
         skeleton = suit_skeleton(read_suit(content, motion=False))
@@ -72,7 +64,7 @@ def mvnx_tree(content: bytes, name: str, where: str, person_mass: float | None =
 def _notes(skeleton: Skeleton, person: Person, where: str, person_mass: float | None) -> list[str]:
     notes = []
     if person_mass is None:
-        notes.append(f"{where}:1: the person is taken to have {_MASS:g} kg; person_mass (--person-mass) says another")
+        notes.append(f"{where}:1: the person is taken to have {_MASS:g} kg; person_mass (--person-mass) states another")
     if person.frame is not None:
         low, high = _HEIGHTS
         notes.append(
@@ -107,25 +99,12 @@ def _tree(skeleton: Skeleton, person: Person, name: str, where: str, metre: floa
             # It stays as it is in the frame in which segments are laid out.
             turn = person.turns[bone.parent].T @ person.turns[number]
             moves = [(f"{bone.name}_fixed", "fixed", "x")]
-        for order, (joint, kind, axis) in enumerate(moves):
-            last = order == len(moves) - 1
-            child = bone.name if last else f"{bone.name}__{axis}"
-            if not last:
+        for order, (joint, kind, axis) in enumerate(moves, 1):
+            child = bone.name if order == len(moves) else f"{bone.name}__{axis}"
+            if child != bone.name:
                 links[child] = Link(child, at)
                 frames.add(child)
-            joints.append(
-                Joint(
-                    name=joint,
-                    where=at,
-                    kind=kind,
-                    parent=parent,
-                    child=child,
-                    place=place,
-                    turn=turn,
-                    axis=_AXES[axis],
-                    after=np.zeros(3),
-                )
-            )
+            joints.append(Joint(joint, at, kind, parent, child, place, turn, _AXES[axis]))
             parent, place = child, np.zeros(3)
     idle = [bones[number].name for number in below if number not in person.moving and bones[number].turns]
     if idle:
@@ -144,7 +123,7 @@ def _joints_of(bone: Bone) -> list[tuple[str, str, str]]:
 
 
 def _link(name: str, where: str, carried: list[Segment]) -> Link:
-    """What a bone carries, in one."""
+    """One link of all segments that a bone carries."""
     mass = sum(segment.mass for segment in carried)
     if not carried:
         return Link(name, where)

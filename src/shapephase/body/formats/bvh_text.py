@@ -15,22 +15,17 @@ import numpy as np
 
 from ... import so3
 from ...arrays import FARTHEST, Array
+from .xml_text import quoted
 
 _START = b"HIERARCHY"
 _PLACES = ("Xposition", "Yposition", "Zposition")
 _TURNS = ("Xrotation", "Yrotation", "Zrotation")
-_MOST_DEPTH = 100
-"""Bones from the root; one with all fingers has twelve."""
-_MOST_OFFSET = 1e6
-"""Units; the square is far from what overflows."""
-_SHOWN = 40
-"""Characters of a file in a message."""
-_STAYS = 1e-4
-"""Share of a bone's length by which its place may differ from the offset: files have six digits."""
+_MOST_DEPTH = 100  # bones from the root; with all fingers there are twelve
+_STAYS = 1e-4  # of a bone's length, between its place and the offset: files have six digits
 
 
 class BvhFaultError(Exception):
-    """What is wrong with a file, and in which line."""
+    """A fault of a file, with its line."""
 
     def __init__(self, message: str, line: int) -> None:
         super().__init__(message)
@@ -41,8 +36,6 @@ class BvhFaultError(Exception):
 class Bone:
     """A joint of the skeleton and what it moves.
 
-    Attributes
-    ----------
     name, line : its name and where that stands
     parent : number of the bone it hangs on; None for the root
     offset : (3,) from the parent's joint, all angles zero [units of the file]
@@ -75,12 +68,12 @@ class Bone:
 
     @property
     def is_ball(self) -> bool:
-        """Whether it turns about all axes, in whatever order: then its angles are a rotation, and no hinges."""
+        """True for a bone that turns about all axes, in any order: its angles are a rotation, not hinges."""
         return len(self.turns) > 2
 
     @property
     def hinge_names(self) -> tuple[str, ...]:
-        """Of the hinges that its channels of rotation would be, each by itself."""
+        """Names of the hinges that its channels of rotation would be, each by itself."""
         return tuple(f"{self.name}_{axis.upper()}rotation" for axis, _ in self.turns)
 
 
@@ -88,8 +81,6 @@ class Bone:
 class Skeleton:
     """All bones, parents before children in the file's order, and their motion.
 
-    Attributes
-    ----------
     frames : (N, c) of all channels [degrees or units]
     lines : where the frames stand
     step : between frames [s]
@@ -101,13 +92,13 @@ class Skeleton:
     step: float
 
     def turned(self, number: int, frames: Array) -> Array:
-        """How a bone is turned in the axes of the one that it hangs on: frames (M, c) -> (M, 3, 3)."""
+        """Rotations of a bone in the axes of the one that it hangs on: frames (M, c) -> (M, 3, 3)."""
         turns = self.bones[number].turns
         angles = np.radians(frames[:, [column for _, column in turns]])
         return so3.matrix_from_euler(angles, "".join(axis for axis, _ in turns))
 
     def placed(self, number: int, frames: Array) -> Array:
-        """Where a bone's joint is in the axes of the one that it hangs on: frames (M, c) -> (M, 3) [units]."""
+        """Places of a bone's joint in the axes of the one that it hangs on: frames (M, c) -> (M, 3) [units]."""
         bone = self.bones[number]
         places = np.tile(bone.offset, (len(frames), 1))
         for axis, column in bone.slides:
@@ -119,15 +110,15 @@ class Skeleton:
 
         Every bone is at its OFFSET; axes are those of the room.
         """
-        found: dict[int, tuple[Array, Array]] = {}
-        for number in sorted({above for each in numbers for above in self.above(each)}):
+        poses: dict[int, tuple[Array, Array]] = {}
+        for number in sorted({above for bone in numbers for above in self.above(bone)}):
             turn, parent = self.turned(number, frames), self.bones[number].parent
             place = np.zeros((len(frames), 3))
             if parent is not None:
-                above_turn, above_place = found[parent]
+                above_turn, above_place = poses[parent]
                 turn, place = above_turn @ turn, above_place + above_turn @ self.bones[number].offset
-            found[number] = turn, place
-        return found
+            poses[number] = turn, place
+        return poses
 
     def base_motion(self, base: int) -> tuple[Array, Array | None]:
         """Turns (N, 3, 3) and places (N, 3) [units] of a bone in the room, those that it hangs on multiplied in.
@@ -143,29 +134,26 @@ class Skeleton:
 
     def below(self, number: int) -> list[int]:
         """The bones that hang on one."""
-        return [other for other, bone in enumerate(self.bones) if bone.parent == number]
+        return [child for child, bone in enumerate(self.bones) if bone.parent == number]
 
     def above(self, number: int) -> list[int]:
         """A bone and those it hangs on, up to the root."""
-        found, at = [], number
+        way, at = [], number
         while at is not None:
-            found.append(at)
+            way.append(at)
             at = self.bones[at].parent
-        return found
+        return way
 
 
 def is_bvh(content: bytes) -> bool:
-    """Whether bytes begin as a BVH file does."""
+    """True where bytes begin like a BVH file."""
     return content[:4096].removeprefix(b"\xef\xbb\xbf").lstrip()[: len(_START)].upper() == _START
 
 
 def bvh_skeleton(content: bytes) -> Skeleton:
     """Read a file.
 
-    Raises
-    ------
-    BvhFaultError
-        For whatever is no BVH, or has other numbers than it says.
+    Raises BvhFaultError for another format, or other counts than the file states.
     """
     try:
         text = content.decode("utf-8-sig")
@@ -180,7 +168,7 @@ def bvh_skeleton(content: bytes) -> Skeleton:
         raise lines.fault("MOTION is needed behind the skeleton: one ROOT, as many closing braces as opening ones")
     count = lines.after("Frames:")
     if not (count.isascii() and count.isdigit() and len(count) < 10):
-        raise lines.fault(f"Frames: {count[:_SHOWN]!r} is no number of frames")
+        raise lines.fault(f"Frames: {quoted(count)!r} is not a number of frames")
     step = _numbers([lines.after("Frame Time:")], lines)[0]
     if not 1e-9 <= step <= 1e9:
         raise lines.fault(f"Frame Time: {step:g} s between frames; a time above 0 is needed")
@@ -212,10 +200,10 @@ class _Lines:
         return line.split()
 
     def after(self, label: str) -> str:
-        """What follows a label in the next line."""
+        """The text after a label in the next line."""
         words = " ".join(self.next(label))
         if not words.lower().startswith(label.lower()):
-            raise self.fault(f"{label} is needed, got {words[:_SHOWN]!r}")
+            raise self.fault(f"{label} is needed, got {quoted(words)!r}")
         return words[len(label) :].strip()
 
     def fault(self, message: str) -> BvhFaultError:
@@ -235,7 +223,7 @@ class _Hierarchy:
         """All bones of one root."""
         words = self.lines.next("ROOT")
         if words[0] != "ROOT":
-            raise self.lines.fault(f"ROOT is needed, got {' '.join(words)[:_SHOWN]!r}")
+            raise self.lines.fault(f"ROOT is needed, got {quoted(' '.join(words))!r}")
         open_bones: list[int] = [self._bone(words, None)]
         while open_bones:
             words = self.lines.next("}")
@@ -248,7 +236,7 @@ class _Hierarchy:
             elif [word.lower() for word in words[:2]] == ["end", "site"]:
                 self._end_site(words, open_bones[-1])
             else:
-                raise self.lines.fault(f"JOINT, End Site or }} is needed, got {' '.join(words)[:_SHOWN]!r}")
+                raise self.lines.fault(f"JOINT, End Site or }} is needed, got {quoted(' '.join(words))!r}")
         return tuple(self.bones)
 
     def _bone(self, words: list[str], parent: int | None) -> int:
@@ -256,7 +244,7 @@ class _Hierarchy:
         brace = words[-1] == "{" and len(words) > 1
         name = " ".join(words[1:-1] if brace else words[1:])
         if not name or not name.isprintable():
-            raise self.lines.fault(f"{words[0]} {name[:_SHOWN]!r}: a name of letters that can be printed is needed")
+            raise self.lines.fault(f"{words[0]} {quoted(name)!r}: a name of letters that can be printed is needed")
         if name in self.names:
             raise self.lines.fault(f"two bones are named {name!r}; give each a name of its own")
         self._open(name, brace)
@@ -282,25 +270,25 @@ class _Hierarchy:
     def _offset(self, name: str) -> Array:
         words = self.lines.next("OFFSET")
         if words[0] != "OFFSET" or len(words) != 4:
-            raise self.lines.fault(f"{name}: OFFSET and three numbers are needed, got {' '.join(words)[:_SHOWN]!r}")
+            raise self.lines.fault(f"{name}: OFFSET and three numbers are needed, got {quoted(' '.join(words))!r}")
         offset = np.array(_numbers(words[1:], self.lines))
-        if np.abs(offset).max() > _MOST_OFFSET:
-            raise self.lines.fault(f"{name}: an offset above {_MOST_OFFSET:g} units, as in no skeleton")
+        if np.abs(offset).max() > FARTHEST:
+            raise self.lines.fault(f"{name}: an offset above {FARTHEST:g} units, as in no skeleton")
         return offset
 
     def _channels(self, name: str) -> tuple[str, ...]:
         words = self.lines.next("CHANNELS")
         if words[0] != "CHANNELS" or len(words) < 2:
-            raise self.lines.fault(f"{name}: CHANNELS and their number are needed, got {' '.join(words)[:_SHOWN]!r}")
+            raise self.lines.fault(f"{name}: CHANNELS and their number are needed, got {quoted(' '.join(words))!r}")
         known = {word.lower(): word for word in (*_PLACES, *_TURNS)}
         channels = [known.get(word.lower(), "") for word in words[2:]]
         for word, channel in zip(words[2:], channels, strict=True):
             if not channel:
                 raise self.lines.fault(
-                    f"{name}: the channel {word[:_SHOWN]!r} is unknown; these are: {', '.join(known.values())}"
+                    f"{name}: the channel {quoted(word)!r} is unknown; these are: {', '.join(known.values())}"
                 )
         if words[1] != str(len(channels)):
-            raise self.lines.fault(f"{name}: CHANNELS {words[1][:_SHOWN]} are said, and {len(channels)} follow")
+            raise self.lines.fault(f"{name}: CHANNELS {quoted(words[1])} are stated, and {len(channels)} follow")
         places = [channel for channel in channels if channel in _PLACES]
         turns = [channel for channel in channels if channel in _TURNS]
         if len(set(places)) < len(places) or (len(turns) == 2 and len(set(turns)) == 1):
@@ -316,12 +304,12 @@ def _numbers(words: Sequence[str], lines: _Lines) -> list[float]:
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise lines.fault(f"{word[:_SHOWN]!r} is no finite number")
+            raise lines.fault(f"{quoted(word)!r} is not a finite number")
     return [float(word) for word in words]
 
 
 def _quick_numbers(line: str, words: list[str]) -> list[float] | None:
-    """A whole frame at once; None where each number has to be looked at."""
+    """A whole frame at once; None where each number must be checked."""
     if not line.isascii() or "_" in line:
         return None
     try:
@@ -338,19 +326,19 @@ def _frames(lines: _Lines, count: int, width: int) -> tuple[Array, list[int]]:
         if len(words) != width:
             raise lines.fault(f"{len(words)} numbers in a frame, and the skeleton has {width} channels")
         if len(at) == count:
-            raise lines.fault(f"Frames: {count} are said, and more follow")
+            raise lines.fault(f"Frames: {count} are stated, and more follow")
         numbers = _quick_numbers(line, words) or _numbers(words, lines)
         if max(map(abs, numbers), default=0.0) > FARTHEST:
             raise lines.fault(f"{max(numbers, key=abs):.6g} in a frame; up to {FARTHEST:g} can be resolved")
         values.extend(numbers)
         at.append(lines.number)
     if len(at) < count:
-        raise lines.fault(f"Frames: {count} are said, and {len(at)} follow; the file is cut off")
+        raise lines.fault(f"Frames: {count} are stated, and {len(at)} follow; the file is cut off")
     return np.frombuffer(values, dtype=np.float64).reshape(-1, width) if at else np.empty((0, width)), at
 
 
 def check_base(skeleton: Skeleton, base: int) -> None:
-    """Raise BvhFaultError where a bone and those it hangs on do not say how it is turned and where it is."""
+    """Raise BvhFaultError unless a bone and those it hangs on have three rotations, and three positions or none."""
     way = [skeleton.bones[number] for number in skeleton.above(base)]
     turns = [axis for bone in way for axis, _ in bone.turns]
     if len(turns) < len(_TURNS):
@@ -367,12 +355,12 @@ def check_lengths(skeleton: Skeleton, numbers: Sequence[int]) -> None:
     for bone in (skeleton.bones[number] for number in numbers):
         if not bone.slides or not len(skeleton.frames):
             continue
-        axes, columns = (list(each) for each in zip(*bone.slides, strict=True))
+        axes, columns = (list(entries) for entries in zip(*bone.slides, strict=True))
         off = np.abs(skeleton.frames[:, columns] - bone.offset[axes]).max(axis=1)
         worst = int(np.argmax(off))
         if off[worst] > _STAYS * max(1.0, float(np.abs(bone.offset).max())):
             raise BvhFaultError(
-                f"bone {bone.name!r} is {off[worst]:.3g} units from its OFFSET: bones of changing length are no rigid "
+                f"bone {bone.name!r} is {off[worst]:.3g} units from its OFFSET: bones of changing length are not rigid "
                 "links; export rotations alone, or positions of the root only",
                 skeleton.lines[worst],
             )

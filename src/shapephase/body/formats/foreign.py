@@ -1,4 +1,4 @@
-"""Files that are no body, told by their content: what each is, and what to do next.
+"""Files that are not bodies, recognised by their content: what each is, and what to do next.
 
 People load what a download, an export or another program has left; a parser's first complaint about it names neither.
 """
@@ -12,8 +12,7 @@ import zipfile
 from pathlib import PurePath
 from typing import Any
 
-_HEAD = 4096
-"""[bytes] of a file that are looked at."""
+_HEAD = 4096  # bytes that are searched
 _MESH = "a mesh, without masses and joints; load the model that names it (URDF, MJCF)"
 _CAD = "a CAD file; export a URDF from the CAD program (Onshape, SolidWorks and Fusion have add-ins) and load that"
 _MOTION = "a recorded motion; the body comes first: shapephase check BODY MOTION"
@@ -29,6 +28,7 @@ _YEADON = (
     "a file of measurements for Yeadon's human without a unit; add the line measurementconversionfactor: 0.01 where "
     "they are in cm (0.001 in mm, 1 in m)"
 )
+# First bytes of files, and what these files are.
 _STARTS: tuple[tuple[bytes, str], ...] = (
     (rb"version https://git-lfs\.github\.com", "a Git LFS pointer, not the file itself; type: git lfs pull"),
     (rb"PXR-USDC|#usda\b", _USD),
@@ -46,7 +46,7 @@ _STARTS: tuple[tuple[bytes, str], ...] = (
     (rb":version \d", "an Acclaim skeleton (ASF); convert it and its AMC to BVH (amc2bvh) and load that"),
     (rb"(#!.*python|import |from \S+ import )", "a Python program; run it, and load the model file that it writes"),
 )
-"""What the first bytes match, and what such a file is."""
+# What an XML file is, by the tag of its root element.
 _ROOTS = {
     "sdf": "an SDF model; convert it to URDF first (sdf2urdf of the ROS package pysdf)",
     "gazebo": "an SDF world of old Gazebo; convert its model to URDF first (sdf2urdf of the ROS package pysdf)",
@@ -62,7 +62,7 @@ _ROOTS = {
     "PhysicalModelingXMLFile": _SIMSCAPE,
     "svg": "a picture; load the model that it shows",
 }
-"""By the tag of an XML file's root element."""
+# Names in an archive, and what such a file is.
 _IN_A_ZIP: tuple[tuple[str, str], ...] = (
     (r"simulink/|\.mdlx?$", _SIMSCAPE),
     (r"\.usd[ac]?$", _USD),
@@ -70,12 +70,11 @@ _IN_A_ZIP: tuple[tuple[str, str], ...] = (
     (r"Document\.xml$|3D/3dmodel", _CAD),
     (r"\.(urdf|xacro|xml|osim|bioMod|bvh)$", "a zip archive; unpack it and load {name!r}"),
 )
-"""What the names in an archive match, and what such a file is."""
 _TABLE = re.compile(rb"[\w.\" -]+([,;\t][\w.\" -]*)+\r?\n[-+\d.eE\" ]+([,;\t][-+\w.\" ]*)+(\r?\n|$)")
 
 
 def foreign_kind(content: bytes) -> str | None:
-    """What a file is that can be no body, with what to do next; None where that is not known."""
+    """Kind of a file that is not a body, with what to do next; None for an unknown one."""
     head = content[:_HEAD].removeprefix(b"\xef\xbb\xbf")
     if not content.strip(b"\0 \t\r\n"):
         return "an empty file; download or write it again"
@@ -101,7 +100,7 @@ def foreign_kind(content: bytes) -> str | None:
 
 
 def foreign_root(tag: str) -> str:
-    """What an XML file is by the tag of its root element, with what to do next."""
+    """Kind of an XML file by the tag of its root element, with what to do next."""
     return _ROOTS.get(tag, "neither a URDF nor an MJCF model; load a file whose first element is <robot> or <mujoco>")
 
 
@@ -122,10 +121,10 @@ def _json_kind(content: bytes, head: bytes) -> str | None:
     if not head.lstrip().startswith((b"{", b"[")):
         return None
     try:
-        found: Any = json.loads(content)
+        data: Any = json.loads(content)
     except (ValueError, RecursionError):
         return None
-    keys = set(found) if isinstance(found, dict) else set()
+    keys = set(data) if isinstance(data, dict) else set()
     if "asset" in keys:
         return f"a glTF file: {_MESH}"
     if {"Frames", "frames"} & keys:

@@ -4,7 +4,7 @@ Masses, centres of mass and radii of gyration are those of men by P. de Leva, J.
 table 4. Limbs are as long as their bones; trunk and head take their length from the distance of hips and shoulders.
 
 All of it is laid out where the joints are in one frame of the file, that of the straightest posture. How the axes of
-bones lie has no part in it: zero angles are no posture where bones have axes of their own.
+bones lie has no part in it: zero angles are not a posture where bones have axes of their own.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from ...arrays import Array
 from .bvh_text import BvhFaultError, Skeleton
+from .xml_text import listed
 
 
 class _Row(NamedTuple):
@@ -40,12 +41,10 @@ _TABLE = {
     "foot": _Row(0.0137, 0.4415, (0.257, 0.245, 0.124), 0.2581),
 }
 _TRUNK = ("upper_trunk", "middle_trunk", "lower_trunk")
-_SHOULDERS = 0.8556
-"""Of the trunk's length, where the shoulders are above the hips: robots/astronaut.urdf, after Drillis and Contini."""
-_HEEL = 0.05 / 0.2581
-"""Of the foot's length, by which the heel is behind the ankle (HeiMan)."""
-_ALONG = 0.7
-"""Cosine of the angle to the long axis above which the front-back axis of the body is none of a segment."""
+_SHOULDERS = 0.8556  # height over the hips, of the trunk's length: robots/astronaut.urdf, after Drillis and Contini
+_HEEL = 0.05 / 0.2581  # behind the ankle, of the foot's length (HeiMan)
+_ALONG = 0.7  # cosine to the long axis above which the body's front-back axis is not a segment's
+# Names of the bones that carry a segment, without their side, the most specific first.
 _NAMES = {
     "thigh": ("upleg", "upperleg", "thigh", "hip"),
     "shank": ("leg", "lowerleg", "lowleg", "calf", "shin", "knee"),
@@ -54,8 +53,8 @@ _NAMES = {
     "forearm": ("forearm", "lowerarm", "lowarm", "elbow"),
     "hand": ("wrist", "hand"),
 }
-"""Of the bones that carry a segment, without their side; the first that there is counts."""
 _SIDES = {"left": ("left", "l"), "right": ("right", "r")}
+# Usual names, behind the side.
 _CALLED = {
     "thigh": "UpLeg",
     "shank": "Leg",
@@ -64,19 +63,14 @@ _CALLED = {
     "forearm": "ForeArm",
     "hand": "Hand",
 }
-"""Behind their side, the names that most files have."""
-_MAY_LACK = {"hand": "forearm"}
-"""Segments that the bone above carries where they have none of their own."""
-_MOST_POSTURES = 2000
-"""Frames that are compared, the first and the last among them: a person stands straight for longer than a frame."""
-_AS_STRAIGHT = 5e-3
-"""Share of the length from shoulders to feet: knees bent by 15 degrees take off so much."""
-_AS_WIDE = 1e-6
-"""Share of a span: files have six digits, and of frames that they cannot tell apart the first counts."""
+_MAY_LACK = {"hand": "forearm"}  # segments that the bone above carries where a skeleton ends early
+_MOST_POSTURES = 2000  # frames that are compared: a person stands straight for longer than a frame
+_AS_STRAIGHT = 5e-3  # of the length from shoulders to feet: knees bent by 15 degrees shorten it so much
+_AS_WIDE = 1e-6  # of a span: files have six digits, and among equal frames the first counts
 
 
 class Segment(NamedTuple):
-    """What a bone carries, in its axes: mass [kg], centre from its joint (3,) [m], inertia about that centre (3, 3)
+    """A segment in axes of its bone: mass [kg], centre from its joint (3,) [m], inertia about that centre (3, 3)
     [kg m^2]."""
 
     bone: int
@@ -88,8 +82,6 @@ class Segment(NamedTuple):
 class Person(NamedTuple):
     """A skeleton with the masses of a person.
 
-    Attributes
-    ----------
     segments : all sixteen of them, each in axes of its bone
     base : the nearest bone that carries all of these, itself or by bones that hang on it
     moving : the base and the bones between it and the segments, parents before children
@@ -116,10 +108,7 @@ def person_of(skeleton: Skeleton, mass: float, metre: float) -> Person:
     mass : of the person [kg]
     metre : length of a unit of the file [m]
 
-    Raises
-    ------
-    BvhFaultError
-        If a bone is not found by its name, or has no length.
+    Raises BvhFaultError if a bone is not found by its name, or has no length.
     """
     return _Layout(skeleton, mass, metre).person()
 
@@ -182,19 +171,19 @@ class _Layout:
         return best, whole[[best]]
 
     def _segments(self) -> list[Segment]:
-        found = self._torso()
+        segments = self._torso()
         for side in _SIDES:
             upper, forearm, thigh, shank, foot = (
                 self.bones[side, part] for part in ("upper_arm", "forearm", "thigh", "shank", "foot")
             )
-            found.append(self._between("upper_arm", upper, self.places[forearm]))
+            segments.append(self._between("upper_arm", upper, self.places[forearm]))
             wrist = self._wrist(side)
-            found.append(self._between("forearm", forearm, wrist))
-            found.append(self._hand(side, wrist))
-            found.append(self._between("thigh", thigh, self.places[shank]))
-            found.append(self._between("shank", shank, self.places[foot]))
-            found.append(self._foot(foot, float(np.linalg.norm(self.places[foot] - self.places[shank]))))
-        return found
+            segments.append(self._between("forearm", forearm, wrist))
+            segments.append(self._hand(side, wrist))
+            segments.append(self._between("thigh", thigh, self.places[shank]))
+            segments.append(self._between("shank", shank, self.places[foot]))
+            segments.append(self._foot(foot, float(np.linalg.norm(self.places[foot] - self.places[shank]))))
+        return segments
 
     def _torso(self) -> list[Segment]:
         """Pelvis, middle and chest along the line from the hips, and the head on its end."""
@@ -203,17 +192,17 @@ class _Layout:
         above = self.skeleton.above(pelvis)
         way = [pelvis, *(bone for bone in self.skeleton.above(chest)[::-1] if bone not in above)]
         whole = sum(_TABLE[part].length for part in _TRUNK)
-        found, top = [], self.trunk
+        segments, top = [], self.trunk
         for part in _TRUNK:
             row = _TABLE[part]
             length = self.trunk * row.length / whole
             height = top - row.centre * length
             top -= length
             carrier = {"upper_trunk": way[-1], "lower_trunk": pelvis}.get(part, self._reaching(way, height))
-            found.append(self._segment(part, carrier, self.hips + height * self.up, self.up, length))
+            segments.append(self._segment(part, carrier, self.hips + height * self.up, self.up, length))
         row, length = _TABLE["head"], self.trunk * _TABLE["head"].length / whole
         centre = self.hips + (self.trunk + (1.0 - row.centre) * length) * self.up
-        return [*found, self._segment("head", self._head(), centre, self.up, length)]
+        return [*segments, self._segment("head", self._head(), centre, self.up, length)]
 
     def _reaching(self, way: list[int], height: float) -> int:
         """The last bone of the trunk whose joint is not above a height over the hips."""
@@ -228,12 +217,12 @@ class _Layout:
         return self._segment(part, bone, centre, direction, length)
 
     def _wrist(self, side: str) -> Array:
-        """Where the forearm ends."""
+        """End of the forearm."""
         forearm, hand = self.bones[side, "forearm"], self.bones[side, "hand"]
         return self.places[hand] if hand != forearm else self.places[forearm] + self._towards(forearm)
 
     def _hand(self, side: str, wrist: Array) -> Segment:
-        """From the wrist on, as long as hands are beside forearms."""
+        """The hand from the wrist on, as long as hands are beside forearms."""
         forearm, hand = self.bones[side, "forearm"], self.bones[side, "hand"]
         along = wrist - self.places[forearm]
         ahead = self._towards(hand) if hand != forearm else along
@@ -242,7 +231,7 @@ class _Layout:
         return self._segment("hand", hand, wrist + _TABLE["hand"].centre * length * direction, direction, length)
 
     def _foot(self, foot: int, shank: float) -> Segment:
-        """From heel to toes, as long as feet are beside shanks."""
+        """The foot from heel to toes, as long as feet are beside shanks."""
         ahead = self._towards(foot)
         direction = self._direction(ahead if ahead.any() else self.front, "it points nowhere", foot)
         length = shank * _TABLE["foot"].length / _TABLE["shank"].length
@@ -263,7 +252,7 @@ class _Layout:
         return Segment(bone, mass, turn.T @ (centre - self.places[bone]), inertia)
 
     def _towards(self, bone: int) -> Array:
-        """From a bone's joint to the next one that is elsewhere, or to the end of the bone: (3,) [m]; or zeros."""
+        """Vector from a bone's joint to the next one elsewhere, or to the end of the bone: (3,) [m]; or zeros."""
         waiting = [bone]
         while waiting:
             at = waiting.pop(0)
@@ -292,9 +281,9 @@ class _Layout:
         raise self._unknown("head", "Head")
 
     def _unknown(self, what: str, name: str) -> BvhFaultError:
-        there = ", ".join(bone.name for bone in self.skeleton.bones[:40])
+        names = listed([bone.name for bone in self.skeleton.bones], 40)
         return BvhFaultError(
-            f"no bone is known as the {what} of a human; call it {name} in the file. There are: {there}",
+            f"no bone is known as the {what} of a human; call it {name} in the file. There are: {names}",
             self.skeleton.bones[0].line,
         )
 

@@ -17,32 +17,28 @@ from scipy.spatial.transform import Rotation
 from ... import so3
 from ...arrays import FARTHEST, Array
 from .bvh_text import Bone, BvhFaultError, Skeleton
+from .xml_text import quoted
 
-_NORMAL = "normal"
-"""Type of a frame of the motion; every other type is a calibration pose."""
+_NORMAL = "normal"  # type of a frame of the motion; every other type is a calibration pose
+# calibration poses, the best first; others, like `tpose-isb`, have axes of their own
 _STANDING = ("tpose", "npose", "identity")
-"""Calibration poses, the best one to lay out a person first; others, as `tpose-isb`, have axes of their own."""
-_ON_TIME = 2e-3
-"""[s] Times are whole milliseconds; frames nearer to index / frame rate are there."""
-_OFF_UNIT = 1e-3
-"""A quaternion's length may be off one by so much: files have six digits."""
+_ON_TIME = 2e-3  # [s] from index / frame rate: times are whole milliseconds
+_OFF_UNIT = 1e-3  # of a quaternion's length: files have six digits
+# Segment -> the point at its far end.
 _TIPS = {"Head": "pTopOfHead", "RightHand": "pRightTopOfHand", "LeftHand": "pLeftTopOfHand"} | {
     f"{side}Toe": f"p{side}Toe" for side in ("Right", "Left")
 }
-"""Segment -> the point at its far end."""
 _CHANNELS = ("Xposition", "Yposition", "Zposition", "Zrotation", "Xrotation", "Yrotation")
 
 
 class MvnxFaultError(BvhFaultError):
-    """What is wrong with a file, and in which line."""
+    """A fault of a file, with its line."""
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Poses of k segments at N times.
 
-    Attributes
-    ----------
     turns : (N, k, 3, 3) segment axes to the room's
     origins : (N, k, 3) [m]
     lines : where the frames stand
@@ -55,10 +51,8 @@ class Poses:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Suit:
-    """What an MVNX file holds.
+    """Contents of an MVNX file.
 
-    Attributes
-    ----------
     segments : their names
     points : for each, name -> place in its axes (3,) [m]
     joints : number of the child -> number of its parent, and the joint's place in the parent's axes [m]
@@ -93,10 +87,7 @@ def read_suit(content: bytes, *, motion: bool = True) -> Suit:
 
     motion : False: what stands before the motion is enough, if it has a calibration pose
 
-    Raises
-    ------
-    MvnxFaultError
-        For whatever is no MVNX, or has other numbers than it says.
+    Raises MvnxFaultError for another format, or other counts than the file states.
     """
     return _Reader(motion=motion).read(content)
 
@@ -155,13 +146,13 @@ class _Reader:
         self.path.append(name)
         self.text.clear()
         if len(self.path) == 1 and name != "mvnx":
-            raise self.fault(f"<{name[:40]}>: expected <mvnx>; this is no MVNX file")
+            raise self.fault(f"<{quoted(name)}>: expected <mvnx>; this is not an MVNX file")
         if name == "subject":
             self.rate = self._number(attributes.get("frameRate", "nan"), "frameRate")
         elif name == "segment" and self.path[-2:-1] == ["segments"]:
             label = attributes.get("label", "")
             if not label or label in self.segments:
-                raise self.fault(f"segment {label[:40]!r}: a label of its own is needed")
+                raise self.fault(f"segment {quoted(label)!r}: a label of its own is needed")
             self.segments.append(label)
             self.points.append({})
         elif name == "point":
@@ -205,7 +196,7 @@ class _Reader:
         try:
             return float(word)
         except ValueError:
-            raise self.fault(f"{what}: {word[:40]!r} is no number") from None
+            raise self.fault(f"{what}: {quoted(word)!r} is not a number") from None
 
     def _poses(self, frames: list[_Frame]) -> Poses:
         count = len(self.segments)
@@ -247,17 +238,17 @@ class _Reader:
 
     def _joints(self) -> dict[int, tuple[int, Array]]:
         """Number of the child -> its parent and the joint's place there, by `Pelvis/jLeftHip` and its like."""
-        found: dict[int, tuple[int, Array]] = {}
+        joints: dict[int, tuple[int, Array]] = {}
         for ends in self.connections:
             parts = [end.partition("/") for end in ends]
             if len(parts) != 2 or any(name not in self.segments for name, _, _ in parts):
-                raise self.fault(f"joint {' and '.join(ends)[:80]!r}: two segments of the file are needed")
+                raise self.fault(f"joint {quoted(' and '.join(ends))!r}: two segments of the file are needed")
             (parent, _, point), (child, _, _) = parts
             above = self.segments.index(parent)
             if point not in self.points[above]:
-                raise self.fault(f"joint {ends[0][:80]!r}: {parent} has no such point; export the file again")
-            found[self.segments.index(child)] = above, self.points[above][point]
-        return found
+                raise self.fault(f"joint {quoted(ends[0])!r}: {parent} has no such point; export the file again")
+            joints[self.segments.index(child)] = above, self.points[above][point]
+        return joints
 
 
 def suit_skeleton(suit: Suit) -> Skeleton:
@@ -265,10 +256,7 @@ def suit_skeleton(suit: Suit) -> Skeleton:
 
     A segment's axes are those of its bone.
 
-    Raises
-    ------
-    MvnxFaultError
-        If joints are missing, or are no tree.
+    Raises MvnxFaultError if joints are missing, or not a tree.
     """
     # A prop in a hand is a segment without joints.
     roots = sorted({parent for parent, _ in suit.joints.values()} - suit.joints.keys())

@@ -18,47 +18,33 @@ import numpy as np
 
 from ...arrays import Array
 from ...errors import ModelFileError
-from ..couplings.coupling import Coupling
+from ..couplings.coupling import Coupling, circular
 from ..link_tree import LEAST_MASS, MOST_MASS, Joint, Link, LinkTree, from_the_root, grouped
 from ..virtual_base import ANYWHERE, IN_A_PLANE, free_base
 from .foreign import foreign_root
-from .xml_text import (
-    Node,
-    child_of,
-    known_attributes,
-    name_of,
-    needed_child,
-    no_misspelt_children,
-    number,
-    quoted,
-    vector,
-)
+from .xml_text import Node, quoted
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _BALL = "spherical"
-_WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)
-"""[rad] as rounded in a file; no angle of a frame needs more, and 10 degrees do."""
-_WORLD = "world"
-"""A link that is there without being written, as Drake and Gazebo have it."""
+WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)  # [rad] as rounded in a file; 10 degrees are beyond it
+_WORLD = "world"  # an implicit link of Drake and Gazebo
 _EXPRESSION = re.compile(r"\$[{(]")
 _DRAKE_JOINT = "drake:joint"
 _DRAKE_BALL = "ball"
-_UNIVERSAL = "universal"
-"""Kinds of Drake's own joints; a universal one turns about x, then about the y that was turned (`UniversalJoint`)."""
+_UNIVERSAL = "universal"  # of Drake: about x, then about the y that was turned (`UniversalJoint`)
 _ROBOT_PARTS = ("link", "joint", _DRAKE_JOINT)
 _LINK_PARTS = ("inertial", "visual", "collision")
 _JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
+# Elements that move a body: in the wrong place they would be ignored, and the body be another.
 _MOVING = (*_ROBOT_PARTS, "parent", "child", "axis", "limit", "mimic", "inertial", "mass", "inertia")
-"""Elements that say how a body moves: in the wrong place they would be passed over, and the body be another."""
+# Elements of other programs, without influence on how a free body turns.
 _OF_OTHERS = {
     "robot": ("material", "transmission", "gazebo", "sensor", "ros2_control", "mujoco", "group", "disable_collisions"),
     "link": ("contact", "surface", "self_filter", "collision_checking", "gravity", "kinematic", "origin", "material"),
     "joint": ("hardwareInterface", "material"),
 }
-"""Elements of other programs, which have no part in how a free body turns."""
-# The offset of an <origin> that states none [m].
-_NO_OFFSET = np.zeros(3)
+_NO_OFFSET = np.zeros(3)  # [m] of an <origin> without xyz
 
 
 @dataclass(frozen=True)
@@ -72,7 +58,7 @@ class Mimic:
 
 @dataclass
 class _Reading:
-    """What is found on the way through the file."""
+    """Results collected on the way through the file."""
 
     text: dict[tuple[str, str], str] = field(default_factory=dict)  # by kind of element and name
     mimics: dict[str, tuple[Node, Mimic]] = field(default_factory=dict)
@@ -84,23 +70,21 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
 
     free : "free": a single joint between a root without mass and the rest goes, too
 
-    Raises
-    ------
-    ModelFileError
-        If it is no URDF, needs xacro, or a link or joint is faulty.
+    Raises ModelFileError if it is not a URDF, needs xacro, or a link or joint is faulty.
     """
     if root.tag != "robot":
-        raise root.fault(f"<{quoted(root.tag)}>", f"expected <robot>: this is {foreign_root(root.tag)}")
+        raise root.fault(f"expected <robot>: this is {foreign_root(root.tag)}")
     if (left := macro_of(root)) is not None:
-        raise left.fault(f"<{quoted(left.tag)}>", "a macro or an expression that xacro has left; define or remove it")
-    name = name_of(root) if root.get("name") else "robot"
+        raise left.fault("a macro or an expression that xacro has left; define or remove it")
+    name = root.name() if root.get("name") else "robot"
     reading = _Reading()
-    _check_parts(root, _ROBOT_PARTS, "<robot>", reading)
+    root.own("<robot>")
+    _check_parts(root, _ROBOT_PARTS, reading)
     frames = frozenset(map(partial(_split_universal, root), root.all(_DRAKE_JOINT))) - {""}
     links = {key: _link(key, node, reading) for key, node in _named(root, "link").items()}
     if not links:
         groups = "; an SRDF file names groups of joints only: load its URDF" if root.all("group") else ""
-        raise root.fault(f"robot {name!r}", f"has no links; a body needs at least one <link>{groups}")
+        raise root.fault(f"has no links; a body needs at least one <link>{groups}", f"robot {name!r}")
     joints = {key: _joint(key, node, reading) for key, node in _named(root, "joint", _DRAKE_JOINT).items()}
     if _WORLD not in links and any(joint.parent == _WORLD for joint in joints.values()):
         links[_WORLD] = _link(_WORLD, Node("link", {}, root.file, root.line), reading)
@@ -109,15 +93,17 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
     couplings = {
         key: Coupling.linear(rule.leader, rule.multiplier, rule.offset) for key, (_, rule) in reading.mimics.items()
     }
+    if (key := circular(couplings)) is not None:
+        raise _mimic_fault(reading.mimics[key][0], "mimic joints follow each other in a circle")
     base = free_base(first, links, ordered, couplings, free)
-    found = {base.link: links[base.link]} | {joint.child: links[joint.child] for joint in base.joints}
+    kept = {base.link: links[base.link]} | {joint.child: links[joint.child] for joint in base.joints}
     # The parser of Pinocchio knows no ball joints, and makes links of mere frames.
     text = None
     if not frames and all(joint.kind != "ball" for joint in base.joints):
-        written = [("link", link) for link in found] + [("joint", joint.name) for joint in base.joints]
+        written = [("link", link) for link in kept] + [("joint", joint.name) for joint in base.joints]
         text = f"<robot name={quoteattr(name)}>{''.join(reading.text[key] for key in written)}</robot>"
     notes = (*grouped(reading.notes), *base.notes)
-    return LinkTree(name, found, base.joints, couplings, frames, notes, text, base_joints=base.way)
+    return LinkTree(name, kept, base.joints, couplings, frames, notes, text, base_joints=base.way)
 
 
 def rpy_matrix(rpy: Array) -> Array:
@@ -143,17 +129,15 @@ def macro_of(root: Node) -> Node | None:
     return None
 
 
-def _check_parts(node: Node, known: Sequence[str], owner: str, reading: _Reading) -> None:
-    """Raise ModelFileError for an element that would be lost; note those that are nobody's."""
-    no_misspelt_children(node, known, owner)
+def _check_parts(node: Node, known: Sequence[str], reading: _Reading) -> None:
+    """Raise ModelFileError for an element that would be lost; note those of no known program."""
+    node.check_children(known)
     others = _OF_OTHERS["joint" if node.tag == _DRAKE_JOINT else node.tag]
     for child in node.children:
         if child.tag in known or child.tag in others:
             continue
         if child.tag in _MOVING:
-            raise child.fault(
-                owner, f"<{child.tag}> stands in <{node.tag}>, where nothing reads it; move it to where it belongs"
-            )
+            raise child.fault(f"<{child.tag}> stands in <{node.tag}>, where nothing reads it; move it where it belongs")
         reading.notes.append((f"{child.file}:{child.line}", "element", f"<{quoted(child.tag)}>", "not read"))
 
 
@@ -161,9 +145,9 @@ def _split_universal(root: Node, node: Node) -> str:
     """Put two hinges and a link between them in the place of a universal joint; the link, or "" for other joints."""
     if node.get("type") != _UNIVERSAL:
         return ""
-    name = name_of(node)
-    owner = f"joint {name!r}"
-    ends = {end: name_of(needed_child(node, end, owner), "link") for end in ("parent", "child")}
+    name = node.name()
+    node.own(f"joint {name!r}")
+    ends = {end: node.needed_child(end).name("link") for end in ("parent", "child")}
     between = f"{ends['child']}__{name}"
 
     def part(tag: str, children: Sequence[Node] = (), **attributes: str) -> Node:
@@ -181,43 +165,40 @@ def _split_universal(root: Node, node: Node) -> str:
 
 def _named(root: Node, *tags: str) -> dict[str, Node]:
     """The links or joints by name."""
-    found: dict[str, Node] = {}
+    named: dict[str, Node] = {}
     for node in root.children:
         if node.tag not in tags:
             continue
-        name = name_of(node)
-        if name in found:
-            raise node.fault(
-                f"{tags[0]} {name!r}",
-                f"two <{node.tag}> elements have this name, the first in line {found[name].line}; rename one",
-            )
-        found[name] = node
-    return found
+        name = node.name()
+        node.own(f"{tags[0]} {name!r}")
+        if name in named:
+            line = named[name].line
+            raise node.fault(f"two <{node.tag}> elements have this name, the first in line {line}; rename one")
+        named[name] = node
+    return named
 
 
 def _link(name: str, node: Node, reading: _Reading) -> Link:
-    owner, where = f"link {name!r}", f"{node.file}:{node.line}"
-    _check_parts(node, _LINK_PARTS, owner, reading)
-    inertial = child_of(node, "inertial", owner)
+    where = f"{node.file}:{node.line}"
+    _check_parts(node, _LINK_PARTS, reading)
+    inertial = node.child("inertial")
     if inertial is None:
         reading.text["link", name] = f"<link name={quoteattr(name)}/>"
         return Link(name, where)
     for part in inertial.children:
         if part.tag not in ("origin", "mass", "inertia"):
-            raise part.fault(
-                owner, f"<inertial> holds <origin>, <mass> and <inertia>, not <{quoted(part.tag)}>; move it out"
-            )
-    written = needed_child(inertial, "mass", owner)
-    known_attributes(written, ("value",), owner)
-    mass = number(written, "value", owner, most=MOST_MASS)
+            raise part.fault(f"<inertial> holds <origin>, <mass> and <inertia>, not <{quoted(part.tag)}>; move it out")
+    written = inertial.needed_child("mass")
+    written.check_attributes("value")
+    mass = written.number("value", most=MOST_MASS)
     if mass < 0.0:
-        raise written.fault(owner, f"negative mass {mass:g} kg; a mass is at least zero: correct it")
+        raise written.fault(f"negative mass {mass:g} kg; a mass is at least zero: correct it")
     if 0.0 < mass < LEAST_MASS:
-        raise written.fault(owner, f"mass {mass:g} kg is too small to be summed; give {LEAST_MASS:g} kg or more, or 0")
-    written = needed_child(inertial, "inertia", owner)
-    known_attributes(written, _INERTIA, owner)
-    xx, xy, xz, yy, yz, zz = values = [number(written, key, owner, most=MOST_MASS) for key in _INERTIA]
-    place, turn, origin = _origin(inertial, owner, reading)
+        raise written.fault(f"mass {mass:g} kg is too small to be summed; give {LEAST_MASS:g} kg or more, or 0")
+    written = inertial.needed_child("inertia")
+    written.check_attributes(*_INERTIA)
+    xx, xy, xz, yy, yz, zz = values = [written.number(key, most=MOST_MASS) for key in _INERTIA]
+    place, turn, origin = _origin(inertial, reading)
     entries = " ".join(f'{key}="{value!r}"' for key, value in zip(_INERTIA, values, strict=True))
     reading.text["link", name] = (
         f'<link name={quoteattr(name)}><inertial>{origin}<mass value="{mass!r}"/><inertia {entries}/></inertial></link>'
@@ -227,48 +208,46 @@ def _link(name: str, node: Node, reading: _Reading) -> Link:
 
 
 def _joint(name: str, node: Node, reading: _Reading) -> Joint:
-    owner = f"joint {name!r}"
-    _check_parts(node, _JOINT_PARTS, owner, reading)
+    _check_parts(node, _JOINT_PARTS, reading)
     kind = node.get("type") or ""
     kind = _BALL if kind == _DRAKE_BALL else kind
     if kind not in (*_AXIS_JOINTS, _BALL, "fixed", ANYWHERE, IN_A_PLANE):
         raise node.fault(
-            owner,
             f"type {quoted(kind)!r} is not supported; use {', '.join(_AXIS_JOINTS)}, {_BALL} "
             "or fixed, several in a row for a joint of several axes",
         )
-    ends = {end: needed_child(node, end, owner) for end in ("parent", "child")}
+    ends = {end: node.needed_child(end) for end in ("parent", "child")}
     for end in ends.values():
-        known_attributes(end, ("link",), owner)
-    parent, child = (name_of(end, "link") for end in ends.values())
-    place, turn, parts = _origin(node, owner, reading)
+        end.check_attributes("link")
+    parent, child = (end.name("link") for end in ends.values())
+    place, turn, parts = _origin(node, reading)
     parts += f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
     axis, limits = [1.0, 0.0, 0.0], (-math.inf, math.inf)
     if kind in (*_AXIS_JOINTS, IN_A_PLANE):
-        written = child_of(node, "axis", owner)
+        written = node.child("axis")
         if written is not None:
-            known_attributes(written, ("xyz",), owner)
-            axis = vector(written, "xyz", owner)
+            written.check_attributes("xyz")
+            axis = written.vector("xyz")
             if math.hypot(*axis) < 1e-9:
-                raise written.fault(owner, f"the axis {axis} points nowhere; give it a length")
+                raise written.fault(f"the axis {axis} points nowhere; give it a length")
         parts += f'<axis xyz="{_text(axis)}"/>'
     fastest = effort = 0.0
-    if kind != "fixed" and (limit := child_of(node, "limit", owner)) is not None:
-        fastest = abs(number(limit, "velocity", owner, default="0", most=math.inf))
+    if kind != "fixed" and (limit := node.child("limit")) is not None:
+        fastest = abs(limit.number("velocity", default="0", most=math.inf))
         effort = _effort(limit)
         for key in ("velocity", "effort"):
             if (limit.get(key) or "").strip().startswith("-"):
-                said = f"the {key} limit is negative, read as its size; write it without the sign"
-                reading.notes.append((f"{limit.file}:{limit.line}", "joint", repr(name), said))
+                text = f"the {key} limit is negative, read as its size; write it without the sign"
+                reading.notes.append((f"{limit.file}:{limit.line}", "joint", repr(name), text))
     if kind in ("revolute", "prismatic"):
-        limits = _limits(node, kind, owner)
+        limits = _limits(node, kind)
         parts += f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="{effort!r}" velocity="{fastest!r}"/>'
     elif kind == "continuous" and (fastest or effort):
         parts += f'<limit effort="{effort!r}" velocity="{fastest!r}"/>'
     reading.text["joint", name] = f'<joint name={quoteattr(name)} type="{kind}">{parts}</joint>'
     _mimic(name, kind, node, reading)
     where = f"{node.file}:{node.line}"
-    if kind == _BALL and child_of(node, "limit", owner) is not None:
+    if kind == _BALL and node.child("limit") is not None:
         reading.notes.append((where, "joint", repr(name), "<limit> of a ball joint is ignored"))
     kind = "ball" if kind == _BALL else kind
     return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NO_OFFSET, limits, (effort, fastest))
@@ -283,30 +262,30 @@ def _effort(limit: Node) -> float:
     return stated if stated < math.inf else 0.0
 
 
-def _limits(node: Node, kind: str, owner: str) -> tuple[float, float]:
-    limit = child_of(node, "limit", owner)
+def _limits(node: Node, kind: str) -> tuple[float, float]:
+    limit = node.child("limit")
     if limit is None:
-        raise node.fault(owner, f"a {kind} joint needs <limit lower upper effort velocity>; add it")
-    lower, upper = (number(limit, key, owner, default="0", most=math.inf) for key in ("lower", "upper"))
+        raise node.fault(f"a {kind} joint needs <limit lower upper effort velocity>; add it")
+    lower, upper = (limit.number(key, default="0", most=math.inf) for key in ("lower", "upper"))
     if lower > upper:
-        raise limit.fault(owner, f"the lower limit {lower:g} is above the upper one, {upper:g}; exchange them")
+        raise limit.fault(f"the lower limit {lower:g} is above the upper one, {upper:g}; exchange them")
     return lower, upper
 
 
-def _origin(node: Node, owner: str, reading: _Reading) -> tuple[Array, Array, str]:
+def _origin(node: Node, reading: _Reading) -> tuple[Array, Array, str]:
     """Place, rotation and the element written anew."""
-    origin = child_of(node, "origin", owner)
+    origin = node.child("origin")
     if origin is None:
         return _NO_OFFSET, np.eye(3), ""
-    known_attributes(origin, ("xyz", "rpy"), owner)
-    parts = {key: vector(origin, key, owner) for key in ("xyz", "rpy") if origin.get(key) is not None}
+    origin.check_attributes("xyz", "rpy")
+    parts = {key: origin.vector(key) for key in ("xyz", "rpy") if origin.get(key) is not None}
     written = " ".join(f'{key}="{_text(values)}"' for key, values in parts.items())
     rpy = parts.get("rpy")
-    if rpy is not None and max(map(abs, rpy)) > _WHOLE_TURN:
-        kind, _, name = owner.partition(" ")
+    if rpy is not None and max(map(abs, rpy)) > WHOLE_TURN:
+        kind, _, name = node.owner.partition(" ")
         radians = _brief(np.radians(rpy).tolist())
-        said = f'rpy="{_brief(rpy)}" goes beyond a whole turn; is it in degrees? Give radians: rpy="{radians}"'
-        reading.notes.append((f"{origin.file}:{origin.line}", kind, name, said))
+        text = f'rpy="{_brief(rpy)}" goes beyond a whole turn; is it in degrees? Give radians: rpy="{radians}"'
+        reading.notes.append((f"{origin.file}:{origin.line}", kind, name, text))
     turn = np.eye(3) if rpy is None or not any(rpy) else rpy_matrix(np.array(rpy))
     return np.array(parts.get("xyz", _NO_OFFSET)), turn, f"<origin {written}/>"
 
@@ -320,8 +299,7 @@ def _text(values: list[float]) -> str:
 
 
 def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
-    owner = f"joint {name!r}"
-    element = child_of(node, "mimic", owner)
+    element = node.child("mimic")
     if element is None:
         return
     if kind == "fixed":
@@ -329,28 +307,22 @@ def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
         reading.notes.append((where, "joint", repr(name), "<mimic> of a fixed joint is ignored"))
         return
     if kind not in _AXIS_JOINTS:
-        raise element.fault(owner, f"a {kind} joint follows no other: it has no single number; remove the <mimic>")
-    known_attributes(element, ("joint", "multiplier", "offset"), owner)
-    multiplier, offset = (number(element, k, owner, default=d) for k, d in (("multiplier", "1"), ("offset", "0")))
-    reading.mimics[name] = (element, Mimic(name_of(element, "joint"), multiplier, offset))
+        raise element.fault(f"a {kind} joint follows no other: it has no single number; remove the <mimic>")
+    element.check_attributes("joint", "multiplier", "offset")
+    multiplier, offset = (element.number(k, default=d) for k, d in (("multiplier", "1"), ("offset", "0")))
+    reading.mimics[name] = (element, Mimic(element.name("joint"), multiplier, offset))
 
 
 def _check_mimics(mimics: dict[str, tuple[Node, Mimic]], joints: dict[str, Joint]) -> None:
-    """Every leader exists and is of the follower's kind, and no joint follows itself."""
+    """Raise ModelFileError unless every leader exists and is of the follower's kind."""
     for name, (element, rule) in mimics.items():
-        owner, leader = f"joint {name!r}", joints.get(rule.leader)
+        leader = joints.get(rule.leader)
         if leader is None:
-            raise _mimic_fault(element, owner, f"mimics joint {rule.leader!r}, which does not exist")
+            raise _mimic_fault(element, f"mimics joint {rule.leader!r}, which does not exist")
         kinds = joints[name].kind, leader.kind
         if kinds[1] in ("fixed", "ball") or (kinds[0] == "prismatic") != (kinds[1] == "prismatic"):
-            raise _mimic_fault(element, owner, f"is {kinds[0]} and mimics joint {rule.leader!r}, which is {kinds[1]}")
-        seen, follower = {name}, name
-        while follower in mimics:
-            follower = mimics[follower][1].leader
-            if follower in seen:
-                raise _mimic_fault(element, owner, "mimic joints follow each other in a circle")
-            seen.add(follower)
+            raise _mimic_fault(element, f"is {kinds[0]} and mimics joint {rule.leader!r}, which is {kinds[1]}")
 
 
-def _mimic_fault(element: Node, owner: str, message: str) -> ModelFileError:
-    return element.fault(owner, f"{message}; remove the <mimic> or name another joint")
+def _mimic_fault(element: Node, message: str) -> ModelFileError:
+    return element.fault(f"{message}; remove the <mimic> or name another joint")

@@ -13,26 +13,31 @@ from functools import lru_cache
 from pathlib import Path
 from xml.parsers import expat
 
+from ...arrays import FARTHEST
 from ...errors import InputFileNotFoundError, ModelFileError
 from ...files import no_such_file
 
-_MOST_QUOTED = 60
-"""Characters of the file that a message quotes."""
-_DECLARED = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([\w.-]+)["']""")
-"""The encoding that the first line states."""
+_MOST_QUOTED = 60  # characters of the file in a message
+_DECLARED = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([\w.-]+)["']""")  # the encoding that the first line states
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 @dataclass(eq=False, slots=True)
 class Node:
-    """An XML element: its tag, attributes, children, and the file and line where it begins."""
+    """An XML element: tag, attributes, children, the file and line where it begins, and its name in messages."""
 
     tag: str
     attributes: dict[str, str]
     file: str
     line: int
     children: list[Node] = field(default_factory=list)
+    owner: str = ""
+
+    def own(self, owner: str) -> None:
+        """Name this element and all below it in messages, as "link 'tail'"."""
+        for node in self.walk():
+            node.owner = owner
 
     def get(self, name: str, default: str | None = None) -> str | None:
         """An attribute."""
@@ -50,18 +55,76 @@ class Node:
             yield node
             waiting.extend(reversed(node.children))
 
-    def fault(self, owner: str, message: str) -> ModelFileError:
-        """The error for what is wrong with this element; `owner` is what people call it: "link 'tail'"."""
-        return ModelFileError(f"{self.file}:{self.line}: {owner}: {message}")
+    def fault(self, message: str, owner: str = "") -> ModelFileError:
+        """The error for what is wrong with this element."""
+        return ModelFileError(f"{self.file}:{self.line}: {owner or self.owner or f'<{quoted(self.tag)}>'}: {message}")
+
+    def name(self, attribute: str = "name") -> str:
+        """A name attribute, printable. Raises ModelFileError."""
+        value = self.get(attribute)
+        if not value or value.isspace():
+            raise self.fault(f"has no {attribute}; give it one", f"<{self.tag}>")
+        if not value.isprintable():
+            what = f"<{self.tag}> {quoted(value)!r}"
+            raise self.fault("a name with characters that cannot be printed; rename it", what)
+        return value
+
+    def child(self, tag: str) -> Node | None:
+        """The only child of this tag, or None. Raises ModelFileError if there are several."""
+        children = self.all(tag)
+        if len(children) > 1:
+            raise children[1].fault(f"{len(children)} <{tag}> elements, at most one is allowed; remove the others")
+        return children[0] if children else None
+
+    def needed_child(self, tag: str) -> Node:
+        """The only child of this tag. Raises ModelFileError."""
+        child = self.child(tag)
+        if child is None:
+            raise self.fault(f"<{self.tag}> has no <{tag}>; add it")
+        return child
+
+    def check_attributes(self, *names: str) -> None:
+        """Raise ModelFileError for an attribute that would be ignored: a misspelt number is a wrong number."""
+        for name in self.attributes:
+            if name not in names and not name.startswith("xmlns:"):
+                valid = ", ".join(names) or "none"
+                raise self.fault(f"<{self.tag}> has no attribute {quoted(name)!r}; valid are {valid}")
+
+    def check_children(self, tags: Sequence[str]) -> None:
+        """Raise ModelFileError for a child whose tag is nearly one of those that are read."""
+        for child in self.children:
+            near = _near(child.tag, tuple(tags))
+            if near is not None:
+                raise child.fault(f"<{child.tag}> is not read; did you mean <{near}>?")
+
+    def number(self, name: str, default: str | None = None, most: float = FARTHEST) -> float:
+        """One number of an attribute, its size below `most`. Raises ModelFileError."""
+        return self._numbers(name, 1, self.get(name, default), most)[0]
+
+    def vector(self, name: str, count: int = 3) -> list[float]:
+        """Numbers of an attribute, each below 1e6 in size. Raises ModelFileError."""
+        return self._numbers(name, count, self.get(name), FARTHEST)
+
+    def _numbers(self, name: str, count: int, text: str | None, most: float) -> list[float]:
+        needed = (
+            "a finite number is needed" if count == 1 else f"{count} finite numbers are needed, with blanks between"
+        )
+        if text is None:
+            raise self.fault(f"<{self.tag}> has no {name}; {needed}")
+        # One word too many shows that there are too many, however long the rest is.
+        words = text.split(maxsplit=count)
+        values = [float(word) for word in words if _NUMBER.fullmatch(word)]
+        if len(words) != count or len(values) != count or not all(map(math.isfinite, values)):
+            raise self.fault(f"<{self.tag}> {name}={quoted(text)!r}: {needed}")
+        if any(abs(value) >= most for value in values):
+            raise self.fault(f"<{self.tag}> {name}={quoted(text)!r}: too large, less than {most:g} is needed")
+        return values
 
 
 def read_file(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a body's file, read once.
 
-    Raises
-    ------
-    InputFileNotFoundError
-        If there is no readable file at `path`.
+    Raises InputFileNotFoundError without a readable file at `path`.
     """
     where = Path(path)
     if "\0" in str(where):
@@ -85,7 +148,7 @@ def xml_text(content: bytes, where: str) -> str:
     """The text of an XML file, without what editors and downloads put around it.
 
     A byte order mark, blank lines before the declaration and zero bytes at the end are left out; lines are counted as
-    in the file. Raises ModelFileError for bytes that are no text in UTF-8 or the encoding that the file states.
+    in the file. Raises ModelFileError for bytes that are not text in UTF-8 or the encoding that the file states.
     """
     stated = _DECLARED.match(content.lstrip())
     # UTF-8 first: bytes that it allows are hardly ever another encoding, whatever the file states.
@@ -112,10 +175,7 @@ def xml_text(content: bytes, where: str) -> str:
 def xml_tree(content: bytes, where: str) -> Node:
     """The root element of an XML file; `where` names the file in messages.
 
-    Raises
-    ------
-    ModelFileError
-        If it is not well-formed XML, has a document type, or is in another encoding than it states.
+    Raises ModelFileError if it is not well-formed XML, has a document type, or is in another encoding than it states.
     """
     text = xml_text(content, where)
     builder = _Builder(where, above=text[: len(text) - len(text.lstrip())].count("\n"))
@@ -134,7 +194,7 @@ def xml_tree(content: bytes, where: str) -> Node:
 
 
 class _Builder:
-    """What expat calls, element by element.
+    """Callbacks of expat, element by element.
 
     Tags keep their prefix, as in "drake:joint", whatever address it stands for: programs that read robots go by it.
     """
@@ -143,7 +203,7 @@ class _Builder:
 
     def __init__(self, where: str, above: int) -> None:
         self.where, self.above = where, above
-        # UTF-8, which the text was encoded in, whatever the declaration says.
+        # The text was encoded in UTF-8, whatever the declaration states.
         self.parser = expat.ParserCreate("utf-8")
         self.parser.buffer_text = True
         self.parser.StartDoctypeDeclHandler = self._doctype
@@ -174,78 +234,16 @@ def quoted(text: str | None) -> str:
     return text if len(text) <= _MOST_QUOTED else text[:_MOST_QUOTED] + "..."
 
 
-def name_of(node: Node, name: str = "name") -> str:
-    """A name attribute of an element, printable. Raises ModelFileError."""
-    value = node.get(name)
-    if not value or value.isspace():
-        raise node.fault(f"<{node.tag}>", f"has no {name}; give it one")
-    if not value.isprintable():
-        raise node.fault(f"<{node.tag}> {quoted(value)!r}", "a name with characters that cannot be printed; rename it")
-    return value
-
-
-def child_of(node: Node, tag: str, owner: str) -> Node | None:
-    """The only child of this tag, or None. Raises ModelFileError if there are several."""
-    found = node.all(tag)
-    if len(found) > 1:
-        raise found[1].fault(owner, f"{len(found)} <{tag}> elements, at most one is allowed; remove the others")
-    return found[0] if found else None
-
-
-def needed_child(node: Node, tag: str, owner: str) -> Node:
-    """The only child of this tag. Raises ModelFileError."""
-    found = child_of(node, tag, owner)
-    if found is None:
-        raise node.fault(owner, f"<{node.tag}> has no <{tag}>; add it")
-    return found
-
-
-def known_attributes(node: Node, names: Sequence[str], owner: str) -> None:
-    """Raise ModelFileError for an attribute that would be ignored: a misspelt number is a wrong number."""
-    for name in node.attributes:
-        if name not in names and not name.startswith("xmlns:"):
-            raise node.fault(
-                owner, f"<{node.tag}> has no attribute {quoted(name)!r}; valid are {', '.join(names) or 'none'}"
-            )
-
-
-def no_misspelt_children(node: Node, tags: Sequence[str], owner: str) -> None:
-    """Raise ModelFileError for a child whose tag is nearly one of those that are read."""
-    for child in node.children:
-        near = _near(child.tag, tuple(tags))
-        if near is not None:
-            raise child.fault(owner, f"<{child.tag}> is not read; did you mean <{near}>?")
+def listed(names: Sequence[str], most: int = 50) -> str:
+    """Names for a message, the first of many."""
+    more = len(names) - most
+    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 @lru_cache(maxsize=1024)
 def _near(name: str, known: tuple[str, ...]) -> str | None:
-    """Which of the known names a misspelt one was meant to be; None for one of them, or one far from all."""
+    """The known name closest to a misspelt one; None for a known name, or one far from all."""
     if name in known or len(name) > _MOST_QUOTED:
         return None
     near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.75)
     return near[0] if near else None
-
-
-def number(node: Node, name: str, owner: str, default: str | None = None, most: float = 1e6) -> float:
-    """One number of an attribute, its size below `most`. Raises ModelFileError."""
-    return numbers(node, name, 1, owner, node.get(name, default), most)[0]
-
-
-def vector(node: Node, name: str, owner: str, count: int = 3, most: float = 1e6) -> list[float]:
-    """Numbers of an attribute, each below `most` in size. Raises ModelFileError."""
-    return numbers(node, name, count, owner, node.get(name), most)
-
-
-def numbers(node: Node, name: str, count: int, owner: str, text: str | None, most: float) -> list[float]:
-    """`count` numbers in the text of an attribute. Raises ModelFileError."""
-    needed = "a finite number is needed" if count == 1 else f"{count} finite numbers are needed, with blanks between"
-    if text is None:
-        raise node.fault(owner, f"<{node.tag}> has no {name}; {needed}")
-    # One word too many shows that there are too many, however long the rest is.
-    words = text.split(maxsplit=count)
-    values = [float(word) for word in words if _NUMBER.fullmatch(word)]
-    if len(words) != count or len(values) != count or not all(map(math.isfinite, values)):
-        raise node.fault(owner, f"<{node.tag}> {name}={quoted(text)!r}: {needed}")
-    if any(abs(value) >= most for value in values):
-        raise node.fault(owner, f"<{node.tag}> {name}={quoted(text)!r}: too large, less than {most:g} is needed")
-    return values

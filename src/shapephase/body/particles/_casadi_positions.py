@@ -13,7 +13,7 @@ from ...letters import what_came
 
 
 def is_casadi_function(value: object) -> bool:
-    """Whether this is a `casadi.Function`; CasADi is not imported to find out."""
+    """True for a `casadi.Function`; CasADi is not imported to find out."""
     kind = type(value)
     return kind.__name__ == "Function" and kind.__module__.partition(".")[0] == "casadi"
 
@@ -21,10 +21,7 @@ def is_casadi_function(value: object) -> bool:
 class CasadiPositions:
     """Places of `particles` particles, shape (n) -> (m, 3), or (m, 2) in the plane z = 0.
 
-    Raises
-    ------
-    ShapeError
-        If the function has other arguments or results.
+    Raises ShapeError if the function has other arguments or results.
     """
 
     def __init__(self, function: Any, n_shape: int, particles: int) -> None:
@@ -62,22 +59,22 @@ class CasadiPositions:
 
         shape = casadi.MX.sym("shape", self._sizes[0])
         entries = casadi.vec(self._function(shape).T)
-        found = [casadi.Function("places", [shape], [entries])]
+        functions = [casadi.Function("places", [shape], [entries])]
         for order in (1, 2):
             entries = casadi.vec(casadi.jacobian(entries, shape).T)
-            found.append(casadi.Function(f"derivatives_{order}", [shape], [entries]))
-        return found
+            functions.append(casadi.Function(f"derivatives_{order}", [shape], [entries]))
+        return functions
 
     def _evaluated(self, order: int, rows: Array) -> Array:
         if not len(rows):
             return np.zeros((0, self._derivatives[order].size1_out(0)))
         try:
-            found = self._derivatives[order].map(len(rows))(rows.T)
+            values = self._derivatives[order].map(len(rows))(rows.T)
         except RuntimeError as error:
             where = what_came(rows[0] if len(rows) == 1 else rows)
             fault = str(error).splitlines()[-1]
             raise ShapeError(f"places: CasADi cannot evaluate the function at {where}: {fault}") from None
-        return finite_array(np.asarray(found, dtype=np.float64).T, "places")
+        return finite_array(np.asarray(values, dtype=np.float64).T, "places")
 
     def _in_space(self, values: Array) -> Array:
         if not self._flat:

@@ -11,26 +11,22 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_picklable, names_argument
-from ...arrays import Array, check_reach, common_batch, finite_array, lock_arrays
+from ...arrays import Array, finite_array, lock_arrays
 from ...display import short_repr
 from ...errors import ShapeError, WrongObjectError, unknown_name
 from ...letters import what_came
+from ..shape_arguments import ShapeArguments
 from ._casadi_positions import CasadiPositions, is_casadi_function
 
 _Places = Callable[[Array], tuple[ArrayLike, ArrayLike]]
-_STEP = 0.02
-"""[unit of the parameter] of the differences that give second derivatives: their errors are some 1e-13 of places that
-swing once in a radian."""
-_DIFFERENCES = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)
-"""Weights of f(h k) - f(-h k), k = 1 to 4, of the central difference of eighth order."""
-_BROAD_STEP = 1e-4
-"""[unit of the parameter] of the differences by which given derivatives are compared with the places."""
-_NOT_DERIVATIVES = 1e-5
-"""Relative to the places: what those differences leave of true derivatives is a thousandth of it."""
+_STEP = 0.02  # of differences for second derivatives: errors of 1e-13 where places swing once in a radian
+_DIFFERENCES = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)  # of f(k h) - f(-k h), k = 1 to 4 (Fornberg 1988)
+_BROAD_STEP = 1e-4  # of differences that are compared with given derivatives
+_NOT_DERIVATIVES = 1e-5  # of the places' size: a thousand times what these differences leave of true derivatives
 
 
 @dataclass(frozen=True, eq=False)
-class ParticleBody:
+class ParticleBody(ShapeArguments):
     """Point masses whose places in a frame are functions of a shape: polygons, n bodies, a hub with a cord.
 
     It stands wherever a `Body` stands for its inertia and momentum alone: `mechanical_connection`, `curvature`,
@@ -68,17 +64,13 @@ class ParticleBody:
 
     __post_init__ = lock_arrays
     __repr__ = short_repr
+    _coordinate = "parameter"
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for places given by a lambda."""
+        """State for pickle. Raises LocalFunctionError for places given by a lambda."""
         given = self.places
         check_picklable(given.function if isinstance(given, _Given) else given, "a body of particles")
         return self.__dict__
-
-    @property
-    def n_shape(self) -> int:
-        """The number of parameters."""
-        return len(self.joint_names)
 
     @property
     def mass(self) -> float:
@@ -90,12 +82,6 @@ class ParticleBody:
         """It comes from no file."""
         return
 
-    def joint_index(self, name: str) -> int:
-        """The place of a parameter in the shape vector. Raises UnknownNameError."""
-        if name not in self.joint_names:
-            raise unknown_name(f"parameter of {self.name}", name, self.joint_names)
-        return self.joint_names.index(name)
-
     def shape(self, joints: Mapping[str, float] | None = None) -> Array:
         """The shape with the named parameters at these values, all others 0: -> (n,). Raises UnknownNameError."""
         shape = np.zeros(self.n_shape)
@@ -104,7 +90,7 @@ class ParticleBody:
         return shape
 
     def positions(self, shape: ArrayLike) -> Array:
-        """Where the particles are, from their centre of mass: (..., n) -> (..., m, 3) [m]."""
+        """Places of the particles from their centre of mass: (..., n) -> (..., m, 3) [m]."""
         r = self._checked(shape)
         return self._centred(self._rows(r))[0].reshape(*r.shape[:-1], len(self.masses), 3)
 
@@ -117,23 +103,6 @@ class ParticleBody:
         """J(r), angular momentum per unit rate: (..., n) -> (..., 3, n) [kg m^2/s per unit]. As `Body`."""
         r = self._checked(shape)
         return self._matrix(*self._centred(self._rows(r))).reshape(*r.shape[:-1], 3, self.n_shape)
-
-    def internal_momentum(self, shape: ArrayLike, rate: ArrayLike) -> Array:
-        """L_o = J(r) rate: (..., n), (..., n) -> (..., 3) [kg m^2/s]. As `Body`."""
-        r, v = self._pair(shape, rate)
-        return so3.apply(self.momentum_matrix(r), v)
-
-    def inertia_gradient(self, shape: ArrayLike) -> Array:
-        """dI/dr_k: (..., n) -> (..., n, 3, 3) [kg m^2 per unit]. As `Body`."""
-        return self.angular_map_gradient(shape)[..., :3]
-
-    def momentum_matrix_gradient(self, shape: ArrayLike) -> Array:
-        """dJ/dr_k: (..., n) -> (..., n, 3, n), the first n counts k. As `Body`.
-
-        Its part that is symmetric in both joints needs second derivatives of the places, which are central
-        differences of eighth order where CasADi does not give the places. No curvature depends on that part.
-        """
-        return self.angular_map_gradient(shape)[..., 3:]
 
     def angular_map_gradient(self, shape: ArrayLike) -> Array:
         """d[I, J]/dr_k, both side by side: (..., n) -> (..., n, 3, 3 + n)."""
@@ -154,25 +123,21 @@ class ParticleBody:
 
     def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
         """dI/dr_k w + dJ/dr_k rate: three times (..., n or 3) -> (..., n, 3) [kg m^2/s per unit]. As `Body`."""
-        r, v = self._pair(shape, rate)
-        w = np.broadcast_to(finite_array(base_rate, "base_rate", (3,), unit="rad/s"), (*r.shape[:-1], 3))
+        r, v, w = self._with_base_rate(shape, rate, base_rate)
         return np.einsum("...kab,...b->...ka", self.angular_map_gradient(r), np.concatenate([w, v], axis=-1))
 
     def centre_of_mass(self, shape: ArrayLike) -> Array:
-        """From the origin of the places: (..., n) -> (..., 3) [m]."""
+        """Centre of mass from the origin of the places: (..., n) -> (..., 3) [m]."""
         r = self._checked(shape)
         return ((self.masses / self.mass) @ self.places(self._rows(r))[0]).reshape(*r.shape[:-1], 3)
 
     def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
         """About the centre of mass, while the frame turns: -> (...) [J]. As `Body`."""
-        r, v = self._pair(shape, rate)
-        omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
-        batch = common_batch(shape=r.shape[:-1], angular_velocity=omega.shape[:-1])
-        r, v = np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
+        r, v, omega = self._turning(shape, rate, angular_velocity)
         places, slopes = self._centred(self._rows(r))
         moving = np.einsum("nkma,nk->nma", slopes, self._rows(v))
-        moving += np.cross(np.broadcast_to(omega, (*batch, 3)).reshape(-1, 1, 3), places)
-        return (0.5 * np.einsum("m,nma,nma->n", self.masses, moving, moving)).reshape(batch)
+        moving += np.cross(omega.reshape(-1, 1, 3), places)
+        return (0.5 * np.einsum("m,nma,nma->n", self.masses, moving, moving)).reshape(r.shape[:-1])
 
     def sample(self, shape: Array, rate: Array) -> tuple[Array, Array]:
         """Locked inertia and internal momentum along a trajectory: (N, n), (N, n) -> (N, 3, 3), (N, 3). Unchecked."""
@@ -210,24 +175,6 @@ class ParticleBody:
 
     def _matrix(self, places: Array, slopes: Array) -> Array:
         return np.einsum("m,nkma->nak", self.masses, np.cross(places[:, None], slopes))
-
-    def _checked(self, shape: ArrayLike, name: str = "shape") -> Array:
-        array = finite_array(shape, name)
-        if array.ndim == 0 or array.shape[-1] != self.n_shape:
-            raise ShapeError(
-                f"{name}: expected (..., {self.n_shape}), one entry per parameter of {self.name} "
-                f"({', '.join(self.joint_names)}), got shape {array.shape}"
-            )
-        check_reach(array, name)
-        return array
-
-    def _pair(self, shape: ArrayLike, rate: ArrayLike) -> tuple[Array, Array]:
-        r, v = self._checked(shape), self._checked(rate, "rate")
-        batch = common_batch(shape=r.shape[:-1], rate=v.shape[:-1])
-        return np.broadcast_to(r, (*batch, self.n_shape)), np.broadcast_to(v, (*batch, self.n_shape))
-
-    def _rows(self, array: Array) -> Array:
-        return array.reshape(-1, self.n_shape)
 
 
 def particle_body(
@@ -280,9 +227,9 @@ def particle_body(
     if len(of_each) != len(names) or not set(of_each) <= {"rad", "m"}:
         raise ShapeError(f'units: "rad" or "m", of all or of each of {len(names)}, are needed, got {what_came(units)}')
     endless = names_argument(continuous, "continuous", "names of parameters in a list")
-    for one in endless:
-        if one not in names:
-            raise unknown_name("parameter", one, names)
+    for parameter in endless:
+        if parameter not in names:
+            raise unknown_name("parameter", parameter, names)
     if is_casadi_function(places):
         function = CasadiPositions(places, len(names), len(weights))
     elif callable(places) and not isinstance(places, type):
@@ -292,7 +239,7 @@ def particle_body(
             f"places: a function of shapes that gives places and derivatives is needed, got {what_came(places)}"
         )
     limits = np.tile([-np.inf, np.inf], (len(names), 1))
-    turning = np.array([one in endless for one in names], dtype=bool)
+    turning = np.array([parameter in endless for parameter in names], dtype=bool)
     return ParticleBody(
         masses=weights,
         joint_names=names,
@@ -318,12 +265,12 @@ class _Given:
         return places, slopes
 
     def _returned(self, rows: Array) -> tuple[Array, Array]:
-        found = self.function(rows)
-        if not isinstance(found, tuple | list) or len(found) != 2:
+        pair = self.function(rows)
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
             raise ShapeError(
-                f"places: a pair, places and their derivatives, must be returned for shapes, got {what_came(found)}"
+                f"places: a pair, places and their derivatives, must be returned for shapes, got {what_came(pair)}"
             )
-        places, slopes = finite_array(found[0], "places", unit="m"), finite_array(found[1], "derivatives of places")
+        places, slopes = finite_array(pair[0], "places", unit="m"), finite_array(pair[1], "derivatives of places")
         expected = (len(rows), self.particles, 3), (len(rows), rows.shape[1], self.particles, 3)
         if (places.shape, slopes.shape) != expected:
             raise ShapeError(

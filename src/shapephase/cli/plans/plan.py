@@ -78,7 +78,7 @@ def plan_command(
     After Ctrl-C (exit code 130), at the time limit (124) and if nothing is found (7) the best result is printed and
     written; the first line of the file says so.
     """
-    from ...body.catalog import load_body
+    from ...body.loading import load_body
     from ...optimal_control.planning import plan_reorientation
     from ...shape_space.files.write import write_shape_path
     from ..texts.plan_text import plan_comment, plan_data, plan_lines, plan_purpose

@@ -21,7 +21,7 @@ FRAME = 24
 TOTAL = 15
 """Rows of the sums: mass times place (3), mass times velocity (3), inertia (6), momentum (3)."""
 NUMBERS = 22
-"""Of a frame in the body, as `shapephase.body.link_rows` has them."""
+"""Of a frame in the body, as `shapephase.body.joint_chain` has them."""
 _CONDITION = 1e10
 """Product of the traces of I and I^-1, one to nine times the condition number; what is above it is left to slower
 code, which judges such tensors by their eigenvalues."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array
-from ...body.appearance import Visual
 from ...body.body import Body
 from ...body.couplings.coordinate_map import CurvedJoint
+from ...body.drawing.visual import Visual
 from ...body.link_motions import link_motions
 from ...errors import unknown_name
 from ...shape_space.interpolation import ball_columns, neighbours_signs

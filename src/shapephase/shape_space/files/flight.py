@@ -127,7 +127,7 @@ def in_flight(
     request, where, base = choices.request, recording.table.where, motion.base
     if request is None or (request == RECORDED and not turns(base.attitude)):
         return recording, motion, None
-    if base.attitude is None and not isinstance(said, tuple):
+    if base.attitude is None and not isinstance(request, tuple):
         raise TrajectoryError(
             f"{where}: a flight is fitted to the recorded attitude of the base, and there is none; columns such as "
             "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed. Or give the "
@@ -136,7 +136,7 @@ def in_flight(
     times, clock, flights, fall = recording.times, recording.clock, (), None
     samples = np.arange(len(times)) if isinstance(request, str) else samples_within(recording.table, request)
     centres = None
-    if base.position is not None and (base.record or {}).get("axes") != ESTIMATE:
+    if base.position is not None and base.attitude is not None and (base.record or {}).get("axes") != ESTIMATE:
         centres = base.position + so3.apply(base.attitude, body.centre_of_mass(motion.shapes))
     if request == AUTO or (request == RECORDED and centres is not None):
         fall = _fall(recording, motion, centres, choices)

@@ -1,33 +1,28 @@
-"""How much of a body is drawn: more triangles or shapes than a page can hold are replaced by hulls around them."""
+"""Limits of a drawing: meshes and shapes beyond what a page holds are replaced by their hulls."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Array
+from ...arrays import Array
+from .visual import Visual
 
-if TYPE_CHECKING:
-    from .appearance import Visual
-
-# Of all meshes together: some 30 MB in a page; the finest robots of example-robot-data have a million.
-_MOST_FACES = 1_500_000
-# Of a body: each is an object of its own in a browser.
-_MOST_SHAPES = 1_000
-# From which the farthest points of a mesh are sought: hulls have up to twice as many faces.
-_DIRECTIONS = 100
-# Of the longest edge of a box that stands for something flat; where all is one point [m].
-_THINNEST = 1e-3
+MOST_FACES = 1_500_000  # of all meshes, 30 MB in a page; the finest robots of example-robot-data have a million
+MOST_SHAPES = 1_000  # each is an object of its own in a browser
+_DIRECTIONS = 100  # farthest points of a mesh are taken in so many; a hull has up to twice as many faces
+_THINNEST = 1e-3  # edge of the box around something flat, of its longest; in metres around a point
 
 
-def within_limits(shapes: list[Visual]) -> tuple[list[Visual], list[str]]:
-    """Shapes that a page can hold, and what has been simplified, as sentences."""
-    fewer, said = _with_fewer_faces(shapes)
-    merged, also = _with_fewer_shapes(fewer)
-    return merged, said + also
+def within_limits(
+    shapes: list[Visual], most_faces: int = MOST_FACES, most_shapes: int = MOST_SHAPES
+) -> tuple[list[Visual], list[str]]:
+    """Return shapes that a page can hold, and sentences on what was simplified."""
+    fewer_faces, on_faces = _with_fewer_faces(shapes, most_faces)
+    fewer_shapes, on_shapes = _with_fewer_shapes(fewer_faces, most_shapes)
+    return fewer_shapes, on_faces + on_shapes
 
 
 def hull(points: Array) -> tuple[Array, Array] | None:
@@ -35,17 +30,16 @@ def hull(points: Array) -> tuple[Array, Array] | None:
     from scipy.spatial import ConvexHull, QhullError
 
     try:
-        found = ConvexHull(points)
+        convex = ConvexHull(points)
     except (QhullError, ValueError):
         return None
     numbers = np.full(len(points), -1)
-    numbers[found.vertices] = np.arange(len(found.vertices))
-    faces = numbers[found.simplices]
-    vertices = points[found.vertices]
+    numbers[convex.vertices] = np.arange(len(convex.vertices))
+    faces, vertices = numbers[convex.simplices], points[convex.vertices]
     corners = vertices[faces]
     outwards = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    turned = np.einsum("ni,ni->n", outwards, found.equations[:, :3]) < 0.0
-    faces[turned] = faces[turned][:, ::-1]
+    inverted = np.einsum("ni,ni->n", outwards, convex.equations[:, :3]) < 0.0
+    faces[inverted] = faces[inverted][:, ::-1]
     return vertices, faces
 
 
@@ -58,14 +52,12 @@ def outermost(points: Array) -> Array:
     return points[np.unique(np.argmax(points @ directions, axis=0))]
 
 
-def _with_fewer_faces(shapes: list[Visual]) -> tuple[list[Visual], list[str]]:
+def _with_fewer_faces(shapes: list[Visual], most: int) -> tuple[list[Visual], list[str]]:
     counts = np.array([len(shape.faces) for shape in shapes], dtype=np.int64)
     total = left = int(counts.sum())
-    if total <= _MOST_FACES:
-        return shapes, []
     result, hulls, simplified = list(shapes), {}, 0
     for place in np.argsort(-counts, kind="stable").tolist():
-        if left <= _MOST_FACES:
+        if left <= most:
             break
         shape = shapes[place]
         # Visuals of one file share their arrays.
@@ -74,42 +66,41 @@ def _with_fewer_faces(shapes: list[Visual]) -> tuple[list[Visual], list[str]]:
         result[place] = _as_hull(shape, shape.vertices, hulls[id(shape.vertices)])
         left += len(result[place].faces) - int(counts[place])
         simplified += 1
-    said = (
+    sentence = (
         f"{simplified} meshes are drawn as their convex hulls: all have {total} triangles together, and up to "
-        f"{_MOST_FACES} are drawn"
+        f"{most} are drawn"
     )
-    return result, [said]
+    return result, [sentence] * bool(simplified)
 
 
-def _with_fewer_shapes(shapes: list[Visual]) -> tuple[list[Visual], list[str]]:
-    if len(shapes) <= _MOST_SHAPES:
+def _with_fewer_shapes(shapes: list[Visual], most: int) -> tuple[list[Visual], list[str]]:
+    if len(shapes) <= most:
         return shapes, []
     by_link: dict[str, list[Visual]] = {}
     for shape in shapes:
         by_link.setdefault(shape.link, []).append(shape)
     left, simplified = len(shapes), []
-    for link, own in sorted(by_link.items(), key=lambda each: -len(each[1])):
-        if left <= _MOST_SHAPES or len(own) == 1:
+    for link, own in sorted(by_link.items(), key=lambda item: -len(item[1])):
+        if left <= most or len(own) == 1:
             break
         corners = np.concatenate([shape.corners @ shape.pose[:3, :3].T + shape.pose[:3, 3] for shape in own])
         by_link[link] = [_as_hull(replace(own[0], pose=np.eye(4), mesh=None), corners, hull(outermost(corners)))]
         left += 1 - len(own)
         simplified.append(link)
-    said = (
+    sentence = (
         f"{len(simplified)} links, {simplified[0]!r} first, are drawn as the hull of what they show: the body has "
-        f"{len(shapes)} shapes, and up to {_MOST_SHAPES} are drawn"
+        f"{len(shapes)} shapes, and up to {most} are drawn"
     )
-    return [shape for own in by_link.values() for shape in own], [said]
+    return [shape for own in by_link.values() for shape in own], [sentence]
 
 
-def _as_hull(shape: Visual, points: Array, found: tuple[Array, Array] | None) -> Visual:
-    """A shape as the hull of points in its axes; where they lie in a plane, as a thin box."""
-    if found is not None:
-        return replace(shape, kind="mesh", dimensions=(1.0, 1.0, 1.0), vertices=found[0], faces=found[1])
+def _as_hull(shape: Visual, points: Array, convex: tuple[Array, Array] | None) -> Visual:
+    """The shape replaced by the hull of points in its axes; by a thin box where they lie in a plane."""
+    if convex is not None:
+        return replace(shape, kind="mesh", dimensions=(1.0, 1.0, 1.0), vertices=convex[0], faces=convex[1])
     low, high = points.min(axis=0), points.max(axis=0)
     longest = float(np.max(high - low))
     edges = np.maximum(high - low, _THINNEST * longest if longest else _THINNEST)
     pose = shape.pose.copy()
     pose[:3, 3] += pose[:3, :3] @ (0.5 * (low + high))
-    nothing = {"vertices": np.zeros((0, 3)), "faces": np.zeros((0, 3), dtype=np.int64)}
-    return replace(shape, kind="box", dimensions=tuple(edges.tolist()), pose=pose, **nothing)
+    return Visual(shape.link, "box", tuple(edges.tolist()), pose, shape.colour, shape.mesh)
