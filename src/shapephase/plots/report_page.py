@@ -91,7 +91,10 @@ def report(
     Examples
     --------
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
-    >>> sp.plots.report(motion, sp.split(motion, "base")).write("report.html")
+    >>> page = sp.plots.report(motion, sp.split(motion, "base"))
+    >>> page.write("report.html")
+    >>> page.html[:9]
+    '<!doctype'
     """
     check_object(motion, "Motion", "motion")
     check_object(result, "PhaseSplit", "result")

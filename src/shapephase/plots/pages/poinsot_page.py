@@ -57,7 +57,10 @@ def rolling_ellipsoid(
     Examples
     --------
     >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
-    >>> sp.plots.rolling_ellipsoid(top, frames=50).write("rolling.html")
+    >>> page = sp.plots.rolling_ellipsoid(top, frames=50)
+    >>> page.write("rolling.html")
+    >>> page.title
+    'A rigid body: its ellipsoid rolls on the invariable plane'
     """
     check_object(top, "EulerTop", "top")
     rolling = Poinsot(top)
