@@ -139,6 +139,20 @@ def test_what_cannot_be_compared_is_refused_unless_a_version_is_given(tmp_path):
         second.run(tmp_path / "out.zarr", workers=0, resume=True)
 
 
+def test_an_object_that_refers_to_itself_is_refused_by_name():
+    nested: list[object] = [1.0]
+    nested.append(nested)
+    with pytest.raises(StudyError, match="version="):
+        spun(scaled(nested))
+
+
+def test_a_function_without_a_module_is_compared():
+    first, second = ({}, {})
+    exec("def value(motion):\n    return motion.duration", first)
+    exec("def value(motion):\n    return -motion.duration", second)
+    assert spun(first["value"]).hash != spun(second["value"]).hash
+
+
 ARM = '<body name="arm" pos="0 0 0.3"><joint name="arm_hinge" axis="1 0 0"/><geom size="0.1" mass="{}"/></body>'
 MJCF = """<mujoco><worldbody><body name="torso"><freejoint/><geom size="0.2" mass="3"/><include file="arm.xml"/></body>
 </worldbody></mujoco>"""
