@@ -75,8 +75,8 @@ class Plan:
     goal_error : angle between the reconstructed attitude at the end and the goal [rad]
     transcription_gap : goal error before the Newton corrections: the error of the discretisation [rad]
     polish_steps : Newton corrections of the path's coefficients that removed it
-    kkt_residual : residual of the discrete optimum's KKT conditions before the corrections, scaled; up to 1e-3 for a
-        motion of many strokes, whose search ends where the cost has settled
+    kkt_residual : residual of the discrete optimum's KKT conditions before the corrections, scaled; for many strokes
+        that of the optimum among motions of so many equal ones
     coefficients : (pieces + 1, m) control points of the free coordinates [rad or m]
     iterations, seconds : of all starts
     starts : results of the starts, in their order

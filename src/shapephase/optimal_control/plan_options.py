@@ -239,7 +239,7 @@ class Search:
     starts : number of local searches from different guesses, up to 1000; the cheapest plan is returned. For up to eight
         free joints, and for up to twelve with several starts, they are the best of more guesses, up to sixteen, by a
         coarse search. For up to eight, two further guesses are tried where none leads to a plan, then a motion of many
-        strokes; that comes first where two joints cannot turn the body so far in four rounds
+        equal strokes; that comes first where two joints cannot turn the body so far in four rounds
     seed : seed of the random guesses; equal seeds give equal plans
     pieces : pieces of the spline, from six to 2000; None: 160 for up to four free joints and the costs "kinetic" and
         "rate", else 40 for up to eight, 20 for more, and up to four times as many where the path misses the goal; a

@@ -23,13 +23,14 @@ from ..body.body import Body
 from ..errors import PlanNotFound
 from ..run_progress import ProgressCallback, check_progress
 from ..shape_space.connection import mechanical_connection
-from ._local_search import Attempt, LocalSearch, failure_message, guessed_attitudes
+from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes, polished_path
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
 from ._polish import panel_nodes
 from ._reachable_turns import check_reachable
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
+from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
 from .plan import Plan
 from .plan_options import Goal, Limits, Search, Waypoint, goal_argument
@@ -251,16 +252,24 @@ def _searched_here(jobs: Sequence[_Job], search: Search, monitor: _SearchMonitor
 
 
 def _searched_by_strokes(task: Reorientation, search: Search, monitor: _SearchMonitor) -> Iterator[Attempt]:
-    """Yield the local search from a motion of many strokes, for few joints."""
-    stroked = guess_of_strokes(task, search.seed, search.pieces) if task.dimension <= _MANY_JOINTS else None
+    """Yield the optimum among motions of many equal strokes, for few joints, else the local search from there."""
+    if task.dimension > _MANY_JOINTS:
+        return
+    stroked = guess_of_strokes(task, search.seed, search.pieces)
     if stroked is None:
         return
-    layout, control = stroked
+    (layout, control), callback = stroked, monitor.solver_callback("search", 1, 1)
+    if strokes_suffice(task):
+        began = time.perf_counter()
+        solution = StrokeProgram(task, layout).solve_strokes(control, callback)
+        equal = corrected_attempt(task, layout.basis, solution, polished_path(task, layout.basis, solution), began)
+        yield equal
+        if equal.report.converged or monitor.stopped:
+            return
     guess = guess_of_control(task, layout.basis, control)
     if guess is not None:
         few = replace(search, pieces=layout.basis.pieces)
-        local = LocalSearch.of(task, layout.basis, few, settles=True)
-        yield local.attempt(guess, monitor.solver_callback("search", 1, 1))
+        yield LocalSearch.of(task, layout.basis, few, settles=True).attempt(guess, callback)
 
 
 def _searched_by(

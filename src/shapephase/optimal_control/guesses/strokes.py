@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -11,9 +10,9 @@ import numpy as np
 from ... import so3
 from ...arrays import Array
 from ...shape_space.connection import connection_slopes, curvature, mechanical_connection
-from .._spline_basis import SplineBasis
 from ..task import Reorientation
 from .loops import start_metric
+from .stroke_program import PIECES_OF_WAY, Layout
 
 _POINTS = 8  # control points of a stroke, a periodic cubic spline: a loop with two harmonics
 _STEPS = 32  # round a stroke: it turns the body by little, so midpoints are good to 1e-3
@@ -27,7 +26,6 @@ _DAMPING = 1e-3  # of it, relative to the turn: small enough to end at rounding
 _STEERED = 1e-6  # [rad], miss of three legs that counts as none: far below one stroke
 _IDLE = 1e-6  # [rad per length], turn below which a stroke is left out
 PIECES_OF_STROKE = 6  # of the shortest stroke; longer ones have more, so that all go at about one pace
-PIECES_OF_WAY = 6  # between legs: enough for a spline to leave one stroke and to come to another
 MOST_PIECES = 2000  # in all, as of `Search`
 _CELLS = 24  # a side of the plane of two coordinates over which curvature is summed: a rough bound
 _RIDGE = 1e-3  # on the metric, share of its mean eigenvalue, so that every motion has a cost
@@ -77,29 +75,6 @@ class _Leg:
         places = np.linspace(0.0, 1.0, len(curve))
         phases = phases if self.rounds >= 0.0 else 1.0 - phases
         return np.stack([np.interp(phases, places, column) for column in smaller.T], axis=1)
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Places of the strokes of some legs on a spline: way, leg, way, leg, ..., way.
-
-    Attributes
-    ----------
-    strokes : pieces of a stroke of each leg, and its number of rounds
-    """
-
-    strokes: tuple[tuple[int, int], ...]
-
-    @cached_property
-    def firsts(self) -> list[int]:
-        """First piece of each leg."""
-        lengths = [pieces * rounds + PIECES_OF_WAY for pieces, rounds in self.strokes]
-        return [PIECES_OF_WAY + sum(lengths[:leg]) for leg in range(len(lengths))]
-
-    @cached_property
-    def basis(self) -> SplineBasis:
-        """Spline of the whole motion."""
-        return SplineBasis(self.firsts[-1] + int(np.prod(self.strokes[-1])) + PIECES_OF_WAY)
 
 
 def most_of_a_loop(task: Reorientation) -> float:
