@@ -68,7 +68,12 @@ library = library_digest()
 nb_merge_streams = True
 
 autosummary_generate = False
-autodoc_default_options = {"members": True, "undoc-members": False}
+autodoc_default_options = {
+    "members": True,
+    "undoc-members": False,
+    # Methods of a base class of our own are on the page of the class that users have.
+    "inherited-members": "object,BaseException,Sequence,Mapping,tuple,str,int,Protocol,Enum",
+}
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
