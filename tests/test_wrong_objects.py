@@ -130,6 +130,8 @@ def test_every_function_that_hands_keywords_on_names_one_that_it_does_not_have(t
         "Motion.write_csv": (motion.write_csv, tmp_path / "m.csv"),
         "export_motion": (sp.exports.export_motion, motion, tmp_path / "m.nc"),
         "motion_dataset": (sp.exports.motion_dataset, motion),
+        "mujoco_arrays": (sp.exports.mujoco_arrays, motion),
+        "pinocchio_arrays": (sp.exports.pinocchio_arrays, motion),
         "motion_html": (sp.plotting.motion_html, motion),
         "motion_page": (sp.motion_page, motion, tmp_path / "m.html"),
         "motion_video": (sp.plotting.motion_video, motion, tmp_path / "m.gif"),

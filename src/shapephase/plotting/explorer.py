@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_file_name, check_object
 from ..arrays import Array, finite_array
-from ..body.drawing.appearance import visuals
 from ..body.body import Body
+from ..body.drawing.appearance import visuals
 from ..errors import ShapeError
 from ..files import write_whole
 from ..letters import what_came

@@ -17,8 +17,8 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Integers
 from ..body.body import Body
-from ..body.loading import load_body
 from ..body.family import BodyFamily
+from ..body.loading import load_body
 from ..deformation.deformation import Deformation, DeformationFamily, articulated, rigid
 from ..errors import StudyError
 from ..integrator import machine_code

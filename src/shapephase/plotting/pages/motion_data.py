@@ -10,9 +10,9 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array
-from ...body.drawing.visual import Visual
 from ...body.body import Body
 from ...body.couplings.coordinate_map import CurvedJoint
+from ...body.drawing.visual import Visual
 from ...shape_space.ball_columns import ball_columns, neighbours_signs
 from .._moving_scene import MovingNode, MovingScene
 
