@@ -1,9 +1,12 @@
 # The checks of .ci/run, on the environment that the README's commands make.
 BIN ?= .venv/bin
 
-.PHONY: check lint types imports test deaths goals published times notebooks docs full lowest fuzz bench
+.PHONY: check lint types imports test deaths goals published times notebooks docs full nightly lowest fuzz bench
 
-check: lint types imports test deaths goals published docs
+check: lint types imports test published docs
+
+# What takes many minutes: long tests, a killed study, damaged files.
+nightly: full deaths fuzz
 
 lint:
 	$(BIN)/ruff check .

@@ -60,6 +60,7 @@ MOST_OBJECTS = 256 * 1024
 MOST_RESIDENT = 6 * 2**20
 
 
+@pytest.mark.full
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="no /proc on this system")
 @pytest.mark.parametrize(
     ("work", "count"),

@@ -144,6 +144,7 @@ def swings(file, rows):
     return file
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("rows", [400_101, pytest.param(1_000_000, marks=pytest.mark.full)])
 def test_a_recording_of_a_million_rows(tmp_path, rows):
     """It is read, and refused with what would do, in the memory that its numbers take."""
@@ -162,6 +163,7 @@ def test_a_recording_of_a_million_rows(tmp_path, rows):
     assert memory < 200e6 + 600.0 * rows
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("rows", "momentum"),
     [(2_000, 10), pytest.param(200_000, 0, marks=pytest.mark.full), pytest.param(200_000, 10, marks=pytest.mark.full)],

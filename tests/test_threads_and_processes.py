@@ -233,6 +233,7 @@ def arrays_of(thing, depth=0):
             yield from arrays_of(getattr(thing, field.name), depth + 1)
 
 
+@pytest.mark.full
 def test_what_is_written_into_results_and_floating_point_errors_that_raise_change_nothing(expected):
     """Every array of every result that can be written to is filled with nonsense; all calls give what they gave."""
     on = objects()

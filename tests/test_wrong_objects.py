@@ -130,6 +130,8 @@ def test_every_function_that_hands_keywords_on_names_one_that_it_does_not_have(t
         "Motion.write_csv": (motion.write_csv, tmp_path / "m.csv"),
         "export_motion": (sp.exports.export_motion, motion, tmp_path / "m.nc"),
         "motion_dataset": (sp.exports.motion_dataset, motion),
+        "mujoco_arrays": (sp.exports.mujoco_arrays, motion),
+        "pinocchio_arrays": (sp.exports.pinocchio_arrays, motion),
         "moving_scene": (sp.plots.moving_scene, motion, 5),
         "view": (sp.view, motion),
         "write_bvh": (sp.exports.write_bvh, motion, tmp_path / "m.bvh"),

@@ -472,6 +472,7 @@ def test_a_fault_of_ours_is_one_line_too(capfd, monkeypatch):
     assert "please report it" in said
 
 
+@pytest.mark.full
 def test_a_search_that_finds_nothing_writes_its_best_try(capfd, tmp_path):
     out = tmp_path / "plan.csv"
     small = ("--pieces", "20", "--iterations", "3")

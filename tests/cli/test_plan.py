@@ -96,6 +96,7 @@ def planned(*arguments, capsys, out):
     return json.loads(capsys.readouterr().out), path.shape(np.linspace(0.0, path.duration, 101)), body
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_a_link_is_pointed(tmp_path, capsys):
     """By the attitude printed and the link's frame as the body has it at the posture asked for."""
@@ -111,6 +112,7 @@ def test_a_link_is_pointed(tmp_path, capsys):
     assert not shapes[:, body.joint_index("waist_roll")].any()
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_postures_lists_and_mirrors(tmp_path, capsys):
     """A plan ends where another ended, and a joint moves against its leader."""
@@ -189,6 +191,7 @@ def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_ta
     assert said == [(0.25, "search 2 of 4: iteration 12, 57 s left"), (0.5, "search 2 of 4: iteration 12, 0 s left")]
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_of_several_turns_the_cheapest_is_made(tmp_path, capsys):
     one, _, _ = planned("cat_two_halves", "--turn", "-8 about 0,1,0", capsys=capsys, out=tmp_path / "one.csv")
@@ -217,6 +220,7 @@ def test_workers_find_what_one_process_finds(tmp_path, capsys):
     assert np.array_equal(shapes, same)
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_a_page_says_that_nothing_was_found(tmp_path):
     page = tmp_path / "plan.html"

@@ -64,6 +64,7 @@ def test_one_command_goes_from_the_take_to_the_split(with_report, take, tmp_path
     assert len(fit["times_s"]) == found["recording"]["samples"]
 
 
+@pytest.mark.full
 def test_what_was_done_is_on_the_card(take, capsys):
     main(["split", "diver", str(take), "--flight", "0.5", "1.2", "--tolerance", "1e-6"])
     text = capsys.readouterr().out

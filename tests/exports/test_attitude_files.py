@@ -76,6 +76,7 @@ def test_spice_has_attitude_and_rates_at_the_records(spice, satellite, tmp_path)
     spice.dafcls(handle)
 
 
+@pytest.mark.full
 def test_times_of_spice_far_from_j2000_are_too_coarse_for_a_fast_body(spice, cat, tmp_path):
     """A digit of a time in 2026 is 1.2e-7 s."""
     with pytest.raises(AccuracyNotReached, match=r"1\.2e-07 s"):

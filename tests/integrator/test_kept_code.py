@@ -193,6 +193,7 @@ def test_a_process_that_is_killed_leaves_nothing_that_hurts(process, tmp_path, t
     assert 0 < found["kept"] < trials
 
 
+@pytest.mark.full
 def test_another_processor_has_a_file_of_its_own(process, home):
     """The same folder, as in a home that two machines share."""
     other = KeepingProcess(NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")

@@ -41,6 +41,7 @@ def flown(name, plan, momentum=(0.0, 0.0, 0.0)):
     return pinocchio_motion(name, plan.body.joint_names, plan.path, np.asarray(momentum), breaks=breaks).attitude[-1]
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_of_several_attitudes_the_cheapest_is_taken(two_halves):
     near = turn([0.3, 1.0, 0.4], 0.5)
@@ -99,6 +100,7 @@ def test_a_body_that_looks_right_already_does_not_move(two_halves):
     assert plan.goal_error < 1e-8
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["cat_two_halves", pytest.param("satellite", marks=pytest.mark.full)])
 @pytest.mark.usefixtures("few_guesses")
 def test_a_link_is_pointed_and_its_joints_help(name):

@@ -115,6 +115,7 @@ def test_the_charge_is_the_price_of_the_turn(two_halves, skew, rng):
     check_multipliers(motion, SKEW, "kinetic", rng)
 
 
+@pytest.mark.full
 def test_from_a_coarse_plan_to_its_extremal(two_halves, skew):
     plan, motion = skew
     truth = pinocchio_motion("cat_two_halves", two_halves.joint_names, motion.path, np.zeros(3))

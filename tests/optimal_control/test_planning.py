@@ -345,6 +345,7 @@ def test_too_short_a_time(cost, load_urdf):
     assert max(start.iterations for start in failure.value.best.starts) <= 60
 
 
+@pytest.mark.full
 @pytest.mark.usefixtures("few_guesses")
 def test_the_same_seed_gives_the_same_plan():
     body = sp.load_body("cat_two_halves")

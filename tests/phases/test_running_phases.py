@@ -378,6 +378,7 @@ def test_arcs_outside_the_motion():
 # ---- A continuous phase --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "closed"),
     [

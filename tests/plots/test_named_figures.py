@@ -173,6 +173,7 @@ def test_the_plot_command(tmp_path, capfd):
         assert said.count("\n") == 1
 
 
+@pytest.mark.full
 def test_the_report_command_writes_nothing_in_a_pipe_but_what_it_says(tmp_path, capfd):
     out = tmp_path / "report.html"
     done = ran("split", "satellite", "satellite_sweep", "--html", out)
@@ -273,6 +274,7 @@ def test_what_is_beside_the_body_follows_the_scrubber(tmp_path, chromium):
     assert [message for message in said if message[0] in ("error", "warning")] == []
 
 
+@pytest.mark.full
 def test_the_report_of_a_body_with_36_joints_is_small_and_says_what_was_given(tmp_path):
     body = sp.load_body("example:human")
     path = random_loop(body, np.random.default_rng(1))

@@ -92,6 +92,7 @@ def test_energy_is_the_work_of_the_torque_and_of_the_joints():
     assert found.loads.energy_defect < 1e-10
 
 
+@pytest.mark.full
 def test_no_torque_and_a_tiny_one_go_the_same_way():
     """No branch: zeros and 1e-12 N m; what a small torque changes is linear in it."""
     free = sp.reconstruct(cat_motion(stir).deformation, [0.004, -0.002, 0.005], tolerance=1e-11)
@@ -124,6 +125,7 @@ def test_axes_and_breaks():
     np.testing.assert_allclose(fixed.final_momentum, [0.8, 0.2, 2.0], rtol=0, atol=1e-12)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("orbits", "factor"), [(3, 2.0), pytest.param(10, 30.0, marks=pytest.mark.full)])
 def test_the_estimate_grows_where_the_motion_is_chaotic(orbits, factor):
     """Hyperion tumbles: an ellipsoid of 190, 145 and 114 km on an orbit of eccentricity 0.1, a period 2 pi.

@@ -333,6 +333,7 @@ def test_stokes_for_loops_of_all_kinds(name, rng):
         assert apart(stokes_holonomy(body, path, 1e-10), want) < 1e-10, kind
 
 
+@pytest.mark.full
 def test_any_centre_will_do(rng):
     """Inside, outside, on the loop, at a corner: the cones differ by what has no boundary."""
     cat = sp.load_body("cat_two_halves")

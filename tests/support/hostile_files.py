@@ -575,7 +575,7 @@ def _mjcfs() -> Iterator[Case]:
         warned="what stands still in the world is left out: 'b'",
     )
     ball = '<body name="b"><freejoint/><geom size="1"/></body>'
-    several = "body 'b': 2 bodies in the world.*'trunk', 'b'; say which one by root_body='trunk'"
+    several = "body 'b': 2 bodies in the world.*'trunk', 'b'; choose one by root_body='trunk'"
     yield _mjcf("a free ball", "</worldbody>", f"{ball}</worldbody>", several, '<body name="b"')
     yield _mjcf("a free ball left out", "</worldbody>", f"{ball}</worldbody>", options=(("root_body", "trunk"),))
     yield _mjcf(

@@ -122,7 +122,8 @@ class JointLoads:
         }
 
 
-_GAUSS, _WEIGHTS = (np.asarray(values, dtype=np.float64) for values in leggauss(_POINTS))
+_GAUSS = np.asarray(leggauss(_POINTS)[0], dtype=np.float64)
+_WEIGHTS = np.asarray(leggauss(_POINTS)[1], dtype=np.float64)
 _TO_SERIES = np.asarray(np.linalg.inv(chebyshev(_GAUSS, _POINTS)), dtype=np.float64)  # from values at Gauss points
 _EVEN = np.linspace(-1.0, 1.0, _LOOKS)
 _TO_EVEN = chebyshev(_EVEN, _POINTS) @ _TO_SERIES  # from values at Gauss points to those at even places

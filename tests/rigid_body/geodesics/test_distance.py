@@ -98,6 +98,7 @@ def test_the_sub_riemannian_distance_to_turns_about_the_forbidden_axis_q6():
         assert found.certified
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("moments", [pytest.param(TRIAXIAL[1], marks=pytest.mark.full), TRIAXIAL[2]], ids=str)
 def test_distances_are_a_metric_between_their_bounds_q6(moments):
     attitudes = Rotation.random(2, random_state=4).as_matrix()
@@ -156,6 +157,7 @@ def test_short_turns_about_stiff_axes_are_straight_q5():
         assert found.length == pytest.approx(1e-6 * np.sqrt(moments[k]), rel=1e-9)
 
 
+@pytest.mark.full
 def test_distances_converge_as_the_inverse_of_the_moment_q5():
     # d^2/2 is the least action, so that its derivative by 1/I_1 is minus half the integral of Pi_1^2 along the way.
     limit = left_invariant_metric([np.inf, 2.0, 1.0])

@@ -9,9 +9,10 @@ from ..formats.bvh_text import is_bvh
 
 _HEAD = 65536  # bytes that are searched: comments of bioMod files fill some thousand
 
-# Read by engines, the first throughout XML and drawn, the second expanded to a URDF; and two that are read here.
-MJCF, XACRO = "mjcf", "xacro"
-BVH, MVNX = "bvh", "mvnx"
+MJCF = "mjcf"  # XML throughout, and drawn
+XACRO = "xacro"  # expanded to a URDF
+BVH = "bvh"  # read here, without an engine
+MVNX = "mvnx"  # read here, without an engine
 
 
 class Format(NamedTuple):

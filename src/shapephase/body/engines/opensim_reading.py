@@ -24,18 +24,18 @@ from .opensim_poses import add_poses
 
 _CUBIC = 3
 _FREE = 6  # coordinates of a body that floats
-_X, _Y, _Z = np.eye(3)
-_NAMED = {"x": _X, "y": _Y, "z": _Z}
+_UNITS = np.eye(3)
+_NAMED = {"x": _UNITS[0], "y": _UNITS[1], "z": _UNITS[2]}
 _TURN = "revolute"
 _SLIDE = "prismatic"
 # Axes of OpenSim's joints in order, and the coordinate of each.
 _KNOWN = {
     "WeldJoint": (),
-    "PinJoint": ((_TURN, _Z, 0),),
-    "SliderJoint": ((_SLIDE, _X, 0),),
-    "UniversalJoint": ((_TURN, _X, 0), (_TURN, _Y, 1)),
-    "GimbalJoint": ((_TURN, _X, 0), (_TURN, _Y, 1), (_TURN, _Z, 2)),
-    "PlanarJoint": ((_SLIDE, _X, 1), (_SLIDE, _Y, 2), (_TURN, _Z, 0)),
+    "PinJoint": ((_TURN, _UNITS[2], 0),),
+    "SliderJoint": ((_SLIDE, _UNITS[0], 0),),
+    "UniversalJoint": ((_TURN, _UNITS[0], 0), (_TURN, _UNITS[1], 1)),
+    "GimbalJoint": ((_TURN, _UNITS[0], 0), (_TURN, _UNITS[1], 1), (_TURN, _UNITS[2], 2)),
+    "PlanarJoint": ((_SLIDE, _UNITS[0], 1), (_SLIDE, _UNITS[1], 2), (_TURN, _UNITS[2], 0)),
 }
 
 
@@ -341,7 +341,7 @@ class _Reading:
         followed = {driver for rule in rules for driver, _ in rule.terms}
         for name, coordinate in self._coordinates.items():
             if name in followed and name not in carriers and coordinate.locked is None:
-                self._step(base, f"{base}__{name}", (np.eye(3), np.zeros(3)), name, coordinate.kind, _Z)
+                self._step(base, f"{base}__{name}", (np.eye(3), np.zeros(3)), name, coordinate.kind, _UNITS[2])
 
     def _add_body(self, body: Any) -> None:
         name = body.getName()

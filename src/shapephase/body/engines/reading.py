@@ -14,10 +14,12 @@ from ...child_process import limit_this_process
 from .chain import UnusableModelError
 from .formats import FORMATS, Format
 
-# What can be requested of a file: links and joints, the URDF that it stands for, or what can be drawn.
-BODY, TEXT, SHAPES = "body", "text", "shapes"
-# Exit codes: out of memory, engine not installed, file unusable (the reason is on standard output).
-NO_MEMORY, MISSING, REFUSED = 3, 4, 5
+BODY = "body"  # request for links and joints
+TEXT = "text"  # request for the URDF that a file expands to
+SHAPES = "shapes"  # request for what can be drawn
+NO_MEMORY = 3  # exit code: out of memory
+MISSING = 4  # exit code: the engine is not installed
+REFUSED = 5  # exit code: the file is unusable, for the reason on standard output
 MEMORY = 1024 * 2**20  # [bytes] beyond the imports; the largest public models take a tenth
 
 

@@ -23,20 +23,20 @@ from ...arrays import Array
 from ..formats.xml_text import quoted
 from .chain import EXACT, Chain, UnusableModelError, inertia_and_momentum, rates_by_differences
 
-_X, _Y, _Z = np.eye(3)  # to the left (turns forwards and back), to the back, and up for a person who stands
+_UNITS = np.eye(3)  # x to the left (turns forwards and back), y to the back, z up for a person who stands
 _ROOT = "P"
 # For each segment the one it hangs on, and the package's names of the turns between them, in their order.
 _JOINTS = {
-    "T": ("P", (("PTsagittalFlexion", _X), ("PTbending", _Y))),
-    "C": ("T", (("TCsagittalSpinalFlexion", _X), ("TCspinalTorsion", _Z))),
-    "A1": ("C", (("CA1extension", _X), ("CA1adduction", _Y), ("CA1rotation", _Z))),
-    "A2": ("A1", (("A1A2extension", _X),)),
-    "B1": ("C", (("CB1extension", _X), ("CB1abduction", _Y), ("CB1rotation", _Z))),
-    "B2": ("B1", (("B1B2extension", _X),)),
-    "J1": ("P", (("PJ1extension", _X), ("PJ1adduction", _Y))),
-    "J2": ("J1", (("J1J2flexion", _X),)),
-    "K1": ("P", (("PK1extension", _X), ("PK1abduction", _Y))),
-    "K2": ("K1", (("K1K2flexion", _X),)),
+    "T": ("P", (("PTsagittalFlexion", _UNITS[0]), ("PTbending", _UNITS[1]))),
+    "C": ("T", (("TCsagittalSpinalFlexion", _UNITS[0]), ("TCspinalTorsion", _UNITS[2]))),
+    "A1": ("C", (("CA1extension", _UNITS[0]), ("CA1adduction", _UNITS[1]), ("CA1rotation", _UNITS[2]))),
+    "A2": ("A1", (("A1A2extension", _UNITS[0]),)),
+    "B1": ("C", (("CB1extension", _UNITS[0]), ("CB1abduction", _UNITS[1]), ("CB1rotation", _UNITS[2]))),
+    "B2": ("B1", (("B1B2extension", _UNITS[0]),)),
+    "J1": ("P", (("PJ1extension", _UNITS[0]), ("PJ1adduction", _UNITS[1]))),
+    "J2": ("J1", (("J1J2flexion", _UNITS[0]),)),
+    "K1": ("P", (("PK1extension", _UNITS[0]), ("PK1abduction", _UNITS[1]))),
+    "K2": ("K1", (("K1K2flexion", _UNITS[0]),)),
 }
 _BY_DIFFERENCES = 1e-11  # share of the largest terms in a momentum by differences
 # factor off the perimeters possible for a width, 2 to pi times; sample female1 is off by 1.46, a slipped point by more
