@@ -50,7 +50,9 @@ def _over_a_floor(name: str, height: float) -> mujoco.MjModel:
     written = mujoco.MjSpec.from_string(floating_urdf(name))
     for number in range(1, alone.nbody):
         body, centre = written.body(alone.body(number).name), alone.body_ipos[number]
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_RADIUS, 0, 0], pos=centre, mass=0.0, contype=1, conaffinity=2)
+        body.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[_RADIUS, 0, 0], pos=centre, mass=0.0, contype=1, conaffinity=2
+        )
     written.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], pos=[0, 0, height], contype=2, conaffinity=1
     )

@@ -154,9 +154,7 @@ def _speeds(body: Body, trajectory: FloatingTrajectory) -> Array | None:
     return velocity + so3.apply(trajectory.attitude, in_base)
 
 
-def _clear_part(
-    times: Array, centres: Array, speeds: Array | None, first: int, past: int, how: str
-) -> AirbornePart:
+def _clear_part(times: Array, centres: Array, speeds: Array | None, first: int, past: int, how: str) -> AirbornePart:
     """The stretch without what a contact accelerates at its ends, which `how` then names."""
     begin, end = first, past
     # Rates that are given show a contact within a sample, through noise that hides it from places.
@@ -212,8 +210,10 @@ def _flight_end(times: Array, values: Array, order: int) -> int:
         held = found[first:].mean(axis=0) - pull
         size = float(np.linalg.norm(held))
         upwards = -held @ pull > _STEEP * float(np.linalg.norm(pull)) * size > 0.0
-        if end < count or jumps[later].max() > _EVEN * _GRAVITY or (
-            length == _SHORTEST and upwards and size > 0.5 * jumps[first]
+        if (
+            end < count
+            or jumps[later].max() > _EVEN * _GRAVITY
+            or (length == _SHORTEST and upwards and size > 0.5 * jumps[first])
         ):
             end = max(int(starts[first]) + 2 - stride, 0)
     return end

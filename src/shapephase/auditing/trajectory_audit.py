@@ -22,7 +22,10 @@ from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
 from ._airborne import AirbornePart, airborne_part
 from ._consistency import rate_agreement
+from ._drag import drag
+from ._gravity import wrong_gravity
 from ._integration_step import StepOrder, as_semi_implicit_euler, step_hypothesis, step_order
+from ._joint_offsets import joint_offsets
 from ._missing_term import no_gyroscopic_term
 from ._noise import TrajectoryNoise
 from ._observation import Observation, observed
@@ -128,8 +131,17 @@ def audit(
     notes = _notes(seen, looked, order)
     most = max(one.tolerance for one in looked)
     if all(one.right for one in looked):
+        # No residual holds a constant acceleration, so nothing else explains it.
+        gravity = wrong_gravity(seen, looked, _WANDER)
+        causes = () if gravity is None else (gravity,)
         return Audit(
-            body=body.name, runs=tuple(looked), tolerance=most, hypotheses=(), cause=(), step_order=order, notes=notes
+            body=body.name,
+            runs=tuple(replace(one, right=not causes) for one in looked),
+            tolerance=most,
+            hypotheses=causes,
+            cause=causes,
+            step_order=order,
+            notes=notes,
         )
     found = _ranked(body, flown, fits, looked, order, noise)
     return Audit(
@@ -315,7 +327,13 @@ def _ranked(
     square = sum(fit.square for fit in fits)
     candidates = [
         Candidate(hypothesis=_with(found, of_rates, freedom + more), of_rates=of_rates)
-        for found in (*wrong_inertias(body, fits), *outside_pushes(fits), no_gyroscopic_term(fits))
+        for found in (
+            *wrong_inertias(body, fits),
+            *joint_offsets(body, fits),
+            *outside_pushes(fits),
+            drag(body, fits),
+            no_gyroscopic_term(fits),
+        )
         if found is not None
     ]
     readings = other_readings(body, runs, noise, [fit.seen.noise for fit in fits])

@@ -1,0 +1,95 @@
+"""The hypotheses that one joint is read with a constant offset, as an encoder has that was set to zero elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..body.body import Body
+from ..shape_space.ball_columns import ball_columns
+from ._observation import Observation
+from ._residuals import Residuals
+from .hypothesis import FittedValue, Hypothesis
+
+_NUDGE = 1e-6  # [rad or m] by which a joint is moved for the derivative of the centre of mass
+_STEPS = 6  # of Gauss and Newton; each gains about two digits
+_CANDIDATES = 4  # hypotheses that leave the least are fitted to the end, the others to first order
+_UNSEEN = 1e9  # [rad or m] bar of an offset that moves nothing
+
+
+def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
+    """One hypothesis for each joint of one coordinate, fitted to all runs together."""
+    joints = np.arange(body.n_shape)
+    joints = np.setdiff1d(
+        joints, np.concatenate([joints[:0], *(joints[ball] for ball in ball_columns(body.joint_names))])
+    )
+    if not len(joints):
+        return []
+    columns = np.vstack([_by_shapes(body, fit) for fit in fits])[:, joints]
+    vector = np.concatenate([fit.vector for fit in fits])
+    freedom = sum(fit.freedom for fit in fits)
+    strengths = np.linalg.norm(columns, axis=0)
+    seen = strengths * _UNSEEN > 1.0
+    values = np.where(seen, vector @ columns / np.where(seen, strengths, 1.0) ** 2, 0.0)
+    squares = vector @ vector - (values * strengths) ** 2
+    found = []
+    for rank, place in enumerate(np.argsort(squares, kind="stable").tolist()):
+        if not seen[place]:
+            continue
+        joint, value, square = int(joints[place]), float(values[place]), float(squares[place])
+        if rank < _CANDIDATES:
+            value, square = _to_the_end(body, joint, value, columns[:, place], fits)
+        unit = body.joint_units[joint]
+        offset = FittedValue(value=value, bar=float(1.0 / strengths[place]), unit=unit)
+        found.append(
+            Hypothesis(
+                name=f"offset of joint {body.joint_names[joint]}",
+                kind="offset",
+                square=square,
+                left_over=float(np.sqrt(max(square, 0.0) / freedom)),
+                parameters=1,
+                values={"offset": offset},
+                remark=f"read {np.degrees(value):+.3g} degrees off" if unit == "rad" else "",
+            )
+        )
+    return found
+
+
+def _by_shapes(body: Body, fit: Residuals) -> Array:
+    """What each coordinate of the shape adds to the residuals: (M, n)."""
+    seen = fit.seen
+    shapes = seen.trajectory.shapes
+    momentum = body.angular_momentum_gradient(shapes, seen.joint_rates, seen.rate)
+    nudges = _NUDGE * np.eye(body.n_shape)
+    ahead, behind = (body.centre_of_mass(shapes[:, None] + sign * nudges) for sign in (1.0, -1.0))
+    centre = (ahead - behind) / (2.0 * _NUDGE)
+    return fit.columns(*(seen.attitude @ np.swapaxes(change, 1, 2) for change in (momentum, centre)))
+
+
+def _to_the_end(body: Body, joint: int, value: float, column: Array, fits: Sequence[Residuals]) -> tuple[float, float]:
+    """Gauss and Newton with the whole dependence: the offset, and what it leaves."""
+    best = (0.0, float(sum(fit.square for fit in fits)))
+    for _ in range(_STEPS):
+        left = np.concatenate([fit.of(_read_with(body, fit.seen, joint, value)) for fit in fits])
+        square = float(left @ left)
+        if square >= best[1]:
+            break
+        best = (value, square)
+        value += float(column @ left) / float(column @ column)
+    return best
+
+
+def _read_with(body: Body, seen: Observation, joint: int, offset: float) -> Observation:
+    """The same samples with an offset taken off one joint."""
+    shapes = seen.trajectory.shapes.copy()
+    shapes[:, joint] -= offset
+    inertia, internal = body.sample(shapes, seen.joint_rates)
+    momentum = so3.apply(seen.attitude, so3.apply(inertia, seen.rate) + internal)
+    if seen.centre is None or seen.trajectory.position is None:
+        return replace(seen, momentum=momentum)
+    centre = seen.trajectory.position + so3.apply(seen.attitude, body.centre_of_mass(shapes))
+    return replace(seen, momentum=momentum, centre=centre)
