@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import shapephase as sp
 from support.flown_bodies import body_of, flown, noisy
+from support.independent import floating_urdf
 from support.landings import landing
 from support.planted_faults import trajectory
 
@@ -142,3 +144,49 @@ def test_gravity_in_another_direction_is_named():
     upwards = sp.audit(body_of("diver"), _flight("diver", gravity=-9.81))
     assert "towards +z" in upwards.cause[0].remark
     assert sp.audit(body_of("diver"), _flight("diver", gravity=0.0)).right
+
+
+def _heavier(name: str, link: str, factor: float) -> mujoco.MjModel:
+    """The body with one link of its file heavier, which MuJoCo merges with what it is fixed on."""
+    root = ElementTree.fromstring(floating_urdf(name))
+    inertial = next(one for one in root.findall("link") if one.get("name") == link).find("inertial")
+    assert inertial is not None
+    for element in inertial:
+        for key in {"value", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"}.intersection(element.keys()):
+            element.set(key, str(factor * float(element.get(key, "0"))))
+    return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+
+
+@pytest.mark.parametrize(
+    ("link", "part", "percent"),
+    [
+        ("dish", "boom with dish (fixed)", 10.0 * 4.0 / 7.0),
+        ("left_panel_3", "left_panel_1 with left_panel_2, left_panel_3 (fixed)", 10.0 / 3.0),
+    ],
+)
+def test_a_heavier_link_that_is_fixed_on_another_is_named_with_it(link: str, part: str, percent: float):
+    run = _flight("satellite", 2, duration=0.8, model=_heavier("satellite", link, 1.1))
+    found = sp.audit(body_of("satellite"), run, tolerance=TIGHT)
+    assert [one.name for one in found.cause] == [f"mass, centre and inertia of {part}"], found.table()
+    assert found.cause[0].values["mass"].value == pytest.approx(percent, rel=1e-4)
+    assert link in found.cause[0].remark
+
+
+def test_links_that_rest_against_each_other_are_one_part():
+    """A joint of the arm does not move: what is beyond it cannot be told from what is before it."""
+    body, times = body_of("satellite"), np.linspace(0.0, 1.0, 101)
+    joint = body.joint_names.index("arm_5")
+    shapes = 0.4 * np.sin(5.0 * times[:, None] + np.arange(body.n_shape)) * (np.arange(body.n_shape) != joint)
+    path = sp.ShapePath.spline(times, shapes, periodic=False, joint_names=body.joint_names)
+    beyond = next(part for part in body.moving_parts if part.links[0] == "arm_link_5")
+    heavier = body.with_inertias(masses={"arm_link_5": 1.1 * beyond.mass}, centres={"arm_link_5": beyond.centre + 0.05})
+    motion = sp.reconstruct(sp.articulated(heavier, path), [3.0, 8.0, 5.0], tolerance=1e-11)
+    run = sp.FloatingTrajectory(
+        times=times,
+        quaternion=sp.so3.quat_from_matrix(motion.attitude(times)),
+        shapes=shapes,
+        certain=("order", "units"),
+    )
+    found = sp.audit(body, run, tolerance=1e-7)
+    name = "mass, centre and inertia of arm_link_4 with arm_link_5 (fixed or at rest)"
+    assert name in [one.name for one in found.cause], found.table()
