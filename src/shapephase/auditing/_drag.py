@@ -78,7 +78,7 @@ def _of_whole_body(flights: Sequence[_Flight]) -> Iterator[Hypothesis]:
             numbers = numbers + np.linalg.lstsq(matrix, left, rcond=None)[0]
         if np.all(numbers[: len(names)] > 0.0) and numbers[:count].any():
             yield _hypothesis(
-                flights, matrix, square, names, numbers, "of the whole body, centre of pressure from the centre of mass"
+                flights, matrix, left, names, numbers, "of the whole body, centre of pressure from the centre of mass"
             )
 
 
@@ -106,7 +106,7 @@ def _of_links(body: Body, flights: Sequence[_Flight]) -> Iterator[Hypothesis]:
         left = vector - matrix[:, kept] @ numbers
         if np.all(numbers > 0.0):
             names = [("density", "viscosity")[place] for place in kept]
-            yield _hypothesis(flights, matrix[:, kept], float(left @ left), names, numbers, "of a fluid on each link")
+            yield _hypothesis(flights, matrix[:, kept], left, names, numbers, "of a fluid on each link")
 
 
 def _by_fluid(body: Body, flight: _Flight) -> Array:
@@ -141,8 +141,9 @@ def _by_fluid(body: Body, flight: _Flight) -> Array:
 
 
 def _hypothesis(
-    flights: Sequence[_Flight], matrix: Array, square: float, names: Sequence[str], numbers: Array, remark: str
+    flights: Sequence[_Flight], matrix: Array, left: Array, names: Sequence[str], numbers: Array, remark: str
 ) -> Hypothesis:
+    square = float(left @ left)
     bars = np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)))
     labels = [(name, _UNITS[name]) for name in names]
     labels += [(f"centre of pressure {axis}", "m") for axis in _AXES[: len(numbers) - len(names)]]
@@ -157,4 +158,5 @@ def _hypothesis(
             for (name, unit), value, bar in zip(labels, numbers, bars, strict=True)
         },
         remark=remark,
+        residuals=left,
     )

@@ -40,9 +40,11 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     for rank, place in enumerate(np.argsort(squares, kind="stable").tolist()):
         if not seen[place]:
             continue
-        joint, value, square = int(joints[place]), float(values[place]), float(squares[place])
+        joint, value, left = int(joints[place]), float(values[place]), None
+        square = float(squares[place])
         if rank < _CANDIDATES:
-            value, square = _to_the_end(body, joint, value, columns[:, place], fits)
+            value, left = _to_the_end(body, joint, value, columns[:, place], fits)
+            square = float(left @ left)
         unit = body.joint_units[joint]
         offset = FittedValue(value=value, bar=float(1.0 / strengths[place]), unit=unit)
         found.append(
@@ -54,6 +56,7 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
                 parameters=1,
                 values={"offset": offset},
                 remark=f"read {np.degrees(value):+.3g} degrees off" if unit == "rad" else "",
+                residuals=left,
             )
         )
     return found
@@ -70,15 +73,14 @@ def _by_shapes(body: Body, fit: Residuals) -> Array:
     return fit.columns(*(seen.attitude @ np.swapaxes(change, 1, 2) for change in (momentum, centre)))
 
 
-def _to_the_end(body: Body, joint: int, value: float, column: Array, fits: Sequence[Residuals]) -> tuple[float, float]:
+def _to_the_end(body: Body, joint: int, value: float, column: Array, fits: Sequence[Residuals]) -> tuple[float, Array]:
     """Gauss and Newton with the whole dependence: the offset, and what it leaves."""
-    best = (0.0, float(sum(fit.square for fit in fits)))
+    best = (0.0, np.concatenate([fit.vector for fit in fits]))
     for _ in range(_STEPS):
         left = np.concatenate([fit.of(_read_with(body, fit.seen, joint, value)) for fit in fits])
-        square = float(left @ left)
-        if square >= best[1]:
+        if left @ left >= best[1] @ best[1]:
             break
-        best = (value, square)
+        best = (value, left)
         value += float(column @ left) / float(column @ column)
     return best
 

@@ -25,12 +25,13 @@ def no_gyroscopic_term(fits: Sequence[Residuals]) -> Hypothesis | None:
     """
     if any(np.sqrt((fit.seen.internal**2).sum(axis=1).mean()) > _AS_ONE * fit.seen.scale for fit in fits):
         return None
-    square, values = 0.0, {}
+    square, values, rests = 0.0, {}, []
     for fit in fits:
         seen = fit.seen
         columns = fit.columns(seen.attitude @ seen.inertia @ so3.transpose(seen.attitude))
         rate, left = _fitted(columns, fit.vector)
         square += float(left @ left)
+        rests.append(left)
         if not values:
             values = {
                 f"angular velocity {axis}": FittedValue(value=float(part), bar=float(bar), unit="rad/s")
@@ -45,6 +46,7 @@ def no_gyroscopic_term(fits: Sequence[Residuals]) -> Hypothesis | None:
         parameters=3 * len(fits),
         values=values,
         remark="the angular velocity is constant in world axes; switch the gyroscopic force of the engine on",
+        residuals=np.concatenate(rests),
     )
 
 

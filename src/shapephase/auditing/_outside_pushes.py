@@ -24,13 +24,14 @@ _AXES = "xyz"
 
 
 class _Push(NamedTuple):
-    """Begin and end [s], fitted columns and what they leave."""
+    """Begin and end [s], fitted columns and what they leave, squared and (M,)."""
 
     begin: float
     end: float
     square: float
     amounts: Array
     bars: Array
+    left: Array
 
 
 def outside_pushes(fits: Sequence[Residuals]) -> list[Hypothesis]:
@@ -105,6 +106,7 @@ def _hypothesis(
         parameters=2 + len(push.amounts),
         values=values,
         remark=remark,
+        residuals=push.left,
     )
 
 
@@ -130,7 +132,7 @@ def _fitted(fits: Sequence[Residuals], *, with_force: bool) -> _Push:
             left = vector - right @ found
             amounts[kept] = found / lengths[kept]
             spread[kept] = np.linalg.norm(np.linalg.inv(triangle), axis=1) / lengths[kept]
-        return _Push(begin, end, float(left @ left), amounts, spread)
+        return _Push(begin, end, float(left @ left), amounts, spread, left)
 
     def cost(pair: Array) -> float:
         begin, lasts = float(pair[0]), float(np.exp(pair[1]))

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..arrays import Array
 from ..display import short_repr
 from ..plain_data import plain
 
@@ -47,6 +48,8 @@ class Hypothesis:
     parameters : how many numbers were fitted for it
     values : what they are
     remark : what else is to be said
+    residuals : (M,) what is left over in time, in units of the noise: of each run the momentum of its samples, then the
+        fall; None where the hypothesis has other samples, or none were kept
 
     Examples
     --------
@@ -62,6 +65,7 @@ class Hypothesis:
     share: float = 1.0
     values: Mapping[str, FittedValue] = field(default_factory=dict)
     remark: str = ""
+    residuals: Array | None = field(default=None, repr=False, compare=False)
 
     __repr__ = short_repr
 
