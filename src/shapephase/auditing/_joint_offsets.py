@@ -19,6 +19,8 @@ _NUDGE = 1e-6  # [rad or m] by which a joint is moved for the derivative of the 
 _STEPS = 6  # of Gauss and Newton; each gains about two digits
 _CANDIDATES = 4  # hypotheses that leave the least are fitted to the end, the others to first order
 _UNSEEN = 1e9  # [rad or m] bar of an offset that moves nothing
+_HALF_TURN = np.pi  # [rad] no joint that turns is off by more
+_FARTHEST = 3.0  # radii of gyration of the whole body: no joint that slides is off by more
 
 
 def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
@@ -38,14 +40,15 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     squares = vector @ vector - (values * strengths) ** 2
     found = []
     for rank, place in enumerate(np.argsort(squares, kind="stable").tolist()):
-        if not seen[place]:
-            continue
         joint, value, left = int(joints[place]), float(values[place]), None
+        unit = body.joint_units[joint]
+        most = _HALF_TURN if unit == "rad" else _FARTHEST * fits[0].seen.extent
+        if not seen[place] or abs(value) > most:
+            continue
         square = float(squares[place])
         if rank < _CANDIDATES:
-            value, left = _to_the_end(body, joint, value, columns[:, place], fits)
+            value, left = _to_the_end(body, joint, value, columns[:, place], fits, most)
             square = float(left @ left)
-        unit = body.joint_units[joint]
         offset = FittedValue(value=value, bar=float(1.0 / strengths[place]), unit=unit)
         found.append(
             Hypothesis(
@@ -81,7 +84,7 @@ def _to_the_end(body: Body, joint: int, value: float, column: Array, fits: Seque
         if left @ left >= best[1] @ best[1]:
             break
         best = (value, left)
-        value += float(column @ left) / float(column @ column)
+        value = float(np.clip(value + column @ left / (column @ column), -most, most))
     return best
 
 

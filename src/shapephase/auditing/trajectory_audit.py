@@ -318,7 +318,7 @@ def _ranked(
 ) -> Ranking:
     seen = [fit.seen for fit in fits]
     stepped = _step(body, seen, order)
-    runs = [_thinned(run) for run in runs]
+    runs = [thinned(run) for run in runs]
     fits = [residuals(observed(body, run, one.noise)) for run, one in zip(runs, looked, strict=True)]
     agreements = [rate_agreement(run, one.noise) for run, one in zip(runs, looked, strict=True)]
     of_rates = sum(one.square for one in agreements if one is not None)
@@ -358,7 +358,7 @@ def _shared(found: Hypothesis, whole: float) -> Hypothesis:
     return replace(found, share=float(np.sqrt(found.square / whole)) if whole > 0.0 else 0.0)
 
 
-def _thinned(run: FloatingTrajectory) -> FloatingTrajectory:
+def thinned(run: FloatingTrajectory) -> FloatingTrajectory:
     """As many samples as hypotheses are told apart by, evenly taken."""
     every = -(-len(run.times) // _MOST_SAMPLES)
     return run if every == 1 else replace(run.every(every), step=run.integrator_step)
