@@ -76,8 +76,10 @@ def _by_shapes(body: Body, fit: Residuals) -> Array:
     return fit.columns(*(seen.attitude @ np.swapaxes(change, 1, 2) for change in (momentum, centre)))
 
 
-def _to_the_end(body: Body, joint: int, value: float, column: Array, fits: Sequence[Residuals]) -> tuple[float, Array]:
-    """Gauss and Newton with the whole dependence: the offset, and what it leaves."""
+def _to_the_end(
+    body: Body, joint: int, value: float, column: Array, fits: Sequence[Residuals], most: float
+) -> tuple[float, Array]:
+    """Gauss and Newton with the whole dependence: the offset, `most` of it, and what it leaves."""
     best = (0.0, np.concatenate([fit.vector for fit in fits]))
     for _ in range(_STEPS):
         left = np.concatenate([fit.of(_read_with(body, fit.seen, joint, value)) for fit in fits])

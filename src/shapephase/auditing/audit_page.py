@@ -5,20 +5,31 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ..arguments import check_file_name, check_object
 from ..body.body import Body
 from ..files import write_whole
+from ..letters import printable
 from ..plotting.pages.templates import page_html
 from ..plotting.plot_style import axes_image
+from ..plotting.report import figure_rows
 from ._observation import observed
 from ._ranking import EXPLAINS
 from ._residuals import residuals
 from .audit_result import Audit, RunAudit
-from .figures import flight_figure, left_over_figure
+from .figures import fall_figure, left_over_figures, momentum_figure
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import Hypothesis
 from .trajectory_audit import thinned
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MOST_ROWS = 20  # hypotheses of the table; the record has all
+_KEY = "Grey: not audited."
 
 
 def write_audit_page(
@@ -29,8 +40,8 @@ def write_audit_page(
 ) -> None:
     """Write an audit as one HTML file that opens offline; whole or not at all.
 
-    Momentum and fall are drawn for all samples, those that were audited in white; then what each hypothesis leaves over
-    in time.
+    Momentum and fall are drawn for all samples, those that were not audited on grey; then the residuals before and
+    after each hypothesis.
 
     Parameters
     ----------
@@ -60,33 +71,41 @@ def write_audit_page(
         "audit.html",
         title=f"Audit of {found.body}",
         scripts=(),
-        styles=("page", "report_page"),
+        styles=("page", "report_page", "audit_page"),
         data={},
         verdict=found.verdict,
-        figures=list(_figures(body, given, found)),
+        flights=figure_rows(list(_flights(body, given, found))),
+        residuals=figure_rows(list(_left_over(body, given, found))),
         runs=[(run.name, _facts(run)) for run in found.runs],
-        hypotheses=[_row(one, found) for one in found.hypotheses],
+        hypotheses=[_row(one, found) for one in found.hypotheses[:_MOST_ROWS]],
+        others=max(len(found.hypotheses) - _MOST_ROWS, 0),
         enough=f"{100.0 * EXPLAINS:.0f} %",
         notes=found.notes,
     )
     write_whole(file, lambda stream: stream.write(page.encode()))
 
 
-def _figures(body: Body, trajectories: Sequence[FloatingTrajectory], found: Audit) -> Iterator[dict[str, str]]:
-    for run, seen in zip(found.runs, trajectories, strict=True):
-        image = axes_image(flight_figure(run, observed(body, seen, run.noise)).axes[0], "svg")
-        caption = f"{run.name}: momentum about the centre of mass, and the centre of mass. Grey: not audited."
-        yield {"caption": caption, "image": base64.b64encode(image).decode()}
-    shown = [one for one in found.hypotheses if one.residuals is not None]
-    if shown:
-        run, part = found.runs[0], found.runs[0].airborne
-        before = residuals(observed(body, thinned(trajectories[0].part(part.first, part.past)), run.noise))
-        image = axes_image(left_over_figure(found, shown, before).axes[0], "svg")
-        caption = (
-            f"Residuals of momentum and fall of {run.name} in units of the noise: grey before, coloured after a "
-            "hypothesis; black the hypotheses that are named."
-        )
-        yield {"caption": caption, "image": base64.b64encode(image).decode()}
+def _flights(body: Body, trajectories: Sequence[FloatingTrajectory], found: Audit) -> Iterator[dict[str, str]]:
+    for run, trajectory in zip(found.runs, trajectories, strict=True):
+        seen, name = observed(body, trajectory, run.noise), printable(run.name)
+        yield _shown(momentum_figure(run, seen), f"{name}: angular momentum about the centre of mass. {_KEY}")
+        fall = fall_figure(run, seen)
+        if fall is not None:
+            yield _shown(fall, f"{name}: the centre of mass, dotted the parabolas of free fall. {_KEY}")
+
+
+def _left_over(body: Body, trajectories: Sequence[FloatingTrajectory], found: Audit) -> Iterator[dict[str, str]]:
+    if not any(one.residuals is not None for one in found.hypotheses):
+        return
+    part = found.runs[0].airborne
+    flown = thinned(trajectories[0].part(part.first, part.past))
+    before = residuals(observed(body, flown, found.runs[0].noise))
+    for one, figure in left_over_figures(found, before):
+        yield _shown(figure, f"{one.name}: {100.0 * one.share:.2g} % left over")
+
+
+def _shown(figure: Figure, caption: str) -> dict[str, str]:
+    return {"caption": caption, "image": base64.b64encode(axes_image(figure.axes[0], "svg")).decode()}
 
 
 def _facts(run: RunAudit) -> list[tuple[str, str, str]]:
@@ -107,7 +126,7 @@ def _facts(run: RunAudit) -> list[tuple[str, str, str]]:
     if run.agreement is not None:
         rows.append(("rates", f"{run.agreement.mismatch:.2g}", "off the samples; " + _against(run.agreement.ratio)))
     if run.attitude_error is not None:
-        degrees = f"{57.29577951308232 * float(run.attitude_error.max()):.3g}°"
+        degrees = f"{float(np.degrees(run.attitude_error.max())):.3g}°"
         rows.append(("attitude", degrees, "at most from the nearest exact reconstruction"))
     return rows
 

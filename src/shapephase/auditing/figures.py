@@ -33,7 +33,6 @@ _A_ROW = 3
 _LONGEST = 34
 """Letters of a name."""
 _BINS = 120  # points of a curve of residuals, each the rms of the samples there
-_SMALL_MULTIPLES = 2  # figures of a row
 
 
 def audit_figure(found: Audit) -> Figure:
@@ -55,7 +54,7 @@ def audit_figure(found: Audit) -> Figure:
     """
     check_object(found, "Audit", "found")
     rows = 3 if found.hypotheses else 2
-    figure = _figure(1.6 * rows)
+    figure = _figure(1.5 * COLUMN, 1.6 * rows)
     axes = np.ravel(figure.subplots(rows, 1)).tolist()
     _drift(axes[0], found)
     _attitude(axes[1], found)
@@ -65,57 +64,66 @@ def audit_figure(found: Audit) -> Figure:
     return figure
 
 
-def flight_figure(run: RunAudit, seen: Observation) -> Figure:
-    """Momentum and centre of mass in time, all samples; those that were not audited are grey.
+def momentum_figure(run: RunAudit, seen: Observation) -> Figure:
+    """Momentum about the centre of mass in time, all samples; those that were not audited are grey.
 
     seen : of the whole trajectory
     """
-    rows = 1 if seen.centre is None else 2
-    figure = _figure(2.2 * rows)
-    axes = np.ravel(figure.subplots(rows, 1, sharex=True)).tolist()
-    _by_axes(axes[0], seen.times, seen.momentum, "momentum [kg m$^2$/s]")
-    if seen.centre is not None:
-        _by_axes(axes[1], seen.times, seen.centre - seen.centre[0], "centre of mass [m]")
-        inside = (run.times[0] <= seen.times) & (seen.times <= run.times[-1])
-        powers = np.vander(seen.times - run.times[0], 3)
-        for values in (seen.centre - seen.centre[0]).T:
-            fall = powers @ np.linalg.lstsq(powers[inside], values[inside], rcond=None)[0]
-            axes[1].plot(seen.times[inside], fall[inside], color=BLACK, linewidth=0.7, linestyle=":")
-    for ax in axes:
-        for first, last in ((seen.times[0], run.times[0]), (run.times[-1], seen.times[-1])):
-            if last > first:
-                ax.axvspan(first, last, color=GREY, alpha=0.35, linewidth=0.0)
-        ax.set_xlim(seen.times[0], seen.times[-1])
-    axes[-1].set_xlabel("time [s]")
-    _plain(axes)
-    finish(axes[0], ncols=_A_ROW)
+    return _in_flight(run, seen.times, seen.momentum, "angular momentum [kg m$^2$/s]")
+
+
+def fall_figure(run: RunAudit, seen: Observation) -> Figure | None:
+    """Centre of mass in time, with the nearest parabolas of the samples that were audited; None without places."""
+    if seen.centre is None:
+        return None
+    inside = (run.times[0] <= seen.times) & (seen.times <= run.times[-1])
+    powers = np.vander(seen.times - run.times[0], 3)
+    places = seen.centre - seen.centre[inside][0]
+    fall = powers @ np.linalg.lstsq(powers[inside], places[inside], rcond=None)[0]
+    figure = _in_flight(run, seen.times, places, "centre of mass [m]")
+    for values in fall[inside].T:
+        figure.axes[0].plot(seen.times[inside], values, color=BLACK, linewidth=0.6, linestyle=":")
     return figure
 
 
-def left_over_figure(found: Audit, shown: Sequence[Hypothesis], before: Residuals) -> Figure:
-    """Residuals in time before and after each hypothesis, small multiples with the same axes.
+def left_over_figures(found: Audit, before: Residuals) -> list[tuple[Hypothesis, Figure]]:
+    """Residuals in time before and after each hypothesis that keeps them, the best first, with the same axes.
 
     before : of the first run
     """
-    shown = shown[:_MOST_SHOWN]
+    shown = [one for one in found.hypotheses if one.residuals is not None][:_MOST_SHOWN]
     named = {one.name for one in found.cause}
-    rows = -(-len(shown) // _SMALL_MULTIPLES)
-    figure = _figure(0.4 + 1.3 * rows)
-    axes = np.ravel(figure.subplots(rows, _SMALL_MULTIPLES, sharex=True, sharey=True, squeeze=False)).tolist()
     times, curve = _in_time(before.seen.times, before.vector)
-    for ax, one in zip(axes, shown, strict=False):
-        assert one.residuals is not None
-        ax.plot(times, curve, color=GREY, linewidth=1.2)
-        after = _in_time(before.seen.times, one.residuals[: len(before.vector)])[1]
-        ax.plot(times, after, color=BLACK if one.name in named else BLUE, linewidth=1.0)
-        ax.set_title(_short(one.name), fontsize=SMALL)
+    after = [_in_time(before.seen.times, one.residuals[: len(before.vector)])[1] for one in shown]
+    every = np.concatenate([curve, *after])
+    drawn = []
+    for one, left in zip(shown, after, strict=True):
+        figure = _figure(COLUMN, 1.7)
+        ax = figure.add_subplot()
+        ax.plot(times, curve, color=GREY, linewidth=1.4)
+        ax.plot(times, left, color=BLACK if one.name in named else BLUE, linewidth=1.2)
         ax.set_yscale("log")
-    for ax in axes[len(shown) :]:
-        ax.set_visible(False)
-    for ax in axes[max(len(shown) - _SMALL_MULTIPLES, 0) : len(shown)]:
+        ax.set_ylim(0.5 * every.min(), 2.0 * every.max())
         ax.set_xlabel("time [s]")
-        ax.tick_params(labelbottom=True)
-    _plain(axes)
+        ax.set_ylabel("residuals [noise]")
+        _plain([ax])
+        drawn.append((one, figure))
+    return drawn
+
+
+def _in_flight(run: RunAudit, times: Array, values: Array, label: str) -> Figure:
+    figure = _figure(COLUMN, 2.4)
+    ax = figure.add_subplot()
+    for axis, style, column in zip("xyz", _styles(3), values.T, strict=True):
+        ax.plot(times, column, label=axis, **style)
+    for first, last in ((times[0], run.times[0]), (run.times[-1], times[-1])):
+        if last > first:
+            ax.axvspan(first, last, color=GREY, alpha=0.35, linewidth=0.0)
+    ax.set_xlim(times[0], times[-1])
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel(label)
+    _plain([ax])
+    finish(ax, ncols=_A_ROW)
     return figure
 
 
@@ -130,19 +138,13 @@ def _in_time(times: Array, vector: Array) -> tuple[Array, Array]:
     )
 
 
-def _by_axes(ax: Axes, times: Array, values: Array, label: str) -> None:
-    for axis, style, column in zip("xyz", _styles(3), values.T, strict=True):
-        ax.plot(times, column, label=axis, **style)
-    ax.set_ylabel(label)
-
-
-def _figure(height: float) -> Figure:
-    """A new one, one and a half columns wide. Raises MissingExtraError."""
+def _figure(width: float, height: float) -> Figure:
+    """A new one [in]. Raises MissingExtraError."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise MissingExtraError("figures need Matplotlib: pip install 'shapephase[plot]'") from error
-    return Figure(figsize=(1.5 * COLUMN, height), layout="constrained")
+    return Figure(figsize=(width, height), layout="constrained")
 
 
 def _plain(axes: Sequence[Axes]) -> None:
