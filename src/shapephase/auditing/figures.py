@@ -76,8 +76,8 @@ def fall_figure(run: RunAudit, seen: Observation) -> Figure | None:
     """Centre of mass in time, with the nearest parabolas of the samples that were audited; None without places."""
     if seen.centre is None:
         return None
-    inside = (run.times[0] <= seen.times) & (seen.times <= run.times[-1])
-    powers = np.vander(seen.times - run.times[0], 3)
+    inside = (run.first_time <= seen.times) & (seen.times <= run.last_time)
+    powers = np.vander(seen.times - run.first_time, 3)
     places = seen.centre - seen.centre[inside][0]
     fall = powers @ np.linalg.lstsq(powers[inside], places[inside], rcond=None)[0]
     figure = _in_flight(run, seen.times, places, "centre of mass [m]")
@@ -116,7 +116,7 @@ def _in_flight(run: RunAudit, times: Array, values: Array, label: str) -> Figure
     ax = figure.add_subplot()
     for axis, style, column in zip("xyz", _styles(3), values.T, strict=True):
         ax.plot(times, column, label=axis, **style)
-    for first, last in ((times[0], run.times[0]), (run.times[-1], times[-1])):
+    for first, last in ((times[0], run.first_time), (run.last_time, times[-1])):
         if last > first:
             ax.axvspan(first, last, color=GREY, alpha=0.35, linewidth=0.0)
     ax.set_xlim(times[0], times[-1])

@@ -183,7 +183,7 @@ def audit_command(
                 file,
                 loaded,
                 step=step,
-                names=column_names(reading.names),
+                names=column_names(reading.names) or None,
                 degrees=reading.degrees,
                 timestep=reading.timestep,
                 joint_order=reading.joint_order,
