@@ -60,7 +60,7 @@ _MOST_SAMPLES = 500
 """Of each run, by which hypotheses are told apart."""
 _MOST_LOOKED_AT = 5000
 """Samples of a trajectory that is read otherwise, to see where it falls then."""
-_NEARLY_ALL = 0.5
+_MOSTLY = 0.5
 """Of the samples: with so many in the air it is not tried whether there would be more, were they read otherwise; a
 landing at the end leaves more than that, and read wrongly it seems to be in the air."""
 _JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing here says whether they are right."
@@ -199,7 +199,7 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
         found = airborne_part(body, run, flight)
     except TrajectoryError as error:
         fault = error
-    if found is not None and found.past - found.first >= _NEARLY_ALL * len(run.times):
+    if found is not None and found.past - found.first >= _MOSTLY * len(run.times):
         return found
     every = -(-len(run.times) // _MOST_LOOKED_AT)
     for other in read_otherwise(body, run.every(every)):
