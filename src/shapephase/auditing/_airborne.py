@@ -144,7 +144,7 @@ def _centres(body: Body, trajectory: FloatingTrajectory) -> Array | None:
 
 
 def _speeds(body: Body, trajectory: FloatingTrajectory) -> Array | None:
-    """Of the centre of mass by the rates, world axes: (N, 3) [m/s], or None where they are not given."""
+    """Velocity of the centre of mass by the given rates, world axes, (N, 3) [m/s]; None without rates."""
     velocity, rate, joint_rates = trajectory.world_velocity, trajectory.base_rate, trajectory.joint_rates
     if velocity is None or rate is None or joint_rates is None:
         return None
@@ -173,11 +173,11 @@ def _clear_part(times: Array, centres: Array, speeds: Array | None, first: int, 
 def _flight_end(times: Array, values: Array, order: int) -> int:
     """The sample before which a contact in the last quarter begins, else the number of samples.
 
-    values : (N, 3) of the centre of mass, its places or, with order 1, its velocities
-
     The flight grows from the middle half of the samples. At each sample the accelerations on windows before and after
     it are compared, for windows of all lengths; the first jump that noise alone brings in all of them with `_CHANCE`
     ends the flight if it is the ground's: `_EVEN` of gravity, or less, but upwards and until the end.
+
+    values : (N, 3) of the centre of mass: with order 2 its places, with order 1 its velocities
     """
     count = len(times)
     quarter, length = count // 4, float(_SHORTEST)
@@ -192,12 +192,12 @@ def _flight_end(times: Array, values: Array, order: int) -> int:
         stride = max(1, length // _OVERLAP)
         # The last window ends with the samples.
         starts = np.arange((count - length) % stride, count - length + 1, stride)
-        found, bars = _window_accelerations(times, values, starts, length, order)
+        pulls, bars = _window_accelerations(times, values, starts, length, order)
         before = np.searchsorted(starts, starts - length, side="right") - 1
         middle = (starts - length >= quarter) & (starts + length <= count - quarter)
         if not middle.any():
             continue
-        jumps = np.where(before >= 0, np.linalg.norm(found - found[before], axis=1), 0.0)
+        jumps = np.where(before >= 0, np.linalg.norm(pulls - pulls[before], axis=1), 0.0)
         # What is smooth jumps from window to window by as much as it did before.
         usual = np.maximum.accumulate(np.where(starts - length >= quarter, jumps, 0.0))[before]
         level = np.maximum(limit * np.sqrt(2.0) * noise * bars, _ABRUPT * np.maximum(usual, jumps[middle].max()))
@@ -206,8 +206,8 @@ def _flight_end(times: Array, values: Array, order: int) -> int:
         if not len(later):
             continue
         first = int(later[0])
-        pull = np.median(found[middle], axis=0)
-        held = found[first:].mean(axis=0) - pull
+        pull = np.median(pulls[middle], axis=0)
+        held = pulls[first:].mean(axis=0) - pull
         size = float(np.linalg.norm(held))
         upwards = -held @ pull > _STEEP * float(np.linalg.norm(pull)) * size > 0.0
         if (
@@ -222,7 +222,7 @@ def _flight_end(times: Array, values: Array, order: int) -> int:
 def _window_accelerations(
     times: Array, values: Array, starts: Integers, length: int, order: int
 ) -> tuple[Array, Array]:
-    """Of the centre of mass on windows, (W, 3) [m/s^2], and their standard deviations for a unit one of samples."""
+    """Accelerations on windows, (W, 3) [m/s^2], and their standard deviations for a unit one of the samples, (W,)."""
     samples = starts[:, None] + np.arange(length)
     since = times[samples] - times[samples].mean(axis=1, keepdims=True)
     power = since**order - (since**order).mean(axis=1, keepdims=True)

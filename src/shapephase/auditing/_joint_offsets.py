@@ -38,7 +38,7 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     seen = strengths * _UNSEEN > 1.0
     values = np.where(seen, vector @ columns / np.where(seen, strengths, 1.0) ** 2, 0.0)
     squares = vector @ vector - (values * strengths) ** 2
-    found = []
+    offsets = []
     for rank, place in enumerate(np.argsort(squares, kind="stable").tolist()):
         joint, value, left = int(joints[place]), float(values[place]), None
         unit = body.joint_units[joint]
@@ -49,24 +49,24 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
         if rank < _CANDIDATES:
             value, left = _to_the_end(body, joint, value, columns[:, place], fits, most)
             square = float(left @ left)
-        offset = FittedValue(value=value, bar=float(1.0 / strengths[place]), unit=unit)
-        found.append(
+        fitted = FittedValue(value=value, bar=float(1.0 / strengths[place]), unit=unit)
+        offsets.append(
             Hypothesis(
                 name=f"offset of joint {body.joint_names[joint]}",
                 kind="offset",
                 square=square,
                 left_over=float(np.sqrt(max(square, 0.0) / freedom)),
                 parameters=1,
-                values={"offset": offset},
+                values={"offset": fitted},
                 remark=f"read {np.degrees(value):+.3g} degrees off" if unit == "rad" else "",
                 residuals=left,
             )
         )
-    return found
+    return offsets
 
 
 def _by_shapes(body: Body, fit: Residuals) -> Array:
-    """What each coordinate of the shape adds to the residuals: (M, n)."""
+    """Derivatives of the residuals by each coordinate of the shape: (M, n)."""
     seen = fit.seen
     shapes = seen.trajectory.shapes
     momentum = body.angular_momentum_gradient(shapes, seen.joint_rates, seen.rate)
@@ -91,7 +91,7 @@ def _to_the_end(
 
 
 def _read_with(body: Body, seen: Observation, joint: int, offset: float) -> Observation:
-    """The same samples with an offset taken off one joint."""
+    """Samples with an offset taken off one joint."""
     shapes = seen.trajectory.shapes.copy()
     shapes[:, joint] -= offset
     inertia, internal = body.sample(shapes, seen.joint_rates)
