@@ -41,6 +41,7 @@ _ENOUGH = 1.0 / 120.0
 _CHANCE = 1e-6  # probability with which noise alone ends a flight
 _STEEP = np.sqrt(0.5)  # cosine of the largest angle of the ground's push from upwards, with a friction of 1
 _TOUCH = 0.01  # of gravity: in a hundredth of a second less changes momenta by less than the usual tolerance
+_FEWEST_WINDOWS = 6  # in the middle half, whose largest jump says little of fewer: 24 samples have them
 _NUDGE = 1e-5  # [s] by which joints are moved along their rates for the velocity of the centre of mass
 _ABRUPT = 2.0  # times the largest jump before
 _SHORTEST = 3  # samples of a window: a second difference
@@ -157,17 +158,26 @@ def _speeds(body: Body, trajectory: FloatingTrajectory) -> Array | None:
 def _clear_part(times: Array, centres: Array, speeds: Array | None, first: int, past: int, how: str) -> AirbornePart:
     """The stretch without what a contact accelerates at its ends, which `how` then names."""
     begin, end = first, past
+    every = -(-(past - first) // _MANY)
     # Rates that are given show a contact within a sample, through noise that hides it from places.
     for values, order in ((centres, 2), (speeds, 1)):
         if values is not None:
             at, some = times[first:past], values[first:past]
-            end = min(end, first + _flight_end(at, some, order))
-            begin = max(begin, past - _flight_end(-at[::-1], some[::-1] * (-1.0) ** order, order))
+            end = min(end, first + _every_end(at, some, order, every))
+            begin = max(begin, past - _every_end(-at[::-1], some[::-1] * (-1.0) ** order, order, every))
+    if end - begin < _FEWEST:
+        begin, end = first, past
     if begin > first or end < past:
         how = f"{how.removeprefix('all of it: ')}, less what is held up"
         how += f" before {times[begin]:.6g} s" if begin > first else ""
         how += f" after {times[end - 1]:.6g} s" if end < past else ""
     return _part(times, centres, begin, end, how)
+
+
+def _every_end(times: Array, values: Array, order: int, every: int) -> int:
+    """The end by `_flight_end`, found in one of every so many samples."""
+    end = _flight_end(times[::every], values[::every], order)
+    return len(times) if every * end >= len(times) else every * max(end - 1, 0) + 1
 
 
 def _flight_end(times: Array, values: Array, order: int) -> int:
@@ -195,7 +205,7 @@ def _flight_end(times: Array, values: Array, order: int) -> int:
         pulls, bars = _window_accelerations(times, values, starts, length, order)
         before = np.searchsorted(starts, starts - length, side="right") - 1
         middle = (starts - length >= quarter) & (starts + length <= count - quarter)
-        if not middle.any():
+        if middle.sum() < _FEWEST_WINDOWS:
             continue
         jumps = np.where(before >= 0, np.linalg.norm(pulls - pulls[before], axis=1), 0.0)
         # What is smooth jumps from window to window by as much as it did before.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from .figures import fall_figure, left_over_figures, momentum_figure
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import Hypothesis
 from .trajectory_audit import thinned
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _MOST_ROWS = 20  # hypotheses of the table; the record has all
 _KEY = "Grey: not audited."
@@ -104,7 +101,7 @@ def _left_over(body: Body, trajectories: Sequence[FloatingTrajectory], found: Au
         yield _shown(figure, f"{hypothesis.name}: {100.0 * hypothesis.share:.2g} % left over")
 
 
-def _shown(figure: Figure, caption: str) -> dict[str, str]:
+def _shown(figure: Any, caption: str) -> dict[str, str]:
     return {"caption": caption, "image": base64.b64encode(axes_image(figure.axes[0], "svg")).decode()}
 
 
