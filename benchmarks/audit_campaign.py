@@ -51,6 +51,7 @@ CRANE = """<mujoco><worldbody><body name="hull"><freejoint name="free"/>
 
 def spider() -> str:
     """Six legs of two hinges about axes that are not parallel, as a URDF."""
+
     def link(name: str, mass: float, moments: tuple[float, float, float], centre: str) -> str:
         x, y, z = moments
         return (
@@ -98,7 +99,7 @@ def mujoco_model(name: str) -> Any:
     """A floating body with a ball about each link's centre, above a floor that touches only where it is switched on."""
     floating = (
         '<link name="world"/><joint name="free" type="floating"><parent link="world"/><child link="link1"/></joint>'
-        '<mujoco><compiler balanceinertia="false" inertiafromgeom="false" boundmass="1e-14" boundinertia="1e-14"/>'
+        '<mujoco><compiler discardvisual="false" balanceinertia="false" inertiafromgeom="false" boundmass="1e-14" boundinertia="1e-14"/>'
         "</mujoco></robot>"
     )
     spec = mujoco.MjSpec.from_string(urdf(name).replace("</robot>", floating))
@@ -164,18 +165,22 @@ def fly(flight: Flight) -> sp.FloatingTrajectory:
     spin = np.linalg.solve(inertia[0], wanted - internal[0])
     velocity = np.array([1.0, 0.2, 3.0 if flight.floor else 4.0])
     simulated = fly_drake if flight.integrator == "drake" else fly_mujoco
-    times, qpos, qvel = simulated(flight, target, quat, velocity, spin)
-    run = sp.FloatingTrajectory.from_mujoco(body, times, qpos, qvel, joint_names=body.joint_names)
+    names, times, qpos, qvel, momenta = simulated(flight, target, quat, velocity, spin)
+    run = sp.FloatingTrajectory.from_mujoco(body, times, qpos, qvel, joint_names=names)
+    inertia, internal = body.sample(run.shapes, run.joint_rates)
+    turning = np.einsum("nij,nj->ni", inertia, run.rate)
+    scale = np.sqrt((turning**2 + internal**2).sum(axis=1).mean())
+    flight.drift = float(np.linalg.norm(momenta - momenta.mean(axis=0), axis=1).max() / scale)
     run = run if flight.record is None else flight.record(run)
     return run if flight.rates else replace(run, rate=None, velocity=None, joint_rates=None)
 
 
-def fly_mujoco(flight: Flight, target: Any, quat: Any, velocity: Any, spin: Any) -> tuple[Any, Any, Any]:
+def fly_mujoco(flight: Flight, target: Any, quat: Any, velocity: Any, spin: Any) -> tuple[Any, ...]:
     model = mujoco_model(flight.name)
     model.opt.integrator, model.opt.timestep = INTEGRATORS[flight.integrator], flight.step
     model.opt.gravity[:] = 0.0, 0.0, -flight.gravity
     if flight.floor:
-        model.geom_conaffinity[model.ngeom - 1 if model.geom_bodyid[-1] == 0 else 0] = 1
+        model.geom_conaffinity[int(np.flatnonzero(model.geom_bodyid == 0)[0])] = 1
     if flight.change is not None:
         flight.change(model)
     data = mujoco.MjData(model)
@@ -202,11 +207,11 @@ def fly_mujoco(flight: Flight, target: Any, quat: Any, velocity: Any, spin: Any)
                 wide = model.body_mass[link] * flight.drag
                 data.xfrc_applied[link, :3] = -wide * np.linalg.norm(wind[3:]) * wind[3:]
         mujoco.mj_step(model, data)
-    flight.drift = float(np.linalg.norm(np.array(momenta) - momenta[0], axis=1).max() / np.linalg.norm(momenta[0]))
-    return tuple(np.array(column) for column in zip(*rows, strict=True))  # type: ignore[return-value]
+    names = [model.joint(k).name for k in range(1, model.njnt)]
+    return names, *(np.array(column) for column in zip(*rows, strict=True)), np.array(momenta)
 
 
-def fly_drake(flight: Flight, target: Any, quat: Any, velocity: Any, spin: Any) -> tuple[Any, Any, Any]:
+def fly_drake(flight: Flight, target: Any, quat: Any, velocity: Any, spin: Any) -> tuple[Any, ...]:
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import MultibodyPlant
     from pydrake.systems.analysis import Simulator
@@ -240,8 +245,9 @@ def fly_drake(flight: Flight, target: Any, quat: Any, velocity: Any, spin: Any) 
         force[6:] = motor(plant.CalcMassMatrix(context), bias, pull)
         port.FixValue(context, force)
         simulator.AdvanceTo((k + 1) * flight.step)
-    flight.drift = float(np.linalg.norm(np.array(momenta) - momenta[0], axis=1).max() / np.linalg.norm(momenta[0]))
-    return tuple(np.array(column) for column in zip(*rows, strict=True))  # type: ignore[return-value]
+    joints = sorted((plant.get_joint(k) for k in plant.GetJointIndices()), key=lambda joint: joint.position_start())
+    names = [joint.name() for joint in joints if joint.num_positions() == 1]
+    return names, *(np.array(column) for column in zip(*rows, strict=True)), np.array(momenta)
 
 
 # ---- Kinds of runs --------------------------------------------------------------------------------------------------
@@ -278,7 +284,10 @@ def white(values: np.ndarray) -> np.ndarray:
 
 def low_passed(rng: np.random.Generator, flight: Flight) -> Any:
     """A recording with white noise, all of it filtered by Butterworth, to and fro or as time goes."""
-    sections = butter(int(rng.integers(2, 5)), rng.uniform(0.08, 0.3), output="sos")
+    spacing = flight.step * flight.every
+    sections = butter(
+        int(rng.integers(2, 5)), min(rng.uniform(6.0, 20.0), 0.2 / spacing), fs=1.0 / spacing, output="sos"
+    )
     add = noisy(rng, 10.0 ** rng.uniform(-3.3, -2.3), white)
     causal = bool(rng.random() < 0.4)
 
@@ -294,10 +303,15 @@ def low_passed(rng: np.random.Generator, flight: Flight) -> Any:
         run = add(run)
         signs = np.where((run.quaternion[1:] * run.quaternion[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
         near = run.quaternion * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
-        fields = {name: smooth(getattr(run, name)) for name in ("position", "shapes", "rate", "velocity", "joint_rates")}
+        fields = {
+            name: smooth(getattr(run, name)) for name in ("position", "shapes", "rate", "velocity", "joint_rates")
+        }
         quaternion = smooth(near)
         assert quaternion is not None
-        return replace(run, quaternion=quaternion / np.linalg.norm(quaternion, axis=1)[:, None], **fields)
+        run = replace(run, quaternion=quaternion / np.linalg.norm(quaternion, axis=1)[:, None], **fields)
+        # What is filtered begins before a flight and ends after it.
+        edge = int(0.25 / spacing)
+        return run.part(edge, len(run.times) - (0 if causal else edge))
 
     return record
 
@@ -319,7 +333,10 @@ def wrong_link(flight: Flight, rng: np.random.Generator) -> None:
     heavy = [part for part in body.moving_parts if part.mass > 0.02 * body.mass]
     link = heavy[int(rng.integers(len(heavy)))].links[0]
     what, factor = str(rng.choice(["mass", "inertia", "centre"])), float(rng.choice([0.75, 1.25, 1.5]))
-    axis, arm = int(rng.integers(3)), 0.15 * float(np.sqrt(0.5 * np.trace(body.locked_inertia(np.zeros(body.n_shape))) / body.mass))
+    axis, arm = (
+        int(rng.integers(3)),
+        0.15 * float(np.sqrt(0.5 * np.trace(body.locked_inertia(np.zeros(body.n_shape))) / body.mass)),
+    )
 
     def change(model: Any) -> None:
         number = model.body(link).id
@@ -332,7 +349,11 @@ def wrong_link(flight: Flight, rng: np.random.Generator) -> None:
 
     flight.change, flight.kinds = change, ("inertia",)
     flight.words = (
-        {"mass": f"mass of {link}", "inertia": f"mass and inertia of {link}", "centre": f"centre of {link}, {'xyz'[axis]}"}[what],
+        {
+            "mass": f"mass of {link}",
+            "inertia": f"mass and inertia of {link}",
+            "centre": f"centre of {link}, {'xyz'[axis]}",
+        }[what],
     )
 
 
@@ -354,10 +375,9 @@ def planned(kind: str, seed: int) -> Flight:
         flight.record = noisy(rng, size, white)
     elif kind == "right, coloured noise":
         memory = rng.uniform(0.5, 0.97)
-        flight.record = noisy(
-            rng, size, lambda x: np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], x, axis=0)
-        )
+        flight.record = noisy(rng, size, lambda x: np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], x, axis=0))
     elif kind == "filtered":
+        flight.duration += 0.5
         flight.record, flight.kinds, flight.silence_allowed = low_passed(rng, flight), ("filter",), True
     elif kind == "landing":
         flight.floor, flight.duration = True, 1.1
@@ -405,8 +425,10 @@ def is_true(flight: Flight, found: Any) -> bool:
     others = [name for name in names if name not in steps]
     if not flight.kinds and not flight.words:
         return bool(steps) and not others
-    return len(others) == 1 and (not flight.words or any(word in others[0] for word in flight.words)) and (
-        not flight.kinds or any(kind in found.kind for kind in flight.kinds)
+    return (
+        len(others) == 1
+        and (not flight.words or any(word in others[0] for word in flight.words))
+        and (not flight.kinds or any(kind in found.kind for kind in flight.kinds))
     )
 
 

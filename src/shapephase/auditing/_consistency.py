@@ -29,8 +29,6 @@ class RateAgreement:
     Attributes
     ----------
     times : (M,) [s]
-    residuals : (M, k) differences over their noise, without unit
-    square : their squares, summed
     mismatch : the slow part of the differences relative to the rates themselves, of the worst of base and joints
     ratio : the same in units of what noise explains: above 1, noise does not
     late : by how much the rates are late against the configurations [s]
@@ -39,15 +37,12 @@ class RateAgreement:
     Examples
     --------
     >>> agreement = sp.auditing.RateAgreement(
-    ...     times=np.zeros(1), residuals=np.zeros((1, 3)), square=0.0, mismatch=0.0, ratio=0.0, late=0.0,
-    ...     mismatch_less_late=0.0)
+    ...     times=np.zeros(1), mismatch=0.0, ratio=0.0, late=0.0, mismatch_less_late=0.0)
     >>> agreement.late
     0.0
     """
 
     times: Array
-    residuals: Array
-    square: float
     mismatch: float
     ratio: float
     late: float
@@ -66,8 +61,6 @@ def rate_agreement(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> Ra
     less = replace(found, difference=found.difference - late * found.slope)
     return RateAgreement(
         times=found.times,
-        residuals=found.whitened,
-        square=float((found.whitened**2).sum()),
         mismatch=mismatch,
         ratio=ratio,
         late=late,
@@ -97,11 +90,6 @@ class RateDifferences:
     slope: Array
     rates: Array
     kinds: tuple[str, ...]
-
-    @property
-    def whitened(self) -> Array:
-        """In units of the noise."""
-        return self.difference / self.level
 
 
 def rate_differences(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> RateDifferences | None:
@@ -166,7 +154,13 @@ def _slow(found: RateDifferences) -> tuple[float, float]:
         columns = [k for k, other in enumerate(found.kinds) if other == kind]
         # What is alike for all samples counts in the slow part by their number.
         squares = found.level**2 + len(found.times) * found.bias
-        parts = [smooth_part(found.times, found.difference[:, [k]], squares[:, [k]][:, :, None], 0) for k in columns]
+        whitened = found.difference[:, columns] / np.sqrt(squares[:, columns])
+        parts = [
+            smooth_part(
+                found.times, found.difference[:, [k]], squares[:, [k]][:, :, None], 0, whitened=whitened[:, [place]]
+            )
+            for place, k in enumerate(columns)
+        ]
         values = np.hstack([part.values for part in parts])
         fast = float(np.sqrt((found.rates[:, columns] ** 2).sum(axis=1).mean()))
         slow = float(np.sqrt((values**2).sum(axis=1).mean()))

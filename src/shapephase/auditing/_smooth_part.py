@@ -15,6 +15,7 @@ from scipy.stats import chi2
 from ..arguments import check_pair, whole_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
+from ._noise_spectrum import noise_spectrum
 
 _HIGHEST = 12
 """Order of the polynomials, the samples allowing."""
@@ -58,7 +59,12 @@ def polynomials(times: Array, highest: int) -> Array:
 
 
 def smooth_part(
-    times: Array, residuals: Array, covariances: Array, free: int, carried: tuple[Array, Array] | None = None
+    times: Array,
+    residuals: Array,
+    covariances: Array,
+    free: int,
+    carried: tuple[Array, Array] | None = None,
+    whitened: Array | None = None,
 ) -> SmoothPart:
     """The smooth part of residuals (N, k) whose noise has covariances (N, k, k).
 
@@ -67,6 +73,7 @@ def smooth_part(
     free : how many of the lowest polynomials a body that nothing acts on may have
     carried : instead of the covariances: what each of m unit noises of a sample adds to its residual, (N, k, m), and
         to all that come after it, (N, k, m)
+    whitened : (N, c) residuals in units of white noise, by which the spectrum of the noise is known; None: it is white
 
     Examples
     --------
@@ -88,6 +95,9 @@ def smooth_part(
         after = np.cumsum(basis[::-1], axis=0)[::-1] - basis
         of_each = np.einsum("np,nim->npim", basis, own) + np.einsum("np,nim->npim", after, further)
         spread = np.einsum("npim,nqjm->piqj", of_each, of_each)
+    if whitened is not None:
+        size = np.sqrt(noise_spectrum(whitened, highest)[lowest : highest + 1])
+        spread = spread * size[:, None, None, None] * size[None, None, :, None]
     count = parts.size
     matrix = spread.reshape(count, count)
     square = float(parts.ravel() @ np.linalg.solve(matrix, parts.ravel()))

@@ -12,7 +12,7 @@ from ..arrays import Array
 from ..body.body import Body
 from ..body.inertial_regressor import PARAMETERS, InertialRegressor, inertial_regressor
 from ._observation import Observation
-from ._residuals import Residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
 _NEXT_TO_NOTHING = 1e-9
@@ -58,7 +58,6 @@ def wrong_inertias(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     # Whitened columns of the ten parameters of every link, and what each hypothesis makes of them.
     of_all = np.vstack([_by_parameters(fit, matrix, body) for fit, matrix in zip(fits, matrices, strict=True)])
     vector = np.concatenate([fit.vector for fit in fits])
-    freedom = sum(fit.freedom for fit in fits)
     changes = np.array([_as_parameters(way, len(body.chain.masses)) for way in ways])
     columns = of_all @ changes.T
     strength = (columns**2).sum(axis=0)
@@ -76,22 +75,16 @@ def wrong_inertias(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     for rank, place in enumerate(order.tolist()):
         if not seen_at_all[place] or 1.0 / np.sqrt(strength[place]) > 1.0 / _UNSEEN:
             continue
-        way, value, square = ways[place], float(guesses[place]), float(squares[place])
+        way, value = ways[place], float(guesses[place])
+        left = vector + value * columns[:, place]
         if rank < _CANDIDATES:
-            value, square = _to_the_end(body, way, value, columns[:, place], fits, matrices)
+            value, left = _to_the_end(body, way, value, columns[:, place], fits, matrices)
         if not _can_be(body, way, value, seen[0].extent):
             continue
         bar = float(1.0 / np.sqrt(strength[place]))
         shown = FittedValue(value=value * way.scale, bar=bar * way.scale, unit=way.unit)
         found.append(
-            Hypothesis(
-                name=way.name,
-                kind="inertia",
-                square=square,
-                left_over=float(np.sqrt(max(square, 0.0) / freedom)),
-                parameters=1,
-                values={way.label: shown},
-            )
+            fitted_hypothesis(way.name, "inertia", leftover(fits, left), parameters=1, values={way.label: shown})
         )
     return found
 
@@ -165,10 +158,10 @@ def _to_the_end(
     column: Array,
     fits: Sequence[Residuals],
     matrices: Sequence[InertialRegressor],
-) -> tuple[float, float]:
+) -> tuple[float, Array]:
     """Gauss and Newton with the whole dependence: the value, and what it leaves."""
     chain = body.chain
-    best = (value, np.inf)
+    best, least = (value, np.concatenate([fit.vector for fit in fits])), np.inf
     for _ in range(_STEPS):
         masses, centres, inertias = chain.masses.copy(), chain.centres.copy(), chain.inertias.copy()
         masses[way.frame] += value * way.mass
@@ -183,9 +176,9 @@ def _to_the_end(
             ]
         )
         square = float(left @ left)
-        if square >= best[1]:
+        if square >= least:
             break
-        best = (value, square)
+        best, least = (value, left), square
         value -= float(column @ left) / float(column @ column)
     return best
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 from ..display import short_repr
 from ..plain_data import plain
+
+if TYPE_CHECKING:
+    from ._residuals import Leftover
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +49,7 @@ class Hypothesis:
     parameters : how many numbers were fitted for it
     values : what they are
     remark : what else is to be said
+    leftover : residuals of each law
 
     Examples
     --------
@@ -61,8 +65,14 @@ class Hypothesis:
     share: float = 1.0
     values: Mapping[str, FittedValue] = field(default_factory=dict)
     remark: str = ""
+    leftover: Leftover | None = None
 
     __repr__ = short_repr
+
+    def paired_with(self, name: str, parameters: int, values: Mapping[str, FittedValue] | None = None) -> Hypothesis:
+        """This hypothesis, fitted together with another one that has so many parameters."""
+        both = {**self.values, **(values or {})}
+        return replace(self, name=f"{self.name}, and {name}", parameters=self.parameters + parameters, values=both)
 
     @property
     def record(self) -> dict[str, Any]:
