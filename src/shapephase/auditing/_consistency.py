@@ -121,7 +121,9 @@ def rate_differences(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> 
         rounding = _ROUNDING * (fast + far * spread)
         # What differences cut off is less than what those of fewer neighbours do.
         slope = differentiated(given, weights)
-        cut = (own - narrow) ** 2 + (held * np.gradient(slope, trajectory.times[inner], axis=0)) ** 2
+        # By the configurations' own jerk: rates in other axes have another one.
+        jerk = np.gradient(np.gradient(own, trajectory.times[inner], axis=0), trajectory.times[inner], axis=0)
+        cut = (own - narrow) ** 2 + (held * jerk) ** 2
         known = cut + cut.mean(axis=0)
         level = np.sqrt((spread * of_place) ** 2 + of_rate**2 + rounding**2 + known)
         biases.append(known)

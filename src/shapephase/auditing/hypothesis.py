@@ -12,6 +12,8 @@ from ..plain_data import plain
 if TYPE_CHECKING:
     from ._residuals import Leftover
 
+AND = ", and "  # between the names of two causes that are fitted together
+
 
 @dataclass(frozen=True, kw_only=True)
 class FittedValue:
@@ -72,7 +74,7 @@ class Hypothesis:
     def paired_with(self, name: str, parameters: int, values: Mapping[str, FittedValue] | None = None) -> Hypothesis:
         """This hypothesis, fitted together with another one that has so many parameters."""
         both = {**self.values, **(values or {})}
-        return replace(self, name=f"{self.name}, and {name}", parameters=self.parameters + parameters, values=both)
+        return replace(self, name=f"{self.name}{AND}{name}", parameters=self.parameters + parameters, values=both)
 
     @property
     def record(self) -> dict[str, Any]:

@@ -35,7 +35,7 @@ from ._transformations import other_readings, read_otherwise
 from ._wrong_inertias import wrong_inertias
 from .audit_result import Audit, RunAudit
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import Hypothesis
+from .hypothesis import AND, Hypothesis
 
 _QUIET = 1e-6
 """[rad] Noise of the attitude below which the first sample is tried as the start of the exact reconstruction."""
@@ -351,7 +351,8 @@ def _ranked(
             read = [residuals(body, observed(body, run, noise)) for run in reading.runs]
             seconds = [*integration_step(read), *wrong_inertias(body, read)]
             pairs += [one.paired_with(first.name, first.parameters, first.values) for one in seconds]
-    return evidence.ranking([*singles, *pairs])
+    nearest = {frozenset(one.name.split(AND)): one for one in sorted(pairs, key=lambda one: -one.square)}
+    return evidence.ranking([*singles, *nearest.values()])
 
 
 def _causes(body: Body, runs: Sequence[FloatingTrajectory], fits: Sequence[Residuals]) -> list[Hypothesis]:
