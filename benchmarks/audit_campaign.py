@@ -425,8 +425,8 @@ def is_true(flight: Flight, found: Any) -> bool:
     if steps and flight.integrator == "rk4":
         return False
     others = [name for name in names if name not in steps]
-    if not flight.kinds and not flight.words:
-        return bool(steps) and not others
+    if not others:
+        return flight.kind in (*RIGHT, "filtered", "sparse steps") and flight.drift >= INVISIBLE
     return (
         len(others) == 1
         and (not flight.words or any(word in others[0] for word in flight.words))
@@ -444,7 +444,8 @@ def judged(flight: Flight) -> tuple[str, str]:
     names = "; ".join(one.name for one in found.cause)
     by_step = flight.kind in (*RIGHT, "sparse steps") and flight.integrator != "rk4"
     if found.right:
-        right = flight.kind in RIGHT and not (by_step and flight.drift > VISIBLE) or flight.silence_allowed
+        hidden = not by_step or flight.drift <= VISIBLE or flight.kind != "right"
+        right = flight.silence_allowed or (flight.kind in RIGHT and hidden)
         return "no alarm" if right or (by_step and flight.drift <= VISIBLE) else "missed", names
     true = [place for place, one in enumerate(found.cause) if is_true(flight, one)]
     if flight.kind in RIGHT and not (true and by_step and flight.drift >= INVISIBLE):

@@ -33,6 +33,7 @@ class RateAgreement:
     ratio : the same in units of what noise explains: above 1, noise does not
     late : by how much the rates are late against the configurations [s]
     mismatch_less_late : the mismatch once that is taken off
+    colour : mean power of the noise of the worst over that of white noise with its highest frequencies
 
     Examples
     --------
@@ -47,6 +48,7 @@ class RateAgreement:
     ratio: float
     late: float
     mismatch_less_late: float
+    colour: float = 1.0
 
     __repr__ = short_repr
 
@@ -57,7 +59,7 @@ def rate_agreement(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> Ra
     if found is None:
         return None
     late = _late(found)
-    mismatch, ratio = _slow(found)
+    mismatch, ratio, colour = _slow(found)
     less = replace(found, difference=found.difference - late * found.slope)
     return RateAgreement(
         times=found.times,
@@ -65,6 +67,7 @@ def rate_agreement(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> Ra
         ratio=ratio,
         late=late,
         mismatch_less_late=_slow(less)[0],
+        colour=colour,
     )
 
 
@@ -149,9 +152,9 @@ def _late(found: RateDifferences) -> float:
     return float((weighted * found.difference).sum()) / below if below > 0.0 else 0.0
 
 
-def _slow(found: RateDifferences) -> tuple[float, float]:
-    """The worst slow part over the rates of its kind, and the worst over what noise explains."""
-    mismatch = ratio = 0.0
+def _slow(found: RateDifferences) -> tuple[float, float, float]:
+    """The worst slow part over the rates of its kind, the worst over what noise explains, and the colour of noise."""
+    mismatch, ratio, colour = 0.0, 0.0, 1.0
     for kind in dict.fromkeys(found.kinds):
         columns = [k for k, other in enumerate(found.kinds) if other == kind]
         # What is alike for all samples counts in the slow part by their number.
@@ -168,4 +171,5 @@ def _slow(found: RateDifferences) -> tuple[float, float]:
         slow = float(np.sqrt((values**2).sum(axis=1).mean()))
         mismatch = max(mismatch, slow / fast if fast > 0.0 else 0.0)
         ratio = max(ratio, *(part.ratio for part in parts))
-    return mismatch, ratio
+        colour = max(colour, *(part.colour for part in parts))
+    return mismatch, ratio, colour

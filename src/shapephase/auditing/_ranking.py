@@ -45,10 +45,12 @@ class Evidence:
     ----------
     without : residuals without any hypothesis
     allowed : (3,) share of these squares that is within the tolerance; 1 or more where that law holds
+    colour : (3,) mean square of the noise of the samples, in units of white noise with its highest frequencies
     """
 
     without: Leftover
     allowed: Array
+    colour: Array
 
     def ranking(self, hypotheses: Sequence[Hypothesis]) -> Ranking:
         """Return the order and the tie."""
@@ -58,7 +60,9 @@ class Evidence:
         squares = np.array([left.squares for _, left in known])
         counts = self.without.counts
         # Laws that hold anyway count with what the tolerance leaves them.
-        holds = np.maximum(counts, np.where(self.allowed >= 1.0, self.allowed * self.without.squares, 0.0))
+        holds = np.maximum(
+            self.colour * counts, np.where(self.allowed >= 1.0, self.allowed * self.without.squares, 0.0)
+        )
         size = squares / np.where(holds > 0.0, holds, 1.0)
         misfit = np.where(size <= 1.0, size, 1.0 + np.log(np.maximum(size, 1.0)))
         fitted = np.array([one.parameters for one, _ in known], dtype=np.float64)
@@ -67,7 +71,7 @@ class Evidence:
             score = misfit @ effective + fitted * np.log(max(effective.sum(), 2.0))
             best = int(np.argmin(score))
             left = known[best][1]
-            noise = left.squares <= counts
+            noise = left.squares <= self.colour * counts
             effective = np.where(noise, counts, np.minimum(np.maximum(left.effective, _FEWEST), counts))
         order = np.argsort(score, kind="stable")
         near = [known[place][0] for place in order if score[place] - score[best] <= _STRONG]
@@ -86,5 +90,5 @@ class Evidence:
     def _within(self, hypothesis: Hypothesis, share: float) -> bool:
         left = hypothesis.leftover
         assert left is not None
-        most = np.maximum(_NOISE * left.counts, np.maximum(share, self.allowed) * self.without.squares)
+        most = np.maximum(_NOISE * self.colour * left.counts, np.maximum(share, self.allowed) * self.without.squares)
         return bool(np.all(left.squares <= most))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.stats import chi2
+from scipy.stats import f
 
 from ..arguments import check_pair, whole_argument
 from ..arrays import Array, finite_array
@@ -36,6 +36,7 @@ class SmoothPart:
     values : (N, k) that they sum up to
     ratio : its square in units of what noise alone brings, over the limit: above 1, noise does not explain it
     noise : what noise alone brings to the values, rms
+    colour : mean power of the noise over that of white noise with its highest frequencies
 
     Examples
     --------
@@ -48,6 +49,7 @@ class SmoothPart:
     values: Array
     ratio: float
     noise: float
+    colour: float = 1.0
 
     __repr__ = short_repr
 
@@ -95,11 +97,18 @@ def smooth_part(
         after = np.cumsum(basis[::-1], axis=0)[::-1] - basis
         of_each = np.einsum("np,nim->npim", basis, own) + np.einsum("np,nim->npim", after, further)
         spread = np.einsum("npim,nqjm->piqj", of_each, of_each)
+    power, known = np.ones(len(times)), np.inf
     if whitened is not None:
-        size = np.sqrt(noise_spectrum(whitened, highest)[lowest : highest + 1])
-        spread = spread * size[:, None, None, None] * size[None, None, :, None]
+        # A smooth curve has cosines of all orders, and no polynomials above its own.
+        slow = polynomials(times, highest)
+        power = noise_spectrum(whitened - slow @ (slow.T @ whitened), highest)
+        # Numbers that the power of the noise is known from (Satterthwaite 1946).
+        above = power[highest + 1 :]
+        known = whitened.shape[1] * above.sum() ** 2 / (above**2).sum()
+    size = np.sqrt(power[lowest : highest + 1])
+    spread = spread * size[:, None, None, None] * size[None, None, :, None]
     count = parts.size
     matrix = spread.reshape(count, count)
     square = float(parts.ravel() @ np.linalg.solve(matrix, parts.ravel()))
-    limit = _UNSURE * float(chi2.isf(_CHANCE, count))
-    return SmoothPart(basis @ parts, square / limit, float(np.sqrt(np.trace(matrix) / len(times))))
+    limit = _UNSURE * count * float(f.isf(_CHANCE, count, known))
+    return SmoothPart(basis @ parts, square / limit, float(np.sqrt(np.trace(matrix) / len(times))), float(power.mean()))

@@ -14,7 +14,7 @@ from ..body.body import Body
 from ..warning_filters import quiet
 from ._noise import TrajectoryNoise
 from ._observation import observed
-from ._residuals import Leftover, fitted_hypothesis, leftover_of_moments, residuals
+from ._residuals import Leftover, Residuals, fitted_hypothesis, leftover_of_moments, residuals
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import FittedValue, Hypothesis
 
@@ -42,6 +42,18 @@ class _Reading:
     kind: str
     change: Change
     needs_rates: bool = False
+    degrees: tuple[bool, bool, bool] = (False, False, False)
+
+    def noise(self, level: TrajectoryNoise, turning: Array) -> TrajectoryNoise:
+        """Noise of the samples read in this way: angles, rates of joints and of the base may be in degrees."""
+        angles, rates, base = self.degrees
+        factor = np.where(turning, np.pi / 180.0, 1.0)
+        return replace(
+            level,
+            joints=tuple((np.array(level.joints) * factor).tolist()) if angles else level.joints,
+            joint_rates=tuple((np.array(level.joint_rates) * factor).tolist()) if rates else level.joint_rates,
+            rate=float(np.radians(level.rate)) if base else level.rate,
+        )
 
 
 @dataclass(frozen=True)
@@ -59,16 +71,20 @@ class _Gradual:
 
 @dataclass(frozen=True, eq=False)
 class OtherReading:
-    """A hypothesis with the trajectories as they are if it is true."""
+    """A hypothesis with the trajectories, and the noise of each, as they are if it is true."""
 
     hypothesis: Hypothesis
     runs: tuple[FloatingTrajectory, ...]
+    levels: tuple[TrajectoryNoise, ...]
+
+    def fits(self, body: Body) -> list[Residuals]:
+        """Residuals of the trajectories as they are then."""
+        return [residuals(body, observed(body, *pair)) for pair in zip(self.runs, self.levels, strict=True)]
 
 
 def other_readings(
     body: Body,
     runs: Sequence[FloatingTrajectory],
-    noise: TrajectoryNoise | None,
     levels: Sequence[TrajectoryNoise],
     *,
     any_step: bool = False,
@@ -77,8 +93,7 @@ def other_readings(
 
     Parameters
     ----------
-    noise : as stated; None: what the samples show, read in that way
-    levels : of each run as it is
+    levels : noise of each run as it is
     any_step : whether the drift of an integrator's step of any length is taken off
     """
     given = all(run.joint_rates is not None for run in runs)
@@ -87,8 +102,10 @@ def other_readings(
         if reading.needs_rates and not given:
             continue
         read = tuple(reading.change(run) for run in runs)
-        left = leftover_of_moments(np.sum([_moments(body, run, noise, any_step) for run in read], axis=0))
-        found.append(OtherReading(fitted_hypothesis(reading.name, reading.kind, left), read))
+        noise = tuple(reading.noise(level, _turning(body)) for level in levels)
+        moments = [_moments(body, run, level, any_step) for run, level in zip(read, noise, strict=True)]
+        left = leftover_of_moments(np.sum(moments, axis=0))
+        found.append(OtherReading(fitted_hypothesis(reading.name, reading.kind, left), read, noise))
     curves = [_Curves(run, level) for run, level in zip(runs, levels, strict=True)]
     return found + [
         _gradual(body, reading, runs, curves, levels, any_step)
@@ -126,27 +143,22 @@ def _readings(body: Body, run: FloatingTrajectory) -> Iterator[_Reading]:
             lambda t: replace(t, rate_axes=rate, velocity_axes=velocity),
             needs_rates=True,
         )
-    turning = np.array([unit == "rad" for unit in body.joint_units], dtype=bool)
+    turning = _turning(body)
     if turning.any() and "units" not in run.certain:
-        yield _Reading("joint angles in degrees", units, lambda t: _scaled(t, turning, angles=True))
-        for rates, base, name in (
-            (True, False, "joint rates in degrees per second"),
-            (False, True, "angular velocity of the base in degrees per second"),
-            (True, True, "all angular rates in degrees per second"),
+        for angles, rates, base, name in (
+            (True, False, False, "joint angles in degrees"),
+            (False, True, False, "joint rates in degrees per second"),
+            (False, False, True, "angular velocity of the base in degrees per second"),
+            (False, True, True, "all angular rates in degrees per second"),
+            (True, True, False, "joint angles and rates in degrees"),
+            (True, True, True, "all angles and rates in degrees"),
         ):
-            yield _Reading(name, units, lambda t, r=rates, b=base: _scaled(t, turning, r, b), needs_rates=True)
-        yield _Reading(
-            "joint angles and rates in degrees",
-            units,
-            lambda t: _scaled(t, turning, True, False, angles=True),
-            needs_rates=True,
-        )
-        yield _Reading(
-            "all angles and rates in degrees",
-            units,
-            lambda t: _scaled(t, turning, True, True, angles=True),
-            needs_rates=True,
-        )
+            which = angles, rates, base
+            yield _Reading(name, units, lambda t, w=which: _scaled(t, turning, *w), rates or base, which)
+
+
+def _turning(body: Body) -> Array:
+    return np.array([unit == "rad" for unit in body.joint_units], dtype=bool)
 
 
 def _rolled(run: FloatingTrajectory, places: int) -> FloatingTrajectory:
@@ -157,9 +169,7 @@ def _inverse(run: FloatingTrajectory) -> FloatingTrajectory:
     return replace(run, quaternion=run.quaternion * [-1.0, -1.0, -1.0, 1.0])
 
 
-def _scaled(
-    run: FloatingTrajectory, turning: Array, rates: bool = False, base: bool = False, *, angles: bool = False
-) -> FloatingTrajectory:
+def _scaled(run: FloatingTrajectory, turning: Array, angles: bool, rates: bool, base: bool) -> FloatingTrajectory:
     factor = np.where(turning, np.pi / 180.0, 1.0)
     return replace(
         run,
@@ -237,7 +247,7 @@ def _sharpened_joints(run: FloatingTrajectory, curves: _Curves, width: float) ->
     return replace(run, shapes=shapes, joint_rates=run.joint_rates - half * bent)
 
 
-def _moments(body: Body, run: FloatingTrajectory, noise: TrajectoryNoise | None, any_step: bool) -> Array:
+def _moments(body: Body, run: FloatingTrajectory, noise: TrajectoryNoise, any_step: bool) -> Array:
     fit = residuals(body, observed(body, run, noise), any_step=any_step)
     return fit.moments(fit.vector)
 
@@ -310,4 +320,4 @@ def _gradual(
     bar = float(np.sqrt(2.0 / bend)) if bend > 0.0 else np.inf
     values = {reading.label: FittedValue(value=value, bar=bar, unit=reading.unit)}
     hypothesis = fitted_hypothesis(reading.name, reading.kind, found, parameters=1, values=values)
-    return OtherReading(hypothesis, changed(value, value))
+    return OtherReading(hypothesis, changed(value, value), tuple(levels))

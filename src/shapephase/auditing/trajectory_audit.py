@@ -121,14 +121,18 @@ def audit(
     if min(len(run.times) for run in flown) < TOLD_APART:
         return _short(body, flown, parts, within, noise)
     seen = [observed(body, run, noise) for run in flown]
-    looked, allowed = [], []
+    looked, allowed, colours = [], [], []
     for run, one, part in zip(flown, seen, parts, strict=True):
-        audited, shares = _run_audit(body, run, one, part, within)
+        audited, shares, colour = _run_audit(body, run, one, part, within)
         looked.append(audited)
         allowed.append(shares)
+        colours.append(colour)
     order = step_order(seen, [one.momentum_noise for one in looked])
     right = all(one.right for one in looked)
-    found = Ranking(ranked=(), tie=()) if right else _ranked(body, flown, looked, np.min(allowed, axis=0), order, noise)
+    found = Ranking(ranked=(), tie=())
+    if not right:
+        levels = np.min(allowed, axis=0), np.max(colours, axis=0)
+        found = _ranked(body, flown, looked, levels, order)
     return Audit(
         body=body.name,
         runs=tuple(looked),
@@ -202,8 +206,8 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
 
 def _run_audit(
     body: Body, run: FloatingTrajectory, seen: Observation, part: AirbornePart, given: float | None
-) -> tuple[RunAudit, Array]:
-    """The audit of one run, and what a right run may leave of the squares of `BLOCKS`, relative to what is there."""
+) -> tuple[RunAudit, Array, Array]:
+    """The audit of one run; for each of `BLOCKS` the share of squares that is allowed, and the colour of the noise."""
     scale = seen.scale
     wander = _wander(run, seen) if given is None else 0.0
     tolerance = _TOLERANCE if given is None else given
@@ -258,7 +262,8 @@ def _run_audit(
         recorded=wander > 0.0,
         right=min(allowed) >= 1.0,
     )
-    return audited, np.array(allowed)
+    colour = [1.0 if part is None else part.colour for part in (smooth, fall, agreement)]
+    return audited, np.array(allowed), np.array(colour)
 
 
 def _off(times: Array, whitened: Array, free: int) -> Array:
@@ -314,16 +319,15 @@ def _ranked(
     body: Body,
     runs: Sequence[FloatingTrajectory],
     looked: Sequence[RunAudit],
-    allowed: Array,
+    allowed: tuple[Array, Array],
     order: StepOrder | None,
-    noise: TrajectoryNoise | None,
 ) -> Ranking:
     """Hypotheses one by one; in twos where the best leaves more than noise and tolerance."""
     runs = [_thinned(run) for run in runs]
     levels = [one.noise for one in looked]
     fits = [residuals(body, observed(body, run, level)) for run, level in zip(runs, levels, strict=True)]
     without = leftover(fits, np.concatenate([fit.vector for fit in fits]))
-    evidence = Evidence(without, allowed)
+    evidence = Evidence(without, *allowed)
     if order is not None:
         late = max(
             (one.agreement.mismatch_less_late / max(one.agreement.mismatch, 1e-300) for one in looked if one.agreement),
@@ -333,7 +337,7 @@ def _ranked(
         steps = [] if step is None else [step]
     else:
         steps = integration_step(fits)
-    readings = other_readings(body, runs, noise, levels)
+    readings = other_readings(body, runs, levels)
     singles = [*steps, *_causes(body, runs, fits), *(one.hypothesis for one in readings)]
     found = evidence.ranking(singles)
     if not found.ranked or evidence.settled_by(found.ranked[0]):
@@ -341,14 +345,14 @@ def _ranked(
     pairs = []
     if order is None:
         stepped = [residuals(body, fit.seen, any_step=True) for fit in fits]
-        others = other_readings(body, runs, noise, levels, any_step=True)
+        others = other_readings(body, runs, levels, any_step=True)
         seconds = [*_causes(body, runs, stepped), *(one.hypothesis for one in others)]
         pairs += [one.paired_with("integration step", len(runs)) for one in seconds]
     nearest = {one.name for one in found.ranked[:_PAIRED]}
     for reading in readings:
         first = reading.hypothesis
         if first.name in nearest:
-            read = [residuals(body, observed(body, run, noise)) for run in reading.runs]
+            read = reading.fits(body)
             seconds = [*integration_step(read), *wrong_inertias(body, read)]
             pairs += [one.paired_with(first.name, first.parameters, first.values) for one in seconds]
     nearest = {frozenset(one.name.split(AND)): one for one in sorted(pairs, key=lambda one: -one.square)}
