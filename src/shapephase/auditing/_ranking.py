@@ -36,6 +36,13 @@ class Ranking:
     ranked: tuple[Hypothesis, ...]
     tie: tuple[Hypothesis, ...]
 
+    def beside(self, other: Hypothesis) -> Ranking:
+        """The ranking where another cause, of which no residual holds anything, is there as well."""
+        if not self.ranked:
+            return Ranking(ranked=(other,), tie=(other,))
+        both = tuple(one.paired_with(other.name, other.parameters, other.values) for one in self.tie)
+        return Ranking(ranked=(*both, *self.ranked[len(both) :]), tie=both)
+
 
 @dataclass(frozen=True, eq=False)
 class Evidence:

@@ -44,7 +44,8 @@ class Hypothesis:
     Attributes
     ----------
     name : for people, as "mass of head"
-    kind : "inertia", "torque", "force", "time", "filter", "frame", "quaternion", "units", "engine" or "step"
+    kind : "inertia", "torque", "force", "time", "filter", "frame", "quaternion", "units", "engine", "step",
+        "drag", "offset" or "gravity"
     square : what is left over, squared and summed in units of the noise
     left_over : the same as the rms of a residual, in units of the noise
     share : of the rms without any hypothesis

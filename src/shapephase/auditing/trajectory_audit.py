@@ -22,7 +22,10 @@ from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
 from ._airborne import AirbornePart, airborne_part
 from ._consistency import rate_agreement
+from ._drag import drag
+from ._gravity import wrong_gravity
 from ._integration_step import StepOrder, integration_step, step_hypothesis, step_order
+from ._joint_offsets import joint_offsets
 from ._missing_term import no_gyroscopic_term
 from ._noise import TrajectoryNoise
 from ._observation import Observation, observed
@@ -128,11 +131,15 @@ def audit(
         allowed.append(shares)
         colours.append(colour)
     order = step_order(seen, [one.momentum_noise for one in looked])
-    right = all(one.right for one in looked)
     found = Ranking(ranked=(), tie=())
-    if not right:
+    if not all(one.right for one in looked):
         levels = np.min(allowed, axis=0), np.max(colours, axis=0)
         found = _ranked(body, flown, looked, levels, order)
+    # No residual holds a constant acceleration, so nothing else explains it.
+    gravity = wrong_gravity(seen, looked, _WANDER)
+    if gravity is not None:
+        found = found.beside(gravity)
+        looked = [replace(one, right=False) for one in looked]
     return Audit(
         body=body.name,
         runs=tuple(looked),
@@ -338,7 +345,7 @@ def _ranked(
     else:
         steps = integration_step(fits)
     readings = other_readings(body, runs, levels)
-    singles = [*steps, *_causes(body, runs, fits), *(one.hypothesis for one in readings)]
+    singles = [*steps, *_causes(body, fits), *(one.hypothesis for one in readings)]
     found = evidence.ranking(singles)
     if not found.ranked or evidence.settled_by(found.ranked[0]):
         return found
@@ -346,7 +353,7 @@ def _ranked(
     if order is None:
         stepped = [residuals(body, fit.seen, any_step=True) for fit in fits]
         others = other_readings(body, runs, levels, any_step=True)
-        seconds = [*_causes(body, runs, stepped), *(one.hypothesis for one in others)]
+        seconds = [*_causes(body, stepped), *(one.hypothesis for one in others)]
         pairs += [one.paired_with("integration step", len(runs)) for one in seconds]
     nearest = {one.name for one in found.ranked[:_PAIRED]}
     for reading in readings:
@@ -359,11 +366,13 @@ def _ranked(
     return evidence.ranking([*singles, *nearest.values()])
 
 
-def _causes(body: Body, runs: Sequence[FloatingTrajectory], fits: Sequence[Residuals]) -> list[Hypothesis]:
+def _causes(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     """Hypotheses that change what the laws predict, not what the samples are; each fitted to all runs."""
     return [
         *wrong_inertias(body, fits),
+        *joint_offsets(body, fits),
         *outside_pushes(fits),
+        *drag(body, fits),
         *no_gyroscopic_term(fits),
     ]
 

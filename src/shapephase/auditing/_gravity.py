@@ -1,0 +1,61 @@
+"""The hypothesis that gravity is wrong: the acceleration of the fall against 9.81 m/s^2 along an axis of the world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..shape_space.free_fall import GRAVITY
+from ._observation import Observation
+from .audit_result import RunAudit
+from .hypothesis import FittedValue, Hypothesis
+
+_ELSEWHERE = 0.005  # of gravity: on earth it is 9.78 to 9.83 m/s^2
+_BARS = 4.0  # standard deviations by which it has to be off
+_OF_A_PARABOLA = 720.0  # variance of the acceleration of a parabola over T, of N samples of variance one: 720 / (N T^4)
+_SAG = 8.0  # acceleration of a parabola over T whose middle is off its chord by s: 8 s / T^2
+_AXES = "xyz"
+
+
+def wrong_gravity(seen: Sequence[Observation], runs: Sequence[RunAudit], wander: float) -> Hypothesis | None:
+    """None where every fall is that on earth with x, y or z up, of a recording also down, or none, as in orbit.
+
+    Parameters
+    ----------
+    runs : what was found of the same trajectories
+    wander : of the centre of mass of those that are recordings [m]
+    """
+    for one, run in zip(seen, runs, strict=True):
+        if one.centre_noise is None or run.airborne.acceleration is None or run.fall_off is None:
+            continue
+        pull, bar = np.array(run.airborne.acceleration), _bar(one, max(run.fall_off, wander if run.recorded else 0.0))
+        size, axis = float(np.linalg.norm(pull)), int(np.argmax(np.abs(pull)))
+        allowed = _ELSEWHERE * GRAVITY + _BARS * bar
+        expected = np.zeros(3)
+        expected[axis] = np.copysign(GRAVITY, pull[axis]) if run.recorded else -GRAVITY
+        if size > allowed and np.linalg.norm(pull - expected) > allowed:
+            tilt = float(np.degrees(np.arccos(min(abs(pull[axis]) / size, 1.0))))
+            return Hypothesis(
+                name="gravity",
+                kind="gravity",
+                square=0.0,
+                left_over=0.0,
+                parameters=3,
+                share=0.0,
+                values={
+                    "size": FittedValue(value=size, bar=bar, unit="m/s^2"),
+                    "tilt": FittedValue(value=tilt, bar=float(np.degrees(bar / size)), unit="deg"),
+                },
+                remark=f"{run.name} falls towards {'-' if pull[axis] < 0.0 else '+'}{_AXES[axis]}; expected "
+                f"{GRAVITY:.4g} m/s^2 along an axis of the world with x, y or z up, or no weight",
+            )
+    return None
+
+
+def _bar(seen: Observation, off: float) -> float:
+    """Standard deviation of the acceleration by the noise and by how far the centre of mass may be off [m/s^2]."""
+    assert seen.centre_noise is not None
+    span = float(seen.times[-1] - seen.times[0])
+    variance = float(np.trace(seen.centre_noise, axis1=1, axis2=2).mean()) / 3.0
+    return float(np.hypot(np.sqrt(_OF_A_PARABOLA * variance / len(seen.times)), _SAG * off)) / span**2
