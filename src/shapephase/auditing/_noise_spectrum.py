@@ -4,13 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.fft import dct
+from scipy.special import digamma
 
 from ..arrays import Array
 
 _MEMORIES = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99])  # from sample to sample
-_SHARPNESS = (2, 4, 8)  # half the powers of frequency by which Butterworth filters of two to eight poles fall
+_SHARPNESS = (
+    2,
+    3,
+    4,
+    6,
+    8,
+)  # half the powers by which Butterworth filters of two to four poles fall, used once or twice
 _ROUNDS = 12  # of Fisher's scoring, each of which gains about two digits of an amplitude
 _PLATEAU = 1.5  # lowest cut-off in units of the slow part's highest order: a third of the plateau has to be seen
+_LEAKAGE = 1e-4  # of the largest power: cosines of noise that does not end where it begins
+_SHOULDER = 0.01  # of the plateau: down to there the spectrum has to be that of a filter
+_UNLIKE = 2.0  # mean deviance in units of that of noise; 1.3 is exceeded by chance in a thousand with 30 orders
 
 
 def noise_spectrum(whitened: Array, slow: int) -> Array:
@@ -18,7 +28,7 @@ def noise_spectrum(whitened: Array, slow: int) -> Array:
 
     It is that of the likeliest of three families above the slow part (Whittle 1953), with log(count) for each number:
     white noise; noise with memory, x' = a x + white, whose highest frequencies are those of the differences of samples;
-    and white noise below a cut-off.
+    and white noise below a cut-off, if the powers there scatter as those of noise do.
 
     Parameters
     ----------
@@ -32,22 +42,32 @@ def noise_spectrum(whitened: Array, slow: int) -> Array:
     if seen.sum() < 2 or columns == 0:
         return np.ones(count)
     memory = _MEMORIES[:, None]
-    remembered = (1.0 + memory) ** 2 / (1.0 - 2.0 * memory * np.cos(np.pi * orders / count) + memory**2)
-    cuts = np.geomspace(max(_PLATEAU * slow, 1.0), count, 16)
+    spectra = (1.0 + memory) ** 2 / (1.0 - 2.0 * memory * np.cos(np.pi * orders / count) + memory**2)
+    penalties = np.minimum(np.arange(len(memory)), 1.0)
+    floor = max(1.0, _LEAKAGE * float(power[seen].max()))
+    cuts = np.geomspace(max(_PLATEAU * slow, 1.0), count, 24)
     shapes = np.vstack([1.0 / (1.0 + (orders / cuts[:, None]) ** (2 * sharp)) for sharp in _SHARPNESS])
-    filtered = 1.0 + _amplitudes(shapes[:, seen], power[seen])[:, None] * shapes
-    spectra = np.vstack([remembered, filtered])
-    penalties = np.concatenate([[0.0], np.ones(len(memory) - 1), 2.0 * np.ones(len(filtered))])
+    filtered = floor + _amplitudes(shapes[:, seen], power[seen], floor)[:, None] * shapes
+    alike = [_is_noise(power[seen], spectrum[seen], columns) for spectrum in filtered]
+    spectra = np.vstack([spectra, filtered[alike]])
+    penalties = np.concatenate([penalties, np.full(sum(alike), 2.0)])
     fit = columns * (np.log(spectra[:, seen]) + power[seen] / spectra[:, seen]).sum(axis=1)
     return spectra[int(np.argmin(fit + penalties * np.log(columns * seen.sum())))]
 
 
-def _amplitudes(shapes: Array, power: Array) -> Array:
-    """The likeliest a of spectra 1 + a shape, at least 0: (families,)."""
+def _is_noise(power: Array, spectrum: Array, columns: int) -> bool:
+    """True where powers, each the mean of so many squares, scatter about a spectrum's plateau as those of noise."""
+    inside = spectrum >= _SHOULDER * spectrum[0]
+    ratio = np.maximum(power[inside] / spectrum[inside], np.finfo(float).tiny)
+    expected = np.log(0.5 * columns) - digamma(0.5 * columns)
+    return bool((ratio - np.log(ratio) - 1.0).mean() <= _UNLIKE * expected)
+
+
+def _amplitudes(shapes: Array, power: Array, floor: float) -> Array:
+    """The likeliest a of spectra floor + a shape, at least 0: (families,)."""
     found = np.maximum((power * shapes).sum(axis=1) / (shapes**2).sum(axis=1), 0.0)
     for _ in range(_ROUNDS):
-        weights = (shapes / (1.0 + found[:, None] * shapes)) ** 2
-        found = np.maximum(
-            ((power - 1.0) / np.maximum(shapes, 1e-300) * weights).sum(axis=1) / weights.sum(axis=1), 0.0
-        )
+        weights = (shapes / (floor + found[:, None] * shapes)) ** 2
+        ratios = (power - floor) / np.maximum(shapes, 1e-300)
+        found = np.maximum((ratios * weights).sum(axis=1) / weights.sum(axis=1), 0.0)
     return found

@@ -1,8 +1,8 @@
 """Hypotheses in the order of their evidence, and which of them the samples cannot separate.
 
 What a hypothesis leaves of each law (momentum, fall, rates) is taken for noise of unknown size, no smaller than that of
-the samples: with nu effective numbers and x, the square over what noise leaves, -2 log likelihood is nu x up to x = 1 and
-nu (1 + log x) beyond. The Bayesian information criterion (Schwarz 1978) adds log(sum of nu) for each fitted number.
+the samples: with nu effective numbers and x, the square over what noise leaves, -2 log likelihood is nu x up to x = 1
+and nu (1 + log x) beyond. The Bayesian information criterion (Schwarz 1978) adds log(sum of nu) for each fitted number.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from .hypothesis import Hypothesis
 _STRONG = 10.0  # difference of two criteria that is very strong evidence (Kass and Raftery 1995)
 _FEWEST = 3.0  # effective numbers of a single cosine
 _ROUNDS = 4  # the effective numbers are those of the best hypothesis, which they decide
-_NOISE = 2.0  # mean square up to which what is left is noise: that of samples is known to some 40 %
+_NOISE = 3.0  # mean square up to which what is left is noise: that of samples is known to some 70 %
+_SETTLED = 0.05  # of the rms: steps of 2 ms at 20 rad/s leave so much by terms of second order
 EXPLAINS = 0.2  # of the rms without any hypothesis: more is not explained
 
 
@@ -91,8 +92,8 @@ class Evidence:
         return self._within(hypothesis, EXPLAINS**2)
 
     def settled_by(self, hypothesis: Hypothesis) -> bool:
-        """True where a hypothesis leaves no more than noise or tolerance, and a second one has nothing to explain."""
-        return self._within(hypothesis, 0.0)
+        """True where a hypothesis leaves noise, a twentieth or what the tolerance allows, and nothing for a second."""
+        return self._within(hypothesis, _SETTLED**2)
 
     def _within(self, hypothesis: Hypothesis, share: float) -> bool:
         left = hypothesis.leftover

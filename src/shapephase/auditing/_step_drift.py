@@ -1,7 +1,7 @@
 """What the step of a semi-implicit integrator adds to momentum, fall and rates of a free body, to first order.
 
 Semi-implicit Euler takes v' = v + h a(q, v), then q' = q moved with v' for h. With L(q, v), linear in v, moved at fixed
-v: dL/ds = G and d2L/ds2 = H. A step conserves L(q, v') + h G(q, v) = L(q, v), so that L grows by h^2 (dG/dt - H / 2), and
+v: dL/ds = G and d2L/ds2 = H. A step conserves L(q, v') + h G(q, v) = L(q, v), so that L grows by h^2 (dG/dt - H / 2):
 
     L(t) - L(0) = h (G - G(0) - 1/2 integral of H dt).
 
