@@ -20,6 +20,7 @@ _ROUNDS = 12  # of Fisher's scoring, each of which gains about two digits of an 
 _PLATEAU = 1.5  # lowest cut-off in units of the slow part's highest order: a third of the plateau has to be seen
 _LEAKAGE = 1e-4  # of the largest power: cosines of noise that does not end where it begins
 _SHOULDER = 0.01  # of the plateau: down to there the spectrum has to be that of a filter
+_FEWEST_ORDERS = 5.0  # of a plateau
 _UNLIKE = 2.0  # mean deviance in units of that of noise; 1.3 is exceeded by chance in a thousand with 30 orders
 
 
@@ -44,15 +45,39 @@ def noise_spectrum(whitened: Array, slow: int) -> Array:
     memory = _MEMORIES[:, None]
     spectra = (1.0 + memory) ** 2 / (1.0 - 2.0 * memory * np.cos(np.pi * orders / count) + memory**2)
     penalties = np.minimum(np.arange(len(memory)), 1.0)
+    filtered, _ = _below_cut_offs(power, seen, columns, _PLATEAU * slow)
+    spectra = np.vstack([spectra, filtered])
+    penalties = np.concatenate([penalties, np.full(len(filtered), 2.0)])
+    return spectra[int(np.argmin(_deviance(power, spectra, seen, columns) + penalties * np.log(columns * seen.sum())))]
+
+
+def cut_off(whitened: Array, free: int) -> float | None:
+    """Order of cosines at which the spectrum of residuals (N, c) ends; None where it is not that of filtered noise.
+
+    free : orders of cosines that were taken off
+    """
+    count, columns = whitened.shape
+    power = (dct(whitened, axis=0, norm="ortho") ** 2).mean(axis=1)
+    seen = np.arange(count) > free
+    spectra, cuts = _below_cut_offs(power, seen, columns, _FEWEST_ORDERS)
+    return None if not len(cuts) else float(cuts[int(np.argmin(_deviance(power, spectra, seen, columns)))])
+
+
+def _deviance(power: Array, spectra: Array, seen: Array, columns: int) -> Array:
+    """-2 log likelihood of spectra (families, N): (families,)."""
+    return columns * (np.log(spectra[:, seen]) + power[seen] / spectra[:, seen]).sum(axis=1)
+
+
+def _below_cut_offs(power: Array, seen: Array, columns: int, lowest: float) -> tuple[Array, Array]:
+    """The likeliest spectra of noise below each cut-off, and these, without those about which powers do not scatter."""
+    orders = np.arange(len(power))
+    cuts = np.tile(np.geomspace(max(lowest, 1.0), max(len(power), lowest + 1.0), 24), len(_SHARPNESS))
+    sharpness = np.repeat(_SHARPNESS, len(cuts) // len(_SHARPNESS))
+    shapes = 1.0 / (1.0 + (orders / cuts[:, None]) ** (2 * sharpness[:, None]))
     floor = max(1.0, _LEAKAGE * float(power[seen].max()))
-    cuts = np.geomspace(max(_PLATEAU * slow, 1.0), count, 24)
-    shapes = np.vstack([1.0 / (1.0 + (orders / cuts[:, None]) ** (2 * sharp)) for sharp in _SHARPNESS])
-    filtered = floor + _amplitudes(shapes[:, seen], power[seen], floor)[:, None] * shapes
-    alike = [_is_noise(power[seen], spectrum[seen], columns) for spectrum in filtered]
-    spectra = np.vstack([spectra, filtered[alike]])
-    penalties = np.concatenate([penalties, np.full(sum(alike), 2.0)])
-    fit = columns * (np.log(spectra[:, seen]) + power[seen] / spectra[:, seen]).sum(axis=1)
-    return spectra[int(np.argmin(fit + penalties * np.log(columns * seen.sum())))]
+    spectra = floor + _amplitudes(shapes[:, seen], power[seen], floor)[:, None] * shapes
+    alike = np.array([_is_noise(power[seen], spectrum[seen], columns) for spectrum in spectra])
+    return spectra[alike], cuts[alike]
 
 
 def _is_noise(power: Array, spectrum: Array, columns: int) -> bool:

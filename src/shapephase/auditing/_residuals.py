@@ -98,17 +98,19 @@ class Residuals:
         rates = None if self.rates is None else self.rates.difference[:, :, None]
         return self.columns(seen.momentum[:, :, None], None if centre is None else centre[:, :, None], rates)[:, 0]
 
+    def blocks(self, vector: Array) -> dict[int, Array]:
+        """The parts of a vector in samples and directions, (rows, c), by their places in `BLOCKS`."""
+        count = len(self.seen.times)
+        parts = np.split(vector, np.cumsum((3 * count, 3 * count if self._centre_factor is not None else 0)))
+        rows = (count, count, 0 if self.rates is None else len(self.rates.times))
+        return {k: part.reshape(rows[k], -1) for k, part in enumerate(parts) if len(part)}
+
     def moments(self, vector: Array) -> Array:
         """(3, 3): of each block sums of squares and of fourth powers of its cosines, and its independent numbers."""
-        count = len(self.seen.times)
-        sizes = (3 * count, 3 * count if self._centre_factor is not None else 0)
-        parts = np.split(vector, np.cumsum(sizes))
         found = np.zeros((3, 3))
-        for block, part in enumerate(parts):
-            if len(part):
-                rows = count if self.rates is None or block < 2 else len(self.rates.times)
-                squares = dct(part.reshape(rows, -1), axis=0, norm="ortho") ** 2
-                found[block] = squares.sum(), (squares**2).sum(), len(part) - self._own[block]
+        for block, part in self.blocks(vector).items():
+            squares = dct(part, axis=0, norm="ortho") ** 2
+            found[block] = squares.sum(), (squares**2).sum(), part.size - self._own[block]
         return found
 
 

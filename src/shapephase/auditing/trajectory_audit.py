@@ -23,6 +23,7 @@ from ..warning_filters import quiet
 from ._airborne import AirbornePart, airborne_part
 from ._consistency import rate_agreement
 from ._drag import drag
+from ._filtered_samples import filtered_samples
 from ._gravity import wrong_gravity
 from ._integration_step import StepOrder, integration_step, step_hypothesis, step_order
 from ._joint_offsets import joint_offsets
@@ -137,7 +138,8 @@ def audit(
         found = _ranked(body, flown, looked, levels, order)
     # No residual holds a constant acceleration, so nothing else explains it.
     gravity = wrong_gravity(seen, looked, _WANDER)
-    if gravity is not None:
+    falls = bool(np.all(np.array(allowed)[:, 1] >= 1.0))
+    if gravity is not None and (falls or all(one.kind == "step" for one in found.tie)):
         found = found.beside(gravity)
         looked = [replace(one, right=False) for one in looked]
     return Audit(
@@ -363,7 +365,8 @@ def _ranked(
             seconds = [*integration_step(read), *wrong_inertias(body, read)]
             pairs += [one.paired_with(first.name, first.parameters, first.values) for one in seconds]
     nearest = {frozenset(one.name.split(AND)): one for one in sorted(pairs, key=lambda one: -one.square)}
-    return evidence.ranking([*singles, *nearest.values()])
+    found = evidence.ranking([*singles, *nearest.values()])
+    return found if found.tie else evidence.ranking([*found.ranked, *filtered_samples(fits, without)])
 
 
 def _causes(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
