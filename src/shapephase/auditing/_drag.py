@@ -42,7 +42,7 @@ class _Flight:
 def drag(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     """The law that explains most; empty where places are unknown, or where every law would speed the body up.
 
-    Either of the whole body: a force -c v - k |v| v at a constant offset from the centre of mass, base axes, and a
+    Either of the whole body: a force -c v - k |v| v at a point fixed to the centre of mass or to the base, and a
     torque -d omega with the rate of the base. Or of each link: density and viscosity of a fluid that acts on the box of
     uniform density that has the link's mass and inertia.
     """
@@ -50,8 +50,7 @@ def drag(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
         return []
     flights = [_Flight(fit, _velocity(fit)) for fit in fits]
     found = [*_of_whole_body(flights), *_of_links(body, flights)]
-    many = np.log(sum(fit.freedom for fit in fits))
-    return sorted(found, key=lambda one: one.square + one.parameters * many)[:1]
+    return sorted(found, key=lambda one: (round(one.leftover.size, 1) if one.leftover else 0.0, one.parameters))[:1]
 
 
 def _velocity(fit: Residuals) -> Array:
@@ -64,12 +63,13 @@ def _velocity(fit: Residuals) -> Array:
 
 
 def _of_whole_body(flights: Sequence[_Flight]) -> Iterator[Hypothesis]:
-    for laws, turn in product((("quadratic",), ("linear",), ("linear", "quadratic")), ((), ("turn",))):
+    laws_of_force = (("quadratic",), ("linear",), ("linear", "quadratic"))
+    for laws, turn, point in product(laws_of_force, ((), ("turn",)), ("centre of mass", "origin of the base")):
         names, count = (*laws, *turn), len(laws)
         vector = np.concatenate([flight.fit.vector for flight in flights])
         numbers, square = np.zeros(len(names) + 3), float(vector @ vector)
         for _ in range(_STEPS):
-            parts = [_by_numbers(flight, laws, turn, numbers) for flight in flights]
+            parts = [_by_numbers(flight, laws, turn, point, numbers) for flight in flights]
             matrix = np.vstack([columns for columns, _ in parts])
             left = vector - np.concatenate([whole for _, whole in parts])
             before, square = square, float(left @ left)
@@ -78,16 +78,22 @@ def _of_whole_body(flights: Sequence[_Flight]) -> Iterator[Hypothesis]:
             numbers = numbers + np.linalg.lstsq(matrix, left, rcond=None)[0]
         if np.all(numbers[: len(names)] > 0.0) and numbers[:count].any():
             yield _hypothesis(
-                flights, matrix, left, names, numbers, "of the whole body, centre of pressure from the centre of mass"
+                flights, matrix, left, names, numbers, f"of the whole body, centre of pressure from the {point}"
             )
 
 
-def _by_numbers(flight: _Flight, laws: Sequence[str], turn: Sequence[str], numbers: Array) -> tuple[Array, Array]:
+def _by_numbers(
+    flight: _Flight, laws: Sequence[str], turn: Sequence[str], point: str, numbers: Array
+) -> tuple[Array, Array]:
     """What the residuals change by with each number, (M, k), and what all of them make, (M,)."""
     seen, count = flight.fit.seen, len(laws)
     speed = np.linalg.norm(flight.velocity, axis=1, keepdims=True)
     forces = np.stack([-flight.velocity * (speed if law == "quadratic" else 1.0) for law in laws], axis=2)
     arm, force = seen.attitude @ numbers[-3:], forces @ numbers[:count]
+    if point != "centre of mass":
+        assert seen.trajectory.position is not None
+        assert seen.centre is not None
+        arm = arm + seen.trajectory.position - seen.centre
     slowing = [-so3.apply(seen.attitude, seen.rate)[:, :, None] for _ in turn]
     torques = np.concatenate(
         [np.cross(arm[:, :, None], forces, axis=1), *slowing, np.cross(seen.attitude, force[:, :, None], axis=1)],

@@ -1,4 +1,4 @@
-"""The hypothesis that the samples were low-pass filtered: what is left of the laws is noise that ends at a frequency."""
+"""The hypothesis that the samples were low-pass filtered: what the laws leave is noise that ends at a frequency."""
 
 from __future__ import annotations
 

@@ -35,13 +35,11 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     turning = np.array([body.joint_units[joint] == "rad" for joint in joints])
     most = np.where(turning, np.pi, _FARTHEST * fits[0].seen.extent)
     values = vector @ columns / np.maximum(strengths, 1e-150) ** 2
-    squares = vector @ vector - (values * strengths) ** 2
+    tried = np.flatnonzero(np.abs(values) <= most).tolist()
+    lefts = {place: vector - values[place] * columns[:, place] for place in tried}
     found = []
-    for rank, place in enumerate(np.argsort(squares, kind="stable").tolist()):
-        if abs(values[place]) > most[place]:
-            continue
-        joint, value = int(joints[place]), float(values[place])
-        left = vector - value * columns[:, place]
+    for rank, place in enumerate(sorted(tried, key=lambda place: leftover(fits, lefts[place]).size)):
+        joint, value, left = int(joints[place]), float(values[place]), lefts[place]
         if rank < _CANDIDATES:
             value, left = _to_the_end(body, joint, value, columns[:, place], fits)
         unit = body.joint_units[joint]

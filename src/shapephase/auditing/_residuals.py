@@ -41,6 +41,12 @@ class Leftover:
     counts: Array
     effective: Array
 
+    @property
+    def size(self) -> float:
+        """Sum of the logarithms of the squares in units of noise, none less than 0: a law may have far more digits."""
+        known = self.counts > 0.0
+        return float(np.log(np.maximum(self.squares[known] / self.counts[known], 1.0)).sum())
+
 
 @dataclass(frozen=True, eq=False)
 class Residuals:

@@ -140,19 +140,14 @@ def wrong_inertias(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     seen_at_all = strength > 0.0
     along = vector @ columns
     guesses = np.where(seen_at_all, -along / np.where(seen_at_all, strength, 1.0), 0.0)
-    squares = vector @ vector - guesses**2 * strength
     # To first order a link may weigh less than nothing.
     least = np.array([-_MOST_LOST * body.chain.masses[way.frame] / way.mass if way.mass else -np.inf for way in ways])
-    too_light = guesses < least
     guesses = np.maximum(guesses, least)
-    squares[too_light] = (vector @ vector + 2.0 * guesses * along + guesses**2 * strength)[too_light]
-    order = np.argsort(squares, kind="stable")
+    tried = [place for place in range(len(ways)) if seen_at_all[place] and np.sqrt(strength[place]) > _UNSEEN]
+    lefts = {place: vector + guesses[place] * columns[:, place] for place in tried}
     found = []
-    for rank, place in enumerate(order.tolist()):
-        if not seen_at_all[place] or 1.0 / np.sqrt(strength[place]) > 1.0 / _UNSEEN:
-            continue
-        way, value = ways[place], float(guesses[place])
-        left = vector + value * columns[:, place]
+    for rank, place in enumerate(sorted(tried, key=lambda place: leftover(fits, lefts[place]).size)):
+        way, value, left = ways[place], float(guesses[place]), lefts[place]
         if rank < _CANDIDATES:
             value, left = _to_the_end(body, way, value, columns[:, place], fits, matrices)
         if not (_is_in_reach(body, way, value, seen[0].extent) and _has_moments(body, way, value)):
