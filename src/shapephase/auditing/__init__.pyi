@@ -3,6 +3,7 @@ from ._consistency import RateAgreement
 from ._integration_step import StepOrder
 from ._noise import TrajectoryNoise
 from ._smooth_part import SmoothPart, smooth_part
+from .audit_page import write_audit_page
 from .audit_result import Audit, RunAudit
 from .figures import audit_figure, write_audit_figure
 from .flight_recorder import FlightRecorder, assert_right_in_flight
@@ -29,4 +30,5 @@ __all__ = [
     "read_trajectory",
     "smooth_part",
     "write_audit_figure",
+    "write_audit_page",
 ]

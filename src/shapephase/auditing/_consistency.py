@@ -119,13 +119,15 @@ def rate_differences(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> 
         pairs.append(("joints", own[0], own[1], joint_rates[:, [joint]], of_shape, of_rate, far))
     slopes, differences, levels, biases, kinds = [], [], [], [], []
     held = _HELD * trajectory.integrator_step**2
+    again = difference_weights(trajectory.times[inner])
     for kind, own, narrow, given, of_place, of_rate, far in pairs:
         fast = float(np.abs(given).max(initial=0.0))
         rounding = _ROUNDING * (fast + far * spread)
         # What differences cut off is less than what those of fewer neighbours do.
         slope = differentiated(given, weights)
-        # By the configurations' own jerk: rates in other axes have another one.
-        jerk = np.gradient(np.gradient(own, trajectory.times[inner], axis=0), trajectory.times[inner], axis=0)
+        # Rates of the base in other axes have another jerk than its configurations.
+        bend = np.pad(differentiated(own, again), ((REACH, REACH), (0, 0)), mode="edge")
+        jerk = np.gradient(slope if kind == "joints" else bend, trajectory.times[inner], axis=0)
         cut = (own - narrow) ** 2 + (held * jerk) ** 2
         known = cut + cut.mean(axis=0)
         level = np.sqrt((spread * of_place) ** 2 + of_rate**2 + rounding**2 + known)
@@ -160,14 +162,19 @@ def _slow(found: RateDifferences) -> tuple[float, float, float]:
         # What is alike for all samples counts in the slow part by their number.
         squares = found.level**2 + len(found.times) * found.bias
         whitened = found.difference[:, columns] / np.sqrt(squares[:, columns])
+        fast = float(np.sqrt((found.rates[:, columns] ** 2).sum(axis=1).mean()))
         parts = [
             smooth_part(
-                found.times, found.difference[:, [k]], squares[:, [k]][:, :, None], 0, whitened=whitened[:, [place]]
+                found.times,
+                found.difference[:, [k]],
+                squares[:, [k]][:, :, None],
+                0,
+                whitened=whitened[:, [place]],
+                size=fast,
             )
             for place, k in enumerate(columns)
         ]
         values = np.hstack([part.values for part in parts])
-        fast = float(np.sqrt((found.rates[:, columns] ** 2).sum(axis=1).mean()))
         slow = float(np.sqrt((values**2).sum(axis=1).mean()))
         mismatch = max(mismatch, slow / fast if fast > 0.0 else 0.0)
         ratio = max(ratio, *(part.ratio for part in parts))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..arrays import Array
 from ..shape_space.free_fall import GRAVITY
 from ._observation import Observation
 from .audit_result import RunAudit
@@ -27,9 +28,9 @@ def wrong_gravity(seen: Sequence[Observation], runs: Sequence[RunAudit], wander:
     wander : of the centre of mass of those that are recordings [m]
     """
     for one, run in zip(seen, runs, strict=True):
-        if one.centre_noise is None or run.airborne.acceleration is None or run.fall_off is None:
+        if one.centre is None or one.centre_noise is None or run.fall_off is None:
             continue
-        pull, bar = np.array(run.airborne.acceleration), _bar(one, max(run.fall_off, wander if run.recorded else 0.0))
+        pull, bar = _fall(one.times, one.centre, one.centre_noise, max(run.fall_off, wander if run.recorded else 0.0))
         size, axis = float(np.linalg.norm(pull)), int(np.argmax(np.abs(pull)))
         allowed = _ELSEWHERE * GRAVITY + _BARS * bar
         expected = np.zeros(3)
@@ -53,9 +54,10 @@ def wrong_gravity(seen: Sequence[Observation], runs: Sequence[RunAudit], wander:
     return None
 
 
-def _bar(seen: Observation, off: float) -> float:
-    """Standard deviation of the acceleration by the noise and by how far the centre of mass may be off [m/s^2]."""
-    assert seen.centre_noise is not None
-    span = float(seen.times[-1] - seen.times[0])
-    variance = float(np.trace(seen.centre_noise, axis1=1, axis2=2).mean()) / 3.0
-    return float(np.hypot(np.sqrt(_OF_A_PARABOLA * variance / len(seen.times)), _SAG * off)) / span**2
+def _fall(times: Array, centres: Array, covariances: Array, off: float) -> tuple[Array, float]:
+    """Acceleration (3,), and its standard deviation by noise and by how far the centre of mass may be off [m/s^2]."""
+    span = float(times[-1] - times[0])
+    pull = 2.0 * np.linalg.lstsq(np.vander((times - times[0]) / span, 3), centres, rcond=None)[0][0]
+    variance = float(np.trace(covariances, axis1=1, axis2=2).mean()) / 3.0
+    bar = float(np.hypot(np.sqrt(_OF_A_PARABOLA * variance / len(times)), _SAG * off))
+    return pull / span**2, bar / span**2

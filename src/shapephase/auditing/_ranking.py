@@ -8,7 +8,7 @@ and nu (1 + log x) beyond. The Bayesian information criterion (Schwarz 1978) add
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,12 +79,13 @@ class Evidence:
             score = misfit @ effective + fitted * np.log(max(effective.sum(), 2.0))
             best = int(np.argmin(score))
             left = known[best][1]
-            noise = left.squares <= self.colour * counts
-            effective = np.where(noise, counts, np.minimum(np.maximum(left.effective, _FEWEST), counts))
+            effective = np.where(left.squares <= noise, counts, np.minimum(np.maximum(left.effective, _FEWEST), counts))
         order = np.argsort(score, kind="stable")
-        near = [known[place][0] for place in order if score[place] - score[best] <= _STRONG]
+        whole = max(float(self.without.squares.sum()), np.finfo(float).tiny)
+        shared = [replace(one, share=float(np.sqrt(max(one.square, 0.0) / whole))) for one, _ in known]
+        near = [shared[place] for place in order if score[place] - score[best] <= _STRONG]
         return Ranking(
-            ranked=tuple(known[place][0] for place in order), tie=tuple(one for one in near if self.explained_by(one))
+            ranked=tuple(shared[place] for place in order), tie=tuple(one for one in near if self.explained_by(one))
         )
 
     def explained_by(self, hypothesis: Hypothesis) -> bool:

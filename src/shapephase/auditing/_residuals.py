@@ -7,7 +7,7 @@ requested, the drift of a semi-implicit Euler step of any length.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import dct
@@ -35,11 +35,13 @@ class Leftover:
     counts : (3,) independent numbers
     effective : (3,) those of them that the spectrum of the residuals leaves independent: nu = 3 (sum c^2)^2 / sum c^4
         of the coefficients c of cosines (Satterthwaite 1946 with variances c^2, of which c^4 / 3 is the square)
+    in_time : (M,) of each run those of momentum and fall, sample by sample; None where the samples are others
     """
 
     squares: Array
     counts: Array
     effective: Array
+    in_time: Array | None = None
 
     @property
     def size(self) -> float:
@@ -111,6 +113,10 @@ class Residuals:
         rows = (count, count, 0 if self.rates is None else len(self.rates.times))
         return {k: part.reshape(rows[k], -1) for k, part in enumerate(parts) if len(part)}
 
+    def in_time(self, vector: Array) -> Array:
+        """The part of a vector that is of momentum and fall."""
+        return np.concatenate([part.ravel() for block, part in self.blocks(vector).items() if block < 2])
+
     def moments(self, vector: Array) -> Array:
         """(3, 3): of each block sums of squares and of fourth powers of its cosines, and its independent numbers."""
         found = np.zeros((3, 3))
@@ -151,7 +157,8 @@ def residuals(body: Body, seen: Observation, *, any_step: bool = False) -> Resid
 def leftover(fits: Sequence[Residuals], vector: Array) -> Leftover:
     """Residuals of all runs by blocks; the vectors of the runs come one after the other."""
     parts = np.split(vector, np.cumsum([len(fit.vector) for fit in fits])[:-1])
-    return leftover_of_moments(np.sum([fit.moments(part) for fit, part in zip(fits, parts, strict=True)], axis=0))
+    left = leftover_of_moments(np.sum([fit.moments(part) for fit, part in zip(fits, parts, strict=True)], axis=0))
+    return replace(left, in_time=np.concatenate([fit.in_time(part) for fit, part in zip(fits, parts, strict=True)]))
 
 
 def leftover_of_moments(moments: Array) -> Leftover:
@@ -181,6 +188,7 @@ def fitted_hypothesis(
         values=values or {},
         remark=remark,
         leftover=left,
+        residuals=left.in_time,
     )
 
 

@@ -23,6 +23,7 @@ _SAMPLES_EACH = 3
 """Samples that a polynomial needs."""
 _UNSURE = 1.5
 """Of a variance: the noise of samples is itself estimated."""
+_MOST_NOISE = 0.05  # of what residuals are of: samples of noise of 3 degrees, or worse, tell nothing
 _CHANCE = 1e-6
 """Probability with which noise alone is taken for something else, for one residual."""
 
@@ -67,6 +68,7 @@ def smooth_part(
     free: int,
     carried: tuple[Array, Array] | None = None,
     whitened: Array | None = None,
+    size: float = np.inf,
 ) -> SmoothPart:
     """The smooth part of residuals (N, k) whose noise has covariances (N, k, k).
 
@@ -76,6 +78,7 @@ def smooth_part(
     carried : instead of the covariances: what each of m unit noises of a sample adds to its residual, (N, k, m), and
         to all that come after it, (N, k, m)
     whitened : (N, c) residuals in units of white noise, by which the spectrum of the noise is known; None: it is white
+    size : of what the residuals are of, in their unit: what is above their slow part is noise up to a twentieth of it
 
     Examples
     --------
@@ -97,16 +100,17 @@ def smooth_part(
         after = np.cumsum(basis[::-1], axis=0)[::-1] - basis
         of_each = np.einsum("np,nim->npim", basis, own) + np.einsum("np,nim->npim", after, further)
         spread = np.einsum("npim,nqjm->piqj", of_each, of_each)
-    power, known = np.ones(len(times)), np.inf
-    if whitened is not None:
-        # A smooth curve has cosines of all orders, and no polynomials above its own.
-        slow = polynomials(times, highest)
+    power, known = np.ones(len(times)), 1e9
+    # A smooth curve has cosines of all orders, and no polynomials above its own.
+    slow = polynomials(times, highest)
+    rough = residuals - slow @ (slow.T @ residuals)
+    if whitened is not None and np.sqrt((rough**2).sum() / len(times)) <= _MOST_NOISE * size:
         power = noise_spectrum(whitened - slow @ (slow.T @ whitened), highest)
         # Numbers that the power of the noise is known from (Satterthwaite 1946).
         above = power[highest + 1 :]
         known = whitened.shape[1] * above.sum() ** 2 / (above**2).sum()
-    size = np.sqrt(power[lowest : highest + 1])
-    spread = spread * size[:, None, None, None] * size[None, None, :, None]
+    deviations = np.sqrt(power[lowest : highest + 1])
+    spread = spread * deviations[:, None, None, None] * deviations[None, None, :, None]
     count = parts.size
     matrix = spread.reshape(count, count)
     square = float(parts.ravel() @ np.linalg.solve(matrix, parts.ravel()))

@@ -241,27 +241,32 @@ def _to_the_end(
     matrices: Sequence[InertialRegressor],
 ) -> tuple[float, Array]:
     """Gauss and Newton with the whole dependence: the value, and what it leaves."""
-    chain = body.chain
-    best, least = (value, np.concatenate([fit.vector for fit in fits])), np.inf
+    best = (0.0, np.concatenate([fit.vector for fit in fits]))
     for _ in range(_STEPS):
-        masses, centres, inertias = chain.masses.copy(), chain.centres.copy(), chain.inertias.copy()
-        masses[way.frame] += value * way.mass
-        centres[way.frame] += value * way.centre
-        inertias[way.frame] += value * way.inertia
-        if masses[way.frame] <= 0.0:
+        if body.chain.masses[way.frame] + value * way.mass <= 0.0:
             break
-        left = np.concatenate(
-            [
-                fit.of(_changed(fit.seen, matrix, masses, centres, inertias))
-                for fit, matrix in zip(fits, matrices, strict=True)
-            ]
-        )
-        square = float(left @ left)
-        if square >= least:
+        left = _left_by(body, way, value, fits, matrices)
+        if left @ left >= best[1] @ best[1]:
             break
-        best, least = (value, left), square
+        best = (value, left)
         value -= float(column @ left) / float(column @ column)
     return best
+
+
+def _left_by(
+    body: Body, way: _Direction, value: float, fits: Sequence[Residuals], matrices: Sequence[InertialRegressor]
+) -> Array:
+    """The residuals of a body that is another by so much: (M,)."""
+    masses, centres, inertias = body.chain.masses.copy(), body.chain.centres.copy(), body.chain.inertias.copy()
+    masses[way.frame] += value * way.mass
+    centres[way.frame] += value * way.centre
+    inertias[way.frame] += value * way.inertia
+    return np.concatenate(
+        [
+            fit.of(_changed(fit.seen, matrix, masses, centres, inertias))
+            for fit, matrix in zip(fits, matrices, strict=True)
+        ]
+    )
 
 
 def _whole_part(
@@ -274,28 +279,20 @@ def _whole_part(
     left, strengths, right = np.linalg.svd(columns / lengths, full_matrices=False)
     kept = strengths > _UNSEEN * max(float(strengths.max(initial=0.0)), np.finfo(float).tiny)
     inverse = (right[kept].T / strengths[kept]) @ left[:, kept].T / lengths[:, None]
-    numbers, best, square = np.zeros(PARAMETERS), np.zeros(PARAMETERS), np.inf
-    unexplained = np.concatenate([fit.vector for fit in fits])
+    change = _Direction(part.name, "", "", frame, 0.0, np.zeros(3), np.zeros((3, 3)), 1.0)
+    numbers = np.zeros(PARAMETERS)
+    rest = _left_by(body, change, 1.0, fits, matrices)
     for _ in range(_STEPS):
-        masses, centres, inertias = chain.masses.copy(), chain.centres.copy(), chain.inertias.copy()
-        masses[frame] += numbers[0]
-        centres[frame] += numbers[1:4]
-        inertias[frame] += _tensor(numbers[4:])
-        if masses[frame] <= 0.0:
+        trial = numbers - inverse @ rest
+        tried = replace(change, mass=float(trial[0]), centre=trial[1:4], inertia=_tensor(trial[4:]))
+        if chain.masses[frame] + tried.mass <= 0.0:
             break
-        rest = np.concatenate(
-            [
-                fit.of(_changed(fit.seen, matrix, masses, centres, inertias))
-                for fit, matrix in zip(fits, matrices, strict=True)
-            ]
-        )
-        if float(rest @ rest) >= square:
+        left_then = _left_by(body, tried, 1.0, fits, matrices)
+        if left_then @ left_then >= rest @ rest:
             break
-        best, unexplained, square = numbers, rest, float(rest @ rest)
-        numbers = numbers - inverse @ rest
+        numbers, change, rest = trial, tried, left_then
     mass = float(chain.masses[frame])
-    change = _Direction(part.name, "", "", frame, float(best[0]), best[1:4], _tensor(best[4:]), 1.0)
-    if not np.isfinite(square) or not _is_in_reach(body, change, 1.0, fits[0].seen.extent):
+    if not numbers.any() or not _is_in_reach(body, change, 1.0, fits[0].seen.extent):
         return None
     # Where a part has other frames, their share of its inertia is not in this one.
     if part.is_one_frame and not _has_moments(body, change, 1.0):
@@ -304,13 +301,15 @@ def _whole_part(
     # What the samples leave open is not bounded by them.
     open_sides = np.abs(right[~kept]).max(axis=0, initial=0.0) > _OPEN
     bars[open_sides] = np.inf
-    values = {"mass": FittedValue(value=100.0 * best[0] / mass, bar=100.0 * bars[0] / mass, unit="%")}
+    values = {"mass": FittedValue(value=100.0 * numbers[0] / mass, bar=100.0 * bars[0] / mass, unit="%")}
     for axis in range(3):
-        values[f"centre {_AXES[axis]}"] = FittedValue(value=float(best[1 + axis]), bar=float(bars[1 + axis]), unit="m")
+        values[f"centre {_AXES[axis]}"] = FittedValue(
+            value=float(numbers[1 + axis]), bar=float(bars[1 + axis]), unit="m"
+        )
     return fitted_hypothesis(
         f"mass, centre and inertia of {part.name}",
         "inertia",
-        leftover(fits, unexplained),
+        leftover(fits, rest),
         parameters=int(kept.sum()),
         values=values,
         remark=part.remark,

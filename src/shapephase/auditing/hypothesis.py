@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from ..arrays import Array
 from ..display import short_repr
 from ..plain_data import plain
 
@@ -53,6 +54,8 @@ class Hypothesis:
     values : what they are
     remark : what else is to be said
     leftover : residuals of each law
+    residuals : (M,) what is left over in time, in units of the noise: of each run the momentum of its samples, then the
+        fall; None where the hypothesis has other samples
 
     Examples
     --------
@@ -68,7 +71,8 @@ class Hypothesis:
     share: float = 1.0
     values: Mapping[str, FittedValue] = field(default_factory=dict)
     remark: str = ""
-    leftover: Leftover | None = None
+    leftover: Leftover | None = field(default=None, repr=False, compare=False)
+    residuals: Array | None = field(default=None, repr=False, compare=False)
 
     __repr__ = short_repr
 

@@ -60,8 +60,9 @@ _MOST_SAMPLES = 500
 """Of each run, by which hypotheses are told apart."""
 _MOST_LOOKED_AT = 5000
 """Samples of a trajectory that is read otherwise, to see where it falls then."""
-_NEARLY_ALL = 0.9
-"""Of the samples: with so many in the air nobody asks whether there would be more, were they read otherwise."""
+_MOSTLY = 0.5
+"""Of the samples: with so many in the air it is not tried whether there would be more, were they read otherwise; a
+landing at the end leaves more than that, and read wrongly it seems to be in the air."""
 _JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing here says whether they are right."
 
 
@@ -196,7 +197,7 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
         found = airborne_part(body, run, flight)
     except TrajectoryError as error:
         fault = error
-    if found is not None and found.past - found.first >= _NEARLY_ALL * len(run.times):
+    if found is not None and found.past - found.first >= _MOSTLY * len(run.times):
         return found
     every = -(-len(run.times) // _MOST_LOOKED_AT)
     for other in read_otherwise(body, run.every(every)):
@@ -226,7 +227,9 @@ def _run_audit(
         tolerance = max(tolerance, 2.0 * np.pi / span * seen.mass * wander * seen.extent / scale)
     momentum, free = seen.seen(seen.momentum), 1 if seen.given_rates else 2
     inner = _off(seen.times, _in_units(momentum, seen.momentum_noise), free)
-    smooth = smooth_part(seen.times, momentum, seen.momentum_noise, free, seen.carried_noise, inner)
+    # The sum of the momentum over the time is compared with a turn of the body.
+    size = scale if seen.given_rates else seen.mass * seen.extent**2
+    smooth = smooth_part(seen.times, momentum, seen.momentum_noise, free, seen.carried_noise, inner, size)
     values, level = smooth.values, smooth.noise
     if not seen.given_rates:
         values = np.gradient(values, seen.times, axis=0)
@@ -235,7 +238,7 @@ def _run_audit(
     fall = None
     if seen.centre is not None and seen.centre_noise is not None:
         inner = _off(seen.times, _in_units(seen.centre, seen.centre_noise), 3)
-        fall = smooth_part(seen.times, seen.centre, seen.centre_noise, 3, whitened=inner)
+        fall = smooth_part(seen.times, seen.centre, seen.centre_noise, 3, whitened=inner, size=seen.extent)
     agreement = rate_agreement(run, seen.noise)
     off = None if fall is None else float(np.linalg.norm(fall.values, axis=1).max())
     error = _attitude_error(body, seen)
@@ -332,7 +335,7 @@ def _ranked(
     order: StepOrder | None,
 ) -> Ranking:
     """Hypotheses one by one; in twos where the best leaves more than noise and tolerance."""
-    runs = [_thinned(run) for run in runs]
+    runs = [thinned(run) for run in runs]
     levels = [one.noise for one in looked]
     fits = [residuals(body, observed(body, run, level)) for run, level in zip(runs, levels, strict=True)]
     without = leftover(fits, np.concatenate([fit.vector for fit in fits]))
@@ -380,7 +383,7 @@ def _causes(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     ]
 
 
-def _thinned(run: FloatingTrajectory) -> FloatingTrajectory:
+def thinned(run: FloatingTrajectory) -> FloatingTrajectory:
     """As many samples as hypotheses are told apart by, evenly taken."""
     every = -(-len(run.times) // _MOST_SAMPLES)
     return run if every == 1 else run.every(every)

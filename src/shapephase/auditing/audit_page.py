@@ -1,0 +1,146 @@
+"""One HTML file about an audit: verdict, momentum and fall in time, what hypotheses leave over, and all numbers."""
+
+from __future__ import annotations
+
+import base64
+import os
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..arguments import check_file_name, check_object
+from ..body.body import Body
+from ..files import write_whole
+from ..letters import printable
+from ..plotting.pages.templates import page_html
+from ..plotting.plot_style import axes_image
+from ..plotting.report import figure_rows
+from ._observation import observed
+from ._ranking import EXPLAINS
+from ._residuals import residuals
+from .audit_result import Audit, RunAudit
+from .figures import fall_figure, left_over_figures, momentum_figure
+from .floating_trajectory import FloatingTrajectory
+from .hypothesis import Hypothesis
+from .trajectory_audit import thinned
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MOST_ROWS = 20  # hypotheses of the table; the record has all
+_KEY = "Grey: not audited."
+
+
+def write_audit_page(
+    body: Body,
+    trajectories: FloatingTrajectory | Sequence[FloatingTrajectory],
+    found: Audit,
+    file: str | os.PathLike[str],
+) -> None:
+    """Write an audit as one HTML file that opens offline; whole or not at all.
+
+    Momentum and fall are drawn for all samples, those that were not audited on grey; then the residuals before and
+    after each hypothesis.
+
+    Parameters
+    ----------
+    body, trajectories : of which the audit was made
+    found : by `audit`
+
+    Raises
+    ------
+    MissingExtraError
+        Without Matplotlib: pip install 'shapephase[plot]'.
+
+    Examples
+    --------
+    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 51)
+    >>> still = sp.FloatingTrajectory(
+    ...     times=times, quaternion=np.tile([0.0, 0.0, 0.0, 1.0], (51, 1)), shapes=np.zeros((51, 3)))
+    >>> sp.auditing.write_audit_page(cat, still, sp.audit(cat, still), "audit.html")
+    >>> from pathlib import Path
+    >>> Path("audit.html").read_text()[:9]
+    '<!doctype'
+    """
+    check_object(body, "Body", "body")
+    check_object(found, "Audit", "found")
+    check_file_name(file, "file")
+    given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else list(trajectories)
+    page = page_html(
+        "audit.html",
+        title=f"Audit of {found.body}",
+        scripts=(),
+        styles=("page", "report_page", "audit_page"),
+        data={},
+        verdict=found.verdict,
+        flights=figure_rows(list(_flights(body, given, found))),
+        residuals=figure_rows(list(_left_over(body, given, found))),
+        runs=[(run.name, _facts(run)) for run in found.runs],
+        hypotheses=[_row(one, found) for one in found.hypotheses[:_MOST_ROWS]],
+        others=max(len(found.hypotheses) - _MOST_ROWS, 0),
+        enough=f"{100.0 * EXPLAINS:.0f} %",
+        notes=found.notes,
+    )
+    write_whole(file, lambda stream: stream.write(page.encode()))
+
+
+def _flights(body: Body, trajectories: Sequence[FloatingTrajectory], found: Audit) -> Iterator[dict[str, str]]:
+    for run, trajectory in zip(found.runs, trajectories, strict=True):
+        seen, name = observed(body, trajectory, run.noise), printable(run.name)
+        yield _shown(momentum_figure(run, seen), f"{name}: angular momentum about the centre of mass. {_KEY}")
+        fall = fall_figure(run, seen)
+        if fall is not None:
+            yield _shown(fall, f"{name}: the centre of mass, dotted the parabolas of free fall. {_KEY}")
+
+
+def _left_over(body: Body, trajectories: Sequence[FloatingTrajectory], found: Audit) -> Iterator[dict[str, str]]:
+    if not any(one.residuals is not None for one in found.hypotheses):
+        return
+    part = found.runs[0].airborne
+    flown = thinned(trajectories[0].part(part.first, part.past))
+    before = residuals(body, observed(body, flown, found.runs[0].noise))
+    for one, figure in left_over_figures(found, before):
+        yield _shown(figure, f"{one.name}: {100.0 * one.share:.2g} % left over")
+
+
+def _shown(figure: Figure, caption: str) -> dict[str, str]:
+    return {"caption": caption, "image": base64.b64encode(axes_image(figure.axes[0], "svg")).decode()}
+
+
+def _facts(run: RunAudit) -> list[tuple[str, str, str]]:
+    """Name, value and words of what was found of a run."""
+    rows = [
+        ("audited", f"{run.first_time:.6g} to {run.last_time:.6g} s", f"{len(run.times)} samples; {run.airborne.how}"),
+        (
+            "momentum",
+            f"{run.relative_drift:.2g}",
+            "largest slow change, of what turns the body; " + _against(run.momentum_ratio),
+        ),
+    ]
+    if run.fall_off is not None and run.fall_ratio is not None:
+        rows.append(("fall", f"{run.fall_off:.2g} m", "off a parabola; " + _against(run.fall_ratio)))
+    if run.airborne.acceleration is not None:
+        pull = " ".join(f"{part:.4g}" for part in run.airborne.acceleration)
+        rows.append(("acceleration", f"{pull} m/s²", "of the centre of mass, axes of the world"))
+    if run.agreement is not None:
+        rows.append(("rates", f"{run.agreement.mismatch:.2g}", "off the samples; " + _against(run.agreement.ratio)))
+    if run.attitude_error is not None:
+        degrees = f"{float(np.degrees(run.attitude_error.max())):.3g}°"
+        rows.append(("attitude", degrees, "at most from the nearest exact reconstruction"))
+    return rows
+
+
+def _against(ratio: float) -> str:
+    return "noise explains it" if ratio <= 1.0 else "more than noise"
+
+
+def _row(one: Hypothesis, found: Audit) -> tuple[str, ...]:
+    named = any(other.name == one.name for other in found.cause)
+    return (
+        "named" if named else "",
+        one.name,
+        f"{100.0 * one.share:.2g} %",
+        f"{one.left_over:.2g}",
+        "; ".join(part for part in (one.text, one.remark) if part),
+    )
