@@ -14,7 +14,7 @@ from .. import so3
 from ..arrays import Array
 from ..body.body import Body
 from ..body.link_motions import link_motions
-from ._residuals import Residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
 _HIGHEST = 8  # order of the polynomials whose slope is the velocity, the samples allowing
@@ -39,19 +39,18 @@ class _Flight:
         return self.fit.columns(momentum, cumulative_trapezoid(speed, times, axis=0, initial=0.0) / self.fit.seen.mass)
 
 
-def drag(body: Body, fits: Sequence[Residuals]) -> Hypothesis | None:
-    """The law that explains most; None where places are unknown, or where every law would speed the body up.
+def drag(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
+    """The law that explains most; empty where places are unknown, or where every law would speed the body up.
 
-    Either of the whole body: a force -c v - k |v| v at a constant offset from the centre of mass, base axes, and a
+    Either of the whole body: a force -c v - k |v| v at a point fixed to the centre of mass or to the base, and a
     torque -d omega with the rate of the base. Or of each link: density and viscosity of a fluid that acts on the box of
     uniform density that has the link's mass and inertia.
     """
     if any(fit.seen.centre is None for fit in fits):
-        return None
+        return []
     flights = [_Flight(fit, _velocity(fit)) for fit in fits]
     laws = [*_of_whole_body(flights), *_of_links(body, flights)]
-    many = np.log(sum(fit.freedom for fit in fits))
-    return min(laws, key=lambda law: law.square + law.parameters * many, default=None)
+    return sorted(laws, key=lambda law: (round(law.leftover.size, 1) if law.leftover else 0.0, law.parameters))[:1]
 
 
 def _velocity(fit: Residuals) -> Array:
@@ -64,37 +63,44 @@ def _velocity(fit: Residuals) -> Array:
 
 
 def _of_whole_body(flights: Sequence[_Flight]) -> Iterator[Hypothesis]:
-    for laws, turn in product((("quadratic",), ("linear",), ("linear", "quadratic")), ((), ("turn",))):
+    laws_of_force = (("quadratic",), ("linear",), ("linear", "quadratic"))
+    for laws, turn, point in product(laws_of_force, ((), ("turn",)), ("centre of mass", "origin of the base")):
         names = (*laws, *turn)
         vector = np.concatenate([flight.fit.vector for flight in flights])
         numbers = np.zeros(len(names) + 3)
-        matrix, made = _all_by_numbers(flights, laws, turn, numbers)
+        matrix, made = _all_by_numbers(flights, laws, turn, point, numbers)
         for _ in range(_STEPS):
             before = vector - made
             numbers = numbers + np.linalg.lstsq(matrix, before, rcond=None)[0]
-            matrix, made = _all_by_numbers(flights, laws, turn, numbers)
+            matrix, made = _all_by_numbers(flights, laws, turn, point, numbers)
             left = vector - made
             if abs(before @ before - left @ left) <= _ENOUGH * (left @ left):
                 break
         if np.all(numbers[: len(names)] > 0.0):
-            remark = "of the whole body, centre of pressure from the centre of mass"
+            remark = f"of the whole body, centre of pressure from the {point}"
             yield _hypothesis(flights, matrix, vector - made, names, numbers, remark)
 
 
 def _all_by_numbers(
-    flights: Sequence[_Flight], laws: Sequence[str], turn: Sequence[str], numbers: Array
+    flights: Sequence[_Flight], laws: Sequence[str], turn: Sequence[str], point: str, numbers: Array
 ) -> tuple[Array, Array]:
     """The results of `_by_numbers`, of all runs below each other."""
-    parts = [_by_numbers(flight, laws, turn, numbers) for flight in flights]
+    parts = [_by_numbers(flight, laws, turn, point, numbers) for flight in flights]
     return np.vstack([columns for columns, _ in parts]), np.concatenate([made for _, made in parts])
 
 
-def _by_numbers(flight: _Flight, laws: Sequence[str], turn: Sequence[str], numbers: Array) -> tuple[Array, Array]:
+def _by_numbers(
+    flight: _Flight, laws: Sequence[str], turn: Sequence[str], point: str, numbers: Array
+) -> tuple[Array, Array]:
     """Derivatives of the residuals by each number, (M, k), and their change by all of them, (M,)."""
     seen, count = flight.fit.seen, len(laws)
     speed = np.linalg.norm(flight.velocity, axis=1, keepdims=True)
     forces = np.stack([-flight.velocity * (speed if law == "quadratic" else 1.0) for law in laws], axis=2)
     arm, force = seen.attitude @ numbers[-3:], forces @ numbers[:count]
+    if point != "centre of mass":
+        assert seen.trajectory.position is not None
+        assert seen.centre is not None
+        arm = arm + seen.trajectory.position - seen.centre
     slowing = [-so3.apply(seen.attitude, seen.rate)[:, :, None] for _ in turn]
     torques = np.concatenate(
         [np.cross(arm[:, :, None], forces, axis=1), *slowing, np.cross(seen.attitude, force[:, :, None], axis=1)],
@@ -150,20 +156,17 @@ def _by_fluid(body: Body, flight: _Flight) -> Array:
 def _hypothesis(
     flights: Sequence[_Flight], matrix: Array, left: Array, names: Sequence[str], numbers: Array, remark: str
 ) -> Hypothesis:
-    square = float(left @ left)
     bars = np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)))
     labels = [(name, _UNITS[name]) for name in names]
     labels += [(f"centre of pressure {axis}", "m") for axis in _AXES[: len(numbers) - len(names)]]
-    return Hypothesis(
-        name="drag of the air",
-        kind="drag",
-        square=square,
-        left_over=float(np.sqrt(square / sum(flight.fit.freedom for flight in flights))),
+    return fitted_hypothesis(
+        "drag of the air",
+        "drag",
+        leftover([flight.fit for flight in flights], left),
         parameters=len(numbers),
         values={
             name: FittedValue(value=float(value), bar=float(bar), unit=unit)
             for (name, unit), value, bar in zip(labels, numbers, bars, strict=True)
         },
         remark=remark,
-        residuals=left,
     )

@@ -12,15 +12,13 @@ from ..arrays import Array
 from ..body.body import Body
 from ..shape_space.ball_columns import ball_columns
 from ._observation import Observation
-from ._residuals import Residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
 _NUDGE = 1e-6  # [rad or m] by which a joint is moved for the derivative of the centre of mass
 _STEPS = 6  # of Gauss and Newton; each gains about two digits
 _CANDIDATES = 4  # hypotheses that leave the least are fitted to the end, the others to first order
-_UNSEEN = 1e9  # [rad or m] bar of an offset that moves nothing
-_HALF_TURN = np.pi  # [rad] no joint that turns is off by more
-_FARTHEST = 3.0  # radii of gyration of the whole body: no joint that slides is off by more
+_FARTHEST = 3.0  # radii of gyration: no slide is set farther off
 
 
 def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
@@ -33,33 +31,27 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
         return []
     columns = np.vstack([_by_shapes(body, fit) for fit in fits])[:, joints]
     vector = np.concatenate([fit.vector for fit in fits])
-    freedom = sum(fit.freedom for fit in fits)
     strengths = np.linalg.norm(columns, axis=0)
-    seen = strengths * _UNSEEN > 1.0
-    values = np.where(seen, vector @ columns / np.where(seen, strengths, 1.0) ** 2, 0.0)
-    squares = vector @ vector - (values * strengths) ** 2
+    turning = np.array([body.joint_units[joint] == "rad" for joint in joints])
+    most = np.where(turning, np.pi, _FARTHEST * fits[0].seen.extent)
+    values = vector @ columns / np.maximum(strengths, 1e-150) ** 2
+    tried = np.flatnonzero(np.abs(values) <= most).tolist()
+    lefts = {place: vector - values[place] * columns[:, place] for place in tried}
     offsets = []
-    for rank, place in enumerate(np.argsort(squares, kind="stable").tolist()):
-        joint, value, left = int(joints[place]), float(values[place]), None
-        unit = body.joint_units[joint]
-        most = _HALF_TURN if unit == "rad" else _FARTHEST * fits[0].seen.extent
-        if not seen[place] or abs(value) > most:
-            continue
-        square = float(squares[place])
+    for rank, place in enumerate(sorted(tried, key=lambda place: leftover(fits, lefts[place]).size)):
+        joint, value, left = int(joints[place]), float(values[place]), lefts[place]
         if rank < _CANDIDATES:
-            value, left = _to_the_end(body, joint, value, columns[:, place], fits, most)
-            square = float(left @ left)
+            value, left = _to_the_end(body, joint, value, columns[:, place], fits, float(most[place]))
+        unit = body.joint_units[joint]
         fitted = FittedValue(value=value, bar=float(1.0 / strengths[place]), unit=unit)
         offsets.append(
-            Hypothesis(
-                name=f"offset of joint {body.joint_names[joint]}",
-                kind="offset",
-                square=square,
-                left_over=float(np.sqrt(max(square, 0.0) / freedom)),
+            fitted_hypothesis(
+                f"offset of joint {body.joint_names[joint]}",
+                "offset",
+                leftover(fits, left),
                 parameters=1,
                 values={"offset": fitted},
                 remark=f"read {np.degrees(value):+.3g} degrees off" if unit == "rad" else "",
-                residuals=left,
             )
         )
     return offsets
@@ -79,13 +71,14 @@ def _by_shapes(body: Body, fit: Residuals) -> Array:
 def _to_the_end(
     body: Body, joint: int, value: float, column: Array, fits: Sequence[Residuals], most: float
 ) -> tuple[float, Array]:
-    """Gauss and Newton with the whole dependence: the offset, `most` of it, and what it leaves."""
-    best = (0.0, np.concatenate([fit.vector for fit in fits]))
+    """Gauss and Newton with the whole dependence: the offset, at most `most`, and what it leaves."""
+    best, least = (0.0, np.concatenate([fit.vector for fit in fits])), float(sum(fit.square for fit in fits))
     for _ in range(_STEPS):
         left = np.concatenate([fit.of(_read_with(body, fit.seen, joint, value)) for fit in fits])
-        if left @ left >= best[1] @ best[1]:
+        square = float(left @ left)
+        if square >= least:
             break
-        best = (value, left)
+        best, least = (value, left), square
         value = float(np.clip(value + column @ left / (column @ column), -most, most))
     return best
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ..arrays import Array
-from ._residuals import Residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
 _KNOTS = 48
@@ -24,14 +24,14 @@ _AXES = "xyz"
 
 
 class _Push(NamedTuple):
-    """Begin and end [s], fitted columns and what they leave, squared and (M,)."""
+    """Begin and end [s], fitted columns and what they leave."""
 
     begin: float
     end: float
+    left: Array
     square: float
     amounts: Array
     bars: Array
-    left: Array
 
 
 def outside_pushes(fits: Sequence[Residuals]) -> list[Hypothesis]:
@@ -97,17 +97,8 @@ def _times(push: _Push) -> dict[str, FittedValue]:
 def _hypothesis(
     name: str, kind: str, push: _Push, fits: Sequence[Residuals], values: dict[str, FittedValue], remark: str
 ) -> Hypothesis:
-    freedom = sum(fit.freedom for fit in fits)
-    return Hypothesis(
-        name=name,
-        kind=kind,
-        square=push.square,
-        left_over=float(np.sqrt(max(push.square, 0.0) / freedom)),
-        parameters=2 + len(push.amounts),
-        values=values,
-        remark=remark,
-        residuals=push.left,
-    )
+    left = leftover(fits, push.left)
+    return fitted_hypothesis(name, kind, left, parameters=2 + len(push.amounts), values=values, remark=remark)
 
 
 def _fitted(fits: Sequence[Residuals], *, with_force: bool) -> _Push:
@@ -132,7 +123,7 @@ def _fitted(fits: Sequence[Residuals], *, with_force: bool) -> _Push:
             left = vector - right @ found
             amounts[kept] = found / lengths[kept]
             spread[kept] = np.linalg.norm(np.linalg.inv(triangle), axis=1) / lengths[kept]
-        return _Push(begin, end, float(left @ left), amounts, spread, left)
+        return _Push(begin, end, left, float(left @ left), amounts, spread)
 
     def cost(pair: Array) -> float:
         begin, lasts = float(pair[0]), float(np.exp(pair[1]))

@@ -13,7 +13,7 @@ from ..body.body import Body
 from ..body.inertial_regressor import PARAMETERS, InertialRegressor, inertial_regressor
 from ..body.link_motions import link_motions
 from ._observation import Observation
-from ._residuals import Residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
 _NEXT_TO_NOTHING = 1e-9
@@ -134,42 +134,34 @@ def wrong_inertias(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     # Whitened columns of the ten parameters of every link, and what each hypothesis makes of them.
     of_all = np.vstack([_by_parameters(fit, matrix, body) for fit, matrix in zip(fits, matrices, strict=True)])
     vector = np.concatenate([fit.vector for fit in fits])
-    freedom = sum(fit.freedom for fit in fits)
     changes = np.array([_as_parameters(way, len(body.chain.masses)) for way in ways])
     columns = of_all @ changes.T
     strength = (columns**2).sum(axis=0)
     seen_at_all = strength > 0.0
     along = vector @ columns
     guesses = np.where(seen_at_all, -along / np.where(seen_at_all, strength, 1.0), 0.0)
-    squares = vector @ vector - guesses**2 * strength
     # To first order a link may weigh less than nothing.
     least = np.array([-_MOST_LOST * body.chain.masses[way.frame] / way.mass if way.mass else -np.inf for way in ways])
-    too_light = guesses < least
     guesses = np.maximum(guesses, least)
-    squares[too_light] = (vector @ vector + 2.0 * guesses * along + guesses**2 * strength)[too_light]
-    order = np.argsort(squares, kind="stable")
+    tried = [place for place in range(len(ways)) if seen_at_all[place] and np.sqrt(strength[place]) > _UNSEEN]
+    lefts = {place: vector + guesses[place] * columns[:, place] for place in tried}
     found = []
-    for rank, place in enumerate(order.tolist()):
-        if not seen_at_all[place] or 1.0 / np.sqrt(strength[place]) > 1.0 / _UNSEEN:
-            continue
-        way, value, square, left = ways[place], float(guesses[place]), float(squares[place]), None
+    for rank, place in enumerate(sorted(tried, key=lambda place: leftover(fits, lefts[place]).size)):
+        way, value, left = ways[place], float(guesses[place]), lefts[place]
         if rank < _CANDIDATES:
             value, left = _to_the_end(body, way, value, columns[:, place], fits, matrices)
-            square = float(left @ left)
         if not (_is_in_reach(body, way, value, seen[0].extent) and _has_moments(body, way, value)):
             continue
         bar = float(1.0 / np.sqrt(strength[place]))
         shown = FittedValue(value=value * way.scale, bar=bar * way.scale, unit=way.unit)
         found.append(
-            Hypothesis(
-                name=way.name,
-                kind="inertia",
-                square=square,
-                left_over=float(np.sqrt(max(square, 0.0) / freedom)),
+            fitted_hypothesis(
+                way.name,
+                "inertia",
+                leftover(fits, left),
                 parameters=1,
                 values={way.label: shown},
                 remark=parts[way.frame].remark,
-                residuals=left,
             )
         )
     for part in dict.fromkeys(parts):
@@ -299,7 +291,7 @@ def _whole_part(
         if left_then @ left_then >= rest @ rest:
             break
         numbers, change, rest = trial, tried, left_then
-    mass, square = float(chain.masses[frame]), float(rest @ rest)
+    mass = float(chain.masses[frame])
     if not numbers.any() or not _is_in_reach(body, change, 1.0, fits[0].seen.extent):
         return None
     # Where a part has other frames, their share of its inertia is not in this one.
@@ -314,15 +306,13 @@ def _whole_part(
         values[f"centre {_AXES[axis]}"] = FittedValue(
             value=float(numbers[1 + axis]), bar=float(bars[1 + axis]), unit="m"
         )
-    return Hypothesis(
-        name=f"mass, centre and inertia of {part.name}",
-        kind="inertia",
-        square=square,
-        left_over=float(np.sqrt(square / sum(fit.freedom for fit in fits))),
+    return fitted_hypothesis(
+        f"mass, centre and inertia of {part.name}",
+        "inertia",
+        leftover(fits, rest),
         parameters=int(kept.sum()),
         values=values,
         remark=part.remark,
-        residuals=rest,
     )
 
 

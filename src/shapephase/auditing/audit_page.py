@@ -96,7 +96,7 @@ def _left_over(body: Body, trajectories: Sequence[FloatingTrajectory], found: Au
         return
     part = found.runs[0].airborne
     flown = thinned(trajectories[0].part(part.first, part.past))
-    before = residuals(observed(body, flown, found.runs[0].noise))
+    before = residuals(body, observed(body, flown, found.runs[0].noise))
     for hypothesis, figure in left_over_figures(found, before):
         yield _shown(figure, f"{hypothesis.name}: {100.0 * hypothesis.share:.2g} % left over")
 
