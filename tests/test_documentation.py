@@ -39,6 +39,7 @@ LIKE_ANOTHER = (
     "shapephase.ForcedSplit",
     "shapephase.FreeHinges",
     "shapephase.auditing.write_audit_figure",
+    "shapephase.auditing.audit_page",
     "shapephase.plots.explore",
 )
 PAGES = sorted(page for page in DOCS.rglob("*.md") if "_build" not in page.parts)

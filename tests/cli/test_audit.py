@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 
 from shapephase.cli.main import main
 from shapephase.cli.outcome import ExitCode
+from support.flown_bodies import flown
 
 FLOWN = Path(__file__).parents[1] / "data" / "flown_cat.csv"
 
@@ -39,3 +42,34 @@ def test_faults_of_its_arguments_are_usage(capsys: pytest.CaptureFixture[str]):
             main(["audit", *words])
         assert ended.value.code == ExitCode.USAGE
     assert "one trajectory or more" in capsys.readouterr().err
+
+
+def test_a_page_says_what_was_audited_and_what_explains_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """MuJoCo's arrays of a body whose joint is read two degrees off, with their rates."""
+    motion = flown("diver", seed=1, step=0.001, every=5, duration=0.4)
+    qpos = motion.qpos + np.radians(2.0) * (np.arange(motion.qpos.shape[1]) == 7)
+    arrays = {"time": motion.times, "qpos": qpos, "qvel": motion.qvel, "joint_names": np.array(motion.joint_names)}
+    np.savez(tmp_path / "run.npz", **arrays)
+    page = tmp_path / "audit.html"
+    with pytest.raises(SystemExit) as ended:
+        main(["audit", "diver", str(tmp_path / "run.npz"), "--tolerance", "1e-6", "--html", str(page), "--json"])
+    assert ended.value.code == ExitCode.WRONG
+    found = json.loads(capsys.readouterr().out)
+    assert found["runs"][0]["rates_given"]
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith("<!doctype html>")
+    assert text.rstrip().endswith("</html>")
+    assert found["verdict"] in unescape(text)
+    assert found["cause"] == [f"offset of joint {motion.joint_names[0]}"]
+    rows = re.findall(r"<tr><td>named</td><td>(.*?)</td>", text)
+    assert rows == found["cause"]
+    # Momentum and fall, and what each of eight hypotheses leaves over.
+    assert text.count("data:image/svg+xml;base64,") == 10
+    assert "://" not in text
+
+
+def test_a_page_of_what_cannot_be_a_page_is_usage(capsys: pytest.CaptureFixture[str]):
+    with pytest.raises(SystemExit) as ended:
+        main(["audit", "cat_two_halves", str(FLOWN), "--html", "audit.pdf"])
+    assert ended.value.code == ExitCode.USAGE
+    assert "must end in .html" in capsys.readouterr().err

@@ -53,6 +53,8 @@ def flown(
     push: Callable[[float], tuple[np.ndarray, np.ndarray]] | None = None,
     gravity: float = 9.81,
     reach: float = 0.5,
+    model: mujoco.MjModel | None = None,
+    watch: Callable[[mujoco.MjModel, mujoco.MjData], None] | None = None,
 ) -> Flown:
     """A flight.
 
@@ -63,8 +65,10 @@ def flown(
     heavier : link -> factor of its mass, its inertia left as it is
     push : time -> force and torque on the base's centre of mass, world axes [N], [N m]
     reach : of the joints' loop [rad]
+    model : the body in other surroundings; None: the body alone
+    watch : called at each state once its forces are known, before the step; it may apply more of them
     """
-    model = copy.copy(mujoco_model(name))
+    model = copy.copy(mujoco_model(name) if model is None else model)
     model.opt.integrator, model.opt.timestep = INTEGRATORS[integrator], step
     model.opt.gravity[:] = 0.0, 0.0, -gravity
     for link, factor in (heavier or {}).items():
@@ -97,6 +101,8 @@ def flown(
         if push is not None:
             force, torque = push(now)
             data.xfrc_applied[1] = np.concatenate([force, torque])
+        if watch is not None:
+            watch(model, data)
         mujoco.mj_step(model, data)
     return Flown(np.array(times), np.array(qpos), np.array(qvel), tuple(joint.name for joint in joints))
 

@@ -433,6 +433,11 @@ def mujoco_model(name: str):
     """
     import mujoco
 
+    return mujoco.MjModel.from_xml_string(floating_urdf(name))
+
+
+def floating_urdf(name: str) -> str:
+    """The URDF as MuJoCo reads it, with a floating base and without drawing or gravity."""
     root = ElementTree.parse(urdf_file(name)).getroot()
     for link in root.findall("link"):
         for kind in ("visual", "collision"):
@@ -456,7 +461,7 @@ def mujoco_model(name: str):
         boundinertia="1e-14",
     )
     ElementTree.SubElement(settings, "option", gravity="0 0 0")
-    return mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 class MujocoBody:

@@ -52,7 +52,9 @@ def _mass(name: str, seed: int, duration: float) -> Planted:
     links = [part.links[0] for part in body_of(name).moving_parts if part.mass > 1e-3]
     link, percent = str(random.choice(links)), 3.0 * float(random.choice([-1.0, 1.0]))
     run = _flight(name, seed, duration, heavier={link: 1.0 + 0.01 * percent})
-    return Planted(body_of(name), run, f"mass of {link}", {"mass": (percent, 0.5)})
+    fixed = next(part.links[1:] for part in body_of(name).moving_parts if part.links[0] == link)
+    part = f"{link} with {', '.join(fixed)} (fixed)" if fixed else link
+    return Planted(body_of(name), run, f"mass of {part}", {"mass": (percent, 0.5)})
 
 
 def _push(name: str, seed: int, duration: float, *, force: bool) -> Planted:

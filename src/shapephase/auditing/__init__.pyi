@@ -8,6 +8,7 @@ from .figures import audit_figure, write_audit_figure
 from .flight_recorder import FlightRecorder, assert_right_in_flight
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import FittedValue, Hypothesis
+from .page import audit_page
 from .reading import read_trajectory
 from .trajectory_audit import audit
 
@@ -26,6 +27,7 @@ __all__ = [
     "assert_right_in_flight",
     "audit",
     "audit_figure",
+    "audit_page",
     "read_trajectory",
     "smooth_part",
     "write_audit_figure",

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from .. import so3
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
@@ -37,6 +38,15 @@ _MANY = 5000
 """Samples; of more, so few a second are looked at that they are about this far apart:"""
 _ENOUGH = 1.0 / 120.0
 """[s] A twentieth of the shortest flight that can be told from rest."""
+_CHANCE = 1e-6  # probability with which noise alone ends a flight
+_STEEP = np.sqrt(0.5)  # cosine of the largest angle of the ground's push from upwards, with a friction of 1
+_TOUCH = 0.01  # of gravity: in a hundredth of a second less changes momenta by less than the usual tolerance
+_FEWEST_WINDOWS = 6  # in the middle half, whose largest jump says little of fewer: 24 samples have them
+_NUDGE = 1e-5  # [s] by which joints are moved along their rates for the velocity of the centre of mass
+_ABRUPT = 2.0  # times the largest jump before
+_SHORTEST = 3  # samples of a window: a second difference
+_LONGER = 1.5  # ratio of a window's samples to those of the next shorter one
+_OVERLAP = 8  # windows begin at every eighth of their length, so that their number grows as that of the samples
 
 
 @dataclass(frozen=True)
@@ -73,7 +83,7 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
     TrajectoryError
         If there is no flight to be found.
     """
-    times, centres = trajectory.times, _centres(body, trajectory)
+    times, centres, speeds = trajectory.times, _centres(body, trajectory), _speeds(body, trajectory)
     if isinstance(flight, str) and flight == "all":
         return _part(times, centres, 0, len(times), "all of it, as given")
     if not isinstance(flight, str) and isinstance(flight, Sequence | np.ndarray) and len(flight) == 2:
@@ -98,9 +108,9 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
     found = _accelerations(at, some)
     if np.linalg.norm(found - np.median(found, axis=0), axis=1).max() < _EVEN * _GRAVITY:
         if number is None and np.linalg.norm(np.median(found, axis=0)) > _EVEN * _GRAVITY:
-            return _part(times, centres, 0, len(times), "all of it: the centre of mass falls")
+            return _clear_part(times, centres, speeds, 0, len(times), "all of it: the centre of mass falls")
         if number is None and _goes_straight(at, some, base):
-            return _part(times, centres, 0, len(times), "all of it: the centre of mass has no weight")
+            return _clear_part(times, centres, speeds, 0, len(times), "all of it: the centre of mass has no weight")
     try:
         fall = free_fall(at - at[0], some, trajectory.name)
     except TrajectoryError:
@@ -118,7 +128,7 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
     flights = "; ".join(f"{at[one]:.6g} to {at[other]:.6g} s" for one, other in fall.all_ends)
     others = f", of {len(fall.all_ends)} flights ({flights}; --flight auto:2)" if len(fall.all_ends) > 1 else ""
     past = min(every * last + 1, len(times))
-    return _part(times, centres, every * first, past, f"the centre of mass falls, {fall.up} up{others}")
+    return _clear_part(times, centres, speeds, every * first, past, f"the centre of mass falls, {fall.up} up{others}")
 
 
 def _goes_straight(times: Array, centres: Array, base: Array) -> bool:
@@ -132,6 +142,104 @@ def _centres(body: Body, trajectory: FloatingTrajectory) -> Array | None:
     if trajectory.position is None:
         return None
     return trajectory.position + so3.apply(trajectory.attitude, body.centre_of_mass(trajectory.shapes))
+
+
+def _speeds(body: Body, trajectory: FloatingTrajectory) -> Array | None:
+    """Velocity of the centre of mass by the given rates, world axes, (N, 3) [m/s]; None without rates."""
+    velocity, rate, joint_rates = trajectory.world_velocity, trajectory.base_rate, trajectory.joint_rates
+    if velocity is None or rate is None or joint_rates is None:
+        return None
+    shapes = trajectory.shapes
+    behind, ahead = (body.centre_of_mass(shapes + sign * _NUDGE * joint_rates) for sign in (-1.0, 1.0))
+    in_base = so3.cross(rate, body.centre_of_mass(shapes)) + (ahead - behind) / (2.0 * _NUDGE)
+    return velocity + so3.apply(trajectory.attitude, in_base)
+
+
+def _clear_part(times: Array, centres: Array, speeds: Array | None, first: int, past: int, how: str) -> AirbornePart:
+    """The stretch without what a contact accelerates at its ends, which `how` then names."""
+    begin, end = first, past
+    every = -(-(past - first) // _MANY)
+    # Rates that are given show a contact within a sample, through noise that hides it from places.
+    for values, order in ((centres, 2), (speeds, 1)):
+        if values is not None:
+            at, some = times[first:past], values[first:past]
+            end = min(end, first + _every_end(at, some, order, every))
+            begin = max(begin, past - _every_end(-at[::-1], some[::-1] * (-1.0) ** order, order, every))
+    if end - begin < _FEWEST:
+        begin, end = first, past
+    if begin > first or end < past:
+        how = f"{how.removeprefix('all of it: ')}, less what is held up"
+        how += f" before {times[begin]:.6g} s" if begin > first else ""
+        how += f" after {times[end - 1]:.6g} s" if end < past else ""
+    return _part(times, centres, begin, end, how)
+
+
+def _every_end(times: Array, values: Array, order: int, every: int) -> int:
+    """The end by `_flight_end`, found in one of every so many samples."""
+    end = _flight_end(times[::every], values[::every], order)
+    return len(times) if every * end >= len(times) else every * max(end - 1, 0) + 1
+
+
+def _flight_end(times: Array, values: Array, order: int) -> int:
+    """The sample before which a contact in the last quarter begins, else the number of samples.
+
+    The flight grows from the middle half of the samples. At each sample the accelerations on windows before and after
+    it are compared, for windows of all lengths; the first jump that noise alone brings in all of them with `_CHANCE`
+    ends the flight if it is the ground's: `_EVEN` of gravity, or less, but upwards and until the end.
+
+    values : (N, 3) of the centre of mass: with order 2 its places, with order 1 its velocities
+    """
+    count = len(times)
+    quarter, length = count // 4, float(_SHORTEST)
+    lengths = []
+    while length <= max(count // _WINDOWS, _SHORTEST):
+        lengths.append(int(length))
+        length = max(_LONGER * length, length + 1.0)
+    limit = float(np.sqrt(chi2.isf(_CHANCE / (count * len(lengths)), 3)))
+    noise = float(white_noise(values[:, None], 3)[0])
+    end = count
+    for length in lengths:
+        stride = max(1, length // _OVERLAP)
+        # The last window ends with the samples.
+        starts = np.arange((count - length) % stride, count - length + 1, stride)
+        pulls, bars = _window_accelerations(times, values, starts, length, order)
+        before = np.searchsorted(starts, starts - length, side="right") - 1
+        middle = (starts - length >= quarter) & (starts + length <= count - quarter)
+        if middle.sum() < _FEWEST_WINDOWS:
+            continue
+        jumps = np.where(before >= 0, np.linalg.norm(pulls - pulls[before], axis=1), 0.0)
+        # What is smooth jumps from window to window by as much as it did before.
+        usual = np.maximum.accumulate(np.where(starts - length >= quarter, jumps, 0.0))[before]
+        level = np.maximum(limit * np.sqrt(2.0) * noise * bars, _ABRUPT * np.maximum(usual, jumps[middle].max()))
+        touched = jumps > np.maximum(level, _TOUCH * _GRAVITY)
+        later = np.flatnonzero(touched & (starts + length > count - quarter) & (starts + length <= end))
+        if not len(later):
+            continue
+        first = int(later[0])
+        pull = np.median(pulls[middle], axis=0)
+        held = pulls[first:].mean(axis=0) - pull
+        size = float(np.linalg.norm(held))
+        upwards = -held @ pull > _STEEP * float(np.linalg.norm(pull)) * size > 0.0
+        if (
+            end < count
+            or jumps[later].max() > _EVEN * _GRAVITY
+            or (length == _SHORTEST and upwards and size > 0.5 * jumps[first])
+        ):
+            end = max(int(starts[first]) + 2 - stride, 0)
+    return end
+
+
+def _window_accelerations(
+    times: Array, values: Array, starts: Integers, length: int, order: int
+) -> tuple[Array, Array]:
+    """Accelerations on windows, (W, 3) [m/s^2], and their standard deviations for a unit one of the samples, (W,)."""
+    samples = starts[:, None] + np.arange(length)
+    since = times[samples] - times[samples].mean(axis=1, keepdims=True)
+    power = since**order - (since**order).mean(axis=1, keepdims=True)
+    if order > 1:
+        power -= since * ((power * since).sum(axis=1) / (since**2).sum(axis=1))[:, None]
+    weights = order * power / (power**2).sum(axis=1, keepdims=True)
+    return np.einsum("wn,wnc->wc", weights, values[samples]), np.linalg.norm(weights, axis=1)
 
 
 def _part(times: Array, centres: Array | None, first: int, past: int, how: str) -> AirbornePart:

@@ -29,29 +29,26 @@ class RateAgreement:
     Attributes
     ----------
     times : (M,) [s]
-    residuals : (M, k) differences over their noise, without unit
-    square : their squares, summed
     mismatch : the slow part of the differences relative to the rates themselves, of the worst of base and joints
     ratio : the same in units of what noise explains: above 1, noise does not
     late : by how much the rates are late against the configurations [s]
     mismatch_less_late : the mismatch once that is taken off
+    colour : mean power of the noise of the worst over that of white noise with its highest frequencies
 
     Examples
     --------
     >>> agreement = sp.auditing.RateAgreement(
-    ...     times=np.zeros(1), residuals=np.zeros((1, 3)), square=0.0, mismatch=0.0, ratio=0.0, late=0.0,
-    ...     mismatch_less_late=0.0)
+    ...     times=np.zeros(1), mismatch=0.0, ratio=0.0, late=0.0, mismatch_less_late=0.0)
     >>> agreement.late
     0.0
     """
 
     times: Array
-    residuals: Array
-    square: float
     mismatch: float
     ratio: float
     late: float
     mismatch_less_late: float
+    colour: float = 1.0
 
     __repr__ = short_repr
 
@@ -62,16 +59,15 @@ def rate_agreement(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> Ra
     if found is None:
         return None
     late = _late(found)
-    mismatch, ratio = _slow(found)
+    mismatch, ratio, colour = _slow(found)
     less = replace(found, difference=found.difference - late * found.slope)
     return RateAgreement(
         times=found.times,
-        residuals=found.whitened,
-        square=float((found.whitened**2).sum()),
         mismatch=mismatch,
         ratio=ratio,
         late=late,
         mismatch_less_late=_slow(less)[0],
+        colour=colour,
     )
 
 
@@ -98,11 +94,6 @@ class RateDifferences:
     rates: Array
     kinds: tuple[str, ...]
 
-    @property
-    def whitened(self) -> Array:
-        """In units of the noise."""
-        return self.difference / self.level
-
 
 def rate_differences(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> RateDifferences | None:
     """None where no rates are given."""
@@ -128,12 +119,16 @@ def rate_differences(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> 
         pairs.append(("joints", own[0], own[1], joint_rates[:, [joint]], of_shape, of_rate, far))
     slopes, differences, levels, biases, kinds = [], [], [], [], []
     held = _HELD * trajectory.integrator_step**2
+    again = difference_weights(trajectory.times[inner])
     for kind, own, narrow, given, of_place, of_rate, far in pairs:
         fast = float(np.abs(given).max(initial=0.0))
         rounding = _ROUNDING * (fast + far * spread)
         # What differences cut off is less than what those of fewer neighbours do.
         slope = differentiated(given, weights)
-        cut = (own - narrow) ** 2 + (held * np.gradient(slope, trajectory.times[inner], axis=0)) ** 2
+        # Rates of the base in other axes have another jerk than its configurations.
+        bend = np.pad(differentiated(own, again), ((REACH, REACH), (0, 0)), mode="edge")
+        jerk = np.gradient(slope if kind == "joints" else bend, trajectory.times[inner], axis=0)
+        cut = (own - narrow) ** 2 + (held * jerk) ** 2
         known = cut + cut.mean(axis=0)
         level = np.sqrt((spread * of_place) ** 2 + of_rate**2 + rounding**2 + known)
         biases.append(known)
@@ -159,17 +154,29 @@ def _late(found: RateDifferences) -> float:
     return float((weighted * found.difference).sum()) / below if below > 0.0 else 0.0
 
 
-def _slow(found: RateDifferences) -> tuple[float, float]:
-    """The worst slow part over the rates of its kind, and the worst over what noise explains."""
-    mismatch = ratio = 0.0
+def _slow(found: RateDifferences) -> tuple[float, float, float]:
+    """The worst slow part over the rates of its kind, the worst over what noise explains, and the colour of noise."""
+    mismatch, ratio, colour = 0.0, 0.0, 1.0
     for kind in dict.fromkeys(found.kinds):
         columns = [k for k, other in enumerate(found.kinds) if other == kind]
         # What is alike for all samples counts in the slow part by their number.
         squares = found.level**2 + len(found.times) * found.bias
-        parts = [smooth_part(found.times, found.difference[:, [k]], squares[:, [k]][:, :, None], 0) for k in columns]
-        values = np.hstack([part.values for part in parts])
+        whitened = found.difference[:, columns] / np.sqrt(squares[:, columns])
         fast = float(np.sqrt((found.rates[:, columns] ** 2).sum(axis=1).mean()))
+        parts = [
+            smooth_part(
+                found.times,
+                found.difference[:, [k]],
+                squares[:, [k]][:, :, None],
+                0,
+                whitened=whitened[:, [place]],
+                size=fast,
+            )
+            for place, k in enumerate(columns)
+        ]
+        values = np.hstack([part.values for part in parts])
         slow = float(np.sqrt((values**2).sum(axis=1).mean()))
         mismatch = max(mismatch, slow / fast if fast > 0.0 else 0.0)
         ratio = max(ratio, *(part.ratio for part in parts))
-    return mismatch, ratio
+        colour = max(colour, *(part.colour for part in parts))
+    return mismatch, ratio, colour

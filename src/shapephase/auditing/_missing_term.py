@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ._residuals import Residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
 _AS_ONE = 1e-3
@@ -18,34 +18,34 @@ _SEEN = 1e-9
 _AXES = "xyz"
 
 
-def no_gyroscopic_term(fits: Sequence[Residuals]) -> Hypothesis | None:
+def no_gyroscopic_term(fits: Sequence[Residuals]) -> list[Hypothesis]:
     """Without omega x I omega in Euler's equations omega is constant in world axes: the momentum goes as R I R^T.
 
-    None where joints move: what an engine makes of their motion then is not known.
+    Empty where joints move: what an engine makes of their motion then is not known.
     """
     if any(np.sqrt((fit.seen.internal**2).sum(axis=1).mean()) > _AS_ONE * fit.seen.scale for fit in fits):
-        return None
-    square, values = 0.0, {}
+        return []
+    lefts, values = [], {}
     for fit in fits:
         seen = fit.seen
         columns = fit.columns(seen.attitude @ seen.inertia @ so3.transpose(seen.attitude))
         rate, left = _fitted(columns, fit.vector)
-        square += float(left @ left)
+        lefts.append(left)
         if not values:
             values = {
                 f"angular velocity {axis}": FittedValue(value=float(part), bar=float(bar), unit="rad/s")
                 for axis, part, bar in zip(_AXES, *rate, strict=True)
             }
-    freedom = sum(fit.freedom for fit in fits)
-    return Hypothesis(
-        name="no gyroscopic term in the engine",
-        kind="engine",
-        square=square,
-        left_over=float(np.sqrt(square / freedom)),
-        parameters=3 * len(fits),
-        values=values,
-        remark="the angular velocity is constant in world axes; switch the gyroscopic force of the engine on",
-    )
+    return [
+        fitted_hypothesis(
+            "no gyroscopic term in the engine",
+            "engine",
+            leftover(fits, np.concatenate(lefts)),
+            parameters=3 * len(fits),
+            values=values,
+            remark="the angular velocity is constant in world axes; switch the gyroscopic force of the engine on",
+        )
+    ]
 
 
 def _fitted(columns: Array, vector: Array) -> tuple[tuple[Array, Array], Array]:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from ..arrays import Array
-from ._residuals import Residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
 _KNOTS = 48
@@ -28,6 +28,7 @@ class _Push(NamedTuple):
 
     begin: float
     end: float
+    left: Array
     square: float
     amounts: Array
     bars: Array
@@ -96,16 +97,8 @@ def _times(push: _Push) -> dict[str, FittedValue]:
 def _hypothesis(
     name: str, kind: str, push: _Push, fits: Sequence[Residuals], values: dict[str, FittedValue], remark: str
 ) -> Hypothesis:
-    freedom = sum(fit.freedom for fit in fits)
-    return Hypothesis(
-        name=name,
-        kind=kind,
-        square=push.square,
-        left_over=float(np.sqrt(max(push.square, 0.0) / freedom)),
-        parameters=2 + len(push.amounts),
-        values=values,
-        remark=remark,
-    )
+    left = leftover(fits, push.left)
+    return fitted_hypothesis(name, kind, left, parameters=2 + len(push.amounts), values=values, remark=remark)
 
 
 def _fitted(fits: Sequence[Residuals], *, with_force: bool) -> _Push:
@@ -130,7 +123,7 @@ def _fitted(fits: Sequence[Residuals], *, with_force: bool) -> _Push:
             left = vector - right @ found
             amounts[kept] = found / lengths[kept]
             spread[kept] = np.linalg.norm(np.linalg.inv(triangle), axis=1) / lengths[kept]
-        return _Push(begin, end, float(left @ left), amounts, spread)
+        return _Push(begin, end, left, float(left @ left), amounts, spread)
 
     def cost(pair: Array) -> float:
         begin, lasts = float(pair[0]), float(np.exp(pair[1]))

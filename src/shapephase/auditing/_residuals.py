@@ -1,90 +1,199 @@
-"""Residuals of an observation in units of its noise, and what a change of momentum or of the fall makes of them.
+"""Residuals of momentum, fall and rates in units of their noise, and what changes of these add to them.
 
-What a free body may have anyway is taken off: any constant momentum, any parabola of the centre of mass.
+What a free body may have anyway is projected out: any constant momentum, any parabola of the centre of mass; and, where
+requested, the drift of a semi-implicit Euler step of any length.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.fft import dct
+from scipy.linalg import block_diag
 
 from ..arrays import Array
+from ..body.body import Body
+from ._consistency import RateDifferences, rate_differences
 from ._observation import Observation
+from ._step_drift import StepDrift, step_drift
+from .hypothesis import FittedValue, Hypothesis
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
 """Of the largest variance: what sums of a dozen products leave of a smaller one."""
+BLOCKS = ("momentum", "fall", "rates")
+
+
+@dataclass(frozen=True, eq=False)
+class Leftover:
+    """Residuals of the three laws, in the order of `BLOCKS`.
+
+    Attributes
+    ----------
+    squares : (3,) their sums of squares
+    counts : (3,) independent numbers
+    effective : (3,) those of them that the spectrum of the residuals leaves independent: nu = 3 (sum c^2)^2 / sum c^4
+        of the coefficients c of cosines (Satterthwaite 1946 with variances c^2, of which c^4 / 3 is the square)
+    in_time : (M,) of each run those of momentum and fall, sample by sample; None where the samples are others
+    """
+
+    squares: Array
+    counts: Array
+    effective: Array
+    in_time: Array | None = None
+
+    @property
+    def size(self) -> float:
+        """Sum of the logarithms of the squares in units of noise, none less than 0: a law may have far more digits."""
+        known = self.counts > 0.0
+        return float(np.log(np.maximum(self.squares[known] / self.counts[known], 1.0)).sum())
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Of momentum and fall, whitened.
+    """Residuals of one run, whitened.
 
     Attributes
     ----------
     seen : what they are of
+    rates : given rates less those of the configurations, or None
+    step : what a step of one second of semi-implicit Euler would add
     vector : (M,)
     """
 
     seen: Observation
+    rates: RateDifferences | None
+    step: StepDrift
     vector: Array
     _momentum_factor: Array
     _centre_factor: Array | None
     _free: Array
+    _own: tuple[int, int, int]
 
     @property
     def square(self) -> float:
-        """Their squares, summed."""
+        """Sum of squares."""
         return float(self.vector @ self.vector)
 
     @property
     def freedom(self) -> int:
-        """Numbers that are independent."""
+        """Independent numbers."""
         return len(self.vector) - self._free.shape[1]
 
-    def columns(self, momentum: Array, centre: Array | None = None) -> Array:
-        """What changes of the momentum (N, 3, k) and of the centre of mass (N, 3, k) add to the vector: (M, k)."""
-        rows = [_whitened(self._momentum_factor, self.seen.seen(momentum))]
+    def whitened(self, momentum: Array, centre: Array | None = None, rates: Array | None = None) -> Array:
+        """Changes of momentum, centre of mass (N, 3, k) and rates (M, c, k) in units of noise: (rows, k)."""
+        blocks = [self._momentum_factor @ self.seen.seen(momentum)]
         if self._centre_factor is not None:
-            moved = np.zeros_like(momentum) if centre is None else centre
-            rows.append(_whitened(self._centre_factor, moved))
-        whole = np.vstack(rows)
+            blocks.append(self._centre_factor @ (np.zeros_like(momentum) if centre is None else centre))
+        if self.rates is not None:
+            shape = (*self.rates.level.shape, momentum.shape[2])
+            blocks.append(np.zeros(shape) if rates is None else rates / self.rates.level[:, :, None])
+        return np.vstack([block.reshape(-1, momentum.shape[2]) for block in blocks])
+
+    def columns(self, momentum: Array, centre: Array | None = None, rates: Array | None = None) -> Array:
+        """What such changes add to the vector: (M, k)."""
+        whole = self.whitened(momentum, centre, rates)
         return whole - self._free @ (self._free.T @ whole)
 
+    def step_column(self) -> Array:
+        """What a step of one second adds: (M, 1)."""
+        return self.columns(*(None if part is None else part[:, :, None] for part in self.step))  # type: ignore[arg-type]
+
     def of(self, seen: Observation) -> Array:
-        """The vector that another observation of the same samples has, in units of this one's noise."""
-        momentum, centre = seen.momentum[:, :, None], seen.centre
-        return self.columns(momentum, None if centre is None else centre[:, :, None])[:, 0]
+        """Vector of another observation of the samples, in units of this one's noise."""
+        centre = seen.centre
+        rates = None if self.rates is None else self.rates.difference[:, :, None]
+        return self.columns(seen.momentum[:, :, None], None if centre is None else centre[:, :, None], rates)[:, 0]
+
+    def blocks(self, vector: Array) -> dict[int, Array]:
+        """The parts of a vector in samples and directions, (rows, c), by their places in `BLOCKS`."""
+        count = len(self.seen.times)
+        parts = np.split(vector, np.cumsum((3 * count, 3 * count if self._centre_factor is not None else 0)))
+        rows = (count, count, 0 if self.rates is None else len(self.rates.times))
+        return {k: part.reshape(rows[k], -1) for k, part in enumerate(parts) if len(part)}
+
+    def in_time(self, vector: Array) -> Array:
+        """The part of a vector that is of momentum and fall."""
+        return np.concatenate([part.ravel() for block, part in self.blocks(vector).items() if block < 2])
+
+    def moments(self, vector: Array) -> Array:
+        """(3, 3): of each block sums of squares and of fourth powers of its cosines, and its independent numbers."""
+        found = np.zeros((3, 3))
+        for block, part in self.blocks(vector).items():
+            squares = dct(part, axis=0, norm="ortho") ** 2
+            found[block] = squares.sum(), (squares**2).sum(), part.size - self._own[block]
+        return found
 
 
-def residuals(seen: Observation) -> Residuals:
-    """The residuals of an observation."""
-    factor = _inverse_factor(seen.momentum_noise)
-    centre = None if seen.centre_noise is None else _inverse_factor(seen.centre_noise)
+def residuals(body: Body, seen: Observation, *, any_step: bool = False) -> Residuals:
+    """Residuals of an observation.
+
+    any_step : whether the drift of a step of any length is projected out, too
+    """
+    factor = inverse_factor(seen.momentum_noise)
+    centre = None if seen.centre_noise is None else inverse_factor(seen.centre_noise)
+    rates = rate_differences(seen.trajectory, seen.noise) if seen.given_rates else None
     since = (seen.times - seen.times[0]) / (seen.times[-1] - seen.times[0])
-    allowed = [factor] if seen.given_rates else [factor, since[:, None, None] * factor]
-    blocks = [np.concatenate(allowed, axis=2).reshape(3 * len(since), -1)]
+    powers = [since[:, None, None] ** k for k in range(3)]
+    free = [np.concatenate([power * factor for power in powers[: 1 if seen.given_rates else 2]], axis=2)]
     if centre is not None:
-        powers = np.concatenate([since[:, None, None] ** k * centre for k in range(3)], axis=2)
-        blocks.append(powers.reshape(3 * len(since), -1))
-    rows = sum(len(block) for block in blocks)
-    free = np.zeros((rows, sum(block.shape[1] for block in blocks)))
-    row = column = 0
-    for block in blocks:
-        free[row : row + len(block), column : column + block.shape[1]] = block
-        row, column = row + len(block), column + block.shape[1]
-    made = Residuals(seen, np.zeros(rows), factor, centre, np.linalg.qr(free)[0])
-    return Residuals(seen, made.of(seen), factor, centre, made._free)
+        free.append(np.concatenate([power * centre for power in powers], axis=2))
+    blocks = [block.reshape(3 * len(since), -1) for block in free]
+    own = [blocks[0].shape[1], blocks[1].shape[1] if len(blocks) > 1 else 0, 0]
+    if rates is not None:
+        blocks.append(np.zeros((rates.level.size, 0)))
+    step = step_drift(body, seen, None if rates is None else rates.slope)
+    basis = np.linalg.qr(block_diag(*blocks))[0]
+    made = Residuals(seen, rates, step, np.zeros(0), factor, centre, basis, (own[0], own[1], own[2]))
+    if any_step:
+        column = made.step_column()
+        length = float(np.linalg.norm(column))
+        basis = np.hstack([basis, column / length]) if length > 0.0 else basis
+        made = Residuals(seen, rates, step, np.zeros(0), factor, centre, basis, made._own)
+    return Residuals(seen, rates, step, made.of(seen), factor, centre, basis, made._own)
 
 
-def _inverse_factor(covariances: Array) -> Array:
+def leftover(fits: Sequence[Residuals], vector: Array) -> Leftover:
+    """Residuals of all runs by blocks; the vectors of the runs come one after the other."""
+    parts = np.split(vector, np.cumsum([len(fit.vector) for fit in fits])[:-1])
+    left = leftover_of_moments(np.sum([fit.moments(part) for fit, part in zip(fits, parts, strict=True)], axis=0))
+    return replace(left, in_time=np.concatenate([fit.in_time(part) for fit, part in zip(fits, parts, strict=True)]))
+
+
+def leftover_of_moments(moments: Array) -> Leftover:
+    """Residuals by blocks, from sums over runs of what `Residuals.moments` returns."""
+    squares, fourths, counts = moments.T
+    effective = np.where(fourths > 0.0, 3.0 * squares**2 / np.where(fourths > 0.0, fourths, 1.0), counts)
+    return Leftover(squares, counts, np.minimum(effective, counts))
+
+
+def fitted_hypothesis(
+    name: str,
+    kind: str,
+    left: Leftover,
+    *,
+    parameters: int = 0,
+    values: Mapping[str, FittedValue] | None = None,
+    remark: str = "",
+) -> Hypothesis:
+    """A hypothesis by what it leaves."""
+    square = float(left.squares.sum())
+    return Hypothesis(
+        name=name,
+        kind=kind,
+        square=square,
+        left_over=float(np.sqrt(square / left.counts.sum())),
+        parameters=parameters,
+        values=values or {},
+        remark=remark,
+        leftover=left,
+        residuals=left.in_time,
+    )
+
+
+def inverse_factor(covariances: Array) -> Array:
     """W with W C W^T = 1: (N, 3, 3)."""
     # Noise of one joint alone has one direction, and rounding what is across.
     floor = _ROUNDING * np.trace(covariances, axis1=1, axis2=2)[:, None, None] * np.eye(3)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariances + floor)), dtype=np.float64)
-
-
-def _whitened(factor: Array, change: Array) -> Array:
-    """(N, 3, 3), (N, 3, k) -> (3 N, k)."""
-    turned = factor @ change
-    return turned.reshape(-1, change.shape[2])

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
-from scipy.stats import chi2
+from scipy.stats import f
 
 from ..arguments import check_pair, whole_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
+from ._noise_spectrum import noise_spectrum
 
 _HIGHEST = 12
 """Order of the polynomials, the samples allowing."""
@@ -22,6 +23,7 @@ _SAMPLES_EACH = 3
 """Samples that a polynomial needs."""
 _UNSURE = 1.5
 """Of a variance: the noise of samples is itself estimated."""
+_MOST_NOISE = 0.05  # of what residuals are of: samples of noise of 3 degrees, or worse, tell nothing
 _CHANCE = 1e-6
 """Probability with which noise alone is taken for something else, for one residual."""
 
@@ -35,6 +37,7 @@ class SmoothPart:
     values : (N, k) that they sum up to
     ratio : its square in units of what noise alone brings, over the limit: above 1, noise does not explain it
     noise : what noise alone brings to the values, rms
+    colour : mean power of the noise over that of white noise with its highest frequencies
 
     Examples
     --------
@@ -47,6 +50,7 @@ class SmoothPart:
     values: Array
     ratio: float
     noise: float
+    colour: float = 1.0
 
     __repr__ = short_repr
 
@@ -58,7 +62,13 @@ def polynomials(times: Array, highest: int) -> Array:
 
 
 def smooth_part(
-    times: Array, residuals: Array, covariances: Array, free: int, carried: tuple[Array, Array] | None = None
+    times: Array,
+    residuals: Array,
+    covariances: Array,
+    free: int,
+    carried: tuple[Array, Array] | None = None,
+    whitened: Array | None = None,
+    size: float = np.inf,
 ) -> SmoothPart:
     """The smooth part of residuals (N, k) whose noise has covariances (N, k, k).
 
@@ -67,6 +77,8 @@ def smooth_part(
     free : how many of the lowest polynomials a body that nothing acts on may have
     carried : instead of the covariances: what each of m unit noises of a sample adds to its residual, (N, k, m), and
         to all that come after it, (N, k, m)
+    whitened : (N, c) residuals in units of white noise, by which the spectrum of the noise is known; None: it is white
+    size : of what the residuals are of, in their unit: what is above their slow part is noise up to a twentieth of it
 
     Examples
     --------
@@ -88,8 +100,19 @@ def smooth_part(
         after = np.cumsum(basis[::-1], axis=0)[::-1] - basis
         of_each = np.einsum("np,nim->npim", basis, own) + np.einsum("np,nim->npim", after, further)
         spread = np.einsum("npim,nqjm->piqj", of_each, of_each)
+    power, known = np.ones(len(times)), 1e9
+    # A smooth curve has cosines of all orders, and no polynomials above its own.
+    slow = polynomials(times, highest)
+    rough = residuals - slow @ (slow.T @ residuals)
+    if whitened is not None and np.sqrt((rough**2).sum() / len(times)) <= _MOST_NOISE * size:
+        power = noise_spectrum(whitened - slow @ (slow.T @ whitened), highest)
+        # Numbers that the power of the noise is known from (Satterthwaite 1946).
+        above = power[highest + 1 :]
+        known = whitened.shape[1] * above.sum() ** 2 / (above**2).sum()
+    deviations = np.sqrt(power[lowest : highest + 1])
+    spread = spread * deviations[:, None, None, None] * deviations[None, None, :, None]
     count = parts.size
     matrix = spread.reshape(count, count)
     square = float(parts.ravel() @ np.linalg.solve(matrix, parts.ravel()))
-    limit = _UNSURE * float(chi2.isf(_CHANCE, count))
-    return SmoothPart(basis @ parts, square / limit, float(np.sqrt(np.trace(matrix) / len(times))))
+    limit = _UNSURE * count * float(f.isf(_CHANCE, count, known))
+    return SmoothPart(basis @ parts, square / limit, float(np.sqrt(np.trace(matrix) / len(times))), float(power.mean()))

@@ -12,10 +12,9 @@ from scipy.interpolate import UnivariateSpline
 from ..arrays import Array
 from ..body.body import Body
 from ..warning_filters import quiet
-from ._consistency import rate_differences
 from ._noise import TrajectoryNoise
 from ._observation import observed
-from ._residuals import residuals
+from ._residuals import Leftover, Residuals, fitted_hypothesis, leftover_of_moments, residuals
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import FittedValue, Hypothesis
 
@@ -43,6 +42,18 @@ class _Reading:
     kind: str
     change: Change
     needs_rates: bool = False
+    degrees: tuple[bool, bool, bool] = (False, False, False)
+
+    def noise(self, level: TrajectoryNoise, turning: Array) -> TrajectoryNoise:
+        """Noise of the samples read in this way: angles, rates of joints and of the base may be in degrees."""
+        angles, rates, base = self.degrees
+        factor = np.where(turning, np.pi / 180.0, 1.0)
+        return replace(
+            level,
+            joints=tuple((np.array(level.joints) * factor).tolist()) if angles else level.joints,
+            joint_rates=tuple((np.array(level.joint_rates) * factor).tolist()) if rates else level.joint_rates,
+            rate=float(np.radians(level.rate)) if base else level.rate,
+        )
 
 
 @dataclass(frozen=True)
@@ -58,35 +69,46 @@ class _Gradual:
     needs_joints: bool = True
 
 
+@dataclass(frozen=True, eq=False)
+class OtherReading:
+    """A hypothesis with the trajectories, and the noise of each, as they are if it is true."""
+
+    hypothesis: Hypothesis
+    runs: tuple[FloatingTrajectory, ...]
+    levels: tuple[TrajectoryNoise, ...]
+
+    def fits(self, body: Body) -> list[Residuals]:
+        """Residuals of the trajectories as they are then."""
+        return [residuals(body, observed(body, *pair)) for pair in zip(self.runs, self.levels, strict=True)]
+
+
 def other_readings(
     body: Body,
     runs: Sequence[FloatingTrajectory],
-    noise: TrajectoryNoise | None,
     levels: Sequence[TrajectoryNoise],
-) -> list[tuple[Hypothesis, float]]:
-    """All of them, each applied to all runs, with the part of its square that is of the agreement of the rates.
+    *,
+    any_step: bool = False,
+) -> list[OtherReading]:
+    """All of them, each applied to all runs.
 
-    noise : as stated; None: what the samples show, read in that way
-    levels : of each run as it is
+    Parameters
+    ----------
+    levels : noise of each run as it is
+    any_step : whether the drift of an integrator's step of any length is taken off
     """
     given = all(run.joint_rates is not None for run in runs)
     found = []
     for reading in _readings(body, runs[0]):
         if reading.needs_rates and not given:
             continue
-        left = np.sum([_left(body, reading.change(run), noise) for run in runs], axis=0)
-        square, of_rates, freedom = left.tolist()
-        hypothesis = Hypothesis(
-            name=reading.name,
-            kind=reading.kind,
-            square=square,
-            left_over=float(np.sqrt(square / freedom)),
-            parameters=0,
-        )
-        found.append((hypothesis, of_rates))
+        read = tuple(reading.change(run) for run in runs)
+        noise = tuple(reading.noise(level, _turning(body)) for level in levels)
+        moments = [_moments(body, run, level, any_step) for run, level in zip(read, noise, strict=True)]
+        left = leftover_of_moments(np.sum(moments, axis=0))
+        found.append(OtherReading(fitted_hypothesis(reading.name, reading.kind, left), read, noise))
     curves = [_Curves(run, level) for run, level in zip(runs, levels, strict=True)]
     return found + [
-        _gradual(body, reading, runs, curves, levels)
+        _gradual(body, reading, runs, curves, levels, any_step)
         for reading in _GRADUAL
         if (given or not reading.needs_rates) and (body.n_shape or not reading.needs_joints)
     ]
@@ -121,27 +143,22 @@ def _readings(body: Body, run: FloatingTrajectory) -> Iterator[_Reading]:
             lambda t: replace(t, rate_axes=rate, velocity_axes=velocity),
             needs_rates=True,
         )
-    turning = np.array([unit == "rad" for unit in body.joint_units], dtype=bool)
+    turning = _turning(body)
     if turning.any() and "units" not in run.certain:
-        yield _Reading("joint angles in degrees", units, lambda t: _scaled(t, turning, angles=True))
-        for rates, base, name in (
-            (True, False, "joint rates in degrees per second"),
-            (False, True, "angular velocity of the base in degrees per second"),
-            (True, True, "all angular rates in degrees per second"),
+        for angles, rates, base, name in (
+            (True, False, False, "joint angles in degrees"),
+            (False, True, False, "joint rates in degrees per second"),
+            (False, False, True, "angular velocity of the base in degrees per second"),
+            (False, True, True, "all angular rates in degrees per second"),
+            (True, True, False, "joint angles and rates in degrees"),
+            (True, True, True, "all angles and rates in degrees"),
         ):
-            yield _Reading(name, units, lambda t, r=rates, b=base: _scaled(t, turning, r, b), needs_rates=True)
-        yield _Reading(
-            "joint angles and rates in degrees",
-            units,
-            lambda t: _scaled(t, turning, True, False, angles=True),
-            needs_rates=True,
-        )
-        yield _Reading(
-            "all angles and rates in degrees",
-            units,
-            lambda t: _scaled(t, turning, True, True, angles=True),
-            needs_rates=True,
-        )
+            which = angles, rates, base
+            yield _Reading(name, units, lambda t, w=which: _scaled(t, turning, *w), rates or base, which)
+
+
+def _turning(body: Body) -> Array:
+    return np.array([unit == "rad" for unit in body.joint_units], dtype=bool)
 
 
 def _rolled(run: FloatingTrajectory, places: int) -> FloatingTrajectory:
@@ -152,9 +169,7 @@ def _inverse(run: FloatingTrajectory) -> FloatingTrajectory:
     return replace(run, quaternion=run.quaternion * [-1.0, -1.0, -1.0, 1.0])
 
 
-def _scaled(
-    run: FloatingTrajectory, turning: Array, rates: bool = False, base: bool = False, *, angles: bool = False
-) -> FloatingTrajectory:
+def _scaled(run: FloatingTrajectory, turning: Array, angles: bool, rates: bool, base: bool) -> FloatingTrajectory:
     factor = np.where(turning, np.pi / 180.0, 1.0)
     return replace(
         run,
@@ -232,14 +247,9 @@ def _sharpened_joints(run: FloatingTrajectory, curves: _Curves, width: float) ->
     return replace(run, shapes=shapes, joint_rates=run.joint_rates - half * bent)
 
 
-def _left(body: Body, run: FloatingTrajectory, noise: TrajectoryNoise | None) -> Array:
-    """Squares of all residuals, those of them that are of the agreement of the rates, and how many are independent."""
-    fit = residuals(observed(body, run, noise))
-    rates = rate_differences(run, fit.seen.noise)
-    if rates is None:
-        return np.array([fit.square, 0.0, fit.freedom])
-    square = float((rates.whitened**2).sum())
-    return np.array([fit.square + square, square, fit.freedom + rates.whitened.size])
+def _moments(body: Body, run: FloatingTrajectory, noise: TrajectoryNoise, any_step: bool) -> Array:
+    fit = residuals(body, observed(body, run, noise), any_step=any_step)
+    return fit.moments(fit.vector)
 
 
 _GRADUAL = (
@@ -255,7 +265,8 @@ def _gradual(
     runs: Sequence[FloatingTrajectory],
     curves: Sequence[_Curves],
     levels: Sequence[TrajectoryNoise],
-) -> tuple[Hypothesis, float]:
+    any_step: bool,
+) -> OtherReading:
     """A number fitted by Gauss and Newton; samples that a shift loses count like those that are left."""
     usual = float(np.median(np.diff(runs[0].times)))
     span = float(runs[0].times[-1] - runs[0].times[0])
@@ -264,33 +275,39 @@ def _gradual(
     least = -longest if reading.unit == "s" else 0.0
     nudge = 0.02 * usual if reading.unit == "s" else 0.1 * usual**2
 
-    def left(value: float, *lost: float) -> Array:
-        found = np.zeros(3)
-        for run, near, level in zip(runs, curves, levels, strict=True):
-            changed = reading.change(run, near, value)
-            for each in lost if reading.unit == "s" else ():
-                changed = _inside(changed, each)
-            found += _left(body, changed, level) * (len(run.times) / len(changed.times))
-        return found
+    def changed(value: float, *lost: float) -> tuple[FloatingTrajectory, ...]:
+        read = [reading.change(run, near, value) for run, near in zip(runs, curves, strict=True)]
+        for each in lost if reading.unit == "s" else ():
+            read = [_inside(run, each) for run in read]
+        return tuple(read)
 
-    # While the shift is looked for, the same samples count.
-    ends = (longest, -longest)
-    value, best = 0.0, left(0.0, *ends)
+    def left(value: float, *lost: float) -> Leftover:
+        moments = np.zeros((3, 3))
+        for run, read, level in zip(runs, changed(value, *lost), levels, strict=True):
+            share = len(run.times) / len(read.times)
+            moments += _moments(body, read, level, any_step) * [share, share**2, share]
+        return leftover_of_moments(moments)
+
+    def square(value: float) -> float:
+        # While the shift is fitted, the same samples count.
+        return float(left(value, longest, -longest).squares.sum())
+
+    value, best = 0.0, square(0.0)
     step, bend = nudge, 0.0
     for _ in range(_STEPS):
-        ahead, behind = left(value + step, *ends)[0], left(value - step, *ends)[0]
-        slope, bend = (ahead - behind) / (2.0 * step), (ahead - 2.0 * best[0] + behind) / step**2
+        ahead, behind = square(value + step), square(value - step)
+        slope, bend = (ahead - behind) / (2.0 * step), (ahead - 2.0 * best + behind) / step**2
         if not bend > 0.0:
             break
         change = float(np.clip(-slope / bend, -0.5 * longest, 0.5 * longest))
         trial = float(np.clip(value + change, least, longest))
-        new = left(trial, *ends)
+        new = square(trial)
         for _ in range(_STEPS):
-            if new[0] <= best[0]:
+            if new <= best:
                 break
             trial = 0.5 * (trial + value)
-            new = left(trial, *ends)
-        if new[0] > best[0]:
+            new = square(trial)
+        if new > best:
             break
         done = abs(trial - value) < _ENOUGH * abs(trial) + 1e-12 * usual
         value, best = trial, new
@@ -298,15 +315,9 @@ def _gradual(
         if done:
             break
     found, without = left(value, value), left(0.0)
-    best = found if found[0] < without[0] else without
-    value = value if found[0] < without[0] else 0.0
+    if found.squares.sum() >= without.squares.sum():
+        found, value = without, 0.0
     bar = float(np.sqrt(2.0 / bend)) if bend > 0.0 else np.inf
-    hypothesis = Hypothesis(
-        name=reading.name,
-        kind=reading.kind,
-        square=float(best[0]),
-        left_over=float(np.sqrt(best[0] / best[2])),
-        parameters=1,
-        values={reading.label: FittedValue(value=value, bar=bar, unit=reading.unit)},
-    )
-    return hypothesis, float(best[1])
+    values = {reading.label: FittedValue(value=value, bar=bar, unit=reading.unit)}
+    hypothesis = fitted_hypothesis(reading.name, reading.kind, found, parameters=1, values=values)
+    return OtherReading(hypothesis, changed(value, value), tuple(levels))

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..arguments import check_file_name, check_object
+from ..arrays import Array
 from ..errors import MissingExtraError, unknown_name
 from ..files import write_whole
-from ..plots.plot_style import BLACK, COLUMN, GREY, SERIES, SKY, SMALL, axes_image
-from .audit_result import Audit
+from ..plots.plot_style import BLACK, BLUE, COLUMN, GREY, SERIES, SKY, SMALL, axes_image, finish
+from ._observation import Observation
+from ._residuals import Residuals
+from .audit_result import Audit, RunAudit
+from .hypothesis import Hypothesis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,6 +32,7 @@ _A_ROW = 3
 """Names of a legend beside each other."""
 _LONGEST = 34
 """Letters of a name."""
+_BINS = 120  # points of a curve of residuals, each the rms of the samples there
 
 
 def audit_figure(found: Audit) -> Figure:
@@ -47,23 +53,111 @@ def audit_figure(found: Audit) -> Figure:
     ['momentum drift', 'attitude error [deg]']
     """
     check_object(found, "Audit", "found")
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingExtraError("figures need Matplotlib: pip install 'shapephase[plot]'") from error
     rows = 3 if found.hypotheses else 2
-    figure = Figure(figsize=(1.5 * COLUMN, 1.6 * rows), layout="constrained")
+    figure = _figure(1.5 * COLUMN, 1.6 * rows)
     axes = np.ravel(figure.subplots(rows, 1)).tolist()
     _drift(axes[0], found)
     _attitude(axes[1], found)
     if found.hypotheses:
         _causes(axes[2], found)
+    _plain(axes)
+    return figure
+
+
+def momentum_figure(run: RunAudit, seen: Observation) -> Figure:
+    """Momentum about the centre of mass in time, all samples; those that were not audited are grey.
+
+    seen : of the whole trajectory
+    """
+    return _in_flight(run, seen.times, seen.momentum, "angular momentum [kg m$^2$/s]")
+
+
+def fall_figure(run: RunAudit, seen: Observation) -> Figure | None:
+    """Centre of mass in time, with the nearest parabolas of the samples that were audited; None without places."""
+    if seen.centre is None:
+        return None
+    inside = (run.first_time <= seen.times) & (seen.times <= run.last_time)
+    powers = np.vander(seen.times - run.first_time, 3)
+    places = seen.centre - seen.centre[inside][0]
+    fall = powers @ np.linalg.lstsq(powers[inside], places[inside], rcond=None)[0]
+    figure = _in_flight(run, seen.times, places, "centre of mass [m]")
+    for values in fall[inside].T:
+        figure.axes[0].plot(seen.times[inside], values, color=BLACK, linewidth=0.6, linestyle=":")
+    return figure
+
+
+def left_over_figures(found: Audit, before: Residuals) -> list[tuple[Hypothesis, Figure]]:
+    """Residuals in time before and after each hypothesis that keeps them, the best first, with the same axes.
+
+    before : of the first run
+    """
+    kept = [(one, one.residuals) for one in found.hypotheses if one.residuals is not None][:_MOST_SHOWN]
+    named = {cause.name for cause in found.cause}
+    start = before.in_time(before.vector)
+    times, curve = _in_time(before.seen.times, start)
+    after = [_in_time(before.seen.times, vector[: len(start)])[1] for _, vector in kept]
+    every = np.concatenate([curve, *after])
+    drawn = []
+    for (hypothesis, _), left in zip(kept, after, strict=True):
+        figure = _figure(COLUMN, 1.7)
+        ax = figure.add_subplot()
+        ax.plot(times, curve, color=GREY, linewidth=1.4)
+        ax.plot(times, left, color=BLACK if hypothesis.name in named else BLUE, linewidth=1.2)
+        ax.set_yscale("log")
+        ax.set_ylim(0.5 * every.min(), 2.0 * every.max())
+        ax.set_xlabel("time [s]")
+        ax.set_ylabel("residuals [noise]")
+        _plain([ax])
+        drawn.append((hypothesis, figure))
+    return drawn
+
+
+def _in_flight(run: RunAudit, times: Array, values: Array, label: str) -> Figure:
+    figure = _figure(COLUMN, 2.4)
+    ax = figure.add_subplot()
+    for axis, style, column in zip("xyz", _styles(3), values.T, strict=True):
+        ax.plot(times, column, label=axis, **style)
+    for first, last in ((times[0], run.first_time), (run.last_time, times[-1])):
+        if last > first:
+            ax.axvspan(first, last, color=GREY, alpha=0.35, linewidth=0.0)
+    ax.set_xlim(times[0], times[-1])
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel(label)
+    _plain([ax])
+    finish(ax, ncols=_A_ROW)
+    return figure
+
+
+def _in_time(times: Array, vector: Array) -> tuple[Array, Array]:
+    """Rms of the residuals of neighbouring samples, at most `_BINS` of them, and their times."""
+    squares = (vector.reshape(-1, len(times), 3) ** 2).mean(axis=(0, 2))
+    parts = np.array_split(np.arange(len(times)), min(_BINS, len(times)))
+    least = np.finfo(np.float64).tiny
+    return (
+        np.array([times[part].mean() for part in parts]),
+        np.sqrt([max(float(squares[part].mean()), least) for part in parts]),
+    )
+
+
+def _figure(width: float, height: float) -> Figure:
+    """A new one [in]. Raises MissingExtraError."""
+    try:
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise MissingExtraError("figures need Matplotlib: pip install 'shapephase[plot]'") from error
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def _plain(axes: Sequence[Axes]) -> None:
     for ax in axes:
         ax.tick_params(which="both", labelsize=SMALL)
         ax.xaxis.label.set_fontsize(SMALL)
         ax.yaxis.label.set_fontsize(SMALL)
         ax.spines[["top", "right"]].set_visible(False)
-    return figure
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= _LONGEST else name[:_LONGEST] + "…"
 
 
 def write_audit_figure(found: Audit, file: str | os.PathLike[str]) -> None:
@@ -122,7 +216,7 @@ def _causes(ax: Axes, found: Audit) -> None:
     ax.barh(rows, shares, left=0.0, color=colours, height=0.7)
     ax.set_xscale("log")
     ax.set_xlim(_LEAST_SHARE, 1.5)
-    ax.set_yticks(rows, [one.name if len(one.name) <= _LONGEST else one.name[:_LONGEST] + "…" for one in shown])
+    ax.set_yticks(rows, [_short(one.name) for one in shown])
     ax.set_xlabel("left over, as a part of what is wrong")
 
 

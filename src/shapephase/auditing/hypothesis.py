@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
+from ..arrays import Array
 from ..display import short_repr
 from ..plain_data import plain
+
+if TYPE_CHECKING:
+    from ._residuals import Leftover
+
+AND = ", and "  # between the names of two causes that are fitted together
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,13 +45,17 @@ class Hypothesis:
     Attributes
     ----------
     name : for people, as "mass of head"
-    kind : "inertia", "torque", "force", "time", "filter", "frame", "quaternion", "units", "engine" or "step"
+    kind : "inertia", "torque", "force", "time", "filter", "frame", "quaternion", "units", "engine", "step",
+        "drag", "offset" or "gravity"
     square : what is left over, squared and summed in units of the noise
     left_over : the same as the rms of a residual, in units of the noise
     share : of the rms without any hypothesis
     parameters : how many numbers were fitted for it
     values : what they are
     remark : what else is to be said
+    leftover : residuals of each law
+    residuals : (M,) what is left over in time, in units of the noise: of each run the momentum of its samples, then the
+        fall; None where the hypothesis has other samples
 
     Examples
     --------
@@ -61,8 +71,15 @@ class Hypothesis:
     share: float = 1.0
     values: Mapping[str, FittedValue] = field(default_factory=dict)
     remark: str = ""
+    leftover: Leftover | None = field(default=None, repr=False, compare=False)
+    residuals: Array | None = field(default=None, repr=False, compare=False)
 
     __repr__ = short_repr
+
+    def paired_with(self, name: str, parameters: int, values: Mapping[str, FittedValue] | None = None) -> Hypothesis:
+        """This hypothesis, fitted together with another one that has so many parameters."""
+        both = {**self.values, **(values or {})}
+        return replace(self, name=f"{self.name}{AND}{name}", parameters=self.parameters + parameters, values=both)
 
     @property
     def record(self) -> dict[str, Any]:

@@ -22,20 +22,24 @@ from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
 from ._airborne import AirbornePart, airborne_part
 from ._consistency import rate_agreement
-from ._integration_step import StepOrder, as_semi_implicit_euler, step_hypothesis, step_order
+from ._drag import drag
+from ._filtered_samples import filtered_samples
+from ._gravity import wrong_gravity
+from ._integration_step import StepOrder, integration_step, step_hypothesis, step_order
+from ._joint_offsets import joint_offsets
 from ._missing_term import no_gyroscopic_term
 from ._noise import TrajectoryNoise
 from ._observation import Observation, observed
 from ._outside_pushes import outside_pushes
-from ._ranking import Candidate, Ranking, ranking
-from ._residuals import Residuals, residuals
+from ._ranking import Evidence, Ranking
+from ._residuals import Residuals, inverse_factor, leftover, residuals
 from ._short_flight import TOLD_APART, short_run_audit
-from ._smooth_part import smooth_part
+from ._smooth_part import polynomials, smooth_part
 from ._transformations import other_readings, read_otherwise
 from ._wrong_inertias import wrong_inertias
 from .audit_result import Audit, RunAudit
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import Hypothesis
+from .hypothesis import AND, Hypothesis
 
 _QUIET = 1e-6
 """[rad] Noise of the attitude below which the first sample is tried as the start of the exact reconstruction."""
@@ -49,16 +53,16 @@ _WANDER = 0.01
 """[m] Skin moves over bones, and bodies are not what tables make of them: markers and masses wander by so much."""
 _MEASURED = 1e-4
 """[rad or m] Noise from which on samples were measured, not computed."""
-_AS_EULER = 0.2
-"""Of the drift of one run: less is left by what semi-implicit Euler does, where it agrees with that."""
+_PAIRED = 3  # readings that are tried together with every other cause: those that leave least
 _ONE_AXIS = 1e-3
 """Of the base's rates: less is across their main axis where the base turns about one axis alone."""
 _MOST_SAMPLES = 500
 """Of each run, by which hypotheses are told apart."""
 _MOST_LOOKED_AT = 5000
 """Samples of a trajectory that is read otherwise, to see where it falls then."""
-_NEARLY_ALL = 0.9
-"""Of the samples: with so many in the air nobody asks whether there would be more, were they read otherwise."""
+_MOSTLY = 0.5
+"""Of the samples: with so many in the air it is not tried whether there would be more, were they read otherwise; a
+landing at the end leaves more than that, and read wrongly it seems to be in the air."""
 _JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing here says whether they are right."
 
 
@@ -122,24 +126,31 @@ def audit(
     if min(len(run.times) for run in flown) < TOLD_APART:
         return _short(body, flown, parts, within, noise)
     seen = [observed(body, run, noise) for run in flown]
-    fits = [residuals(one) for one in seen]
-    looked = [_run_audit(body, run, one, part, within) for run, one, part in zip(flown, seen, parts, strict=True)]
+    looked, allowed, colours = [], [], []
+    for run, one, part in zip(flown, seen, parts, strict=True):
+        audited, shares, colour = _run_audit(body, run, one, part, within)
+        looked.append(audited)
+        allowed.append(shares)
+        colours.append(colour)
     order = step_order(seen, [one.momentum_noise for one in looked])
-    notes = _notes(seen, looked, order)
-    most = max(one.tolerance for one in looked)
-    if all(one.right for one in looked):
-        return Audit(
-            body=body.name, runs=tuple(looked), tolerance=most, hypotheses=(), cause=(), step_order=order, notes=notes
-        )
-    found = _ranked(body, flown, fits, looked, order, noise)
+    found = Ranking(ranked=(), tie=())
+    if not all(one.right for one in looked):
+        levels = np.min(allowed, axis=0), np.max(colours, axis=0)
+        found = _ranked(body, flown, looked, levels, order)
+    # No residual holds a constant acceleration, so nothing else explains it.
+    gravity = wrong_gravity(seen, looked, _WANDER)
+    falls = bool(np.all(np.array(allowed)[:, 1] >= 1.0))
+    if gravity is not None and (falls or all(one.kind == "step" for one in found.tie)):
+        found = found.beside(gravity)
+        looked = [replace(one, right=False) for one in looked]
     return Audit(
         body=body.name,
         runs=tuple(looked),
-        tolerance=most,
+        tolerance=max(one.tolerance for one in looked),
         hypotheses=found.ranked,
         cause=found.tie,
         step_order=order,
-        notes=notes,
+        notes=_notes(seen, looked, order),
     )
 
 
@@ -186,7 +197,7 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
         found = airborne_part(body, run, flight)
     except TrajectoryError as error:
         fault = error
-    if found is not None and found.past - found.first >= _NEARLY_ALL * len(run.times):
+    if found is not None and found.past - found.first >= _MOSTLY * len(run.times):
         return found
     every = -(-len(run.times) // _MOST_LOOKED_AT)
     for other in read_otherwise(body, run.every(every)):
@@ -205,7 +216,8 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
 
 def _run_audit(
     body: Body, run: FloatingTrajectory, seen: Observation, part: AirbornePart, given: float | None
-) -> RunAudit:
+) -> tuple[RunAudit, Array, Array]:
+    """The audit of one run; for each of `BLOCKS` the share of squares that is allowed, and the colour of the noise."""
     scale = seen.scale
     wander = _wander(run, seen) if given is None else 0.0
     tolerance = _TOLERANCE if given is None else given
@@ -213,9 +225,11 @@ def _run_audit(
     if wander and scale > 0.0:
         span = float(seen.times[-1] - seen.times[0])
         tolerance = max(tolerance, 2.0 * np.pi / span * seen.mass * wander * seen.extent / scale)
-    momentum = seen.seen(seen.momentum)
-    free = 1 if seen.given_rates else 2
-    smooth = smooth_part(seen.times, momentum, seen.momentum_noise, free, seen.carried_noise)
+    momentum, free = seen.seen(seen.momentum), 1 if seen.given_rates else 2
+    inner = _off(seen.times, _in_units(momentum, seen.momentum_noise), free)
+    # The sum of the momentum over the time is compared with a turn of the body.
+    size = scale if seen.given_rates else seen.mass * seen.extent**2
+    smooth = smooth_part(seen.times, momentum, seen.momentum_noise, free, seen.carried_noise, inner, size)
     values, level = smooth.values, smooth.noise
     if not seen.given_rates:
         values = np.gradient(values, seen.times, axis=0)
@@ -223,18 +237,21 @@ def _run_audit(
     drift = float(np.linalg.norm(values, axis=1).max())
     fall = None
     if seen.centre is not None and seen.centre_noise is not None:
-        fall = smooth_part(seen.times, seen.centre, seen.centre_noise, 3)
+        inner = _off(seen.times, _in_units(seen.centre, seen.centre_noise), 3)
+        fall = smooth_part(seen.times, seen.centre, seen.centre_noise, 3, whitened=inner, size=seen.extent)
     agreement = rate_agreement(run, seen.noise)
     off = None if fall is None else float(np.linalg.norm(fall.values, axis=1).max())
     error = _attitude_error(body, seen)
-    right = _holds(smooth.ratio, drift / scale if scale > 0.0 else 0.0, tolerance)
-    right = right and (fall is None or off is None or _holds(fall.ratio, off / seen.extent, of_fall))
+    allowed = [_allowed(smooth.ratio, drift / scale if scale > 0.0 else 0.0, tolerance)]
+    allowed.append(1.0 if fall is None or off is None else _allowed(fall.ratio, off / seen.extent, of_fall))
+    # Half a step apart, as semi-implicit integrators leave them, is no fault.
+    late = agreement is None or abs(agreement.late) <= run.integrator_step
     if agreement is not None:
-        # Half a step apart, as semi-implicit integrators leave them, is no fault.
-        late = abs(agreement.late) <= run.integrator_step
-        belongs = _holds(agreement.ratio, agreement.mismatch, tolerance)
-        right = right and (belongs or (late and agreement.mismatch_less_late <= tolerance))
-    return RunAudit(
+        rates = _allowed(agreement.ratio, agreement.mismatch, tolerance)
+        allowed.append(max(rates, float(late and agreement.mismatch_less_late <= tolerance)))
+    else:
+        allowed.append(1.0)
+    audited = RunAudit(
         name=run.name,
         airborne=part,
         first_time=float(run.times[0]),
@@ -255,8 +272,20 @@ def _run_audit(
         attitude_error=error,
         tolerance=tolerance,
         recorded=wander > 0.0,
-        right=right,
+        right=min(allowed) >= 1.0,
     )
+    colour = [1.0 if part is None else part.colour for part in (smooth, fall, agreement)]
+    return audited, np.array(allowed), np.array(colour)
+
+
+def _off(times: Array, whitened: Array, free: int) -> Array:
+    """Less the polynomials that a free body may have anyway."""
+    basis = polynomials(times, free - 1)
+    return whitened - basis @ (basis.T @ whitened)
+
+
+def _in_units(values: Array, covariances: Array) -> Array:
+    return so3.apply(inverse_factor(covariances), values - values.mean(axis=0))
 
 
 def _wander(run: FloatingTrajectory, seen: Observation) -> float:
@@ -265,8 +294,10 @@ def _wander(run: FloatingTrajectory, seen: Observation) -> float:
     return _WANDER if run.captured or noisy else 0.0
 
 
-def _holds(ratio: float, value: float, tolerance: float) -> bool:
-    return ratio <= 1.0 or value <= tolerance
+def _allowed(ratio: float, value: float, tolerance: float) -> float:
+    """Share of a square that noise or the tolerance allows; 1 or more where the law holds."""
+    within = (tolerance / value) ** 2 if value > 0.0 else 1.0
+    return max(within, 1.0) if ratio <= 1.0 else within
 
 
 def _attitude_error(body: Body, seen: Observation) -> Array | None:
@@ -299,76 +330,63 @@ def _from_exact(body: Body, seen: Observation) -> Array:
 def _ranked(
     body: Body,
     runs: Sequence[FloatingTrajectory],
-    fits: Sequence[Residuals],
     looked: Sequence[RunAudit],
+    allowed: tuple[Array, Array],
     order: StepOrder | None,
-    noise: TrajectoryNoise | None,
 ) -> Ranking:
-    seen = [fit.seen for fit in fits]
-    stepped = _step(body, seen, order)
-    runs = [_thinned(run) for run in runs]
-    fits = [residuals(observed(body, run, one.noise)) for run, one in zip(runs, looked, strict=True)]
-    agreements = [rate_agreement(run, one.noise) for run, one in zip(runs, looked, strict=True)]
-    of_rates = sum(one.square for one in agreements if one is not None)
-    more = sum(one.residuals.size for one in agreements if one is not None)
-    freedom = sum(fit.freedom for fit in fits)
-    square = sum(fit.square for fit in fits)
-    candidates = [
-        Candidate(hypothesis=_with(found, of_rates, freedom + more), of_rates=of_rates)
-        for found in (*wrong_inertias(body, fits), *outside_pushes(fits), no_gyroscopic_term(fits))
-        if found is not None
-    ]
-    readings = other_readings(body, runs, noise, [fit.seen.noise for fit in fits])
-    candidates += [Candidate(hypothesis=found, of_rates=rates) for found, rates in readings]
-    if stepped is not None:
-        # What is late in the rates by a part of the step comes from it, too.
-        rest = sum(
-            one.square * (one.mismatch_less_late / max(one.mismatch, 1e-300)) ** 2
-            for one in agreements
-            if one is not None
+    """Hypotheses one by one; in twos where the best leaves more than noise and tolerance."""
+    runs = [thinned(run) for run in runs]
+    levels = [one.noise for one in looked]
+    fits = [residuals(body, observed(body, run, level)) for run, level in zip(runs, levels, strict=True)]
+    without = leftover(fits, np.concatenate([fit.vector for fit in fits]))
+    evidence = Evidence(without, *allowed)
+    if order is not None:
+        late = max(
+            (one.agreement.mismatch_less_late / max(one.agreement.mismatch, 1e-300) for one in looked if one.agreement),
+            default=0.0,
         )
-        made = replace(stepped, square=stepped.square * square)
-        candidates.append(Candidate(hypothesis=_with(made, rest, freedom + more), of_rates=rest))
-    found = ranking(candidates, square + of_rates, freedom + more)
-    whole = square + of_rates
-    return Ranking(
-        ranked=tuple(_shared(one, whole) for one in found.ranked), tie=tuple(_shared(one, whole) for one in found.tie)
-    )
+        step = step_hypothesis(order, without, late**2)
+        steps = [] if step is None else [step]
+    else:
+        steps = integration_step(fits)
+    readings = other_readings(body, runs, levels)
+    singles = [*steps, *_causes(body, fits), *(one.hypothesis for one in readings)]
+    found = evidence.ranking(singles)
+    if not found.ranked or evidence.settled_by(found.ranked[0]):
+        return found
+    pairs = []
+    if order is None:
+        stepped = [residuals(body, fit.seen, any_step=True) for fit in fits]
+        others = other_readings(body, runs, levels, any_step=True)
+        seconds = [*_causes(body, stepped), *(one.hypothesis for one in others)]
+        pairs += [one.paired_with("integration step", len(runs)) for one in seconds]
+    nearest = {one.name for one in found.ranked[:_PAIRED]}
+    for reading in readings:
+        first = reading.hypothesis
+        if first.name in nearest:
+            read = reading.fits(body)
+            seconds = [*integration_step(read), *wrong_inertias(body, read)]
+            pairs += [one.paired_with(first.name, first.parameters, first.values) for one in seconds]
+    nearest = {frozenset(one.name.split(AND)): one for one in sorted(pairs, key=lambda one: -one.square)}
+    found = evidence.ranking([*singles, *nearest.values()])
+    return found if found.tie else evidence.ranking([*found.ranked, *filtered_samples(fits, without)])
 
 
-def _shared(found: Hypothesis, whole: float) -> Hypothesis:
-    return replace(found, share=float(np.sqrt(found.square / whole)) if whole > 0.0 else 0.0)
+def _causes(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
+    """Hypotheses that change what the laws predict, not what the samples are; each fitted to all runs."""
+    return [
+        *wrong_inertias(body, fits),
+        *joint_offsets(body, fits),
+        *outside_pushes(fits),
+        *drag(body, fits),
+        *no_gyroscopic_term(fits),
+    ]
 
 
-def _thinned(run: FloatingTrajectory) -> FloatingTrajectory:
+def thinned(run: FloatingTrajectory) -> FloatingTrajectory:
     """As many samples as hypotheses are told apart by, evenly taken."""
     every = -(-len(run.times) // _MOST_SAMPLES)
-    return run if every == 1 else replace(run.every(every), step=run.integrator_step)
-
-
-def _step(body: Body, seen: Sequence[Observation], order: StepOrder | None) -> Hypothesis | None:
-    """The integrator's step as a cause; its square is relative to all there is to explain."""
-    if order is not None:
-        return step_hypothesis(order)
-    if len(seen) > 1:
-        return None
-    share = as_semi_implicit_euler(body, seen[0])
-    if share is None or share > _AS_EULER:
-        return None
-    return Hypothesis(
-        name="integration step",
-        kind="step",
-        square=share**2,
-        left_over=share,
-        parameters=0,
-        remark="consistent with semi-implicit Euler; a run with half the step tells",
-    )
-
-
-def _with(found: Hypothesis, of_rates: float, freedom: int) -> Hypothesis:
-    """The same with what it leaves of the agreement of the rates."""
-    square = max(found.square, 0.0) + of_rates
-    return replace(found, square=square, left_over=float(np.sqrt(square / freedom)))
+    return run if every == 1 else run.every(every)
 
 
 def _notes(seen: Sequence[Observation], looked: Sequence[RunAudit], order: StepOrder | None) -> tuple[str, ...]:

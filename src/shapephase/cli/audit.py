@@ -137,6 +137,7 @@ def audit_command(
     flight: Annotated[tuple[str, ...], Parameter(negative_iterable="", consume_multiple=True)] = ("auto",),
     reading: TrajectoryOptions = AS_IT_IS,
     figure: Path | None = None,
+    html: Annotated[Path | None, Parameter(show_default=False)] = None,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Audit trajectories in flight: momentum, fall, attitude and rates, and what explains it if they are wrong.
@@ -155,6 +156,9 @@ def audit_command(
     figure
         Write drift, error of the attitude and what the hypotheses leave over to this figure, .svg, .pdf or .png;
         without it none is written. For example `--figure audit.pdf`.
+    html
+        Write the audit with curves in time and all hypotheses to this HTML file; without it none is written. For
+        example `--html audit.html`.
     """
     from ..auditing.figures import write_audit_figure
     from ..auditing.reading import read_trajectory
@@ -164,6 +168,7 @@ def audit_command(
     from .outcome import ExitCode
 
     aside = check_writable(figure, "--figure", *_ENDINGS)
+    aside = check_writable(html, "--html", ".html") or aside
     if not trajectories:
         raise ShapeError("audit: one trajectory or more is needed after the body")
     if len(reading.step) not in (0, 1, len(trajectories)):
@@ -178,7 +183,7 @@ def audit_command(
                 file,
                 loaded,
                 step=step,
-                names=column_names(reading.names),
+                names=column_names(reading.names) or None,
                 degrees=reading.degrees,
                 timestep=reading.timestep,
                 joint_order=reading.joint_order,
@@ -199,5 +204,10 @@ def audit_command(
         if figure is not None:
             write_audit_figure(found, figure)
             say_written(figure)
+        if html is not None:
+            from ..auditing.page import audit_page
+
+            audit_page(loaded, runs, found).write(html)
+            say_written(html)
     code = ExitCode.DONE if found.right else ExitCode.WRONG
     return Outcome(found.table(), found.record, code=code, aside=aside, made_from={})

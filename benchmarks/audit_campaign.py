@@ -1,0 +1,504 @@
+"""Which cause an audit names: `python -m benchmarks.audit_campaign [--runs N] [--seed S] [--kinds ...]`.
+
+Flights of five bodies by MuJoCo (Euler, implicitfast, RK4) and Drake (discrete), logged every 1 to 10 steps, with one
+fault planted, or none. Printed for each kind of run: how often the true cause is first or in a tie of at most five, how
+often a wrong one is named alone, and how often a right run raises an alarm.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+import shapephase as sp
+from shapephase.errors import ShapePhaseError
+
+from .simulators import plain_urdf
+
+LIBRARY = {"diver": 20.0, "satellite": 20.0, "cat_two_halves": 0.05}
+"""And the size of their momenta [kg m^2/s]."""
+MOMENTA = LIBRARY | {"crane": 4.0, "spider": 1.0}
+INTEGRATORS = {"euler": 0, "implicitfast": 3, "rk4": 1, "drake": None}
+MOST_IN_A_TIE = 5
+STIFFNESS = 20.0
+"""[rad/s] How fast the motors follow their targets."""
+VISIBLE, INVISIBLE = 2e-3, 5e-4
+"""Drifts of the momentum by the step alone that an audit has to name, and must not [relative]."""
+
+CRANE = """<mujoco><worldbody><body name="hull"><freejoint name="free"/>
+<inertial pos="0.02 -0.01 0.03" mass="8" diaginertia="0.30 0.22 0.16"/>
+<body name="boom" pos="0.2 0.05 0.1"><joint name="slew" axis="0.2 0.1 1"/>
+<inertial pos="0.25 0 0.02" mass="1.5" diaginertia="0.004 0.03 0.031"/>
+<body name="jib" pos="0.5 0 0"><joint name="luff" axis="0 1 0.3"/>
+<inertial pos="0.2 0.03 0" mass="0.9" diaginertia="0.002 0.012 0.0125"/>
+<body name="load" pos="0.4 0 0"><joint name="hoist" type="slide" axis="0 0.3 1"/>
+<inertial pos="0 0 -0.05" mass="1.1" diaginertia="0.003 0.003 0.004"/></body></body></body>
+<body name="counterweight" pos="-0.2 0 0.1"><joint name="swing" axis="1 0.4 0"/>
+<inertial pos="-0.15 0.05 0" mass="2" diaginertia="0.01 0.015 0.012"/></body></body></worldbody></mujoco>"""
+
+
+def spider() -> str:
+    """Six legs of two hinges about axes that are not parallel, as a URDF."""
+
+    def link(name: str, mass: float, moments: tuple[float, float, float], centre: str) -> str:
+        x, y, z = moments
+        return (
+            f'<link name="{name}"><inertial><origin xyz="{centre}"/><mass value="{mass}"/>'
+            f'<inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+        )
+
+    parts = [link("body", 3.0, (0.02, 0.03, 0.04), "0.01 0 0.02")]
+    for leg in range(6):
+        turn = leg * np.pi / 3.0 + 0.1
+        at = f"{0.15 * np.cos(turn):.6f} {0.15 * np.sin(turn):.6f} 0"
+        parts.append(link(f"thigh{leg}", 0.35, (0.0004, 0.0016, 0.0016), "0.1 0 0.01"))
+        parts.append(link(f"shin{leg}", 0.2 + 0.03 * leg, (0.0002, 0.0012, 0.0012), "0.1 0.01 0"))
+        for name, parent, child, where, axis in (
+            (f"hip{leg}", "body", f"thigh{leg}", f'xyz="{at}" rpy="0 0 {turn:.6f}"', "0 1 0.3"),
+            (f"knee{leg}", f"thigh{leg}", f"shin{leg}", 'xyz="0.2 0 0"', "0.2 1 0"),
+        ):
+            parts.append(
+                f'<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>'
+                f'<origin {where}/><axis xyz="{axis}"/><limit lower="-3" upper="3" effort="99" velocity="99"/></joint>'
+            )
+    return f'<robot name="spider">{"".join(parts)}</robot>'
+
+
+@cache
+def urdf(name: str) -> str:
+    """All that moves and weighs in a body, as both simulators read it."""
+    with tempfile.TemporaryDirectory() as folder:
+        if name in LIBRARY:
+            return plain_urdf(sp.load_body(name)._model, "revolute")
+        file = Path(folder) / ("body.xml" if name == "crane" else "body.urdf")
+        file.write_text(CRANE if name == "crane" else spider())
+        return plain_urdf(sp.load_body(file)._model, "revolute")
+
+
+@cache
+def body_of(name: str) -> sp.Body:
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "body.urdf"
+        file.write_text(urdf(name))
+        return sp.load_body(file)
+
+
+def mujoco_model(name: str) -> Any:
+    """A floating body with a ball about each link's centre, above a floor that touches only where it is switched on."""
+    floating = (
+        '<link name="world"/><joint name="free" type="floating"><parent link="world"/><child link="link1"/></joint>'
+        '<mujoco><compiler discardvisual="false" balanceinertia="false" inertiafromgeom="false" '
+        'boundmass="1e-14" boundinertia="1e-14"/></mujoco></robot>'
+    )
+    spec = mujoco.MjSpec.from_string(urdf(name).replace("</robot>", floating))
+    for part in spec.bodies[1:]:
+        part.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.03, 0.0, 0.0], pos=part.ipos, mass=0.0, conaffinity=0)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[50.0, 50.0, 1.0], contype=0, conaffinity=0)
+    return spec.compile()
+
+
+@dataclass
+class Flight:
+    """How one is flown, and what is true of it.
+
+    words : a hypothesis whose name has one of these is the true cause
+    """
+
+    kind: str
+    name: str
+    rng: np.random.Generator
+    integrator: str = "rk4"
+    step: float = 0.001
+    every: int = 5
+    duration: float = 1.0
+    gravity: float = 9.81
+    height: float = 30.0
+    floor: bool = False
+    drag: float = 0.0
+    change: Callable[[Any], object] | None = None
+    record: Callable[[sp.FloatingTrajectory], sp.FloatingTrajectory] | None = None
+    words: tuple[str, ...] = ()
+    silence_allowed: bool = False
+    rates: bool = True
+    drift: float = field(default=0.0)
+
+
+def targets(rng: np.random.Generator, joints: int) -> Callable[[float], tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    sizes, turns = rng.uniform(0.2, 0.6, joints), rng.uniform(4.0, 11.0, joints)
+    phases, middle = rng.uniform(0.0, 6.0, joints), rng.uniform(-0.4, 0.4, joints)
+
+    def at(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        angle = turns * t + phases
+        swing, slope = sizes * np.sin(angle), sizes * turns * np.cos(angle)
+        return middle + swing, slope, -(turns**2) * swing
+
+    return at
+
+
+def motor(mass: np.ndarray, bias: np.ndarray, pull: np.ndarray) -> np.ndarray:
+    """Torques of the joints that give them an acceleration while the base gives way."""
+    share = np.linalg.solve(mass[:6, :6], np.column_stack([mass[:6, 6:], bias[:6]]))
+    way = mass[6:, :6] @ share
+    return (mass[6:, 6:] - way[:, :-1]) @ pull + bias[6:] - way[:, -1]
+
+
+def fly(flight: Flight) -> sp.FloatingTrajectory:
+    body, rng = body_of(flight.name), flight.rng
+    target = targets(rng, body.n_shape)
+    quat = Rotation.random(random_state=int(rng.integers(1 << 30))).as_quat()[[3, 0, 1, 2]]
+    shapes, rates, _ = target(0.0)
+    inertia, internal = body.sample(shapes[None], rates[None])
+    wanted = MOMENTA[flight.name] * rng.uniform(0.4, 1.0) * rng.normal(size=3) / np.sqrt(3.0)
+    spin = np.linalg.solve(inertia[0], wanted - internal[0])
+    velocity = np.array([1.0, 0.2, 3.0 if flight.floor else 4.0])
+    simulated = fly_drake if flight.integrator == "drake" else fly_mujoco
+    names, times, qpos, qvel, momenta = simulated(flight, target, quat, velocity, spin)
+    run = sp.FloatingTrajectory.from_mujoco(body, times, qpos, qvel, joint_names=names)
+    inertia, internal = body.sample(run.shapes, run.joint_rates)
+    turning = np.einsum("nij,nj->ni", inertia, run.rate)
+    scale = np.sqrt((turning**2 + internal**2).sum(axis=1).mean())
+    flight.drift = float(np.linalg.norm(momenta - momenta.mean(axis=0), axis=1).max() / scale)
+    run = run if flight.record is None else flight.record(run)
+    return run if flight.rates else replace(run, rate=None, velocity=None, joint_rates=None)
+
+
+def fly_mujoco(flight: Flight, target: Any, quat: Any, velocity: Any, spin: Any) -> tuple[Any, ...]:
+    model = mujoco_model(flight.name)
+    model.opt.integrator, model.opt.timestep = INTEGRATORS[flight.integrator], flight.step
+    model.opt.gravity[:] = 0.0, 0.0, -flight.gravity
+    if flight.floor:
+        model.geom_conaffinity[int(np.flatnonzero(model.geom_bodyid == 0)[0])] = 1
+    if flight.change is not None:
+        flight.change(model)
+    data = mujoco.MjData(model)
+    mujoco.mj_setConst(model, data)
+    shapes, rates, _ = target(0.0)
+    data.qpos[:] = np.concatenate([[0.0, 0.0, flight.height], quat, shapes])
+    data.qvel[:] = np.concatenate([velocity, spin, rates])
+    mass = np.zeros((model.nv, model.nv))
+    rows, momenta = [], []
+    for k in range(round(flight.duration / flight.step) + 1):
+        mujoco.mj_forward(model, data)
+        if k % flight.every == 0:
+            rows.append((k * flight.step, data.qpos.copy(), data.qvel.copy()))
+            mujoco.mj_subtreeVel(model, data)
+            momenta.append(data.subtree_angmom[1].copy())
+        place, slope, bend = target(k * flight.step)
+        pull = bend + STIFFNESS**2 * (place - data.qpos[7:]) + 2.0 * STIFFNESS * (slope - data.qvel[6:])
+        mujoco.mj_fullM(model, data, mass)
+        data.qfrc_applied[6:] = motor(mass, data.qfrc_bias, pull)
+        if flight.drag:
+            wind = np.zeros(6)
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, 1, wind, 0)
+            wide = model.body_subtreemass[1] * flight.drag
+            data.xfrc_applied[1, :3] = -wide * np.linalg.norm(wind[3:]) * wind[3:]
+        mujoco.mj_step(model, data)
+    names = [model.joint(k).name for k in range(1, model.njnt)]
+    return names, *(np.array(column) for column in zip(*rows, strict=True)), np.array(momenta)
+
+
+def fly_drake(flight: Flight, target: Any, quat: Any, velocity: Any, spin: Any) -> tuple[Any, ...]:
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import MultibodyPlant
+    from pydrake.systems.analysis import Simulator
+
+    plant = MultibodyPlant(time_step=flight.step)
+    Parser(plant).AddModelsFromString(urdf(flight.name), "urdf")
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -flight.gravity])
+    plant.Finalize()
+    simulator = Simulator(plant)
+    context = simulator.get_mutable_context()
+    shapes, rates, _ = target(0.0)
+    turned = Rotation.from_quat(quat[[1, 2, 3, 0]])
+    plant.SetPositions(context, np.concatenate([quat, [0.0, 0.0, flight.height], shapes]))
+    plant.SetVelocities(context, np.concatenate([turned.apply(spin), velocity, rates]))
+    port = plant.get_applied_generalized_force_input_port()
+    rows, momenta = [], []
+    for k in range(round(flight.duration / flight.step) + 1):
+        q, v = plant.GetPositions(context), plant.GetVelocities(context)
+        turned = Rotation.from_quat(q[[1, 2, 3, 0]])
+        if k % flight.every == 0:
+            base = np.concatenate([q[4:7], q[:4] / np.linalg.norm(q[:4])])
+            rows.append(
+                (k * flight.step, np.append(base, q[7:]), np.concatenate([v[3:6], turned.inv().apply(v[:3]), v[6:]]))
+            )
+            centre = plant.CalcCenterOfMassPositionInWorld(context)
+            momenta.append(plant.CalcSpatialMomentumInWorldAboutPoint(context, centre).rotational())
+        place, slope, bend = target(k * flight.step)
+        pull = bend + STIFFNESS**2 * (place - q[7:]) + 2.0 * STIFFNESS * (slope - v[6:])
+        bias = plant.CalcBiasTerm(context) - plant.CalcGravityGeneralizedForces(context)
+        force = np.zeros(plant.num_velocities())
+        force[6:] = motor(plant.CalcMassMatrix(context), bias, pull)
+        port.FixValue(context, force)
+        simulator.AdvanceTo((k + 1) * flight.step)
+    joints = sorted((plant.get_joint(k) for k in plant.GetJointIndices()), key=lambda joint: joint.position_start())
+    names = [joint.name() for joint in joints if joint.num_positions() == 1]
+    return names, *(np.array(column) for column in zip(*rows, strict=True)), np.array(momenta)
+
+
+# ---- Kinds of runs --------------------------------------------------------------------------------------------------
+
+
+def noisy(rng: np.random.Generator, size: float, colour: Callable[[np.ndarray], np.ndarray]) -> Any:
+    """Noise of a fraction of degrees and millimetres on configurations, and ten times that a second on rates."""
+
+    def make(shape: tuple[int, ...]) -> np.ndarray:
+        return size * colour(rng.normal(size=(shape[0] + 500, *shape[1:])))[500:]
+
+    def record(run: sp.FloatingTrajectory) -> sp.FloatingTrajectory:
+        turned = Rotation.from_quat(run.quaternion) * Rotation.from_rotvec(make((len(run.times), 3)))
+        assert run.position is not None
+        assert run.rate is not None
+        assert run.velocity is not None
+        assert run.joint_rates is not None
+        return replace(
+            run,
+            quaternion=turned.as_quat(),
+            position=run.position + 0.3 * make(run.position.shape),
+            shapes=run.shapes + make(run.shapes.shape),
+            rate=run.rate + 10.0 * make(run.rate.shape),
+            velocity=run.velocity + 3.0 * make(run.velocity.shape),
+            joint_rates=run.joint_rates + 10.0 * make(run.joint_rates.shape),
+        )
+
+    return record
+
+
+def white(values: np.ndarray) -> np.ndarray:
+    return values
+
+
+def low_passed(rng: np.random.Generator, flight: Flight) -> Any:
+    """A recording with white noise, all of it filtered by Butterworth, to and fro or as time goes."""
+    spacing = flight.step * flight.every
+    sections = butter(
+        int(rng.integers(2, 5)), min(rng.uniform(6.0, 20.0), 0.2 / spacing), fs=1.0 / spacing, output="sos"
+    )
+    add = noisy(rng, 10.0 ** rng.uniform(-3.3, -2.3), white)
+    causal = bool(rng.random() < 0.4)
+
+    def smooth(values: np.ndarray | None) -> np.ndarray | None:
+        if values is None:
+            return None
+        if not causal:
+            return sosfiltfilt(sections, values, axis=0)
+        first = values[0]
+        return sosfilt(sections, values - first, axis=0) + first
+
+    def record(run: sp.FloatingTrajectory) -> sp.FloatingTrajectory:
+        run = add(run)
+        signs = np.where((run.quaternion[1:] * run.quaternion[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
+        near = run.quaternion * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
+        fields = {
+            name: smooth(getattr(run, name)) for name in ("position", "shapes", "rate", "velocity", "joint_rates")
+        }
+        quaternion = smooth(near)
+        assert quaternion is not None
+        run = replace(run, quaternion=quaternion / np.linalg.norm(quaternion, axis=1)[:, None], **fields)
+        # What is filtered begins before a flight and ends after it.
+        edge = int(0.25 / spacing)
+        return run.part(edge, len(run.times) - (0 if causal else edge))
+
+    return record
+
+
+def in_other_axes(turn_rate: bool, velocity: bool) -> Any:
+    def record(run: sp.FloatingTrajectory) -> sp.FloatingTrajectory:
+        turned = Rotation.from_quat(run.quaternion)
+        return replace(
+            run,
+            rate=turned.apply(run.rate) if turn_rate else run.rate,
+            velocity=turned.inv().apply(run.velocity) if velocity else run.velocity,
+        )
+
+    return record
+
+
+def wrong_link(flight: Flight, rng: np.random.Generator) -> None:
+    body = body_of(flight.name)
+    heavy = [part for part in body.moving_parts if part.mass > 0.02 * body.mass]
+    link = heavy[int(rng.integers(len(heavy)))].links[0]
+    what, factor = str(rng.choice(["mass", "inertia", "centre"])), float(rng.choice([0.75, 1.25, 1.5]))
+    if flight.name == "cat_two_halves" and what == "mass":
+        what = "inertia"  # its halves have their centres in the waist, where masses change nothing
+    axis, arm = (
+        int(rng.integers(3)),
+        0.15 * float(np.sqrt(0.5 * np.trace(body.locked_inertia(np.zeros(body.n_shape))) / body.mass)),
+    )
+
+    def change(model: Any) -> None:
+        number = model.body(link).id
+        if what in ("mass", "inertia"):
+            model.body_mass[number] *= factor
+        if what == "inertia":
+            model.body_inertia[number] *= factor
+        if what == "centre":
+            model.body_ipos[number, axis] += arm
+
+    flight.change = change
+    flight.words = (
+        {
+            "mass": f"mass of {link}",
+            "inertia": f"mass and inertia of {link}",
+            "centre": f"centre of {link}, {'xyz'[axis]}",
+        }[what],
+    )
+
+
+def shown_offset(body: sp.Body, rng: np.random.Generator) -> tuple[int, float]:
+    """A joint whose offset changes inertia, momentum or centre of mass by a thousandth at least, and the offset."""
+    while True:
+        joint = int(rng.integers(body.n_shape))
+        off = float(np.radians(rng.choice([-2.0, 2.0, 3.0])) if body.joint_units[joint] == "rad" else 0.03)
+        shape = rng.uniform(-0.5, 0.5, body.n_shape)
+        other = shape + off * np.eye(body.n_shape)[joint]
+        changes = [
+            np.linalg.norm(of(other) - of(shape)) / np.linalg.norm(of(shape))
+            for of in (body.locked_inertia, body.momentum_matrix)
+        ]
+        if max(changes) > 1e-3:
+            return joint, off
+
+
+def planned(kind: str, seed: int) -> Flight:
+    """A flight of one kind."""
+    rng = np.random.default_rng([seed, KINDS.index(kind)])
+    name = list(MOMENTA)[int(rng.integers(len(MOMENTA)))]
+    if kind == "drag" and name == "cat_two_halves":
+        name = "crane"  # a fluid throws links that weigh nothing about
+    flight = Flight(kind, name, rng, every=int(rng.integers(1, 11)))
+    flight.integrator = str(rng.choice(["euler", "implicitfast", "rk4", "rk4", "drake"]))
+    if flight.integrator == "drake" and (name in LIBRARY or kind in ("wrong link", "landing", "drag")):
+        flight.integrator = "euler"
+    flight.step = float(rng.choice([0.0005, 0.001, 0.002]))
+    flight.duration = max(0.8, 45 * flight.every * flight.step)
+    flight.rates = bool(rng.random() < 0.75)
+    size = 10.0 ** rng.uniform(-4.3, -2.7)
+    if kind in ("right", "right, white noise", "right, coloured noise"):
+        flight.integrator = str(rng.choice(["rk4", flight.integrator]))
+    if kind == "right, white noise":
+        flight.record = noisy(rng, size, white)
+    elif kind == "right, coloured noise":
+        memory = rng.uniform(0.5, 0.97)
+        flight.record = noisy(rng, size, lambda x: np.sqrt(1.0 - memory**2) * lfilter([1.0], [1.0, -memory], x, axis=0))
+    elif kind == "filtered":
+        flight.duration += 0.5
+        flight.record, flight.words, flight.silence_allowed = low_passed(rng, flight), ("filtered",), True
+    elif kind == "landing":
+        flight.floor, flight.duration = True, 1.1
+        flight.height = 0.5 * 9.81 * rng.uniform(0.75, 0.95) ** 2 - 3.0 * 0.8
+        flight.height = max(flight.height, 0.5)
+    elif kind == "drag":
+        flight.words = ("drag",)
+        if rng.random() < 0.5:
+            flight.drag = rng.uniform(0.02, 0.2)
+        else:
+            density, viscosity = rng.uniform(1.0, 30.0), rng.choice([0.0, rng.uniform(0.1, 1.0)])
+            flight.change = lambda model: (
+                setattr(model.opt, "density", density),
+                setattr(model.opt, "viscosity", viscosity),
+            )
+    elif kind == "wrong link":
+        wrong_link(flight, rng)
+    elif kind in ("frame", "two laws"):
+        turns = bool(rng.random() < 0.5)
+        flight.rates, flight.record = True, in_other_axes(turns, not turns)
+        flight.words = ("angular velocity in world axes" if turns else "linear velocity in base axes",)
+        if kind == "two laws":
+            flight.integrator, flight.step = "euler", float(rng.choice([0.002, 0.004]))
+            flight.duration = max(0.8, 45 * flight.every * flight.step)
+    elif kind == "joint offset":
+        joint, off = shown_offset(body_of(name), rng)
+        flight.record = lambda run: replace(run, shapes=run.shapes + off * np.eye(run.shapes.shape[1])[joint])
+        flight.words = (f"offset of joint {body_of(name).joint_names[joint]}",)
+    elif kind == "gravity":
+        flight.gravity, flight.words = float(rng.choice([9.0, 8.0, 10.8, 1.62, 3.7])), ("gravity",)
+    elif kind == "sparse steps":
+        flight.integrator = "drake" if name not in LIBRARY and rng.random() < 0.4 else "euler"
+        flight.step = float(rng.choice([0.002, 0.004]))
+        flight.duration = max(0.8, 45 * flight.every * flight.step)
+    return flight
+
+
+KINDS = (
+    "right", "right, white noise", "right, coloured noise", "filtered", "landing", "drag", "wrong link", "frame",
+    "two laws", "joint offset", "gravity", "sparse steps",
+)  # fmt: skip
+RIGHT = ("right", "right, white noise", "right, coloured noise", "landing")
+
+
+def is_true(flight: Flight, found: Any) -> bool:
+    """Whether every part of a hypothesis is there, and the planted cause among them, or the step where none is."""
+    names = found.name.split(", and ")
+    steps = [name for name in names if name.startswith("integration step")]
+    if steps and flight.integrator == "rk4":
+        return False
+    others = [name for name in names if name not in steps]
+    if not others:
+        return flight.kind in (*RIGHT, "filtered", "sparse steps") and flight.drift >= INVISIBLE
+    return len(others) == 1 and any(word in others[0] for word in flight.words)
+
+
+def judged(flight: Flight) -> tuple[str, str]:
+    """One of "no alarm", "first", "tie", "missed", "wrong alone", "alarm", "refused", "either"; and what was named."""
+    run = fly(flight)
+    try:
+        found = sp.audit(body_of(flight.name), run)
+    except ShapePhaseError as error:
+        return "refused", str(error)
+    names = "; ".join(one.name for one in found.cause)
+    by_step = flight.kind in (*RIGHT, "sparse steps") and flight.integrator != "rk4"
+    if found.right:
+        hidden = not by_step or flight.drift <= VISIBLE or flight.kind != "right"
+        right = flight.silence_allowed or (flight.kind in RIGHT and hidden)
+        return "no alarm" if right or (by_step and flight.drift <= VISIBLE) else "missed", names
+    true = [place for place, one in enumerate(found.cause) if is_true(flight, one)]
+    if flight.kind in RIGHT and not (true and by_step and flight.drift >= INVISIBLE):
+        return "alarm", names
+    if true and (true[0] == 0 or len(found.cause) <= MOST_IN_A_TIE):
+        return "first" if len(found.cause) == 1 else "tie", names
+    return "wrong alone" if len(found.cause) == 1 else "missed", names
+
+
+def main() -> None:
+    """Print a table of counts."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=120)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kinds", nargs="*", default=KINDS)
+    parser.add_argument("--verbose", action="store_true")
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    counts: dict[str, Counter[str]] = {kind: Counter() for kind in options.kinds}
+    for number in range(options.runs):
+        kind = options.kinds[number % len(options.kinds)]
+        flight = planned(kind, options.seed + number // len(options.kinds))
+        outcome, named = judged(flight)
+        counts[kind][outcome] += 1
+        if options.verbose or outcome in ("missed", "wrong alone", "alarm", "refused"):
+            print(
+                f"{options.seed + number // len(options.kinds)} {kind}: {outcome}; {flight.name} {flight.integrator} "
+                f"{1e3 * flight.step:g} ms x {flight.every}, rates {flight.rates}, drift {flight.drift:.2g}, "
+                f"true {flight.words}; named: {named[:200]}",
+                flush=True,
+            )
+    columns = ("no alarm", "first", "tie", "missed", "wrong alone", "alarm", "refused")
+    print(f"{'kind':24}" + "".join(f"{name:>13}" for name in columns))
+    for kind, count in counts.items():
+        print(f"{kind:24}" + "".join(f"{count[name]:13d}" for name in columns))
+
+
+if __name__ == "__main__":
+    main()
