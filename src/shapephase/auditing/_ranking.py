@@ -67,10 +67,9 @@ class Evidence:
             return Ranking(ranked=(), tie=())
         squares = np.array([left.squares for _, left in known])
         counts = self.without.counts
-        # Laws that hold anyway count with what the tolerance leaves them.
-        holds = np.maximum(
-            self.colour * counts, np.where(self.allowed >= 1.0, self.allowed * self.without.squares, 0.0)
-        )
+        # No hypothesis leaves less than the noise. Laws that hold anyway count with what the tolerance leaves.
+        noise = np.clip(squares.min(axis=0), counts, self.colour * counts)
+        holds = np.maximum(noise, np.where(self.allowed >= 1.0, self.allowed * self.without.squares, 0.0))
         size = squares / np.where(holds > 0.0, holds, 1.0)
         misfit = np.where(size <= 1.0, size, 1.0 + np.log(np.maximum(size, 1.0)))
         fitted = np.array([one.parameters for one, _ in known], dtype=np.float64)
