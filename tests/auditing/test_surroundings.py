@@ -58,6 +58,23 @@ def test_a_landing_within_noise_is_audited_up_to_first_contact():
     assert found.right, found.table()
 
 
+@pytest.mark.parametrize("name", ["diver", "satellite"])
+def test_a_take_off_is_audited_from_last_contact(name: str):
+    """A landing backwards in time."""
+    flight = landing(name, seed=3, lands=0.88, duration=0.9, step=0.001, every=5)
+    run = trajectory(name, flight.motion)
+    backwards = {
+        field: factor * getattr(run, field)[::-1]
+        for factor, fields in ((1.0, ("quaternion", "shapes", "position")), (-1.0, ("rate", "velocity", "joint_rates")))
+        for field in fields
+    }
+    run = replace(run, times=run.times[-1] - run.times[::-1], **backwards)
+    found = sp.audit(body_of(name), run)
+    assert run.times[-1] - flight.last_free - 1e-9 <= found.runs[0].first_time <= 0.1
+    assert found.runs[0].last_time == run.times[-1]
+    assert found.right, found.table()
+
+
 @pytest.mark.parametrize(("name", "seed"), [("diver", 1), ("satellite", 2), ("cat", 3)])
 def test_a_flight_without_contact_is_audited_whole(name: str, seed: int):
     for run in (_flight(name, seed), _flight(name, seed, gravity=0.0)):

@@ -41,6 +41,7 @@ _ENOUGH = 1.0 / 120.0
 _CHANCE = 1e-6  # probability with which noise alone ends a flight
 _STEEP = np.sqrt(0.5)  # cosine of the largest angle of the ground's push from upwards, with a friction of 1
 _TOUCH = 0.01  # of gravity: in a hundredth of a second less changes momenta by less than the usual tolerance
+_FEWEST_WINDOWS = 6  # in the middle half, whose largest jump says little of fewer: 24 samples have them
 _NUDGE = 1e-5  # [s] by which joints are moved along their rates for the velocity of the centre of mass
 _ABRUPT = 2.0  # times the largest jump before
 _SHORTEST = 3  # samples of a window: a second difference
@@ -144,7 +145,7 @@ def _centres(body: Body, trajectory: FloatingTrajectory) -> Array | None:
 
 
 def _speeds(body: Body, trajectory: FloatingTrajectory) -> Array | None:
-    """Of the centre of mass by the rates, world axes: (N, 3) [m/s], or None where they are not given."""
+    """Velocity of the centre of mass by the given rates, world axes, (N, 3) [m/s]; None without rates."""
     velocity, rate, joint_rates = trajectory.world_velocity, trajectory.base_rate, trajectory.joint_rates
     if velocity is None or rate is None or joint_rates is None:
         return None
@@ -157,12 +158,15 @@ def _speeds(body: Body, trajectory: FloatingTrajectory) -> Array | None:
 def _clear_part(times: Array, centres: Array, speeds: Array | None, first: int, past: int, how: str) -> AirbornePart:
     """The stretch without what a contact accelerates at its ends, which `how` then names."""
     begin, end = first, past
+    every = -(-(past - first) // _MANY)
     # Rates that are given show a contact within a sample, through noise that hides it from places.
     for values, order in ((centres, 2), (speeds, 1)):
         if values is not None:
             at, some = times[first:past], values[first:past]
-            end = min(end, first + _flight_end(at, some, order))
-            begin = max(begin, past - _flight_end(-at[::-1], some[::-1] * (-1.0) ** order, order))
+            end = min(end, first + _every_end(at, some, order, every))
+            begin = max(begin, past - _every_end(-at[::-1], some[::-1] * (-1.0) ** order, order, every))
+    if end - begin < _FEWEST:
+        begin, end = first, past
     if begin > first or end < past:
         how = f"{how.removeprefix('all of it: ')}, less what is held up"
         how += f" before {times[begin]:.6g} s" if begin > first else ""
@@ -170,14 +174,20 @@ def _clear_part(times: Array, centres: Array, speeds: Array | None, first: int, 
     return _part(times, centres, begin, end, how)
 
 
+def _every_end(times: Array, values: Array, order: int, every: int) -> int:
+    """The end by `_flight_end`, found in one of every so many samples."""
+    end = _flight_end(times[::every], values[::every], order)
+    return len(times) if every * end >= len(times) else every * max(end - 1, 0) + 1
+
+
 def _flight_end(times: Array, values: Array, order: int) -> int:
     """The sample before which a contact in the last quarter begins, else the number of samples.
-
-    values : (N, 3) of the centre of mass, its places or, with order 1, its velocities
 
     The flight grows from the middle half of the samples. At each sample the accelerations on windows before and after
     it are compared, for windows of all lengths; the first jump that noise alone brings in all of them with `_CHANCE`
     ends the flight if it is the ground's: `_EVEN` of gravity, or less, but upwards and until the end.
+
+    values : (N, 3) of the centre of mass: with order 2 its places, with order 1 its velocities
     """
     count = len(times)
     quarter, length = count // 4, float(_SHORTEST)
@@ -192,12 +202,12 @@ def _flight_end(times: Array, values: Array, order: int) -> int:
         stride = max(1, length // _OVERLAP)
         # The last window ends with the samples.
         starts = np.arange((count - length) % stride, count - length + 1, stride)
-        found, bars = _window_accelerations(times, values, starts, length, order)
+        pulls, bars = _window_accelerations(times, values, starts, length, order)
         before = np.searchsorted(starts, starts - length, side="right") - 1
         middle = (starts - length >= quarter) & (starts + length <= count - quarter)
-        if not middle.any():
+        if middle.sum() < _FEWEST_WINDOWS:
             continue
-        jumps = np.where(before >= 0, np.linalg.norm(found - found[before], axis=1), 0.0)
+        jumps = np.where(before >= 0, np.linalg.norm(pulls - pulls[before], axis=1), 0.0)
         # What is smooth jumps from window to window by as much as it did before.
         usual = np.maximum.accumulate(np.where(starts - length >= quarter, jumps, 0.0))[before]
         level = np.maximum(limit * np.sqrt(2.0) * noise * bars, _ABRUPT * np.maximum(usual, jumps[middle].max()))
@@ -206,8 +216,8 @@ def _flight_end(times: Array, values: Array, order: int) -> int:
         if not len(later):
             continue
         first = int(later[0])
-        pull = np.median(found[middle], axis=0)
-        held = found[first:].mean(axis=0) - pull
+        pull = np.median(pulls[middle], axis=0)
+        held = pulls[first:].mean(axis=0) - pull
         size = float(np.linalg.norm(held))
         upwards = -held @ pull > _STEEP * float(np.linalg.norm(pull)) * size > 0.0
         if (
@@ -222,7 +232,7 @@ def _flight_end(times: Array, values: Array, order: int) -> int:
 def _window_accelerations(
     times: Array, values: Array, starts: Integers, length: int, order: int
 ) -> tuple[Array, Array]:
-    """Of the centre of mass on windows, (W, 3) [m/s^2], and their standard deviations for a unit one of samples."""
+    """Accelerations on windows, (W, 3) [m/s^2], and their standard deviations for a unit one of the samples, (W,)."""
     samples = starts[:, None] + np.arange(length)
     since = times[samples] - times[samples].mean(axis=1, keepdims=True)
     power = since**order - (since**order).mean(axis=1, keepdims=True)

@@ -33,9 +33,9 @@ class _Flight:
     velocity: Array
 
     def columns(self, torque: Array, force: Array) -> Array:
-        """What torques about the centre of mass and forces (N, 3, k), world axes, add to the residuals: (M, k)."""
+        """Change of the residuals, (M, k), by torques about the centre of mass and forces (N, 3, k), world axes."""
         times = self.fit.seen.times
-        momentum, speed = (cumulative_trapezoid(each, times, axis=0, initial=0.0) for each in (torque, force))
+        momentum, speed = (cumulative_trapezoid(push, times, axis=0, initial=0.0) for push in (torque, force))
         return self.fit.columns(momentum, cumulative_trapezoid(speed, times, axis=0, initial=0.0) / self.fit.seen.mass)
 
 
@@ -49,8 +49,8 @@ def drag(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     if any(fit.seen.centre is None for fit in fits):
         return []
     flights = [_Flight(fit, _velocity(fit)) for fit in fits]
-    found = [*_of_whole_body(flights), *_of_links(body, flights)]
-    return sorted(found, key=lambda one: (round(one.leftover.size, 1) if one.leftover else 0.0, one.parameters))[:1]
+    laws = [*_of_whole_body(flights), *_of_links(body, flights)]
+    return sorted(laws, key=lambda law: (round(law.leftover.size, 1) if law.leftover else 0.0, law.parameters))[:1]
 
 
 def _velocity(fit: Residuals) -> Array:
@@ -65,27 +65,34 @@ def _velocity(fit: Residuals) -> Array:
 def _of_whole_body(flights: Sequence[_Flight]) -> Iterator[Hypothesis]:
     laws_of_force = (("quadratic",), ("linear",), ("linear", "quadratic"))
     for laws, turn, point in product(laws_of_force, ((), ("turn",)), ("centre of mass", "origin of the base")):
-        names, count = (*laws, *turn), len(laws)
+        names = (*laws, *turn)
         vector = np.concatenate([flight.fit.vector for flight in flights])
-        numbers, square = np.zeros(len(names) + 3), float(vector @ vector)
+        numbers = np.zeros(len(names) + 3)
+        matrix, made = _all_by_numbers(flights, laws, turn, point, numbers)
         for _ in range(_STEPS):
-            parts = [_by_numbers(flight, laws, turn, point, numbers) for flight in flights]
-            matrix = np.vstack([columns for columns, _ in parts])
-            left = vector - np.concatenate([whole for _, whole in parts])
-            before, square = square, float(left @ left)
-            if numbers.any() and abs(before - square) <= _ENOUGH * square:
+            before = vector - made
+            numbers = numbers + np.linalg.lstsq(matrix, before, rcond=None)[0]
+            matrix, made = _all_by_numbers(flights, laws, turn, point, numbers)
+            left = vector - made
+            if abs(before @ before - left @ left) <= _ENOUGH * (left @ left):
                 break
-            numbers = numbers + np.linalg.lstsq(matrix, left, rcond=None)[0]
-        if np.all(numbers[: len(names)] > 0.0) and numbers[:count].any():
-            yield _hypothesis(
-                flights, matrix, left, names, numbers, f"of the whole body, centre of pressure from the {point}"
-            )
+        if np.all(numbers[: len(names)] > 0.0):
+            remark = f"of the whole body, centre of pressure from the {point}"
+            yield _hypothesis(flights, matrix, vector - made, names, numbers, remark)
+
+
+def _all_by_numbers(
+    flights: Sequence[_Flight], laws: Sequence[str], turn: Sequence[str], point: str, numbers: Array
+) -> tuple[Array, Array]:
+    """The results of `_by_numbers`, of all runs below each other."""
+    parts = [_by_numbers(flight, laws, turn, point, numbers) for flight in flights]
+    return np.vstack([columns for columns, _ in parts]), np.concatenate([made for _, made in parts])
 
 
 def _by_numbers(
     flight: _Flight, laws: Sequence[str], turn: Sequence[str], point: str, numbers: Array
 ) -> tuple[Array, Array]:
-    """What the residuals change by with each number, (M, k), and what all of them make, (M,)."""
+    """Derivatives of the residuals by each number, (M, k), and their change by all of them, (M,)."""
     seen, count = flight.fit.seen, len(laws)
     speed = np.linalg.norm(flight.velocity, axis=1, keepdims=True)
     forces = np.stack([-flight.velocity * (speed if law == "quadratic" else 1.0) for law in laws], axis=2)
@@ -108,7 +115,7 @@ def _of_links(body: Body, flights: Sequence[_Flight]) -> Iterator[Hypothesis]:
     vector = np.concatenate([flight.fit.vector for flight in flights])
     matrix = np.vstack([_by_fluid(body, flight) for flight in flights])
     for kept in ([0], [1], [0, 1]):
-        numbers = np.linalg.lstsq(matrix[:, kept], vector, rcond=None)[0]
+        numbers = np.asarray(np.linalg.lstsq(matrix[:, kept], vector, rcond=None)[0], dtype=np.float64)
         left = vector - matrix[:, kept] @ numbers
         if np.all(numbers > 0.0):
             names = [("density", "viscosity")[place] for place in kept]
@@ -116,7 +123,7 @@ def _of_links(body: Body, flights: Sequence[_Flight]) -> Iterator[Hypothesis]:
 
 
 def _by_fluid(body: Body, flight: _Flight) -> Array:
-    """What a fluid of unit density, and of unit viscosity, adds to the residuals: (M, 2).
+    """Change of the residuals by a fluid of unit density, and of unit viscosity: (M, 2).
 
     Source: MuJoCo's documentation, Computation, Fluid forces, Inertia model.
     """

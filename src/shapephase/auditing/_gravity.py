@@ -24,13 +24,14 @@ def wrong_gravity(seen: Sequence[Observation], runs: Sequence[RunAudit], wander:
 
     Parameters
     ----------
-    runs : what was found of the same trajectories
+    runs : results of the same trajectories
     wander : of the centre of mass of those that are recordings [m]
     """
-    for one, run in zip(seen, runs, strict=True):
-        if one.centre is None or one.centre_noise is None or run.fall_off is None:
+    for sampled, run in zip(seen, runs, strict=True):
+        if sampled.centre is None or sampled.centre_noise is None or run.fall_off is None:
             continue
-        pull, bar = _fall(one.times, one.centre, one.centre_noise, max(run.fall_off, wander if run.recorded else 0.0))
+        off = max(run.fall_off, wander if run.recorded else 0.0)
+        pull, bar = _fall(sampled.times, sampled.centre, sampled.centre_noise, off)
         size, axis = float(np.linalg.norm(pull)), int(np.argmax(np.abs(pull)))
         allowed = _ELSEWHERE * GRAVITY + _BARS * bar
         expected = np.zeros(3)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import os
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from .floating_trajectory import FloatingTrajectory
 from .hypothesis import Hypothesis
 from .trajectory_audit import thinned
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 _MOST_ROWS = 20  # hypotheses of the table; the record has all
 _KEY = "Grey: not audited."
 
@@ -45,7 +42,7 @@ def write_audit_page(
 
     Parameters
     ----------
-    body, trajectories : of which the audit was made
+    body, trajectories : those of the audit
     found : by `audit`
 
     Raises
@@ -77,7 +74,7 @@ def write_audit_page(
         flights=figure_rows(list(_flights(body, given, found))),
         residuals=figure_rows(list(_left_over(body, given, found))),
         runs=[(run.name, _facts(run)) for run in found.runs],
-        hypotheses=[_row(one, found) for one in found.hypotheses[:_MOST_ROWS]],
+        hypotheses=[_row(hypothesis, found) for hypothesis in found.hypotheses[:_MOST_ROWS]],
         others=max(len(found.hypotheses) - _MOST_ROWS, 0),
         enough=f"{100.0 * EXPLAINS:.0f} %",
         notes=found.notes,
@@ -95,21 +92,21 @@ def _flights(body: Body, trajectories: Sequence[FloatingTrajectory], found: Audi
 
 
 def _left_over(body: Body, trajectories: Sequence[FloatingTrajectory], found: Audit) -> Iterator[dict[str, str]]:
-    if not any(one.residuals is not None for one in found.hypotheses):
+    if not any(hypothesis.residuals is not None for hypothesis in found.hypotheses):
         return
     part = found.runs[0].airborne
     flown = thinned(trajectories[0].part(part.first, part.past))
     before = residuals(body, observed(body, flown, found.runs[0].noise))
-    for one, figure in left_over_figures(found, before):
-        yield _shown(figure, f"{one.name}: {100.0 * one.share:.2g} % left over")
+    for hypothesis, figure in left_over_figures(found, before):
+        yield _shown(figure, f"{hypothesis.name}: {100.0 * hypothesis.share:.2g} % left over")
 
 
-def _shown(figure: Figure, caption: str) -> dict[str, str]:
+def _shown(figure: Any, caption: str) -> dict[str, str]:
     return {"caption": caption, "image": base64.b64encode(axes_image(figure.axes[0], "svg")).decode()}
 
 
 def _facts(run: RunAudit) -> list[tuple[str, str, str]]:
-    """Name, value and words of what was found of a run."""
+    """Name, value and explanation of each result of a run."""
     rows = [
         ("audited", f"{run.first_time:.6g} to {run.last_time:.6g} s", f"{len(run.times)} samples; {run.airborne.how}"),
         (
@@ -135,12 +132,12 @@ def _against(ratio: float) -> str:
     return "noise explains it" if ratio <= 1.0 else "more than noise"
 
 
-def _row(one: Hypothesis, found: Audit) -> tuple[str, ...]:
-    named = any(other.name == one.name for other in found.cause)
+def _row(hypothesis: Hypothesis, found: Audit) -> tuple[str, ...]:
+    named = any(cause.name == hypothesis.name for cause in found.cause)
     return (
         "named" if named else "",
-        one.name,
-        f"{100.0 * one.share:.2g} %",
-        f"{one.left_over:.2g}",
-        "; ".join(part for part in (one.text, one.remark) if part),
+        hypothesis.name,
+        f"{100.0 * hypothesis.share:.2g} %",
+        f"{hypothesis.left_over:.2g}",
+        "; ".join(text for text in (hypothesis.text, hypothesis.remark) if text),
     )

@@ -91,24 +91,24 @@ def left_over_figures(found: Audit, before: Residuals) -> list[tuple[Hypothesis,
 
     before : of the first run
     """
-    shown = [one for one in found.hypotheses if one.residuals is not None][:_MOST_SHOWN]
-    named = {one.name for one in found.cause}
-    vector = before.in_time(before.vector)
-    times, curve = _in_time(before.seen.times, vector)
-    after = [_in_time(before.seen.times, one.residuals[: len(vector)])[1] for one in shown]
+    kept = [(one, one.residuals) for one in found.hypotheses if one.residuals is not None][:_MOST_SHOWN]
+    named = {cause.name for cause in found.cause}
+    without = before.in_time(before.vector)
+    times, curve = _in_time(before.seen.times, without)
+    after = [_in_time(before.seen.times, vector[: len(without)])[1] for _, vector in kept]
     every = np.concatenate([curve, *after])
     drawn = []
-    for one, left in zip(shown, after, strict=True):
+    for (hypothesis, _), left in zip(kept, after, strict=True):
         figure = _figure(COLUMN, 1.7)
         ax = figure.add_subplot()
         ax.plot(times, curve, color=GREY, linewidth=1.4)
-        ax.plot(times, left, color=BLACK if one.name in named else BLUE, linewidth=1.2)
+        ax.plot(times, left, color=BLACK if hypothesis.name in named else BLUE, linewidth=1.2)
         ax.set_yscale("log")
         ax.set_ylim(0.5 * every.min(), 2.0 * every.max())
         ax.set_xlabel("time [s]")
         ax.set_ylabel("residuals [noise]")
         _plain([ax])
-        drawn.append((one, figure))
+        drawn.append((hypothesis, figure))
     return drawn
 
 
