@@ -92,8 +92,8 @@ class Evidence:
         return self._within(hypothesis, EXPLAINS**2)
 
     def settled_by(self, hypothesis: Hypothesis) -> bool:
-        """True where a hypothesis leaves noise, a twentieth or what the tolerance allows, and nothing for a second."""
-        return self._within(hypothesis, _SETTLED**2)
+        """True where a hypothesis leaves noise or tolerance, or a twentieth by one that is true to first order."""
+        return self._within(hypothesis, _SETTLED**2 if hypothesis.parameters else 0.0)
 
     def _within(self, hypothesis: Hypothesis, share: float) -> bool:
         left = hypothesis.leftover
