@@ -16,17 +16,21 @@ _APART = 1.7  # ratio of the cut-offs of two laws up to which they are one
 
 
 def filtered_samples(fits: Sequence[Residuals], without: Leftover) -> list[Hypothesis]:
-    """The cut-off; empty where momentum and fall do not end at one frequency, as those of filtered samples do."""
+    """The cut-off; empty where momentum and fall do not end at one frequency, as those of filtered samples do.
+
+    Without rates the momentum is summed over the time, which adds slow noise of its own: there the fall decides.
+    """
     cuts = []
     for fit in fits:
         span = float(fit.seen.times[-1] - fit.seen.times[0])
+        blocks = (0, 1) if fit.seen.given_rates else (1,)
         for block, part in fit.blocks(fit.vector).items():
-            if block < 2:  # rates are fitted to differences of samples, which have a cut-off of their own
+            if block in blocks:  # rates are held against differences of samples, which have a cut-off of their own
                 order = cut_off(part, _FREE[block])
                 if order is None:
                     return []
                 cuts.append(0.5 * order / span)
-    if len(cuts) < 2 or max(cuts) > _APART * min(cuts):
+    if not cuts or max(cuts) > _APART * min(cuts):
         return []
     value = FittedValue(value=float(np.exp(np.log(cuts).mean())), bar=float(np.ptp(cuts) / 2.0), unit="Hz")
     left = replace(without, squares=np.minimum(without.squares, without.counts), effective=without.counts)

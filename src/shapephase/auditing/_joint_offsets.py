@@ -50,15 +50,15 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
                 "offset",
                 leftover(fits, left),
                 parameters=1,
-                values={"offset": fitted},
+                values={"offset": offset},
                 remark=f"read {np.degrees(value):+.3g} degrees off" if unit == "rad" else "",
             )
         )
-    return offsets
+    return found
 
 
 def _by_shapes(body: Body, fit: Residuals) -> Array:
-    """Derivatives of the residuals by each coordinate of the shape: (M, n)."""
+    """What each coordinate of the shape adds to the residuals: (M, n)."""
     seen = fit.seen
     shapes = seen.trajectory.shapes
     momentum = body.angular_momentum_gradient(shapes, seen.joint_rates, seen.rate)
@@ -84,7 +84,7 @@ def _to_the_end(
 
 
 def _read_with(body: Body, seen: Observation, joint: int, offset: float) -> Observation:
-    """Samples with an offset taken off one joint."""
+    """The same samples with an offset taken off one joint."""
     shapes = seen.trajectory.shapes.copy()
     shapes[:, joint] -= offset
     inertia, internal = body.sample(shapes, seen.joint_rates)

@@ -67,7 +67,7 @@ class Evidence:
             return Ranking(ranked=(), tie=())
         squares = np.array([left.squares for _, left in known])
         counts = self.without.counts
-        # A hypothesis leaves no less than the noise. Laws that hold anyway count with what the tolerance leaves.
+        # No hypothesis leaves less than the noise. Laws that hold anyway count with what the tolerance leaves.
         noise = np.clip(squares.min(axis=0), counts, self.colour * counts)
         holds = np.maximum(noise, np.where(self.allowed >= 1.0, self.allowed * self.without.squares, 0.0))
         size = squares / np.where(holds > 0.0, holds, 1.0)
@@ -92,8 +92,8 @@ class Evidence:
         return self._within(hypothesis, EXPLAINS**2)
 
     def settled_by(self, hypothesis: Hypothesis) -> bool:
-        """True where a hypothesis leaves noise, a twentieth or what the tolerance allows, and nothing for a second."""
-        return self._within(hypothesis, _SETTLED**2)
+        """True where a hypothesis leaves noise or tolerance, or a twentieth by one that is true to first order."""
+        return self._within(hypothesis, _SETTLED**2 if hypothesis.parameters else 0.0)
 
     def _within(self, hypothesis: Hypothesis, share: float) -> bool:
         left = hypothesis.leftover

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from .. import so3
-from ..arguments import check_object, positive_argument
+from ..arguments import check_object, positive_argument, whole_argument
 from ..arrays import Array
 from ..body.body import Body
 from ..deformation.deformation import articulated
@@ -73,16 +73,18 @@ def audit(
     tolerance: float | None = None,
     flight: str | Sequence[float] = "auto",
     noise: TrajectoryNoise | None = None,
+    every: int | None = None,
 ) -> Audit:
     """Look whether trajectories obey the laws of a free body, and what explains it if they do not.
 
     In the air the angular momentum about the centre of mass is constant, the centre of mass goes along a parabola, and
     the rates are those of the configurations. A trajectory is right where all three hold within its own noise or
-    within the tolerance. Where they do not, each hypothesis is fitted and ranked by what it leaves over: the
-    integrator's step and order (from several runs), a link's mass, centre or inertia, a torque or a force from
-    outside, a shift in time or a filter of the joints, frames of velocities, the order of quaternions, degrees.
-    Hypotheses that the noise cannot separate are named together. Of a flight of 8 to 23 samples, as 25 to 60 frames a
-    second make it, momentum, drift and fall are given with their standard deviations, and no causes.
+    within the tolerance. Where they do not, each hypothesis is fitted and ranked by its evidence: the integrator's
+    step, and its order from several runs, a link's mass, centre or inertia, offsets of joints, drag, a torque or a
+    force from outside, a shift in time or a filter, frames of velocities, the order of quaternions, degrees, gravity.
+    Where the best leaves more than noise, they are fitted in twos. Hypotheses that the samples cannot separate are
+    named together. Of a flight of 8 to 23 samples, as 25 to 60 frames a second make it, momentum, drift and fall are
+    given with their standard deviations, and no causes.
 
     Parameters
     ----------
@@ -93,7 +95,8 @@ def audit(
         of the body that wander by a centimetre over the flight make of it
     flight : "auto", where the centre of mass falls longest; "auto:2", the second such flight; "all"; or its first and
         last time [s]
-    noise : of the samples; None: what they show
+    noise : of the samples; None: what they show, the white part of it by differences, its spectrum by the residuals
+    every : steps of the integrator between samples, of trajectories that do not have their `step`; None: fitted
 
     Raises
     ------
@@ -120,6 +123,9 @@ def audit(
     if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
         raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {what_came(trajectories)}")
     within = None if tolerance is None else positive_argument(tolerance, "tolerance", "a ratio")
+    if every is not None:
+        many = whole_argument(every, "every", 1)
+        runs = [run if run.step else replace(run, step=run.integrator_step / many) for run in runs]
     runs = [_with_near_signs(body, run) for run in runs]
     parts = [_airborne(body, run, flight) for run in runs]
     flown = [run.part(part.first, part.past) for run, part in zip(runs, parts, strict=True)]
