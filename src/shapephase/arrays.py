@@ -112,7 +112,7 @@ def lock_arrays(result: Any) -> None:
     fields = result.__dict__
     for name, value in fields.items():
         if type(value) is np.ndarray:
-            # As `read_only`: thousands of results are made in a second.
+            # `read_only` in place, as thousands of results are made in a second.
             fields[name] = view = value.view()
             view.setflags(write=False)
 

@@ -377,7 +377,7 @@ class Body(ShapeArguments):
     def joint_rates(self, shape: ArrayLike, rate: ArrayLike) -> Array:
         """The rates of the joints from the derivatives of the shape: (..., n), (..., n) -> (..., m), m = `n_rates`.
 
-        Of a ball joint the angular velocity in axes of the link that it moves, against the link it hangs on [rad/s].
+        For a ball joint the angular velocity in axes of the link that it moves, relative to its parent link [rad/s].
 
         Examples
         --------

@@ -17,8 +17,8 @@ from .joint_chain import FULL_FROM_SIX, JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 PARAMETERS = 10
-"""Of a link, in its axes and about its centre of mass in the body that the matrices were made for: mass [kg],
-first moment (3) [kg m], inertia xx yy zz yz xz xy [kg m^2]."""
+"""Parameters of a link, in its axes and about its centre of mass in the body of the matrices: mass [kg], first
+moment (3) [kg m], inertia xx yy zz yz xz xy [kg m^2]."""
 OUTPUTS = 15
 """About the point that is that body's centre of mass: inertia xx yy zz yz xz xy, angular momentum (3), first moment of
 mass (3), its rate (3)."""

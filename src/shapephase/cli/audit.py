@@ -147,9 +147,8 @@ def audit_command(
     Parameters
     ----------
     tolerance
-        Of momentum and rates relative to those that turn and move the body, and of the fall relative to its extent,
-        without unit; without it 0.001, and of recordings with noise, or of people, what a centimetre of wander makes of
-        it. For example `--tolerance 1e-6`.
+        Relative tolerance of momentum and rates, and of the fall relative to the body's extent; without it 0.001, and
+        for recordings with noise, or of people, the effect of a centimetre of wander. For example `--tolerance 1e-6`.
     flight
         What is in the air: auto (where the centre of mass falls longest), auto:2 (the second such flight), all, or its
         first and last time, in s; for example `--flight all` or `--flight 0.4 1.2`.

@@ -151,7 +151,7 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     Warns
     -----
     VisualWarning
-        As `visuals`.
+        For the shapes that `visuals` warns of.
 
     Examples
     --------

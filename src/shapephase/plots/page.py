@@ -29,7 +29,7 @@ _MAX_FRAMES = 3000  # keeps a page below some megabytes
 class Page:
     """A page that needs no network and no server, and may use none.
 
-    Made by `view`, `report`, `explore` and `rolling_ellipsoid`. As the last value of a notebook's cell it is displayed.
+    Made by `view`, `report`, `explore` and `rolling_ellipsoid`. The last value of a notebook's cell is displayed.
 
     Attributes
     ----------

@@ -217,7 +217,7 @@ def with_symbols(ax: Any) -> None:
 def in_time(ax: Any, duration: tuple[float, float], label: str, *, loops: int = 1, **place: Any) -> None:
     """Limits, labels and legend of a figure whose abscissa is time [s]; `label` with its unit is for the ordinate.
 
-    Of a path that is gone round in many `loops`, lines and markers are finer.
+    Lines and markers are finer for a path with many `loops`.
     """
     ax.set_xlim(*duration)
     finer(ax, loops)

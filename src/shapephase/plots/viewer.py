@@ -54,13 +54,13 @@ def view(
     Raises
     ------
     ShapeError, UnknownNameError
-        As `moving_scene`, for a speed that is not above 0, and for an unknown axis.
+        For the arguments that `moving_scene` refuses, a speed that is not above 0, or an unknown axis.
 
     Warns
     -----
     VisualWarning
-        As `visuals`; and, where `frames` is None, if something turns by more than a quarter turn from one frame to the
-        next, so that it may seem to turn the other way.
+        For the shapes that `visuals` warns of; where `frames` is None, also if something turns by more than a quarter
+        turn from one frame to the next, so that it may seem to turn the other way.
 
     Examples
     --------

@@ -95,12 +95,12 @@ class ParticleBody(ShapeArguments):
         return self._centred(self._rows(r))[0].reshape(*r.shape[:-1], len(self.masses), 3)
 
     def locked_inertia(self, shape: ArrayLike) -> Array:
-        """Inertia frozen in a shape, about the centre of mass: (..., n) -> (..., 3, 3) [kg m^2]. As `Body`."""
+        """Inertia frozen in a shape, about the centre of mass: (..., n) -> (..., 3, 3) [kg m^2]. See `Body`."""
         r = self._checked(shape)
         return self._inertia(self._centred(self._rows(r))[0]).reshape(*r.shape[:-1], 3, 3)
 
     def momentum_matrix(self, shape: ArrayLike) -> Array:
-        """J(r), angular momentum per unit rate: (..., n) -> (..., 3, n) [kg m^2/s per unit]. As `Body`."""
+        """J(r), angular momentum per unit rate: (..., n) -> (..., 3, n) [kg m^2/s per unit]. See `Body`."""
         r = self._checked(shape)
         return self._matrix(*self._centred(self._rows(r))).reshape(*r.shape[:-1], 3, self.n_shape)
 
@@ -122,7 +122,7 @@ class ParticleBody(ShapeArguments):
         return np.einsum("...kab,...k->...ab", self.inertia_gradient(r), v)
 
     def angular_momentum_gradient(self, shape: ArrayLike, rate: ArrayLike, base_rate: ArrayLike) -> Array:
-        """dI/dr_k w + dJ/dr_k rate: three times (..., n or 3) -> (..., n, 3) [kg m^2/s per unit]. As `Body`."""
+        """dI/dr_k w + dJ/dr_k rate: three times (..., n or 3) -> (..., n, 3) [kg m^2/s per unit]. See `Body`."""
         r, v, w = self._with_base_rate(shape, rate, base_rate)
         return np.einsum("...kab,...b->...ka", self.angular_map_gradient(r), np.concatenate([w, v], axis=-1))
 
@@ -132,7 +132,7 @@ class ParticleBody(ShapeArguments):
         return ((self.masses / self.mass) @ self.places(self._rows(r))[0]).reshape(*r.shape[:-1], 3)
 
     def kinetic_energy(self, shape: ArrayLike, rate: ArrayLike, angular_velocity: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
-        """About the centre of mass, while the frame turns: -> (...) [J]. As `Body`."""
+        """About the centre of mass, while the frame turns: -> (...) [J]. See `Body`."""
         r, v, omega = self._turning(shape, rate, angular_velocity)
         places, slopes = self._centred(self._rows(r))
         moving = np.einsum("nkma,nk->nma", slopes, self._rows(v))
