@@ -6,7 +6,7 @@ import numpy as np
 from scipy.fft import dct
 from scipy.special import digamma
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 
 _MEMORIES = np.array([0.0, 0.2, 0.4, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99])  # from sample to sample
 _SHARPNESS = (
@@ -24,6 +24,11 @@ _FEWEST_ORDERS = 5.0  # of a plateau
 _UNLIKE = 2.0  # mean deviance in units of that of noise; 1.3 is exceeded by chance in a thousand with 30 orders
 
 
+def cosines(values: Array) -> Array:
+    """Coefficients of orthonormal cosines of values (N, c) along the first axis."""
+    return np.asarray(dct(values, axis=0, norm="ortho"), dtype=np.float64)
+
+
 def noise_spectrum(whitened: Array, slow: int) -> Array:
     """Power of the noise at each order of cosines, relative to that of white noise: (N,).
 
@@ -37,7 +42,7 @@ def noise_spectrum(whitened: Array, slow: int) -> Array:
     slow : orders of cosines that may be no noise
     """
     count, columns = whitened.shape
-    power = (dct(whitened, axis=0, norm="ortho") ** 2).mean(axis=1)
+    power = (cosines(whitened) ** 2).mean(axis=1)
     orders = np.arange(count)
     seen = orders > slow
     if seen.sum() < 2 or columns == 0:
@@ -57,18 +62,18 @@ def cut_off(whitened: Array, free: int) -> float | None:
     free : orders of cosines that were taken off
     """
     count, columns = whitened.shape
-    power = (dct(whitened, axis=0, norm="ortho") ** 2).mean(axis=1)
+    power = (cosines(whitened) ** 2).mean(axis=1)
     seen = np.arange(count) > free
     spectra, cuts = _below_cut_offs(power, seen, columns, _FEWEST_ORDERS)
     return None if not len(cuts) else float(cuts[int(np.argmin(_deviance(power, spectra, seen, columns)))])
 
 
-def _deviance(power: Array, spectra: Array, seen: Array, columns: int) -> Array:
+def _deviance(power: Array, spectra: Array, seen: Mask, columns: int) -> Array:
     """-2 log likelihood of spectra (families, N): (families,)."""
     return columns * (np.log(spectra[:, seen]) + power[seen] / spectra[:, seen]).sum(axis=1)
 
 
-def _below_cut_offs(power: Array, seen: Array, columns: int, lowest: float) -> tuple[Array, Array]:
+def _below_cut_offs(power: Array, seen: Mask, columns: int, lowest: float) -> tuple[Array, Array]:
     """The likeliest spectra of noise below each cut-off, and these, without those about which powers do not scatter."""
     orders = np.arange(len(power))
     cuts = np.tile(np.geomspace(max(lowest, 1.0), max(len(power), lowest + 1.0), 24), len(_SHARPNESS))

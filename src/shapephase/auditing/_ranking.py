@@ -73,7 +73,7 @@ class Evidence:
         size = squares / np.where(holds > 0.0, holds, 1.0)
         misfit = np.where(size <= 1.0, size, 1.0 + np.log(np.maximum(size, 1.0)))
         fitted = np.array([one.parameters for one, _ in known], dtype=np.float64)
-        best, effective = 0, np.minimum(counts, _ROUNDS * _FEWEST)
+        best, score, effective = 0, np.zeros(len(known)), np.minimum(counts, _ROUNDS * _FEWEST)
         for _ in range(_ROUNDS):
             score = misfit @ effective + fitted * np.log(max(effective.sum(), 2.0))
             best = int(np.argmin(score))

@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import dct
 from scipy.linalg import block_diag
 
 from ..arrays import Array
 from ..body.body import Body
 from ._consistency import RateDifferences, rate_differences
+from ._noise_spectrum import cosines
 from ._observation import Observation
 from ._step_drift import StepDrift, step_drift
 from .hypothesis import FittedValue, Hypothesis
@@ -121,7 +121,7 @@ class Residuals:
         """(3, 3): of each block sums of squares and of fourth powers of its cosines, and its independent numbers."""
         found = np.zeros((3, 3))
         for block, part in self.blocks(vector).items():
-            squares = dct(part, axis=0, norm="ortho") ** 2
+            squares = cosines(part) ** 2
             found[block] = squares.sum(), (squares**2).sum(), part.size - self._own[block]
         return found
 
@@ -144,7 +144,7 @@ def residuals(body: Body, seen: Observation, *, any_step: bool = False) -> Resid
     if rates is not None:
         blocks.append(np.zeros((rates.level.size, 0)))
     step = step_drift(body, seen, None if rates is None else rates.slope)
-    basis = np.linalg.qr(block_diag(*blocks))[0]
+    basis = np.linalg.qr(np.asarray(block_diag(*blocks), dtype=np.float64))[0]
     made = Residuals(seen, rates, step, np.zeros(0), factor, centre, basis, (own[0], own[1], own[2]))
     if any_step:
         column = made.step_column()
