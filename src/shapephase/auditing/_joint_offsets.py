@@ -50,11 +50,11 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
                 "offset",
                 leftover(fits, left),
                 parameters=1,
-                values={"offset": offset},
+                values={"offset": fitted},
                 remark=f"read {np.degrees(value):+.3g} degrees off" if unit == "rad" else "",
             )
         )
-    return found
+    return offsets
 
 
 def _by_shapes(body: Body, fit: Residuals) -> Array:
