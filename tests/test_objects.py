@@ -33,7 +33,8 @@ INNER = ("deformation.frames", "shape_space.body_path", "plots.plot_style", "opt
          "shape_space.path_samples", "shape_space.path_series", "shape_space.files.formats", "phases.split_text",
          "phases.momentum_curve", "body.engines", "shape_space.files.flight", "shape_space.files.nameless_joints",
          "shape_space.files.inputs", "shape_space.files.times", "shape_space.unit_doubts", "shape_space.knot_crossings",
-         "dynamics.moving_body",
+         "dynamics.moving_body", "plots.named_figures.figure_image", "shape_space.files.smoothing.check_swings",
+         "shape_space.shape_geodesic.changes_by_ends",
          "deformation.deformation.deformation_along",
          "optimal_control.extremals.hamiltonian.checked_metric",
          "optimal_control.extremals.hamiltonian.natural_scales")  # fmt: skip

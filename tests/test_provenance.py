@@ -145,7 +145,7 @@ def test_an_older_motion_is_read_and_a_damaged_one_is_named(tmp_path):
     motion.save(tmp_path / "m.npz")
     with np.load(tmp_path / "m.npz") as arrays:
         stored = dict(arrays)
-    for content, outcome in ((None, None), ([1], "no object"), ("a", "no object")):
+    for content, outcome in ((None, None), ([1], "not an object"), ("a", "not an object")):
         header = json.loads(str(stored["header"]))
         del header["provenance"]
         if content is not None:

@@ -27,7 +27,7 @@
 | pickling gauges and motions by DOP853 | `test_objects.py::test_it_pickles_and_copies`, `test_objects.py::test_what_is_made_of_a_lambda_says_so_and_is_copied_all_the_same` |
 | a recording of 200,000 rows, a report of 10,000 | `test_rough_edges.py::test_a_long_recording_takes_bounded_memory`, `plots/test_plots.py::test_long_curves_are_images_within_the_figure` |
 | `x.NPZ` | `cli/test_endings.py::test_what_was_written_is_said_unless_it_is_quiet`, `cli/test_endings.py::test_endings_in_any_case` |
-| `kill -9` while writing | `test_files.py::test_killed_at_random_times_a_writer_leaves_no_half_and_the_next_write_no_litter`, `test_writers.py::test_a_writer_that_is_killed_leaves_the_old_file_or_the_new_one`, `test_files.py::test_litter_of_a_dead_writer_goes_and_of_a_living_one_stays` |
+| `kill -9` while writing | `test_files.py::test_killed_at_random_times_a_writer_leaves_no_half`, `test_writers.py::test_a_writer_that_is_killed_leaves_the_old_file_or_the_new_one` |
 | `--turn` with `--somersaults` | `cli/test_endings.py::test_options_that_do_not_fit_are_refused_at_once`, `cli/test_endings.py::test_what_needs_no_motion_is_checked_before_there_is_one` |
 | files written in silence | `cli/test_endings.py::test_what_was_written_is_said_unless_it_is_quiet` |
 | `plan --out` that finds nothing | `cli/test_endings.py::test_a_search_that_finds_nothing_writes_its_best_try` |

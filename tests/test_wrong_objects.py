@@ -25,7 +25,7 @@ WRONG_OF_A_STUDY = {"body": ("str",), "motion": ("str", "builtin_function_or_met
                     "draws": (), "seed": (), "chunk": (), "momentum": (), "attitude": ("NoneType", "ndarray"),
                     "tolerance": (), "gauge": (), "parameters": (), "time_limit": ("NoneType", "float")}  # fmt: skip
 # A function is what is wanted, whatever it then does.
-FUNCTIONS = ("Callable", "Gauge", "Profile", "Meridian", "Stretch", "ClosedArcs", "Effort")
+FUNCTIONS = ("Callable", "ProgressCallback", "Gauge", "Profile", "Meridian", "Stretch", "ClosedArcs", "Effort")
 # What may be given as well as what the example gives.
 ALSO_TAKEN = (("rigid_body.geodesics._andoyer_variables.andoyer_motion", "Motion"),
               ("shape_space.connection.curvature", "Body"))  # fmt: skip

@@ -347,7 +347,7 @@ def test_without_the_reader_of_a_mesh_the_extra_is_named(tmp_path, load_urdf, mo
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None if name == "collada" else real(name))
     (tmp_path / "a.dae").write_text("<COLLADA/>")
     body = load_urdf(with_visual("<visual><geometry><mesh filename='a.dae'/></geometry></visual>"))
-    with pytest.warns(VisualWarning, match=r"shapephase\[viz\]"):
+    with pytest.warns(VisualWarning, match=r"shapephase\[plot\]"):
         assert shown(body)[0].kind == "box"
 
 

@@ -106,7 +106,7 @@ def test_unknown_names_are_answered_with_the_nearest_and_all():
 def test_without_example_robot_data_the_error_names_the_extra(monkeypatch):
     monkeypatch.setattr(sys, "path", [])
     assert catalog.example_names() == ()
-    with pytest.raises(MissingExtraError, match=r"shapephase\[robots\]"):
+    with pytest.raises(MissingExtraError, match=r"shapephase\[bodies\]"):
         sp.load_body("example:human")
 
 

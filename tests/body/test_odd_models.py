@@ -335,7 +335,7 @@ COMMANDS = (
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_that_takes_a_body_has_its_options(command, capsys):
-    main([*command.split(), "--help"])
+    main([*command.split(), "--help-all"])
     said = capsys.readouterr().out
     assert all(option in said for option in ("--xacro", "--on-unphysical", "--packages"))
 
@@ -348,7 +348,7 @@ def test_on_the_command_line_an_odd_inertia_is_taken_with_a_warning(tmp_path, ca
     assert any("negative principal moment" in said for said in data["warnings"])
     with pytest.raises(SystemExit):
         main(["check", path, "--xacro", "payload=true", "--json"])
-    assert "type it as in --xacro payload:=true" in json.loads(capsys.readouterr().out)["error"]["message"]
+    assert "as in --xacro payload:=true" in json.loads(capsys.readouterr().out)["error"]["message"]
 
 
 # ---- Roots that move in a plane -------------------------------------------------------------------------------------

@@ -100,7 +100,7 @@ def test_what_spice_has_not_is_refused(satellite, tmp_path, monkeypatch):
     import sys
 
     monkeypatch.setitem(sys.modules, "spiceypy", None)
-    with pytest.raises(MissingExtraError, match="space"):
+    with pytest.raises(MissingExtraError, match="spiceypy"):
         sp.exports.write_spice_ck(satellite, tmp_path / "attitude.bc")
     assert list(tmp_path.iterdir()) == []
 

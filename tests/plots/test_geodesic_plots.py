@@ -223,7 +223,7 @@ def test_figures_refuse_what_they_cannot_draw():
 
 
 def test_the_command_prints_the_reference_table():
-    said = conjugate_command(*MOMENTS, momenta=tuple(TABLE[:, 0]))
+    said = conjugate_command(MOMENTS, momenta=tuple(TABLE[:, 0]))
     rows = [[float(word) for word in line.split()] for line in said.text.splitlines()[4:9]]
     printed = np.array(rows)
     assert np.abs(printed[:, [0, 1, 2]] - TABLE[:, :3]).max() < 1e-9
@@ -239,7 +239,7 @@ def test_the_command_prints_the_reference_table():
 
 def test_the_command_chooses_momenta_and_writes_the_figure(tmp_path, capsys):
     out = tmp_path / "locus.svg"
-    said = conjugate_command(*MOMENTS, order=2, out=out)
+    said = conjugate_command(MOMENTS, order=2, out=out)
     assert out.read_bytes().startswith(b"<?xml")
     assert b"<dc:date>" not in out.read_bytes()
     assert capsys.readouterr().err.startswith(f"wrote {out} (")
@@ -248,7 +248,7 @@ def test_the_command_chooses_momenta_and_writes_the_figure(tmp_path, capsys):
     assert abs(said.data["theta_rad"][0] - 2.0 * np.pi) < 1e-7
     assert np.all(np.diff(said.data["theta_rad"]) > 0.0)
     for ending in ("png", "pdf"):
-        conjugate_command(*MOMENTS, order=2, out=tmp_path / f"locus.{ending}")
+        conjugate_command(MOMENTS, order=2, out=tmp_path / f"locus.{ending}")
         assert (tmp_path / f"locus.{ending}").stat().st_size > 1000
     ax = plot_conjugate_locus(column_axes(2.8), MOMENTS, 2, momenta=said.data["p"])
     ax.figure.savefig(tmp_path / "direct.png", dpi=300)
@@ -256,7 +256,7 @@ def test_the_command_chooses_momenta_and_writes_the_figure(tmp_path, capsys):
 
 
 def test_the_command_takes_moments_in_any_order():
-    said, other = conjugate_command(*MOMENTS), conjugate_command(*MOMENTS[::-1])
+    said, other = conjugate_command(MOMENTS), conjugate_command(MOMENTS[::-1])
     assert other.data["moments_kg_m2"] == list(MOMENTS[::-1])
     assert said.text.splitlines()[1:] == other.text.splitlines()[1:]
 
@@ -270,14 +270,14 @@ def test_the_command_is_read_from_words():
 
 def test_the_command_refuses_with_a_reason(tmp_path):
     with pytest.raises(ShapeError, match=r"1\.41421 < p <= 1\.73205"):
-        conjugate_command(*MOMENTS, momenta=(1.5, 1.2))
+        conjugate_command(MOMENTS, momenta=(1.5, 1.2))
     with pytest.raises(ShapeError, match="--momenta"):
-        conjugate_command(*MOMENTS, momenta=(1.5, 1.8))
+        conjugate_command(MOMENTS, momenta=(1.5, 1.8))
     with pytest.raises(ShapeError, match="three different moments"):
-        conjugate_command(2.0, 2.0, 3.0)
+        conjugate_command((2.0, 2.0, 3.0))
     with pytest.raises(UnknownNameError, match="--out"):
-        conjugate_command(*MOMENTS, out=tmp_path / "locus.txt")
+        conjugate_command(MOMENTS, out=tmp_path / "locus.txt")
     with pytest.raises(InputFileNotFoundError):
-        conjugate_command(*MOMENTS, out=tmp_path / "nowhere" / "locus.svg")
+        conjugate_command(MOMENTS, out=tmp_path / "nowhere" / "locus.svg")
     with pytest.raises(ShapeError, match="order"):
-        conjugate_command(*MOMENTS, order=0)
+        conjugate_command(MOMENTS, order=0)

@@ -137,7 +137,8 @@ def killed(home: str, trials: int, seed: int) -> dict[str, Any]:
         found["kept"] += moment is not None and any(name.endswith(".nbc") for name in left)
         found["littered"] += any(name.endswith(".part") for name in left)
         (after,) = at_once(1, home=home)
-        found["wrong"] += after.get("value") != 14.0 or len(list(folder.iterdir())) != 1
+        kept = [file for file in folder.iterdir() if file.suffix != ".part"]
+        found["wrong"] += after.get("value") != 14.0 or len(kept) != 1
     return found
 
 

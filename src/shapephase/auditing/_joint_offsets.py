@@ -37,24 +37,24 @@ def joint_offsets(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
     values = vector @ columns / np.maximum(strengths, 1e-150) ** 2
     tried = np.flatnonzero(np.abs(values) <= most).tolist()
     lefts = {place: vector - values[place] * columns[:, place] for place in tried}
-    found = []
+    offsets = []
     for rank, place in enumerate(sorted(tried, key=lambda place: leftover(fits, lefts[place]).size)):
         joint, value, left = int(joints[place]), float(values[place]), lefts[place]
         if rank < _CANDIDATES:
-            value, left = _to_the_end(body, joint, value, columns[:, place], fits)
+            value, left = _to_the_end(body, joint, value, columns[:, place], fits, float(most[place]))
         unit = body.joint_units[joint]
-        offset = FittedValue(value=value, bar=float(1.0 / strengths[place]), unit=unit)
-        found.append(
+        fitted = FittedValue(value=value, bar=float(1.0 / strengths[place]), unit=unit)
+        offsets.append(
             fitted_hypothesis(
                 f"offset of joint {body.joint_names[joint]}",
                 "offset",
                 leftover(fits, left),
                 parameters=1,
-                values={"offset": offset},
+                values={"offset": fitted},
                 remark=f"read {np.degrees(value):+.3g} degrees off" if unit == "rad" else "",
             )
         )
-    return found
+    return offsets
 
 
 def _by_shapes(body: Body, fit: Residuals) -> Array:
@@ -68,8 +68,10 @@ def _by_shapes(body: Body, fit: Residuals) -> Array:
     return fit.columns(*(seen.attitude @ np.swapaxes(change, 1, 2) for change in (momentum, centre)))
 
 
-def _to_the_end(body: Body, joint: int, value: float, column: Array, fits: Sequence[Residuals]) -> tuple[float, Array]:
-    """Gauss and Newton with the whole dependence: the offset, and what it leaves."""
+def _to_the_end(
+    body: Body, joint: int, value: float, column: Array, fits: Sequence[Residuals], most: float
+) -> tuple[float, Array]:
+    """Gauss and Newton with the whole dependence: the offset, at most `most`, and what it leaves."""
     best, least = (0.0, np.concatenate([fit.vector for fit in fits])), float(sum(fit.square for fit in fits))
     for _ in range(_STEPS):
         left = np.concatenate([fit.of(_read_with(body, fit.seen, joint, value)) for fit in fits])
@@ -77,7 +79,7 @@ def _to_the_end(body: Body, joint: int, value: float, column: Array, fits: Seque
         if square >= least:
             break
         best, least = (value, left), square
-        value += float(column @ left) / float(column @ column)
+        value = float(np.clip(value + column @ left / (column @ column), -most, most))
     return best
 
 

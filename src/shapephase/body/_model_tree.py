@@ -4,7 +4,6 @@ from __future__ import annotations
 
 # Pinocchio fills its namespace at import time, which a type checker cannot follow.
 # pyright: reportAttributeAccessIssue=false
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -99,11 +98,6 @@ def moving_joints(model: pin.Model) -> dict[str, int]:
             )
         moving[model.names[number]] = number
     return moving
-
-
-def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:
-    """Features that Pinocchio was built with, by the names of its own flags."""
-    return {name: bool(getattr(pin, name, False)) for name in names}
 
 
 def _built(tree: LinkTree, root: str) -> pin.Model:

@@ -217,3 +217,10 @@ def _from_model(source: Any, on_unphysical: str) -> tuple[Body, _Doubts]:
     inertia = body.locked_inertia(body.shape())
     doubts += hollow_warnings(links, turns, inertia, on_unphysical, "what joint {!r} moves")
     return body, [(UnphysicalInertiaWarning, doubt) for doubt in doubts]
+
+
+def pinocchio_features(names: Sequence[str]) -> dict[str, bool]:
+    """Features that Pinocchio was built with, by the names of its own flags."""
+    import pinocchio
+
+    return {name: bool(getattr(pinocchio, name, False)) for name in names}

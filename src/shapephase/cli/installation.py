@@ -97,7 +97,7 @@ def _versions(names: tuple[str, ...]) -> dict[str, str | None]:
 
 
 def _features() -> dict[str, bool]:
-    from ..body._model_tree import pinocchio_features
+    from ..body.loading import pinocchio_features
 
     return pinocchio_features(_FEATURES)
 

@@ -439,7 +439,7 @@ def test_a_wheel_that_turns_far_is_asked_about_and_comes_back_as_it_was_written(
     ("module", "file", "extra"),
     [
         *(("openpyxl", "m.xlsx", "data"), ("pyarrow.parquet", "m.parquet", "data"), ("h5py", "m.h5", "data")),
-        *(("ezc3d", "m.c3d", "data"), ("rosbags.highlevel", "m.bag", "ros"), ("yaml", "m.yaml", "ros")),
+        *(("ezc3d", "m.c3d", "data"), ("rosbags.highlevel", "m.bag", "data"), ("yaml", "m.yaml", "data")),
     ],
 )
 def test_a_missing_extra_is_named(tmp_path, monkeypatch, module, file, extra):
