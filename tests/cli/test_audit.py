@@ -73,3 +73,16 @@ def test_a_page_of_what_cannot_be_a_page_is_usage(capsys: pytest.CaptureFixture[
         main(["audit", "cat_two_halves", str(FLOWN), "--html", "audit.pdf"])
     assert ended.value.code == ExitCode.USAGE
     assert "must end in .html" in capsys.readouterr().err
+
+
+def test_the_steps_between_samples_are_stated(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """Every fourth step of MuJoCo's semi-implicit Euler: the step is the cause, with the size that MuJoCo took."""
+    motion = flown("diver", seed=3, integrator="euler", step=0.002, every=4, duration=0.8)
+    arrays = {"time": motion.times, "qpos": motion.qpos, "qvel": motion.qvel}
+    np.savez(tmp_path / "run.npz", **arrays, joint_names=np.array(motion.joint_names))
+    with pytest.raises(SystemExit) as ended:
+        main(["audit", "diver", str(tmp_path / "run.npz"), "--tolerance", "1e-6", "--every", "4", "--json"])
+    assert ended.value.code == ExitCode.WRONG
+    found = json.loads(capsys.readouterr().out)
+    assert "integration step" in found["cause"]
+    assert abs(found["runs"][0]["step"] - 0.002) < 1e-9

@@ -93,15 +93,9 @@ def left_over_figures(found: Audit, before: Residuals) -> list[tuple[Hypothesis,
     """
     kept = [(one, one.residuals) for one in found.hypotheses if one.residuals is not None][:_MOST_SHOWN]
     named = {cause.name for cause in found.cause}
-<<<<<<< HEAD
-    without = before.in_time(before.vector)
-    times, curve = _in_time(before.seen.times, without)
-    after = [_in_time(before.seen.times, vector[: len(without)])[1] for _, vector in kept]
-=======
     start = before.in_time(before.vector)
     times, curve = _in_time(before.seen.times, start)
     after = [_in_time(before.seen.times, vector[: len(start)])[1] for _, vector in kept]
->>>>>>> w-audit
     every = np.concatenate([curve, *after])
     drawn = []
     for (hypothesis, _), left in zip(kept, after, strict=True):

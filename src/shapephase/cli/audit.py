@@ -136,6 +136,7 @@ def audit_command(
     tolerance: Annotated[float | None, Parameter(show_default=False)] = None,
     flight: Annotated[tuple[str, ...], Parameter(negative_iterable="", consume_multiple=True)] = ("auto",),
     reading: TrajectoryOptions = AS_IT_IS,
+    every: Annotated[int | None, Parameter(show_default=False)] = None,
     figure: Path | None = None,
     html: Annotated[Path | None, Parameter(show_default=False)] = None,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -152,6 +153,9 @@ def audit_command(
     flight
         What is in the air: auto (where the centre of mass falls longest), auto:2 (the second such flight), all, or its
         first and last time, in s; for example `--flight all` or `--flight 0.4 1.2`.
+    every
+        Steps of the integrator between two samples, for files without the step; without it the step is fitted where the
+        samples tell it. For example `--every 5`.
     figure
         Write drift, error of the attitude and what the hypotheses leave over to this figure, .svg, .pdf or .png;
         without it none is written. For example `--figure audit.pdf`.
@@ -199,7 +203,7 @@ def audit_command(
             for file, step in zip(trajectories, each, strict=True)
         ]
         work.begin("auditing")
-        found = audit(loaded, runs, tolerance=tolerance, flight=flight_words(flight) or "auto")
+        found = audit(loaded, runs, tolerance=tolerance, flight=flight_words(flight) or "auto", every=every)
         if figure is not None:
             write_audit_figure(found, figure)
             say_written(figure)
