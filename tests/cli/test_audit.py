@@ -85,4 +85,5 @@ def test_the_steps_between_samples_are_stated(tmp_path: Path, capsys: pytest.Cap
     assert ended.value.code == ExitCode.WRONG
     found = json.loads(capsys.readouterr().out)
     assert "integration step" in found["cause"]
-    assert abs(found["runs"][0]["step"] - 0.002) < 1e-9
+    (cause,) = (one for one in found["hypotheses"] if one["name"] == "integration step")
+    assert abs(cause["values"]["step"]["value"] - 0.002) < 1e-5
