@@ -21,10 +21,8 @@ from .floating_trajectory import FloatingTrajectory
 
 _GRAVITY = 9.81
 """[m/s^2]"""
-_EVEN = 0.3
-"""Of gravity: ground that carries a body or lets it go changes the acceleration of its centre of mass by more."""
-_WINDOWS = 12
-"""Over the whole trajectory, over each of which an acceleration is fitted."""
+_EVEN = 0.3  # of gravity: the ground changes the acceleration of the centre of mass by more
+_WINDOWS = 12  # over the whole trajectory, with an acceleration fitted in each
 _LEAST_WINDOW = 8
 """Samples of a window."""
 _FEWEST = 8

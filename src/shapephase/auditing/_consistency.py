@@ -13,13 +13,11 @@ from ._noise import TrajectoryNoise
 from ._smooth_part import smooth_part
 from .floating_trajectory import FloatingTrajectory
 
-_ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
-"""Of a rate or a coordinate: what arithmetic leaves."""
+_ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of a rate or coordinate: rounding of 32 operations
 
 _LEAST = 1e-150
 """[rad/s or m/s] Noise of what never moves, whose square is a number, too."""
-_HELD = 2.0 / 12.0
-"""Of the square of a step and the jerk: torques that are held over a step keep rates apart by half as much."""
+_HELD = 2.0 / 12.0  # of squared step times jerk: torques held over a step shift rates by half a step
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -24,7 +24,7 @@ def difference_weights(times: Array, reach: int = REACH) -> Array:
 
 
 def fewer_neighbours(times: Array) -> Array:
-    """The same of all but the outermost neighbours, which get zeros: for how much differences cut off."""
+    """Weights without the outermost neighbours, which get zeros: the difference shows the truncation error."""
     return np.pad(difference_weights(times[1:-1], REACH - 1), ((0, 0), (1, 1)))
 
 

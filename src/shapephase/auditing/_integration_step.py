@@ -24,10 +24,8 @@ _APART = 1.05
 """Ratio of two steps from which they tell an order."""
 _ABOVE = 10.0
 """Drifts in units of what is known of them, by noise and rounding: smaller ones tell no order."""
-_BELONGS = 0.25
-"""Of the drifts: more must not be left by the law of one order."""
-_UNEVEN = 1.0
-"""Orders from one step to the next differ by less where the step alone is the cause."""
+_BELONGS = 0.25  # of the drifts: largest share that the law of one order may leave
+_UNEVEN = 1.0  # largest difference of orders between steps where the step alone is the cause
 _INACCURATE = 0.1  # of a step: what terms of second order add, 0.1 % for 2 ms at 10 rad/s, and 5 % for 20 ms
 
 

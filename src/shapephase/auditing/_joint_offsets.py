@@ -84,7 +84,7 @@ def _to_the_end(
 
 
 def _read_with(body: Body, seen: Observation, joint: int, offset: float) -> Observation:
-    """The same samples with an offset taken off one joint."""
+    """Samples with an offset taken off one joint."""
     shapes = seen.trajectory.shapes.copy()
     shapes[:, joint] -= offset
     inertia, internal = body.sample(shapes, seen.joint_rates)

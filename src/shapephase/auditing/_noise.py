@@ -78,7 +78,7 @@ def _of_each(samples: Array | None) -> tuple[float, ...]:
 
 
 def white_noise(samples: Array, freedom: int) -> Array:
-    """Of c vectors (N, c, k) in whose directions the noise is alike: its standard deviation along each, (c,).
+    """Standard deviation of noise that is alike in all directions of c vectors (N, c, k): (c,).
 
     freedom : in how many directions there is noise
     """
@@ -96,11 +96,11 @@ def white_noise(samples: Array, freedom: int) -> Array:
 
 @lru_cache(maxsize=8)
 def _median_square(freedom: int) -> float:
-    """Of a vector with so many numbers of variance one."""
+    """Median of the squared length of a vector of `freedom` numbers with variance one."""
     return float(chi2.median(freedom))
 
 
 def _continuous(quaternions: Array) -> Array:
-    """The same attitudes without changes of sign."""
+    """Quaternions of the same attitudes without changes of sign."""
     flips = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     return quaternions * np.concatenate([[1.0], np.cumprod(flips)])[:, None]

@@ -1,6 +1,6 @@
 """What a stretch of a trajectory says of momentum, fall and rates, with the noise of each, for one body.
 
-Of a body on which nothing acts, the angular momentum about the centre of mass is constant and the centre of mass goes
+Where nothing acts on a body, its angular momentum about the centre of mass is constant and the centre of mass goes
 along a parabola. Where rates are given, the momentum of every sample is seen by itself. Where they are not, they are
 differences of the samples; their noise is as large as it is fast, and what is looked at is the sum of the momentum
 over the time, in which the noise is that of the samples.
@@ -19,10 +19,8 @@ from ._differences import REACH, difference_weights, differentiated, turn_rates
 from ._noise import TrajectoryNoise, estimated_noise
 from .floating_trajectory import FloatingTrajectory
 
-_ROUNDING = 32.0 * float(np.finfo(np.float64).eps)
-"""Of a momentum and a place: what their own sums leave."""
-_AT_REST = 1e-6
-"""[rad] In all the time: a body that turns by less is at rest."""
+_ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of a momentum or place: rounding of 32 operations
+_AT_REST = 1e-6  # rad: a body that turns by less in all the time is at rest
 _NUDGE = 1e-6
 """[rad or m] By which a joint is moved to see how the centre of mass goes with it: for the noise alone."""
 _ENOUGH = 32
@@ -197,7 +195,7 @@ def _carried_noise(body: Body, seen: Observation) -> tuple[Array, Array]:
 def _centre(
     body: Body, moving: FloatingTrajectory, attitude: Array, level: TrajectoryNoise, extent: float
 ) -> tuple[Array | None, Array | None]:
-    """Of mass, and the covariance of each sample."""
+    """Centre of mass, and the covariance of each sample; None without places."""
     if moving.position is None:
         return None, None
     own = body.centre_of_mass(moving.shapes)

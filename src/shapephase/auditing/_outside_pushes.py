@@ -14,12 +14,9 @@ from .hypothesis import FittedValue, Hypothesis
 
 _KNOTS = 48
 """Times between which a push is looked for, all pairs of them, before the best is refined."""
-_MOST_CALLS = 600
-"""Of the refinement."""
-_AS_GOOD_AS_NONE = 1e-6
-"""Of what a blow in the middle adds to the residuals."""
-_FARTHEST = 30.0
-"""Radii of gyration: nothing pushes a body farther away from its centre."""
+_MOST_CALLS = 600  # of the refinement
+_AS_GOOD_AS_NONE = 1e-6  # of the effect of a blow in the middle: smaller columns are not fitted
+_FARTHEST = 30.0  # radii of gyration: largest lever of a force
 _AXES = "xyz"
 
 
@@ -143,7 +140,7 @@ def _fitted(fits: Sequence[Residuals], *, with_force: bool) -> _Push:
 
 
 def _columns(fit: Residuals, begin: float, end: float, *, with_force: bool) -> Array:
-    """Of an angular impulse about each axis, and of a linear one along each: (M, 3 or 6)."""
+    """Residuals of an angular impulse about each axis, and of a linear one along each: (M, 3 or 6)."""
     since = fit.seen.times
     ramp = np.clip((since - begin) / (end - begin), 0.0, 1.0)
     count = 6 if with_force else 3

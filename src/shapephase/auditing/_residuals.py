@@ -20,8 +20,7 @@ from ._observation import Observation
 from ._step_drift import StepDrift, step_drift
 from .hypothesis import FittedValue, Hypothesis
 
-_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)
-"""Of the largest variance: what sums of a dozen products leave of a smaller one."""
+_ROUNDING = 16.0 * float(np.finfo(np.float64).eps)  # of the largest variance: rounding of sums of a dozen products
 BLOCKS = ("momentum", "fall", "rates")
 
 

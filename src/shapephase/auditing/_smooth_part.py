@@ -21,8 +21,7 @@ _HIGHEST = 12
 """Order of the polynomials, the samples allowing."""
 _SAMPLES_EACH = 3
 """Samples that a polynomial needs."""
-_UNSURE = 1.5
-"""Of a variance: the noise of samples is itself estimated."""
+_UNSURE = 1.5  # factor of a variance: the noise is itself estimated
 _MOST_NOISE = 0.05  # of what residuals are of: samples of noise of 3 degrees, or worse, tell nothing
 _CHANCE = 1e-6
 """Probability with which noise alone is taken for something else, for one residual."""
@@ -91,7 +90,7 @@ def smooth_part(
     highest = int(min(_HIGHEST, max(lowest, len(times) // _SAMPLES_EACH)))
     basis = polynomials(times, highest)[:, lowest:]
     parts = basis.T @ residuals
-    # Of noise that is independent from sample to sample.
+    # Noise that is independent from sample to sample.
     if carried is None:
         spread = np.einsum("np,nq,nij->piqj", basis, basis, covariances)
     else:

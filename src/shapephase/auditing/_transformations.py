@@ -18,18 +18,13 @@ from ._residuals import Leftover, Residuals, fitted_hypothesis, leftover_of_mome
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import FittedValue, Hypothesis
 
-_STEPS = 8
-"""Of Gauss and Newton, for a time."""
-_ENOUGH = 1e-7
-"""Relative change of a fitted number below which it is kept."""
-_LONGEST = 0.1
-"""Of the trajectory: the longest shift in time that is tried; samples at the ends are lost by it."""
+_STEPS = 8  # of Gauss and Newton, for a time
+_ENOUGH = 1e-7  # relative change of a fitted number below which it is kept
+_LONGEST = 0.1  # of the trajectory: longest shift in time that is tried, which costs samples at the ends
 _OTHER_FRAME = {"world": "base", "base": "world"}
 
-_SLACK = 1e-12
-"""Of the trajectory: rounding of a time."""
-_AS_GOOD_AS_EXACT = 1e-7
-"""Of the range of a joint or rate: noise below which the samples are taken as they are."""
+_SLACK = 1e-12  # of the trajectory: rounding of a time
+_AS_GOOD_AS_EXACT = 1e-7  # of the range of a joint or rate: smaller noise is taken as none
 
 Change = Callable[[FloatingTrajectory], FloatingTrajectory]
 

@@ -16,14 +16,10 @@ from ._observation import Observation
 from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
-_NEXT_TO_NOTHING = 1e-9
-"""Of the body's mass: a frame between two joints, whose mass no one can see."""
-_STEPS = 6
-"""Of Gauss and Newton; each gains about two digits."""
-_CANDIDATES = 12
-"""Hypotheses that leave the least are fitted to the end, the others to first order."""
-_MOST_LOST = 0.9
-"""Of a link's mass: to first order a link that is much too heavy would have none."""
+_NEXT_TO_NOTHING = 1e-9  # of the body's mass: a frame between two joints without a visible mass
+_STEPS = 6  # of Gauss and Newton; each gains about two digits
+_CANDIDATES = 12  # hypotheses that leave least are fitted to the end, the others to first order
+_MOST_LOST = 0.9  # of a link's mass: to first order a link that is much too heavy would have none
 _AXES = "xyz"
 _ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
@@ -37,8 +33,7 @@ _STILL = 1e-6  # [rad or m] Range of a joint that is at rest
 _BY_NOISE = 8.0  # standard deviations of the noise that its range is, too
 _OPEN = 1e-6  # share of a number in what the samples leave open
 _NAMED = 3  # links in the name of a part
-_UNSEEN = 1e-9
-"""Of a column's entries, relative to those of the body's own momentum: what moves nothing cannot be fitted."""
+_UNSEEN = 1e-9  # of the body's own momentum: smaller columns move nothing and are not fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,7 +320,7 @@ def _tensor(entries: Array) -> Array:
 def _changed(
     seen: Observation, regressor: InertialRegressor, masses: Array, centres: Array, inertias: Array
 ) -> Observation:
-    """The same samples of a body with other links."""
+    """Observation of the samples with other links."""
     inertia, internal = regressor.inertia_and_momentum(masses[None], centres[None], inertias[None])
     momentum = so3.apply(seen.attitude, so3.apply(inertia[0], seen.rate) + internal[0])
     if seen.centre is None:

@@ -87,7 +87,7 @@ class RunAudit:
 
     @property
     def relative_drift(self) -> float:
-        """Of the momentum, without unit."""
+        """Drift of the momentum relative to its scale."""
         return self.momentum_drift / self.momentum_scale if self.momentum_scale > 0.0 else 0.0
 
     @property

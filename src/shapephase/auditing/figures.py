@@ -26,10 +26,8 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 8
 """Hypotheses."""
 _ENDINGS = (".svg", ".pdf", ".png")
-_LEAST_SHARE = 1e-6
-"""Of what is to be explained: where the bars begin."""
-_A_ROW = 3
-"""Names of a legend beside each other."""
+_LEAST_SHARE = 1e-6  # where the bars begin
+_A_ROW = 3  # names of a legend beside each other
 _LONGEST = 34
 """Letters of a name."""
 _BINS = 120  # points of a curve of residuals, each the rms of the samples there

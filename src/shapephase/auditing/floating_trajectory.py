@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 FRAMES = ("world", "base")
 _FEWEST = 8
 """Samples: a flight of 0.3 s at 30 frames a second; fewer say nothing of noise."""
-_LARGEST = 1e12
-"""Of places, rates and times: no recorder has a clock or a place beyond it."""
+_LARGEST = 1e12  # m, rad/s or s: no recorder has a clock or a place beyond it
 _OF_JOINTS = ("shapes", "joint_rates")
 """What is read up to `FARTHEST`, as by a body."""
 _OFF_UNIT = 0.1
@@ -127,7 +126,7 @@ class FloatingTrajectory:
         step: float | None = None,
         name: str = "trajectory",
     ) -> FloatingTrajectory:
-        """Of MuJoCo's arrays, free joint first: the linear velocity is in world axes, the angular one in base axes.
+        """Trajectory of MuJoCo's arrays, free joint first: linear velocity in world axes, angular one in base axes.
 
         Parameters
         ----------
@@ -171,7 +170,7 @@ class FloatingTrajectory:
         step: float | None = None,
         name: str = "trajectory",
     ) -> FloatingTrajectory:
-        """Of Pinocchio's arrays, as Crocoddyl stores them: both velocities of the base are in base axes.
+        """Return a trajectory of Pinocchio's arrays (Crocoddyl): both velocities of the base are in base axes.
 
         Parameters
         ----------
@@ -216,7 +215,7 @@ class FloatingTrajectory:
 
     @property
     def integrator_step(self) -> float:
-        """As given, else the usual one between samples [s]."""
+        """Step of the integrator: as given, else the median between samples [s]."""
         return float(np.median(np.diff(self.times))) if self.step is None else self.step
 
     def part(self, first: int, past: int) -> FloatingTrajectory:

@@ -83,7 +83,7 @@ class Hypothesis:
 
     @property
     def record(self) -> dict[str, Any]:
-        """The same as JSON can hold it."""
+        """Return the hypothesis for JSON."""
         return {
             "name": self.name,
             "kind": self.kind,

@@ -45,24 +45,19 @@ _QUIET = 1e-6
 """[rad] Noise of the attitude below which the first sample is tried as the start of the exact reconstruction."""
 _NEAR = 1e-4
 """[rad] From there on another start may be nearer: motions near the middle axis make much of the last digit."""
-_STEADY = 0.01
-"""Of what turns the body: a momentum that changes by more is no flight's, which need not be looked for."""
-_TOLERANCE = 1e-3
-"""Tolerance of momentum, rates and fall, where nothing else is asked for."""
+_STEADY = 0.01  # of the momentum: a flight does not change it by more
+_TOLERANCE = 1e-3  # of momentum, rates and fall by default
 _WANDER = 0.01
 """[m] Skin moves over bones, and bodies are not what tables make of them: markers and masses wander by so much."""
 _MEASURED = 1e-4
 """[rad or m] Noise from which on samples were measured, not computed."""
 _PAIRED = 3  # readings that are tried together with every other cause: those that leave least
-_ONE_AXIS = 1e-3
-"""Of the base's rates: less is across their main axis where the base turns about one axis alone."""
-_MOST_SAMPLES = 500
-"""Of each run, by which hypotheses are told apart."""
-_MOST_LOOKED_AT = 5000
-"""Samples of a trajectory that is read otherwise, to see where it falls then."""
+_ONE_AXIS = 1e-3  # of the base's rates: smaller ones across their main axis mean a turn about one axis
+_MOST_SAMPLES = 500  # of each run, for fits of hypotheses
+_MOST_LOOKED_AT = 5000  # samples of a trajectory that is read otherwise to find its fall
+# Share of the samples in the air from which no other reading is tried: a landing at the end leaves more than that, and
+# read wrongly it seems to be in the air.
 _MOSTLY = 0.5
-"""Of the samples: with so many in the air it is not tried whether there would be more, were they read otherwise; a
-landing at the end leaves more than that, and read wrongly it seems to be in the air."""
 _JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing here says whether they are right."
 
 
@@ -83,8 +78,8 @@ def audit(
     step, and its order from several runs, a link's mass, centre or inertia, offsets of joints, drag, a torque or a
     force from outside, a shift in time or a filter, frames of velocities, the order of quaternions, degrees, gravity.
     Where the best leaves more than noise, they are fitted in twos. Hypotheses that the samples cannot separate are
-    named together. Of a flight of 8 to 23 samples, as 25 to 60 frames a second make it, momentum, drift and fall are
-    given with their standard deviations, and no causes.
+    named together. A flight of 8 to 23 samples, typical for 25 to 60 frames a second, gets momentum, drift and fall
+    with their standard deviations, and no causes.
 
     Parameters
     ----------
@@ -187,7 +182,7 @@ def _short(
 
 
 def _with_near_signs(body: Body, run: FloatingTrajectory) -> FloatingTrajectory:
-    """The same, each quaternion of a ball joint with the sign that is nearer to the sample before: it is smoothed."""
+    """Trajectory with each quaternion of a ball joint in the sign that is nearer to the sample before."""
     balls = ball_columns(body.joint_names)
     if not balls or run.shapes.shape[1] != body.n_shape:
         return run
@@ -390,7 +385,7 @@ def _causes(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:
 
 
 def thinned(run: FloatingTrajectory) -> FloatingTrajectory:
-    """As many samples as hypotheses are told apart by, evenly taken."""
+    """Every k-th sample, at most as many as hypotheses are fitted to."""
     every = -(-len(run.times) // _MOST_SAMPLES)
     return run if every == 1 else run.every(every)
 
