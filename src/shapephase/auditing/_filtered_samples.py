@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ._noise_spectrum import cut_off
-from ._residuals import Leftover, Residuals, fitted_hypothesis
-from .hypothesis import FittedValue, Hypothesis
+from ._residuals import Residuals, fitted_hypothesis
+from .hypothesis import FittedValue, Hypothesis, Leftover
 
 _FREE = (1, 2, 0)  # orders of cosines that the laws leave open in each block
 _APART = 1.7  # ratio of the cut-offs of two laws up to which they are one

@@ -15,8 +15,8 @@ from scipy.interpolate import CubicSpline
 from ..arrays import Array
 from ..display import short_repr
 from ._observation import Observation
-from ._residuals import Leftover, Residuals, fitted_hypothesis, leftover
-from .hypothesis import FittedValue, Hypothesis
+from ._residuals import Residuals, fitted_hypothesis, leftover
+from .hypothesis import FittedValue, Hypothesis, Leftover
 
 _LOWEST = 0.3
 """Order below which it is none: halving the step then changes next to nothing."""

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Array
-from ._residuals import Leftover
-from .hypothesis import Hypothesis
+from .hypothesis import Hypothesis, Leftover
 
 _STRONG = 10.0  # difference of two criteria that is very strong evidence (Kass and Raftery 1995)
 _FEWEST = 3.0  # effective numbers of a single cosine

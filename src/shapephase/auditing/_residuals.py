@@ -18,35 +18,9 @@ from ._consistency import RateDifferences, rate_differences
 from ._noise_spectrum import cosines
 from ._observation import Observation
 from ._step_drift import StepDrift, step_drift
-from .hypothesis import FittedValue, Hypothesis
+from .hypothesis import FittedValue, Hypothesis, Leftover
 
 _ROUNDING = 16.0 * float(np.finfo(np.float64).eps)  # of the largest variance: rounding of sums of a dozen products
-BLOCKS = ("momentum", "fall", "rates")
-
-
-@dataclass(frozen=True, eq=False)
-class Leftover:
-    """Residuals of the three laws, in the order of `BLOCKS`.
-
-    Attributes
-    ----------
-    squares : (3,) their sums of squares
-    counts : (3,) independent numbers
-    effective : (3,) those of them that the spectrum of the residuals leaves independent: nu = 3 (sum c^2)^2 / sum c^4
-        of the coefficients c of cosines (Satterthwaite 1946 with variances c^2, of which c^4 / 3 is the square)
-    in_time : (M,) of each run those of momentum and fall, sample by sample; None where the samples are others
-    """
-
-    squares: Array
-    counts: Array
-    effective: Array
-    in_time: Array | None = None
-
-    @property
-    def size(self) -> float:
-        """Sum of the logarithms of the squares in units of noise, none less than 0: a law may have far more digits."""
-        known = self.counts > 0.0
-        return float(np.log(np.maximum(self.squares[known] / self.counts[known], 1.0)).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +80,7 @@ class Residuals:
         return self.columns(seen.momentum[:, :, None], None if centre is None else centre[:, :, None], rates)[:, 0]
 
     def blocks(self, vector: Array) -> dict[int, Array]:
-        """The parts of a vector in samples and directions, (rows, c), by their places in `BLOCKS`."""
+        """The parts of a vector in samples and directions, (rows, c), for momentum, fall and rates."""
         count = len(self.seen.times)
         parts = np.split(vector, np.cumsum((3 * count, 3 * count if self._centre_factor is not None else 0)))
         rows = (count, count, 0 if self.rates is None else len(self.rates.times))

@@ -14,9 +14,9 @@ from ..body.body import Body
 from ..warning_filters import quiet
 from ._noise import TrajectoryNoise
 from ._observation import observed
-from ._residuals import Leftover, Residuals, fitted_hypothesis, leftover_of_moments, residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover_of_moments, residuals
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import FittedValue, Hypothesis
+from .hypothesis import FittedValue, Hypothesis, Leftover
 
 _STEPS = 8  # of Gauss and Newton, for a time
 _ENOUGH = 1e-7  # relative change of a fitted number below which it is kept

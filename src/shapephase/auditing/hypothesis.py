@@ -4,16 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from ..arrays import Array
 from ..display import short_repr
 from ..plain_data import plain
 
-if TYPE_CHECKING:
-    from ._residuals import Leftover
-
 AND = ", and "  # between the names of two causes that are fitted together
+
+
+@dataclass(frozen=True, eq=False)
+class Leftover:
+    """Residuals of the three laws: momentum, fall, rates.
+
+    Attributes
+    ----------
+    squares : (3,) their sums of squares
+    counts : (3,) independent numbers
+    effective : (3,) those of them that the spectrum of the residuals leaves independent: nu = 3 (sum c^2)^2 / sum c^4
+        of the coefficients c of cosines (Satterthwaite 1946 with variances c^2, of which c^4 / 3 is the square)
+    in_time : (M,) of each run those of momentum and fall, sample by sample; None where the samples are others
+    """
+
+    squares: Array
+    counts: Array
+    effective: Array
+    in_time: Array | None = None
+
+    @property
+    def size(self) -> float:
+        """Sum of the logarithms of the squares in units of noise, none less than 0: a law may have far more digits."""
+        known = self.counts > 0.0
+        return float(np.log(np.maximum(self.squares[known] / self.counts[known], 1.0)).sum())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,15 +26,15 @@ _CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")
 """Formats in which people are recorded; they say what is in degrees, and how attitudes are written."""
 
 
-@show_options(TrajectoryOptions)
-def read_trajectory(
-    file: str | os.PathLike[str],
-    body: Body,
-    *,
-    step: float | None = None,
-    **options: Unpack[TrajectoryOptions],
-) -> FloatingTrajectory:
-    """A trajectory with its base.
+class StepOptions(TrajectoryOptions, total=False):
+    """Keyword arguments of `read_trajectory`."""
+
+    step: float | None
+
+
+@show_options(StepOptions)
+def read_trajectory(file: str | os.PathLike[str], body: Body, **options: Unpack[StepOptions]) -> FloatingTrajectory:
+    """Return a trajectory with its base.
 
     Files are read as `read_recorded_motion` does, whose arguments the rest are. Where they hold arrays of a whole
     body, `qpos` and `qvel`, `q` and `v`, `Q` and `Qdot`, `q` and `qdot`, or Isaac Lab's, the coordinates are taken as
@@ -64,9 +64,10 @@ def read_trajectory(
     check_object(body, "Body", "body")
     check_file_name(file, "file")
     where = Path(file)
+    check_options(options, StepOptions, "read_trajectory")
+    step = options.pop("step", None)
     if step is not None:
         step = positive_argument(step, "step")
-    check_options(options, TrajectoryOptions, "read_trajectory")
     names, joint_order, degrees = options.get("names"), options.get("joint_order"), options.get("degrees")
     if joint_order is not None:
         check_choice(joint_order, "joint_order", WORDS)
