@@ -218,7 +218,7 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
 def _run_audit(
     body: Body, run: FloatingTrajectory, seen: Observation, part: AirbornePart, given: float | None
 ) -> tuple[RunAudit, Array, Array]:
-    """The audit of one run; for momentum, fall and rates the share of squares that is allowed, and the colour of the noise."""
+    """Audit of one run; for momentum, fall and rates the allowed share of squares, and the colour of the noise."""
     scale = seen.scale
     wander = _wander(run, seen) if given is None else 0.0
     tolerance = _TOLERANCE if given is None else given
