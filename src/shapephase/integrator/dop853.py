@@ -25,10 +25,7 @@ def dop853_rotation(
     dense : times (N,) -> quaternions (N, 4)
     evaluations : of I and L_o
 
-    Raises
-    ------
-    AccuracyNotReached
-        As `dop853_attitude`.
+    Raises the errors of `driven_attitude`.
 
     Examples
     --------
@@ -38,14 +35,14 @@ def dop853_rotation(
     >>> print(f"{np.linalg.norm(sp.so3.rotation_vector_from_quat(turn(np.array([1.0])))):.6f}")
     2.000000
     """
-    found = dop853_attitude(evaluate, breaks, momentum, tolerance)
-    return found.run, found.evaluations
+    driven = dop853_attitude(evaluate, breaks, momentum, tolerance)
+    return driven.run, driven.evaluations
 
 
 def dop853_attitude(
     evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float, limits: StepLimits | None = None
 ) -> DrivenAttitude:
-    """S(t) of `dop853_rotation` with its measured error, by steps within limits. Raises as `driven_attitude`."""
+    """S(t) of `dop853_rotation` with its measured error, by steps within limits; errors as `driven_attitude`."""
 
     def rates(times: Array, attitudes: Array, states: Array) -> tuple[Array, Array]:
         inertia, internal = evaluate(times)

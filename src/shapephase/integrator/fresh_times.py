@@ -13,10 +13,8 @@ from ..errors import AccuracyNotReached
 from .channels import rates_of
 from .interpolant import Interpolant
 
-# Terms of series for each fresh time: 8 % of the evaluations at most.
-_TERMS_A_TIME = 12
-# Shares of a panel at which neighbours are compared: a low-discrepancy sequence, none of them a node.
-_GOLDEN = 0.6180339887498949
+_TERMS_A_TIME = 12  # terms of series for each fresh time: 8 % of the evaluations at most
+_GOLDEN = 0.6180339887498949  # step of the shares of panels at which neighbours are compared: never a node
 
 
 def fresh_times(interpolant: Interpolant) -> tuple[Array, Integers]:

@@ -41,7 +41,7 @@ class LinkRows(Protocol):
         ...
 
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
-        """Of all joints: (N, n), (N, n) -> (N, k), (N, k)."""
+        """Coordinates and rates of all joints: (N, n), (N, n) -> (N, k), (N, k)."""
         ...
 
 
@@ -61,15 +61,9 @@ def tree_inertia_and_momentum(tree: LinkRows, shapes: Array, rates: Array) -> tu
 
 
 def trees_channels(tree: LinkRows, rows: Array, masses: Array, shapes: Array, rates: Array) -> tuple[Array, Mask]:
-    """`tree_channels` of trees that differ from one in their masses, each as if alone, and which can be relied on.
+    """`tree_channels` of trees that differ in their masses, each as if alone, and which are reliable: (V, N, 9), (V,).
 
-    Parameters
-    ----------
-    rows, masses : (V, k + 1, 22), (V,) as in `LinkRows`
-
-    Returns
-    -------
-    (V, N, 9), (V,)
+    `rows` (V, k + 1, 22) and `masses` (V,) are those of each tree, as in `LinkRows`.
     """
     return _sampled(tree, rows, masses, shapes, rates, inverted=True)
 

@@ -22,8 +22,8 @@ def in_threads(run: Callable[[slice], None], batch: int, threads: int | None = N
     threads : how many at most; None: one for each processor
     """
     workers = max(1, min(processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
-    each = max(1, min(-(-batch // workers), _MOST_AT_ONCE))
-    parts = [slice(first, min(first + each, batch)) for first in range(0, max(batch, 1), each)]
+    count = max(1, min(-(-batch // workers), _MOST_AT_ONCE))
+    parts = [slice(first, min(first + count, batch)) for first in range(0, max(batch, 1), count)]
     results = map(run, parts) if workers == 1 or len(parts) == 1 else _pool(workers).map(run, parts)
     for rows, _ in zip(parts, results, strict=True):
         yield rows

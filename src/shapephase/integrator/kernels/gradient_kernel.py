@@ -10,8 +10,7 @@ import numpy as np
 from ..machine_code import inline, kernel
 from .tree_kernel import FRAME, LANES, NUMBERS, TOTAL, add_link, add_point, place_frames
 
-_PARAMETERS = 10
-"""Of a frame: mass, first moment (3), inertia xx yy zz yz xz xy."""
+_PARAMETERS = 10  # of a frame: mass, first moment (3), inertia xx yy zz yz xz xy
 
 
 @inline

@@ -1,4 +1,4 @@
-"""What the series of panels say of their own errors, and the same series with errors like those."""
+"""Error estimates from the series of panels, and series changed by such errors."""
 
 from __future__ import annotations
 
@@ -9,28 +9,16 @@ import numpy as np
 from ..constants import BEYOND_LAST_TERMS, CHANGED_LAST_TERMS, EPS, ROUNDED_SAMPLES, SLOWEST_DECAY
 from ..machine_code import inline, kernel
 
-# Columns of what `judge` finds.
-GOOD = 0
-CHANGE = 1
-NOISY = 2
-BETWEEN = 3
-MISSING = 4
-ALLOWED = 5
-LATE = 6
-CONDITION = 7
-INVERSE = 8
-DRIFT = 9
-COLUMNS = 10
-# Of what a panel's parent had beyond its degree: noise is as large in the halves, anything else is smaller.
-_NOISE_STAYS = 0.5
-# Of the largest term: what counts as noise is far below.
-_NOISE = 1e-6
+COLUMNS = 10  # of the table that `judge` fills, in this order
+GOOD, CHANGE, NOISY, BETWEEN, MISSING, ALLOWED, LATE, CONDITION, INVERSE, DRIFT = range(COLUMNS)
+_NOISE_STAYS = 0.5  # ratio of last terms to those of the panel's parent: 1 for noise, smaller for anything smooth
+_NOISE = 1e-6  # of the largest term: noise is far below
 _TINY = 1e-300
 
 
 @inline
 def _sizes(c):
-    """Of the nine channels: |I^-1| by its entries, |I^-1 L_o|."""
+    """|I^-1| by its entries, and |I^-1 L_o|, from the nine channels."""
     inverse = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + 2.0 * (c[3] * c[3] + c[4] * c[4] + c[5] * c[5])
     return math.sqrt(inverse), math.sqrt(c[6] * c[6] + c[7] * c[7] + c[8] * c[8])
 
@@ -49,9 +37,9 @@ def _condition(c):
 def judge(series, widths, spacing, before, momentum, rate, table):
     """Judge series (P, degree + 1, 9) of one degree, for momenta up to a magnitude; `table` (P, COLUMNS) is filled.
 
-    The two last terms tell what is missing beyond them, by the factor by which terms fall from the middle to the end:
-    single terms are small by chance, or by a motion's symmetry. What is missing swings as often over the panel as its
-    degree says, but for how far the body turns in it.
+    The two last terms bound those missing beyond them, by the factor by which terms fall from the middle to the end:
+    single terms are small by chance, or by a motion's symmetry. Missing terms swing as often over the panel as their
+    degree, less the angle by which the body turns in it.
 
     widths, spacing: (P,) [s] of panels, and of floating-point numbers at their ends
     before: (P,) the last terms, at this degree, of the panel that each is a half of [rad/s]

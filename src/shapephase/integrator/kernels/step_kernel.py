@@ -15,22 +15,16 @@ from scipy.integrate import DOP853
 from ..machine_code import inline, kernel
 
 STAGES = 12
-NODES = np.ascontiguousarray(DOP853.C[:STAGES])
-"""Of the stages, in units of the step."""
+NODES = np.ascontiguousarray(DOP853.C[:STAGES])  # times of the stages [steps]
 WEIGHTS = np.ascontiguousarray(DOP853.B[:STAGES])
 _TABLEAU = np.vstack([DOP853.A[:STAGES, :STAGES], WEIGHTS])
 # The entries that are not zero, row after row; row STAGES is the end of the step.
 _VALUES = _TABLEAU[_TABLEAU != 0.0]
 _COLUMNS = np.ascontiguousarray(np.nonzero(_TABLEAU)[1])
 _STARTS = np.concatenate([[0], np.cumsum(np.count_nonzero(_TABLEAU, axis=1))])
-
-
-# The states of `attempt`: by steps, twice and four times as many, on changed series, and from turned starts.
-_OF_FINER = 1
-_OF_FINEST = 2
-_OF_CHANGED = 3
-_OF_TURNED = 4
-# Which of them go on one after another in one step, and by which of their own steps in it.
+# The states of `attempt`: by steps (0), twice and four times as many, on changed series, and from turned starts.
+_OF_FINER, _OF_FINEST, _OF_CHANGED, _OF_TURNED = 1, 2, 3, 4
+# The states that advance one after another within a step, and which of their own steps they take.
 _STATES = np.array([0, 1, 3, 2, 2, 1, 3, 2, 2, 4, 5, 6])
 _NUMBERS = np.array([0, 0, 0, 0, 1, 1, 1, 2, 3, 0, 0, 0])
 
@@ -70,7 +64,7 @@ def turned_at(slopes, row, x, y, z, w, u, v, t):
 
 @inline
 def normalised(x, y, z, w):
-    """Of length one."""
+    """Quaternion scaled to length one."""
     scale = 1.0 / np.sqrt(x * x + y * y + z * z + w * w)
     return scale * x, scale * y, scale * z, scale * w
 
@@ -148,8 +142,8 @@ def _mark(state, marked):
 
 @inline
 def _turn_of_step(q, r, p, s):
-    """Of a step from one quaternion to the next, about the direction p at its start: what the shortest rotation that
-    takes the direction s at its end there leaves."""
+    """Turn of a step from one quaternion to the next about the direction p at its start, after the shortest rotation
+    that takes the direction s at its end to p."""
     x = q[3] * r[0] - q[0] * r[3] - (q[1] * r[2] - q[2] * r[1])
     y = q[3] * r[1] - q[1] * r[3] - (q[2] * r[0] - q[0] * r[2])
     z = q[3] * r[2] - q[2] * r[3] - (q[0] * r[1] - q[1] * r[0])
