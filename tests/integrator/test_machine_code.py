@@ -16,7 +16,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.cli.main import main
-from shapephase.cli.terminal import spoken
+from shapephase.cli.terminal import verbosity_from
 from shapephase.errors import CompilerError
 from shapephase.integrator import kept_code, machine_code
 from shapephase.integrator.machine_code import inline, kernel, plain
@@ -274,7 +274,7 @@ def test_the_first_compilation_is_announced_once(capfd, quiet):
     handler = logging.StreamHandler(sys.stderr)
     logging.getLogger("shapephase").addHandler(handler)
     try:
-        with spoken(["compile", *(["--quiet"] if quiet else [])]):
+        with verbosity_from(["compile", *(["--quiet"] if quiet else [])]):
             for _ in range(2):
                 kernel(fill.interpreted)(np.ones(1), *np.empty((2, 1)))
     finally:

@@ -28,7 +28,6 @@ from .assembly_parts import Boom, Moments, MovingMass, Part, RigidPart
 from .deformation import Deformation
 from .descriptions import UngaugedDescription, inertia_of
 
-_SUBJECT = "what moves the parts of the assembly"
 _PART_WORDS = Words(
     units=("m", "m/s"),
     continuous="parts move continuously",
@@ -36,10 +35,8 @@ _PART_WORDS = Words(
     values="places",
     returned="(places, velocities)",
 )
-# Times at which the whole is looked at to know its size.
-_SIZE_SAMPLES = 64
-# Of the part at the distance at which it alone would be the body's inertia: a lever is no shorter.
-_LEAST_ARM = 0.1
+_SIZE_SAMPLES = 64  # times at which the size of the whole is taken
+_LEAST_ARM = 0.1  # of the distance at which a part alone would make the body's inertia: the least lever
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +119,10 @@ class AssemblyDescription(UngaugedDescription):
 
     def depends_on(self) -> ScannedFunction:
         """See `Description`: the paths of all parts, judged by the angular momentum that their rates are worth."""
-        return side_by_side([self._moved(k) for k, part in enumerate(self.parts) if part.path is not None], _SUBJECT)
+        return side_by_side(
+            [self._moved(k) for k, part in enumerate(self.parts) if part.path is not None],
+            "the motion of the parts of the assembly",
+        )
 
     def _moved(self, number: int) -> ScannedFunction:
         part, path = self.parts[number], self.parts[number].path
@@ -307,8 +307,8 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     lengths = [path.duration for path in paths] + ([] if duration is None else [positive_argument(duration)])
     if not lengths:
         raise TrajectoryError("an assembly without moving parts needs a duration [s]")
-    for one, other in pairwise(lengths):
-        if abs(one - other) > 1e-9 * one:
+    for first, second in pairwise(lengths):
+        if abs(first - second) > 1e-9 * first:
             raise TrajectoryError(f"all parts must move for one time, got {lengths} s; stretch or extend the paths")
     length = lengths[0]
     inner = [path.breaks[1:-1] for path in paths]

@@ -1,4 +1,4 @@
-"""The parts of an assembly: each says what it adds to the sums over all mass."""
+"""The parts of an assembly, with their terms of the sums over all mass."""
 
 from __future__ import annotations
 
@@ -152,8 +152,8 @@ class MovingMass:
 class Boom:
     """A uniform straight boom that comes out of a point of the body; made by `boom`.
 
-    Of its `mass` the share length/full_length is out, a rod that moves along itself; the rest is stowed at the root as
-    a point mass at rest. So the boom's mass stays, and what is out is missing at the root.
+    The share length/full_length of its `mass` is out, a rod that moves along itself; the rest is stowed at the root, a
+    point mass at rest. The boom's mass is constant.
 
     Attributes
     ----------

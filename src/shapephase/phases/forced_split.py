@@ -197,17 +197,15 @@ def _dynamic_phase(motion: ForcedMotion, frames: Any, edges: Array) -> tuple[flo
         nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
         turn, spin, magnitude = _seen(motion, frames, nodes.ravel())
         along = so3.apply(turn, motion.body_momentum(nodes.ravel())) / magnitude[:, None]
-        each = weights.ravel()
-        return float(each @ np.sum(spin * along, axis=-1)), float(each @ np.linalg.norm(spin, axis=-1))
+        weight = weights.ravel()
+        return float(weight @ np.sum(spin * along, axis=-1)), float(weight @ np.linalg.norm(spin, axis=-1))
 
-    found = settled(
-        map(integrals, halved(edges, _HALVINGS)), lambda one, other: abs(one[0] - other[0]), _SETTLED * len(edges)
-    )
-    if found is None:
+    phases = settled(map(integrals, halved(edges, _HALVINGS)), lambda a, b: abs(a[0] - b[0]), _SETTLED * len(edges))
+    if phases is None:
         raise AccuracyNotReached(
-            "the dynamic phase does not settle: the momentum turns too fast, or its torque has breaks that are not said"
+            "the dynamic phase does not settle: the momentum turns too fast, or its torque has undeclared breaks"
         )
-    return found
+    return phases
 
 
 def _direction(vector: Array, change: Array, magnitude: Array) -> tuple[Array, Array]:
@@ -223,14 +221,14 @@ def _least_momentum(motion: ForcedMotion) -> tuple[float, float]:
     sizes = np.linalg.norm(motion.momentum(times), axis=-1)
     place = int(np.argmin(sizes))
     left, right = times[max(place - 1, 0)], times[min(place + 1, len(times) - 1)]
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda t: float(np.sum(np.square(motion.momentum(min(max(t, left), right))))),
         bounds=(left, right),
         method="bounded",
         options={"xatol": 1e-12 * motion.duration},
     )
-    least = float(np.sqrt(found.fun))
-    return (least, float(found.x)) if least < sizes[place] else (float(sizes[place]), float(times[place]))
+    least = float(np.sqrt(minimum.fun))
+    return (least, float(minimum.x)) if least < sizes[place] else (float(sizes[place]), float(times[place]))
 
 
 def _energy_change(motion: ForcedMotion) -> float | None:

@@ -23,15 +23,13 @@ from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import ProgressCallback, watched
 from ._curve_errors import arc_errors, running_errors, split_errors
-from ._deferred import Deferred
-from ._motion_parts import array_by_parts, by_parts
+from ._motion_parts import Deferred, array_by_parts, by_parts
 from .error_estimates import ArcErrors, RunningErrors
 from .forced_split import ForcedSplit, forced_split
 from .momentum_curve import Gauge, momentum_curve
 from .phase_split import PhaseSplit, SplitMotion
 
-CLOSINGS = ("start", "reference")
-"""Ends of the great circle that closes the momentum's curve so far, for `running_phases`."""
+CLOSINGS = ("start", "reference")  # ends of the great circle that closes the momentum's curve in `running_phases`
 
 
 @overload
@@ -375,10 +373,8 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     dynamic, area = np.diff(swept_phase, axis=1), np.diff(swept_area, axis=1) + closing
     phase = dynamic - area
     polygon = whole - closing.sum(axis=1)
-    tilts, tilt = (
-        tilted(attitudes[:, :-1], ends[:, :-1], ends[:, 1:]),
-        tilted(attitudes[:, :1], ends[:, :1], ends[:, -1:]),
-    )
+    tilts = tilted(attitudes[:, :-1], ends[:, :-1], ends[:, 1:])
+    tilt = tilted(attitudes[:, :1], ends[:, :1], ends[:, -1:])
 
     def apart(phases: Array, starts: Array, stops: Array, transports: Array) -> Array:
         """Differences between phases and the angles read off the attitudes."""
@@ -390,8 +386,8 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
         apart(phase, attitudes[:, :-1], attitudes[:, 1:], tilts),
         apart(total[:, None], attitudes[:, :1], attitudes[:, -1:], tilt),
     )
-    batch, count = motion.batch, len(cuts) - 1
-    arcs = (*batch, count)
+    batch = motion.batch
+    arcs = (*batch, len(cuts) - 1)
     return ArcPhases(
         times=cuts,
         gauge=gauge if isinstance(gauge, str) else "given",
