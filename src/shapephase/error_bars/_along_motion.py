@@ -1,10 +1,10 @@
-"""What the derivatives of a motion's results are integrals of, at the nodes of a quadrature.
+"""Integrands of the derivatives of a motion's results, at the nodes of a quadrature.
 
 With eta the turn of the attitude by a small change, inertial axes, and G = R I^-1 R^T,
 
     eta' = G (l x eta + s),
 
-where s is what the change adds to the angular momentum, seen from inertial axes. Its adjoint Lambda' = l x (G Lambda),
+where s is the change of the angular momentum, inertial axes. Its adjoint Lambda' = l x (G Lambda),
 Lambda = 1 at the end, makes one integral of every change: eta(T) = integral of Lambda^T G s.
 """
 
@@ -22,16 +22,12 @@ from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 
-# Gauss nodes on each piece: their rule has the order ten, a step of the motion's eight.
-_NODES = 5
-# Steps of the motion's in one piece, at first.
-_STEPS = 4
-# The factor by which the coefficients of what is integrated fall, from one Legendre polynomial to the next, at most.
-# What is integrated is multiplied by cubics of the path, so that the rule misses the factor's seventh power; with this
-# one that was never more than 5e-8 of a derivative's norm.
+_NODES = 5  # of Gauss's rule on each piece: its order is ten, that of a step of the motion eight
+_STEPS = 4  # of the motion in one piece, at first
+# Ratio of neighbouring Legendre coefficients of the integrands, at most. They are multiplied by cubics of the path, so
+# that the rule misses the ratio's seventh power, never more than 5e-8 of a derivative's norm.
 _LARGEST_FACTOR = 0.15
-# Times that pieces where they fall more slowly are cut in halves.
-_MOST_HALVINGS = 4
+_MOST_HALVINGS = 4  # of pieces with a larger ratio
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +61,14 @@ class AlongMotion:
 def along_motion(motion: Motion, path: ShapePath, breaks: Array | None = None) -> AlongMotion:
     """A motion that is no batch, of an articulated body; no piece of the quadrature has one of the breaks within."""
     edges = _pieces(one_rotation(motion), path.breaks if breaks is None else np.union1d(path.breaks, breaks))
-    found = _at_nodes(motion, path, edges)
+    along = _at_nodes(motion, path, edges)
     for _ in range(_MOST_HALVINGS):
-        rough = _factors(found) > _LARGEST_FACTOR
+        rough = _factors(along) > _LARGEST_FACTOR
         if not rough.any():
             break
         edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
-        found = _at_nodes(motion, path, edges)
-    return found
+        along = _at_nodes(motion, path, edges)
+    return along
 
 
 def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
@@ -102,15 +98,15 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
 
 
 def _factors(along: AlongMotion) -> Array:
-    """By which Legendre coefficients fall in each piece, of the slowest of what is integrated: (P,)."""
+    """Ratio of neighbouring Legendre coefficients in each piece, for the integrand where they fall least: (P,)."""
     count = len(along.times)
     turned = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse, along.lifted @ along.inverse
-    vectors = [*(one.reshape(count, 9) for one in turned), along.spins, along.lifted_spins]
+    vectors = [*(matrices.reshape(count, 9) for matrices in turned), along.spins, along.lifted_spins]
     whole = np.concatenate([*vectors, np.cos(along.shapes), np.sin(along.shapes)], axis=1)
     at_nodes = whole.reshape(-1, _NODES, whole.shape[1])
     squares = (_last_polynomials() @ at_nodes) ** 2
     # Vectors by their length; cosine and sine by one.
-    starts, joints = np.cumsum([0, *(one.shape[1] for one in vectors)]), along.shapes.shape[1]
+    starts, joints = np.cumsum([0, *(rows.shape[1] for rows in vectors)]), along.shapes.shape[1]
     sizes = np.add.reduceat(at_nodes[..., : starts[-1]] ** 2, starts[:-1], axis=2).max(axis=1)[:, None]
     last = np.add.reduceat(squares[..., : starts[-1]], starts[:-1], axis=2)
     shares = np.divide(last, sizes, out=np.zeros_like(last), where=sizes > 0.0).max(axis=2)
@@ -135,7 +131,7 @@ def one_rotation(motion: Motion) -> SteppedRotation:
 
 
 def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
-    """How the attitude turns at each time by turns of the start and by changes of the momentum, inertial axes.
+    """Turns of the attitude at each time by turns of the start and by changes of the momentum, inertial axes.
 
     (N,) ascending -> (N, 3, 6 + 3 modes): the first three columns by the start, the next three by the momentum, each
     three more by one that changes like the next Legendre polynomial from the first to the last of the times.
@@ -151,32 +147,31 @@ def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
     scaled = widths[:, None, None, None] * turning.reshape(len(widths), _NODES, 3, 3)
     slopes = scaled @ so3.hat(motion.momentum)
     # Within a piece: from its start, and by a unit of momentum.
-    changes = (scaled[..., None, :] * legendre(at, times, modes).reshape(len(widths), _NODES, 1, -1, 1)).reshape(
-        len(widths), _NODES, 3, -1
-    )
+    shapes = legendre(at, times, modes).reshape(len(widths), _NODES, 1, -1, 1)
+    changes = (scaled[..., None, :] * shapes).reshape(len(widths), _NODES, 3, -1)
     from_start, by_momentum = _within(slopes), _within(slopes, np.einsum("ij,pjab->piab", matrix, changes))
     across = np.eye(3) + np.einsum("j,pjab->pab", shares, slopes @ from_start)
     added = np.einsum("j,pjab->pab", shares, changes + slopes @ by_momentum)
     columns = 6 + 3 * modes
-    found, reached = np.empty((len(edges), 3, columns)), np.eye(3, columns)
-    found[0] = reached
+    at_edges, reached = np.empty((len(edges), 3, columns)), np.eye(3, columns)
+    at_edges[0] = reached
     for piece in range(len(widths)):
         reached = across[piece] @ reached
         reached[:, 3:] += added[piece]
-        found[piece + 1] = reached
+        at_edges[piece + 1] = reached
     # Times that differ from an edge by rounding are that edge.
-    return found[np.searchsorted(0.5 * (edges[1:] + edges[:-1]), times)]
+    return at_edges[np.searchsorted(0.5 * (edges[1:] + edges[:-1]), times)]
 
 
 def legendre(at: Array, times: Array, modes: int) -> Array:
     """Legendre polynomials of orders 0 to `modes` from the first to the last of the times: (M,) -> (M, 1 + modes)."""
     since = 2.0 * (at - times[0]) / max(float(times[-1] - times[0]), np.finfo(float).tiny) - 1.0
-    # Before and after, nothing was recorded that could say how they go on.
+    # Constant before and after: nothing was recorded there.
     return np.polynomial.legendre.legvander(np.clip(since, -1.0, 1.0), modes)
 
 
 def _pieces(stepped: SteppedRotation, breaks: Array) -> Array:
-    """The edges of what Gauss's rule is used on: steps, a few together, that no break is within."""
+    """Edges of the pieces for Gauss's rule: a few steps each, without a break inside."""
     first = np.flatnonzero(np.diff(stepped.panel, prepend=-1))
     counts = np.diff(first, append=len(stepped.panel))
     within = np.arange(len(stepped.panel)) - np.repeat(first, counts)

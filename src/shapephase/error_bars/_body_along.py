@@ -1,4 +1,4 @@
-"""How a body's angular momentum answers, along a path, to this path and to the inertias of the body's links."""
+"""Derivatives of a body's angular momentum along a path, by this path and by the inertias of the body's links."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class BodyAlong:
 
     Attributes
     ----------
-    body : whose they are
+    body : the body of the path
     times : (N,) [s]
     shapes, rates : (N, n)
     """
@@ -38,7 +38,7 @@ class BodyAlong:
         Parameters
         ----------
         spins, rows : (N, S, 3), (N, S, r, 3)
-        momenta : (N, S, 3) I w + J rate, which a unit of the duration's logarithm takes off where a path is closed
+        momenta : (N, S, 3) I w + J rate, minus the derivative by the duration's logarithm where a path is closed
 
         Returns
         -------
@@ -51,24 +51,24 @@ class BodyAlong:
             parts = by_independent(chain, *of_all, self.shapes, self.rates)
         else:
             parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
-        found = samples.by_knots(self.times, *parts)
+        by_knots = samples.by_knots(self.times, *parts)
         if closing.any():
             by_duration = -np.einsum("nsrc,nsc->sr", rows[closing], momenta[closing]).ravel()
-            found += by_duration[:, None] * samples.seconds_by_knots()
-        return found
+            by_knots += by_duration[:, None] * samples.seconds_by_knots()
+        return by_knots
 
     def by_inertias(self, spins: Array, rows: Array) -> Array:
         """Derivatives by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
         chain = self.body.chain
         if not self._has_kernels:
-            each = [by_link_parameters(self._links, rows[:, k], spins[:, k]) for k in range(rows.shape[1])]
-            return np.concatenate(each)
-        found = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
-        return chain.rows.in_chain_axes(found).reshape(len(found), -1)
+            pairs = zip(np.moveaxis(rows, 1, 0), np.moveaxis(spins, 1, 0), strict=True)
+            return np.concatenate([by_link_parameters(self._links, row, spin) for row, spin in pairs])
+        sums = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
+        return chain.rows.in_chain_axes(sums).reshape(len(sums), -1)
 
     @property
     def _has_kernels(self) -> bool:
-        """Bodies with ball joints have no rows; arrays are quicker than interpreted kernels."""
+        """True where kernels serve: bodies with ball joints have no rows, and interpreted kernels are slower."""
         return self.body.chain.has_rows and machine_code.is_used()
 
     @cached_property

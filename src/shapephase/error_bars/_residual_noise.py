@@ -16,30 +16,26 @@ import numpy as np
 
 from ..arrays import Array
 
+# Correlations of neighbours, even in their arcsines: there the reference prior is flat. The last is 0.999.
 _EXPONENTIAL = np.sin((np.arange(36) + 0.5) / 36.0 * np.pi - 0.5 * np.pi)
-"""Correlations of neighbours, even in their arcsines: there the reference prior is flat. The last is 0.999."""
+# Samples of a mean, or until a bell is 1/e: shorter is nearly white, longer hardly noise.
 _LENGTHS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0, 32.0])
-"""Samples of a mean, or until a bell is 1/e: shorter is nearly white, longer hardly noise."""
 _OWN = 0.01  # white share of the variance of smoothed noise: digits of recordings are rounded
-_BLOCK = 128
-"""Samples that are weighed together, four times the longest mean; blocks count as independent."""
-_CHANCE = 0.02
-"""With which residuals that are noise make bars longer."""
-_SURE = 0.001
-"""With which residuals that are noise are taken for a momentum that changes."""
-_MOST_MODES = 6
-"""Legendre polynomials of a momentum in time: more resolve less than a tenth of the flight."""
+_BLOCK = 128  # samples weighed together, four times the longest mean; blocks count as independent
+_CHANCE = 0.02  # probability with which noise makes bars longer
+_SURE = 0.001  # probability with which noise is taken for a momentum that changes
+_MOST_MODES = 6  # Legendre polynomials of a momentum in time: more resolve less than a tenth of the flight
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualNoise:
-    """How likely each kind and length of correlation is, and what follows of the parameters with it.
+    """Probability of each kind and length of correlation, and the parameters of the fit that follow.
 
     Attributes
     ----------
     weights : (F,) of the correlations; their sum is one
     variances : (F,) of each residual [rad^2], the larger of what is left of whitened and of plain residuals: where the
-        kind does not fit, as of a filter's stop band, whitened ones say too little
+        kind does not fit, as of a filter's stop band, whitened ones are too small
     parameters : (F, m) by generalised least squares
     precisions : (F, m, m) inverse covariances of the parameters, where residuals have variance one
     free : numbers less parameters

@@ -22,16 +22,13 @@ from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
-from ._error_sources import Inputs, by_relative_errors, drawn_bodies, inputs_of
-from ._fit_answers import fit_by_inertias, fit_by_knots
-from .inertia_errors import InertiaErrors
+from ._fit_derivatives import fit_by_inertias, fit_by_knots
+from .error_sources import InertiaErrors, Inputs, by_relative_errors, drawn_bodies, inputs_of
 from .recorded_momentum import UNKNOWNS, RecordedMomentum
 from .result_derivatives import Derivatives, ResultDerivative, derivatives, described_by
 
-# An angle has a bar of its own where it is this many of them from 0 and from 180 degrees.
-_BARS_FROM_THE_ENDS = 5.0
-# Variances along other axes of a rotation than its worst, as a part of that, that are rounding.
-_ROUNDING = 1e-9
+_BARS_FROM_THE_ENDS = 5.0  # from an angle to 0 and to 180 degrees, for it to have a bar of its own
+_ROUNDING = 1e-9  # of the largest variance of a rotation: smaller ones about other axes are rounding
 _ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation")
 _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
 
@@ -253,7 +250,7 @@ def _causes(found: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
         samples, by_fit = path_samples(found.path), _fit_by_knots(found.motion, inputs)
         for rule in samples.rules:
             yield moving_the_fit(found.at_knots(rule), rule(by_fit), inputs.samples)
-        # What is known of the bias is one number of variance one, times itself.
+        # The bias is one unknown of variance one, times its estimate.
         taken = samples.bias[:, None]
         yield moving_the_fit(found.at_knots(lambda by_knots: by_knots @ taken), by_fit @ taken, np.ones(1))
     if inputs.links is not None:
@@ -268,13 +265,12 @@ def _causes(found: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
 
 
 def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivative) -> ResultDerivative:
-    """What a rule makes of each derivative of the parts."""
+    """Result of a rule for each derivative of the parts."""
     return ResultDerivative(*(rule(tuple(getattr(part, name) for part in parts)) for name in (*_ROTATIONS, *_PHASES)))
 
 
 def _fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
-    """How values at the knots of the path move attitude and momentum at the start, where these were fitted:
-    (6, knots n)."""
+    """Derivatives of fitted attitude and momentum at the start by the path at its knots: (6, knots n)."""
     if inputs.fit is None:
         _, path = described_by(motion)
         return np.zeros((UNKNOWNS, path_samples(path).bias.size))

@@ -5,22 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..arguments import positive_argument
+from ..arrays import Array
 from ..body.loading import load_body
 from ..deformation.deformation import articulated
 from ..shape_space.shape_path import ShapePath
 from ._closed_form_motions import Example
 
-# Of the diver's arms [rad].
-_ARM_UP = 3.0
-_ARM_DOWN = 0.2
-# Of the whole dive: how long an arm moves, and half of how long it stays down.
-_ARM_MOVES = 0.2
-_ARM_STAYS = 0.13155869448710526
-# Of the dive of five stages, as shares of its duration: how long the arm goes down, stays down, and goes up; and the
-# momentum times the duration [kg m^2]. The last three solve the three equations of the landing, by Newton's method.
-_GOES_DOWN = 0.2
-_STAYS_DOWN = 0.2722422708607259
-_GOES_UP = 0.17453232069381736
+_ARM_UP, _ARM_DOWN = 3.0, 0.2  # [rad]
+# Shares of a simple dive: an arm moves, and half of its stay below.
+_ARM_MOVES, _ARM_STAYS = 0.2, 0.13155869448710526
+# Shares of the dive of five stages: the arm goes down, stays down, goes up. The last two and the momentum times the
+# duration [kg m^2] solve the three equations of the landing, by Newton's method.
+_GOES_DOWN, _STAYS_DOWN, _GOES_UP = 0.2, 0.2722422708607259, 0.17453232069381736
 _MOMENTUM_TIMES_DURATION = 92.37710163942651
 
 
@@ -43,19 +39,15 @@ def diver_twist(duration: float = 1.5) -> ShapePath:
     1.5 [ 0.2 -3. ]
     """
     period = positive_argument(duration)
-    body = load_body("diver")
-    both_up = {"left_shoulder_abduction": _ARM_UP, "right_shoulder_abduction": -_ARM_UP}
-    up, down = body.shape(both_up), body.shape(both_up | {"left_shoulder_abduction": _ARM_DOWN})
     moves = 0.5 + np.array([-_ARM_STAYS - _ARM_MOVES, -_ARM_STAYS, _ARM_STAYS, _ARM_STAYS + _ARM_MOVES])
-    times = period * np.array([0.0, *moves, 1.0])
-    return ShapePath.waypoints(times, [up, up, down, down, up, up], joint_names=body.joint_names)
+    return _arm_down_and_up(period * np.array([0.0, *moves, 1.0]))
 
 
 def five_stage_dive(duration: float = 1.6) -> ShapePath:
     """A dive of the `diver` that lands: forward, one and a half somersaults and one twist, exactly.
 
-    Its stages are those of Dullin and Tong: somersault, shape change, twist, the change back, somersault. As in
-    `diver_twist` the left arm comes down and goes up again. Here it goes up a little faster than it came down, because
+    Its stages are those of Dullin and Tong: somersault, shape change, twist, the change back, somersault. The left arm
+    comes down and goes up again, like in `diver_twist`. Here it goes up a little faster than it came down, because
     the shoulders are not in the plane of the centre of mass: so the twist ends with the momentum exactly along the axis
     of the somersault. `full_dive` has it with its momentum, (0, 92.37710163942651 / duration, 0) kg m^2/s. The arm
     keeps its rate of 20 rad/s in 1.504 s and longer.
@@ -69,12 +61,17 @@ def five_stage_dive(duration: float = 1.6) -> ShapePath:
     1.6 [0.     0.2826 0.6026 1.0382 1.3174 1.6   ] [ 0.2 -3. ]
     """
     period = positive_argument(duration)
-    body = load_body("diver")
-    both_up = {"left_shoulder_abduction": _ARM_UP, "right_shoulder_abduction": -_ARM_UP}
-    up, down = body.shape(both_up), body.shape(both_up | {"left_shoulder_abduction": _ARM_DOWN})
     alone = 0.5 * (1.0 - _GOES_DOWN - _STAYS_DOWN - _GOES_UP)
     times = period * np.append(0.0, np.cumsum([alone, _GOES_DOWN, _STAYS_DOWN, _GOES_UP, alone]))
     times[-1] = period
+    return _arm_down_and_up(times)
+
+
+def _arm_down_and_up(times: Array) -> ShapePath:
+    """Path of the diver whose left arm goes down and up between these six times."""
+    body = load_body("diver")
+    both_up = {"left_shoulder_abduction": _ARM_UP, "right_shoulder_abduction": -_ARM_UP}
+    up, down = body.shape(both_up), body.shape(both_up | {"left_shoulder_abduction": _ARM_DOWN})
     return ShapePath.waypoints(times, [up, up, down, down, up, up], joint_names=body.joint_names)
 
 

@@ -21,12 +21,9 @@ from ..shape_space.curves import Curve, Swings
 from ..shape_space.shape_path import ShapePath
 from .dives import diver_twist, five_stage_dive
 
-# Joints of the waist of both cats, in the order of their angles.
-_WAIST = ("waist_pitch", "waist_yaw", "waist_roll")
-# Of the waist that cannot twist.
-_BEND = ("waist_pitch", "waist_yaw")
-# Of the reconstruction of a closed orbit [rad]: its phases are then good to ten digits.
-_TOLERANCE = 1e-11
+_WAIST = ("waist_pitch", "waist_yaw", "waist_roll")  # joints of both cats, in the order of their angles
+_BEND = _WAIST[:2]  # joints of the waist that cannot twist
+_TOLERANCE = 1e-11  # [rad] of a closed orbit: its phases are then good to ten digits
 
 
 @dataclass(frozen=True)
@@ -275,12 +272,12 @@ MOTIONS: Mapping[str, NamedMotion] = {
     ),
 }
 
+# Motions whose shape and momentum close together: the loop of shapes, and the momentum's magnitude [kg m^2/s].
 CLOSED_ORBITS: Mapping[str, tuple[str, float]] = {
     "cat": ("cat_righting", 0.005),
     "astronaut": ("astronaut_leg_swing", 2.0),
     "satellite": ("satellite_sweep", 1.0),
 }
-"""Motions whose shape and momentum close together: the loop of shapes, and the momentum's magnitude [kg m^2/s]."""
 
 
 def named_motion(name: str) -> ShapePath:
@@ -416,7 +413,7 @@ class _CatRighting:
         return _untwisted(axis, axis_rate)
 
 
-# Squares of what is next to nothing are nothing, also for those who let NumPy raise.
+# Squares of tiny numbers are zero, also where NumPy is set to raise.
 @np.errstate(under="ignore")
 def _untwisted(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
     """Waist angles pitch, yaw, roll (Ry Rz Rx) that carry the x axis to `axis` without twist, and their rates.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, overload
@@ -24,8 +24,9 @@ from ..arguments import (
 from ..arrays import Array, Integers, common_batch, copied_when_read, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
 from ..display import short_repr
-from ..errors import WrongObjectError, unknown_name
+from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..inertia_tensor import inverse_inertia
+from ..integrator.families import VariantRotations, rotations_of_variants
 from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
 from ..integrator.lift import Lift, error_turns, lift_along
@@ -39,7 +40,8 @@ from .motion_record import MotionRecord, read_motion_record, write_motion_record
 if TYPE_CHECKING:
     from .external_torque import ExternalTorque, TorqueState
     from .forced_motion import ForcedMotion
-    from .motion_family import MotionFamily
+
+_FAMILY_METHODS = ("auto", "spectral")
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,6 +330,92 @@ class Motion(MotionViews):
         return total / h[:, None]
 
 
+@made_by(Motion="take one of its motions, family[0]")
+@dataclass(frozen=True, eq=False)
+class MotionFamily(Sequence[Motion]):
+    """Motions of N bodies of a family, a sequence made by `reconstruct`.
+
+    Attributes
+    ----------
+    deformations : what moved
+    momentum : (N, 3) of each about its centre of mass, inertial axes [kg m^2/s]
+    initial_attitude : (N, 3, 3) base axes to inertial axes
+    tolerance : the one requested [rad]
+    solution : S(t) of each, the attitude relative to the start
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> family = cat.with_inertias(masses=np.outer([1.0, 2.0], [part.mass for part in cat.moving_parts]))
+    >>> motions = sp.reconstruct(sp.articulated(family, loop), [0.0, 0.0, 0.0])
+    >>> [round(float(sp.so3.angle(motion.final_attitude)), 6) for motion in motions]
+    [1.139791, 1.139791]
+    """
+
+    deformations: DeformationFamily
+    momentum: Array
+    initial_attitude: Array
+    tolerance: float
+    solution: VariantRotations
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+    def __len__(self) -> int:
+        """Number of motions, N."""
+        return len(self.momentum)
+
+    @overload
+    def __getitem__(self, index: int) -> Motion: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Motion, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Motion | tuple[Motion, ...]:
+        """Return one of the motions, or a tuple of those of a slice."""
+        numbers = range(len(self))[index]
+        if isinstance(numbers, range):
+            return tuple(self[number] for number in numbers)
+        solution = self.solution[numbers]
+        return Motion(
+            deformation=self.deformations[numbers],
+            momentum=self.momentum[numbers],
+            initial_attitude=self.initial_attitude[numbers],
+            tolerance=self.tolerance,
+            method="spectral",
+            evaluations=solution.interpolant.evaluations,
+            solution=solution,
+        )
+
+    @property
+    def duration(self) -> float:
+        """Length T of the interval [s]."""
+        return self.deformations.duration
+
+    @property
+    def error_estimate(self) -> Array:
+        """Estimate of the largest attitude error of each over [0, T]: (N,) [rad]."""
+        return self.solution.error_estimate
+
+    @property
+    def evaluations(self) -> Integers:
+        """How often the locked inertia and internal momentum of each were computed: (N,)."""
+        return self.solution.evaluations
+
+    @property
+    def final_attitude(self) -> Array:
+        """R(T) of each: (N, 3, 3)."""
+        return self.initial_attitude @ self.solution.end
+
+    def attitude(self, t: ArrayLike) -> Array:
+        """R(t) of each, base axes to inertial axes: times (...) -> (N, ..., 3, 3)."""
+        times = times_argument(t, self.duration)
+        turned = np.empty((len(self), times.size, 3, 3))
+        for number, start in enumerate(self.initial_attitude):
+            turned[number] = start @ self.solution[number].rotation(times.ravel())[0]
+        return turned.reshape(len(self), *times.shape, 3, 3)
+
+
 @overload
 def reconstruct(
     deformation: Deformation,
@@ -442,10 +530,8 @@ def reconstruct(
         assert isinstance(deformation, Deformation)
         return reconstruct_forced(deformation, momentum, attitude, torque, goal, method)
     if not isinstance(deformation, Deformation) and isinstance(deformation, DeformationFamily):
-        from .motion_family import reconstruct_family
-
         with watched(progress):
-            return reconstruct_family(deformation, momentum, attitude, goal, method)
+            return _family_motions(deformation, momentum, attitude, goal, method)
     if not isinstance(method, str) or method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
     spatial, start = initial_state_arguments(momentum, attitude)
@@ -460,6 +546,35 @@ def reconstruct(
         tolerance=goal,
         method="spectral" if method == "auto" else method,
         evaluations=evaluations,
+        solution=solution,
+    )
+
+
+def _family_motions(
+    deformations: DeformationFamily,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None,
+    tolerance: float,
+    method: str,
+) -> MotionFamily:
+    """Return the motions of a family of deformations; the tolerance has been checked."""
+    if not isinstance(method, str) or method not in _FAMILY_METHODS:
+        raise unknown_name("method for a family of bodies", method, _FAMILY_METHODS)
+    count = len(deformations)
+    spatial, start = initial_state_arguments(momentum, attitude)
+    if spatial.shape[:-1] not in ((), (count,)):
+        raise ShapeError(
+            f"momentum and attitude: one for all or one for each of {count} bodies is needed, got a batch of "
+            f"{spatial.shape[:-1]}"
+        )
+    spatial, start = np.broadcast_to(spatial, (count, 3)), np.broadcast_to(start, (count, 3, 3))
+    at_start = so3.apply(so3.transpose(start), spatial)
+    solution = rotations_of_variants(deformations.variants(), at_start, tolerance)
+    return MotionFamily(
+        deformations=deformations,
+        momentum=spatial,
+        initial_attitude=start,
+        tolerance=tolerance,
         solution=solution,
     )
 

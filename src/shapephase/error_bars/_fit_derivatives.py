@@ -1,7 +1,7 @@
-"""How a fit of momentum and start to recorded attitudes answers to changes of the path and of the body's inertias.
+"""Derivatives of a fit of momentum and start to recorded attitudes, by the path and by the body's inertias.
 
-A change turns the attitude at each recorded time by eta(t_k), as `_along_motion` has it. The recording stays what it
-is, so that the fit moves as if it were recorded to have turned by -eta(t_k).
+A change turns the attitude at each recorded time by eta(t_k) of `_along_motion`. The recording stays, so that the fit
+moves like one to attitudes turned by -eta(t_k).
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from .result_derivatives import described_by
 
 
 def fit_by_knots(motion: Motion, times: Array, by_attitudes: Array) -> Array:
-    """By the values of the path at its knots: (6, knots n); `by_attitudes` as `RecordedMomentum` has it."""
+    """Derivative of the fit by the path at its knots: (6, knots n); `by_attitudes` is that of `RecordedMomentum`."""
     body, path = described_by(motion)
     along = along_motion(motion, path, times)
     rows = _by_added_momentum(motion, along, times, by_attitudes)
-    samples, there = path_samples(path), BodyAlong(body, along.times, along.shapes, along.rates)
+    samples, body_along = path_samples(path), BodyAlong(body, along.times, along.shapes, along.rates)
     momenta = motion.momentum @ along.attitudes
-    return there.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None])
+    return body_along.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None])
 
 
 def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:
-    """By mass, first moment and inertia of the frames of the body as in `Derivatives.by_inertias`: (6, 10 (k + 1))."""
+    """Derivative of the fit by the ten parameters of each frame, in the order of `by_inertias`: (6, 10 (k + 1))."""
     body, path = described_by(motion)
     along = along_motion(motion, path, times)
     rows = _by_added_momentum(motion, along, times, by_attitudes)
@@ -36,13 +36,13 @@ def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:
 
 
 def _by_added_momentum(motion: Motion, along: AlongMotion, times: Array, by_attitudes: Array) -> Array:
-    """What a unit of internal angular momentum at each node, base axes, moves the fit by: (M, 6, 3)."""
-    # From a turn at the end of the motion to those at the recorded times that come of the same.
+    """Change of the fit by a unit of internal angular momentum at each node, base axes: (M, 6, 3)."""
+    # Turns at the recorded times from the turn at the end by an equal change.
     from_end = np.linalg.inv(along.adjoint_at_start.T)
     at_times = responses(motion, times)[:, :, :3] @ from_end
     by_turn = np.moveaxis(by_attitudes.reshape(len(by_attitudes), -1, 3), 1, 0)
     by_end = by_turn @ so3.transpose(motion.attitude(times)) @ at_times
-    # What happens at a node turns only what is recorded later.
+    # A change at a node turns only the attitudes recorded later.
     later = np.concatenate([np.cumsum(by_end[::-1], axis=0)[::-1], np.zeros((1, *by_end.shape[1:]))])
     carried = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse
     return along.weights[:, None, None] * (later[np.searchsorted(times, along.times)] @ carried)
