@@ -45,14 +45,8 @@ def check_never_on_a_line(moment: Callable[[Array], Array], breaks: Array) -> No
 def check_triangle(inertia: Array, times: Array | None, on_unphysical: str) -> None:
     """Refuse, or warn of, tensors (N, 3, 3) that no distribution of mass has, with the worst of the times (N,).
 
-    Raises
-    ------
-    UnphysicalInertiaError
-        Where `on_unphysical` is "error" and the triangle inequality fails by more than rounding.
-
-    Notes
-    -----
-    Source: theory.md A4.
+    Raises UnphysicalInertiaError where `on_unphysical` is "error" and the triangle inequality fails by more than
+    rounding. Source: theory.md A4.
     """
     if on_unphysical == "allow" or not len(inertia):
         return

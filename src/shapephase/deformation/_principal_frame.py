@@ -65,13 +65,7 @@ def principal_frames(deformation: Deformation) -> Frames:
     equal for all time, one of their axes lies in the plane of the distinct axis and the base axis farthest from it, and
     the one that lies along the earlier base axis comes first; if all three are, U is the identity.
 
-    Raises
-    ------
-    GaugeError
-        If the axes jump where moments meet, or turn by more than 2e8 rad per loop.
-
-    Notes
-    -----
+    Raises GaugeError if the axes jump where moments meet, or turn by more than 2e8 rad per loop.
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
     """
     panels, freedom = _joined(deformation)

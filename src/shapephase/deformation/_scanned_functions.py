@@ -73,10 +73,8 @@ def inertia_and_momentum(sample: Pair, subject: str) -> ScannedFunction:
 def positions_and_velocities(masses: Array, motion: Pair, raw_size: Callable[[Array], float]) -> ScannedFunction:
     """Particles from their centre of mass, each coordinate a column; of many, sums that hold all of them.
 
-    Parameters
-    ----------
-    motion : times (N,) -> positions and velocities (N, m, 3) from the centre of mass
-    raw_size : times (N,) -> the largest number among the positions as they are given [m]
+    `motion` gives positions and velocities (N, m, 3) from the centre of mass at times (N,), `raw_size` the largest
+    number among the user's positions there [m].
     """
     few = len(masses) <= _FEW_PARTICLES
     signs = np.where(np.random.default_rng(7).random((_SUMS, len(masses))) < 0.5, -masses, masses)

@@ -77,21 +77,17 @@ class AssemblyDescription(UngaugedDescription):
         return self.about_centre(times).second
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """See `Description`."""
         total = self.about_centre(times)
         return inertia_of(total.second), so3.vee(np.swapaxes(total.flow, -1, -2) - total.flow)
 
     def inertia_rate(self, times: Array) -> Array:
-        """See `Description`."""
         flow = self.about_centre(times).flow
         return inertia_of(flow + np.swapaxes(flow, -1, -2))
 
     def centre_of_mass(self, times: Array) -> Array:
-        """See `Description`."""
         return self.origin + self.about_centre(times).first / self.mass
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
-        """See `Description`."""
         pairs = [part.correlation(times, reference, self.origin) for part in self.parts]
         total = self.about_centre(times)
         there = self.about_centre(np.array([reference])).first[0] / self.mass
@@ -100,14 +96,12 @@ class AssemblyDescription(UngaugedDescription):
         return value, rate
 
     def kinetic_energy(self, times: Array, turning: Array) -> Array:
-        """See `Description`."""
         inertia, momentum = self.sample(times)
         turned = 0.5 * so3.apply(inertia, turning) + momentum
         return np.sum(turning * turned, axis=-1) + 0.5 * self.about_centre(times).vis_viva
 
     @property
     def scan(self) -> FunctionScan | None:
-        """See `Description`."""
         return self._scan
 
     @cached_property
@@ -142,7 +136,6 @@ class AssemblyDescription(UngaugedDescription):
         return replace(moved, judge=judge, angles=angles, columns=columns, quantities=quantities, words=_PART_WORDS)
 
     def smoothness(self, breaks: Array) -> Smoothness:
-        """See `Description`."""
         scan = self.scan
         return Smoothness(
             breaks=breaks,

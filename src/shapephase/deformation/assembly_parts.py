@@ -92,7 +92,6 @@ class RigidPart:
     __repr__ = short_repr
 
     def moments(self, times: Array, origin: Array) -> Moments:
-        """See `Part`."""
         arm = self.centre - origin
         still = np.zeros((len(times), 3))
         second = self.moment + self.mass * np.outer(arm, arm)
@@ -100,12 +99,10 @@ class RigidPart:
         return Moments(still + self.mass * arm, still, matrix + second, matrix, np.zeros(len(times)))
 
     def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:  # noqa: ARG002
-        """See `Part`."""
         of_all = self.moments(times, origin)
         return of_all.second, of_all.flow
 
     def lever(self, columns: Array, origin: Array) -> float:  # noqa: ARG002
-        """See `Part`."""
         return 0.0
 
 
@@ -131,14 +128,12 @@ class MovingMass:
     __repr__ = short_repr
 
     def moments(self, times: Array, origin: Array) -> Moments:
-        """See `Part`."""
         at, speed = self.path.curve(times)
         arm = at - origin
         second, flow = (self.mass * arm[:, :, None] * other[:, None] for other in (arm, speed))
         return Moments(self.mass * arm, self.mass * speed, second, flow, self.mass * np.sum(speed**2, axis=-1))
 
     def correlation(self, times: Array, reference: float, origin: Array) -> tuple[Array, Array]:
-        """See `Part`."""
         at, speed = self.path.curve(times)
         there = self.mass * (self.path.curve(np.array([reference]))[0][0] - origin)
         return (at - origin)[:, :, None] * there, speed[:, :, None] * there
@@ -179,7 +174,6 @@ class Boom:
     __repr__ = short_repr
 
     def moments(self, times: Array, origin: Array) -> Moments:
-        """See `Part`."""
         out, speed = (column[:, 0] for column in self.path.curve(times))
         density, arm, axis = self.mass / self.full_length, self.root - origin, self.direction
         half, third = 0.5 * density * out**2, density * out**3 / 3.0

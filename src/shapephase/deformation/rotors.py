@@ -33,16 +33,7 @@ class Rotor:
     inertia : J about the axle [kg m^2]
     axle : (3,) unit vector in the axes of the link
     value : the momentum p = J (a . omega_link + spin), or the spin itself [kg m^2/s] or [rad/s]
-    is_momentum : which of both it is
-
-    Examples
-    --------
-    >>> satellite = sp.load_body("satellite")
-    >>> rest = [name for name in satellite.joint_names if name != "wheel_spin"]
-    >>> still = sp.ShapePath.waypoints([0.0, 1.0], np.zeros((2, len(rest))), joint_names=rest)
-    >>> deformation = sp.articulated(satellite, still, rotors={"wheel_spin": 2.0})
-    >>> deformation.description.rotors[0].joint, deformation.internal_momentum(0.5).round(9).tolist()
-    ('wheel_spin', [0.0, 0.0, 2.0])
+    is_momentum : True for the momentum
     """
 
     joint: str
@@ -72,7 +63,6 @@ class RotorDescription(UngaugedDescription):
     __repr__ = short_repr
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """See `Description`."""
         shapes, rates = self.route.curve(times)
         inertia, internal = self.platform.sample(shapes, rates)
         for rotor in self.rotors:
@@ -86,7 +76,6 @@ class RotorDescription(UngaugedDescription):
         return inertia, internal
 
     def inertia_rate(self, times: Array) -> Array:
-        """See `Description`."""
         shapes, rates = self.route.curve(times)
         rate = self.platform.inertia_rate(shapes, rates)
         for rotor in self.rotors:
@@ -116,11 +105,9 @@ class RotorDescription(UngaugedDescription):
         return np.stack(speeds, axis=-1)
 
     def centre_of_mass(self, times: Array) -> Array:
-        """See `Description`."""
         return self.platform.centre_of_mass(self.route.curve(times)[0])
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
-        """See `Description`."""
         still = self.route.curve(np.array([reference]))[0][0]
         return self.platform.mass_correlation(*self.route.curve(times), still)
 
@@ -134,22 +121,18 @@ class RotorDescription(UngaugedDescription):
 
     @property
     def scan(self) -> FunctionScan | None:
-        """See `Description`."""
         return self.route.scan
 
     def depends_on(self) -> ScannedFunction:
-        """See `Description`."""
         return path_function(self.route.curve, self.route.n_shape, self.route.joint_names)
 
     def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:
-        """See `Description`."""
         shapes, rates = self.route.curve(times)
         return self.platform.link_pose(shapes, link)[:, :3, :3], self.platform.link_angular_velocity(
             shapes, rates, link
         )
 
     def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
-        """See `Description`."""
         return self.route.smoothness
 
     def _axle(self, rotor: Rotor, shapes: Array, rates: Array) -> tuple[Array, Array]:

@@ -11,15 +11,21 @@ Lambda = 1 at the end, makes one integral of every change: eta(T) = integral of 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ..body.body import Body
+from ..body.couplings.coordinate_map import check_smooth
+from ..body.inertial_regressor import LinkMotions, by_link_parameters, link_motions
+from ..body.momentum_gradients import by_independent, by_shape_and_rate
+from ..integrator import link_tree, machine_code
 from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
+from ..shape_space.path_samples import PathSamples
 from ..shape_space.shape_path import ShapePath
 
 _NODES = 5  # of Gauss's rule on each piece: its order is ten, that of a step of the motion eight
@@ -218,3 +224,57 @@ def _rule() -> tuple[Array, Array, Array]:
     exponents = np.arange(1.0, _NODES + 1.0)
     matrix = (powers * (0.5 * (nodes + 1.0))[:, None] / exponents) @ np.linalg.inv(powers)
     return 0.5 * (nodes + 1.0), 0.5 * weights, matrix
+
+
+@dataclass(frozen=True, eq=False)
+class BodyAlong:
+    """A body at N shapes and rates of a path.
+
+    Attributes
+    ----------
+    body : the body of the path
+    times : (N,) [s]
+    shapes, rates : (N, n)
+    """
+
+    body: Body
+    times: Array
+    shapes: Array
+    rates: Array
+
+    def by_knots(self, samples: PathSamples, spins: Array, rows: Array, momenta: Array) -> Array:
+        """Sums of row . d(I w + J rate), w staying, by the path at its knots.
+
+        (S r, m), from spins (N, S, 3), rows (N, S, r, 3) and momenta I w + J rate (N, S, 3), which are minus the
+        derivative by the duration's logarithm where a path is closed.
+        """
+        chain, closing = self.body.chain, samples.is_closing(self.times)
+        check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
+        if self._has_kernels:
+            of_all = link_tree.momentum_gradients(chain.rows, self.shapes, self.rates, spins, rows)
+            parts = by_independent(chain, *of_all, self.shapes, self.rates)
+        else:
+            parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
+        by_knots = samples.by_knots(self.times, *parts)
+        if closing.any():
+            by_duration = -np.einsum("nsrc,nsc->sr", rows[closing], momenta[closing]).ravel()
+            by_knots += by_duration[:, None] * samples.seconds_by_knots()
+        return by_knots
+
+    def by_inertias(self, spins: Array, rows: Array) -> Array:
+        """Derivatives by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
+        chain = self.body.chain
+        if not self._has_kernels:
+            pairs = zip(np.moveaxis(rows, 1, 0), np.moveaxis(spins, 1, 0), strict=True)
+            return np.concatenate([by_link_parameters(self._links, row, spin) for row, spin in pairs])
+        sums = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
+        return chain.rows.in_chain_axes(sums).reshape(len(sums), -1)
+
+    @property
+    def _has_kernels(self) -> bool:
+        """True where kernels serve: bodies with ball joints have no rows, and interpreted kernels are slower."""
+        return self.body.chain.has_rows and machine_code.is_used()
+
+    @cached_property
+    def _links(self) -> LinkMotions:
+        return link_motions(self.body.chain, self.shapes, self.rates)

@@ -12,8 +12,7 @@ from .. import so3
 from ..arrays import Array
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import path_samples
-from ._along_motion import AlongMotion, along_motion, responses
-from ._body_along import BodyAlong
+from ._along_motion import AlongMotion, BodyAlong, along_motion, responses
 from .result_derivatives import described_by
 
 

@@ -102,10 +102,10 @@ def residual_noise(residuals: Array, slopes: Array) -> ResidualNoise:
 
 def _by_correlation(slopes: Array) -> Array:
     """Covariances of an ordinary least-squares fit, where residuals have variance one: (3 N, m) -> (m, m, F)."""
-    answers = np.linalg.pinv(slopes).reshape(slopes.shape[1], -1, 3)
-    count = answers.shape[1]
+    inverse = np.linalg.pinv(slopes).reshape(slopes.shape[1], -1, 3)
+    count = inverse.shape[1]
     size = 1 << (2 * count - 1).bit_length()
-    waves = np.fft.rfft(answers, size, axis=1)
+    waves = np.fft.rfft(inverse, size, axis=1)
     by_lag = np.fft.irfft(np.einsum("afc,bfc->abf", waves, waves.conj()), size, axis=2)[:, :, :count]
     by_lag += np.swapaxes(by_lag, 0, 1)
     by_lag[:, :, 0] *= 0.5

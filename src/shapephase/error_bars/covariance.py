@@ -56,8 +56,8 @@ class Uncertainty:
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.uncertainty(motion, attitude=0.01)
-    >>> print(np.sqrt(found.final_attitude.diagonal()).round(3))
+    >>> bars = sp.uncertainty(motion, attitude=0.01)
+    >>> print(np.sqrt(bars.final_attitude.diagonal()).round(3))
     [0.012 0.009 0.01 ]
     """
 
@@ -129,23 +129,23 @@ def uncertainty(
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.uncertainty(motion, momentum=1e-5)
-    >>> print(f"{found.dynamic_phase:.6f} rad")
+    >>> bars = sp.uncertainty(motion, momentum=1e-5)
+    >>> print(f"{bars.dynamic_phase:.6f} rad")
     0.000813 rad
     """
     if inertias is not None:
         check_object(inertias, "InertiaErrors", "inertias")
-    found = derivatives(motion)
+    derived = derivatives(motion)
     inputs = inputs_of(motion, joints, inertias, momentum, attitude, start)
     covariances = [np.zeros((3, 3)) for _ in _ROTATIONS]
     variances, of_start = np.zeros(len(_PHASES)), np.zeros((UNKNOWNS, UNKNOWNS))
-    for cause in _causes(found, inputs):
+    for cause in _causes(derived, inputs):
         for total, name in zip(covariances, _ROTATIONS, strict=True):
             total += _carried(getattr(cause.derivative, name), cause.covariance)
         variances += [_carried(getattr(cause.derivative, name)[None], cause.covariance)[0, 0] for name in _PHASES]
         of_start += _carried(cause.start, cause.covariance)
     deviations = np.sqrt(variances)
-    bias = 0.0 if inputs.samples is None else _smoothing_bias(found, covariances, deviations)
+    bias = 0.0 if inputs.samples is None else _smoothing_bias(derived, covariances, deviations)
     return _uncertainty(split(motion), covariances, deviations, of_start, smoothing_bias=bias, draws=0)
 
 
@@ -182,8 +182,8 @@ def sampled_uncertainty(
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.sampled_uncertainty(motion, momentum=1e-5, draws=10)
-    >>> print(f"{found.draws} draws, {found.dynamic_phase:.4f} rad")
+    >>> bars = sp.sampled_uncertainty(motion, momentum=1e-5, draws=10)
+    >>> print(f"{bars.draws} draws, {bars.dynamic_phase:.4f} rad")
     10 draws, 0.0008 rad
     """
     if inertias is not None:
@@ -196,7 +196,7 @@ def sampled_uncertainty(
     paths, bodies, changes = [path] * draws, [body] * draws, np.zeros((draws, UNKNOWNS))
     if inputs.samples is not None:
         samples, errors = path_samples(path), normal(inputs.samples)
-        paths = [samples.path_through(samples.values + one.reshape(samples.values.shape)) for one in errors]
+        paths = [samples.path_through(samples.values + row.reshape(samples.values.shape)) for row in errors]
         changes += errors @ samples.by_samples(_fit_by_knots(motion, inputs)).T
     if inputs.links is not None:
         errors = normal(inputs.links)
@@ -218,7 +218,7 @@ def sampled_uncertainty(
         for which, (rotation, usual) in enumerate(zip(rotations, expected, strict=True)):
             turns[which, row] = so3.log(rotation @ usual.T)
         phases[row] = angles
-    covariances = [np.cov(one, rowvar=False) for one in turns]
+    covariances = [np.cov(vectors, rowvar=False) for vectors in turns]
     return _uncertainty(middle, covariances, phases.std(axis=0, ddof=1), np.cov(changes, rowvar=False), draws=draws)
 
 
@@ -240,26 +240,26 @@ class _Cause(NamedTuple):
     covariance: Array
 
 
-def _causes(found: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
-    by_start = _combined(np.hstack, found.by_attitude, found.by_momentum)
+def _causes(derived: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
+    by_start = _combined(np.hstack, derived.by_attitude, derived.by_momentum)
 
     def moving_the_fit(derivative: ResultDerivative, start: Array, covariance: Array) -> _Cause:
         return _Cause(_combined(lambda pair: pair[0] + pair[1] @ start, derivative, by_start), start, covariance)
 
     if inputs.samples is not None:
-        samples, by_fit = path_samples(found.path), _fit_by_knots(found.motion, inputs)
+        samples, by_fit = path_samples(derived.path), _fit_by_knots(derived.motion, inputs)
         for rule in samples.rules:
-            yield moving_the_fit(found.at_knots(rule), rule(by_fit), inputs.samples)
+            yield moving_the_fit(derived.at_knots(rule), rule(by_fit), inputs.samples)
         # The bias is one unknown of variance one, times its estimate.
         taken = samples.bias[:, None]
-        yield moving_the_fit(found.at_knots(lambda by_knots: by_knots @ taken), by_fit @ taken, np.ones(1))
+        yield moving_the_fit(derived.at_knots(lambda by_knots: by_knots @ taken), by_fit @ taken, np.ones(1))
     if inputs.links is not None:
-        by_links = _combined(lambda only: by_relative_errors(found.body, only[0]), found.by_inertias)
-        yield moving_the_fit(by_links, _fit_by_links(found.motion, inputs), inputs.links)
+        by_links = _combined(lambda only: by_relative_errors(derived.body, only[0]), derived.by_inertias)
+        yield moving_the_fit(by_links, _fit_by_links(derived.motion, inputs), inputs.links)
     if inputs.momentum is not None:
-        yield _Cause(found.by_momentum, np.eye(UNKNOWNS)[:, 3:], inputs.momentum)
+        yield _Cause(derived.by_momentum, np.eye(UNKNOWNS)[:, 3:], inputs.momentum)
     if inputs.attitude is not None:
-        yield _Cause(found.by_attitude, np.eye(UNKNOWNS)[:, :3], inputs.attitude)
+        yield _Cause(derived.by_attitude, np.eye(UNKNOWNS)[:, :3], inputs.attitude)
     if inputs.start is not None:
         yield _Cause(by_start, np.eye(UNKNOWNS), inputs.start)
 
@@ -299,20 +299,20 @@ def _carried(derivative: Array, covariance: Array) -> Array:
     return (derivative * covariance if covariance.ndim == 1 else derivative @ covariance) @ derivative.T
 
 
-def _smoothing_bias(found: Derivatives, covariances: list[Array], deviations: Array) -> float:
+def _smoothing_bias(derived: Derivatives, covariances: list[Array], deviations: Array) -> float:
     """The largest shift of a result by smoothing, in standard deviations: of a rotation about its worst axis."""
-    taken = path_samples(found.path).bias
+    taken = path_samples(derived.path).bias
     if not taken.any():
         return 0.0
     shifts = []
     for name, covariance in zip(_ROTATIONS, covariances, strict=True):
         values, vectors = np.linalg.eigh(covariance)
         known = values > _ROUNDING * max(float(values[-1]), 0.0)
-        turn = vectors.T @ (getattr(found.by_knots, name) @ taken)
+        turn = vectors.T @ (getattr(derived.by_knots, name) @ taken)
         shifts.append(float(np.sqrt((turn[known] ** 2 / values[known]).sum())))
     for name, deviation in zip(_PHASES, deviations, strict=True):
         if deviation:
-            shifts.append(abs(float(getattr(found.by_knots, name) @ taken)) / float(deviation))
+            shifts.append(abs(float(getattr(derived.by_knots, name) @ taken)) / float(deviation))
     return max(shifts)
 
 

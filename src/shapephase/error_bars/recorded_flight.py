@@ -79,10 +79,10 @@ def motion_from_recording(
     ShapeError
         For an attitude beside a momentum that is fitted, or axes to be found without a fit.
     TrajectoryError
-        If nobody said that the recording is a flight, and its base is none: the fit does not settle, or what it leaves
-        is no noise.
+        If the recording was not declared to be a flight, and its base is none: the fit does not settle, or what it
+        leaves is no noise.
     AccuracyNotReached
-        If the fit to a flight that was asked for does not settle.
+        If the fit to a requested flight does not settle.
 
     Warns
     -----

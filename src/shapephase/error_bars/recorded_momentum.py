@@ -153,8 +153,8 @@ def momentum_from_recording(
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> motion, times = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), np.linspace(0.0, 1.0, 9)
-    >>> found = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times))
-    >>> print(found.momentum.round(6) + 0.0)
+    >>> result = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times))
+    >>> print(result.momentum.round(6) + 0.0)
     [0.    0.    0.005]
     """
     check_flag(find_axes, "find_axes")
@@ -173,10 +173,10 @@ def momentum_from_recording(
         if _is_flight_with_w_first(deformation, at, recorded, tolerance, find_axes=find_axes):
             raise TrajectoryError(f"the recorded base is no flight of this body; {W_FIRST}") from error
         raise
-    found = _estimated(fit, at, noise, tolerance)
-    if not found.conserved:
-        warn_of_drift(found)
-    return found
+    result = _estimated(fit, at, noise, tolerance)
+    if not result.conserved:
+        warn_of_drift(result)
+    return result
 
 
 def _estimated(fit: _Fitted, times: Array, noise: float | None, tolerance: float) -> RecordedMomentum:

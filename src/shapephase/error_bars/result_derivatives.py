@@ -1,4 +1,4 @@
-"""How the results of a motion answer to small changes of everything that they depend on."""
+"""Derivatives of the results of a motion by everything that they depend on."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from ..errors import ShapeError, WrongObjectError
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
-from ._along_motion import along_motion
-from ._body_along import BodyAlong
+from ._along_motion import BodyAlong, along_motion
 
 
 @dataclass(frozen=True, eq=False)

@@ -182,8 +182,8 @@ def orbit_of_area(moments: ArrayLike, magnitude: float, solid_angle: float) -> E
         raise ShapeError(
             f"solid_angle: the orbits about axis 3 have areas from 0 to {limit:.9g} sr, got {what_came(solid_angle)}"
         )
-    found = root_scalar(lambda x: orbit(x).solid_angle - solid_angle, bracket=(nearest, farthest), xtol=1e-15)
-    return orbit(float(found.root))
+    tilt = root_scalar(lambda x: orbit(x).solid_angle - solid_angle, bracket=(nearest, farthest), xtol=1e-15)
+    return orbit(float(tilt.root))
 
 
 def adiabatic_precession(deformation: Deformation, momentum: ArrayLike, until: float) -> float:

@@ -66,10 +66,7 @@ class Channels:
 def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
     """The channels of I and L_o: (N, 3, 3), (N, 3) -> (N, 9); messages have the times (N,) [s].
 
-    Raises
-    ------
-    SingularInertiaError, ShapeError
-        If a tensor is singular, or a momentum not finite.
+    Raises SingularInertiaError if a tensor is singular, ShapeError if a momentum is not finite.
     """
     inverse = inverse_inertia(inertia, times)
     channels = np.empty((len(times), 9))

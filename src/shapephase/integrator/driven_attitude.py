@@ -13,6 +13,7 @@ from ..arrays import Array, lock_arrays
 from ..display import short_repr
 from ..errors import AccuracyNotReached
 from ..sphere import gauss_nodes
+from .channels import Evaluate
 from .limited_steps import Run, StepLimits, limited_run
 
 # Times (N,), attitudes (N, 3, 3), other states (N, k) -> angular velocities, body axes (N, 3), and rates (N, k).
@@ -106,15 +107,6 @@ def driven_attitude(
     ------
     AccuracyNotReached
         If the sharpest two runs disagree by more than the tolerance, or the rates change too often in short times.
-
-    Examples
-    --------
-    >>> from shapephase.integrator.driven_attitude import driven_attitude
-    >>> def rates(t, attitude, states):
-    ...     return np.column_stack([0.0 * t, 0.0 * t, states[:, 0]]), np.ones((len(t), 1))  # a turn that speeds up
-    >>> driven = driven_attitude(rates, np.array([0.0, 1.0]), np.eye(3), np.zeros(1), np.ones(1), 1e-9)
-    >>> print(f"{float(sp.so3.angle(driven.attitude(np.array([1.0]))[0])):.9f}")
-    0.500000000
     """
 
     def slopes(times: Array, values: Array) -> Array:
@@ -211,3 +203,39 @@ def _defects(slopes: Callable[[Array, Array], Array], run: Run) -> Array:
         integrals = np.add.reduceat(np.einsum("pm,pmk->pk", weights, at_nodes), first, axis=0)
         defects[long] = np.abs(run(run.times[long + 1]) - run(run.times[long]) - integrals)
     return defects
+
+
+def dop853_rotation(
+    evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float
+) -> tuple[Callable[[Array], Array], int]:
+    """S(t) for one Pi_0 by SciPy's DOP853 on the quaternion, restarted at the breaks.
+
+    Every stage evaluates the deformation itself; the library's interpolation and stepping are not used.
+
+    Returns a function of times (N,) -> quaternions (N, 4), and the number of evaluations of I and L_o. Raises the
+    errors of `driven_attitude`. An independent check of `integrate`.
+
+    Examples
+    --------
+    >>> def evaluate(t):
+    ...     return np.broadcast_to(np.diag([1.0, 2.0, 2.5]), (len(t), 3, 3)), np.zeros((len(t), 3))
+    >>> turn, _ = sp.integrator.dop853_rotation(evaluate, np.array([0.0, 1.0]), np.array([0.0, 0.0, 5.0]), 1e-9)
+    >>> print(f"{np.linalg.norm(sp.so3.rotation_vector_from_quat(turn(np.array([1.0])))):.6f}")
+    2.000000
+    """
+    driven = dop853_attitude(evaluate, breaks, momentum, tolerance)
+    return driven.run, driven.evaluations
+
+
+def dop853_attitude(
+    evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float, limits: StepLimits | None = None
+) -> DrivenAttitude:
+    """S(t) of `dop853_rotation` with its measured error, by steps within limits; errors as `driven_attitude`."""
+
+    def rates(times: Array, attitudes: Array, states: Array) -> tuple[Array, Array]:
+        inertia, internal = evaluate(times)
+        pi = so3.apply(so3.transpose(attitudes), momentum)
+        return np.asarray(np.linalg.solve(inertia, (pi - internal)[..., None])[..., 0], dtype=np.float64), states
+
+    nothing = np.zeros(0)
+    return driven_attitude(rates, breaks, np.eye(3), nothing, nothing, tolerance, limits)

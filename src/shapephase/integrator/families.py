@@ -16,7 +16,7 @@ from .. import run_progress
 from ..arrays import Array, Integers, Mask
 from ..errors import AccuracyNotReached, ShapeError, SingularInertiaError
 from .channels import inverted
-from .fresh_times import fresh_times
+from .integrate import fresh_times
 from .many_rotations import CLASSES, GroupedRotations, rotations_of_each, rounded_up
 from .samples import Panels
 from .sampling import Sampler, nodes_of_panels
@@ -75,17 +75,10 @@ class VariantRotations:
 
 
 def rotations_of_variants(variants: Variants, momentum: Array, tolerance: float) -> VariantRotations:
-    """Integrate the attitude equation of each deformation as if there were no others.
+    """Integrate the attitude equation of each deformation as if there were no others, to a tolerance [rad].
 
-    Parameters
-    ----------
-    momentum : (N, 3) body angular momentum at the start of each [kg m^2/s]
-    tolerance : of every attitude over the whole interval [rad]
-
-    Raises
-    ------
-    AccuracyNotReached, SingularInertiaError
-        Where one deformation alone would raise it; the message has its number.
+    `momentum` (N, 3) is the body's at the start of each [kg m^2/s]. Raises AccuracyNotReached and SingularInertiaError
+    where one deformation alone would; the message has its number.
     """
     count = len(momentum)
     ceilings = rounded_up(magnitudes_and_directions(momentum)[0], CLASSES)

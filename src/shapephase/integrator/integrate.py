@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
+from .channels import rates_of
 from .constants import (
     ANGLE_OF_STEP,
     EPS,
@@ -28,7 +29,6 @@ from .constants import (
     STEPPING_SHARE,
     TERMS_OF_STEP,
 )
-from .fresh_times import compare, fresh_times
 from .interpolant import Interpolant
 from .kernels import spectra_kernel
 from .machine_code import plain
@@ -46,6 +46,8 @@ _LEAST_TOLERANCE = 1e-9  # of the tolerance: samples are not made denser
 _EXAGGERATED = 1024.0  # roundings by which samples are changed, so that the effect stands out of the marches' own
 _TINY = 1e-300  # keeps quotients defined where marches agree to the last bit
 _LOST = 0.1  # [rad] between marches, beyond which their distance does not show how errors fall
+_TERMS_A_TIME = 12  # terms of series for each fresh time: 8 % of the evaluations at most
+_GOLDEN = 0.6180339887498949  # step of the shares of panels at which neighbours are compared: never a node
 
 
 class Refinement(NamedTuple):
@@ -244,3 +246,44 @@ def rounding_of_times(samples: Samples, momentum: Array) -> Array:
     magnitudes, _ = magnitudes_and_directions(momentum)
     inverse, drift = samples.rates
     return EPS * float(samples.interpolant.edges[-1]) * (magnitudes * inverse + drift)
+
+
+def fresh_times(interpolant: Interpolant) -> tuple[Array, Integers]:
+    """One time in each panel of the first loop, or in every few of low degree, and the panels: (N,) [s], (N,)."""
+    panels, terms = len(interpolant.coefficients), np.count_nonzero(interpolant.coefficients[:, :, 0])
+    chosen = np.arange(0, panels, -(-_TERMS_A_TIME * panels // max(terms, panels)))
+    share = np.mod(0.5 + _GOLDEN * (chosen + 1.0), 1.0)
+    return interpolant.edges[chosen] + share * interpolant.widths[chosen], chosen
+
+
+def swings(gaps: Array, coefficients: Array, widths: Array, momentum: float) -> Array:
+    """Angles by which gaps between series and body swing the attitude: (..., N) [rad].
+
+    The terms that a series of degree d lacks swing at least d half-times over its panel, so a gap of r rad/s in the
+    rate of turning swings the attitude by about r width/d.
+
+    `gaps` (..., N, 9) are those of the channels, `coefficients` (..., N, n, 9) those of the series, `widths` (N,) those
+    of their panels [s], `momentum` is a magnitude [kg m^2/s].
+    """
+    is_term = np.abs(coefficients).max(axis=-1) > 0.0
+    degrees = is_term.shape[-1] - 1 - np.argmax(is_term[..., ::-1], axis=-1)
+    return rates_of(gaps, momentum) * widths / np.maximum(degrees, 1)
+
+
+def compare(interpolant: Interpolant, body: Array, momentum: float, tolerance: float) -> None:
+    """Compare an interpolant with the body's channels (N, 9) at its fresh times.
+
+    Error estimates come from an interpolant's own series; only this comparison shows a fault in how these were put
+    together. Series within their estimates are off by swings of at most a third of the tolerance [rad], over all loops
+    and for momenta up to a magnitude [kg m^2/s]. Raises AccuracyNotReached for a swing above the tolerance.
+    """
+    times, chosen = fresh_times(interpolant)
+    gaps = interpolant.channels(times[:, None], chosen)[:, 0] - body
+    angles = interpolant.loops * swings(gaps, interpolant.coefficients[chosen], interpolant.widths[chosen], momentum)
+    worst = int(np.argmax(angles))
+    if not angles[worst] <= tolerance:
+        raise AccuracyNotReached(
+            f"the samples near t = {times[worst]:.9g} s do not give the body there: the attitude may be off by "
+            f"{angles[worst]:.3g} rad, which no error estimate shows. Either a function of yours gives other values "
+            'when it is called again, or this is a fault of shapephase; method="dop853" takes no samples'
+        )

@@ -108,15 +108,8 @@ def limited_run(
 ) -> Run:
     """Integrate by SciPy's DOP853, restarted at the breaks, with steps within limits.
 
-    Parameters
-    ----------
-    slope : time, state (4 + k,) -> (4 + k,); a unit quaternion comes first
-    breaks : (M,) between which the slope is smooth, and at whose inner sides it is evaluated [s]
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the steps become too short.
+    `slope` is a function of time and state (4 + k,), of which a unit quaternion comes first, smooth between the breaks
+    (M,) [s] and evaluated at their inner sides. Raises AccuracyNotReached if the steps become too short.
     """
     from scipy.integrate import DOP853, OdeSolution
 

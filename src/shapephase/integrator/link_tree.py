@@ -83,14 +83,7 @@ def _sampled(
 def momentum_gradients(tree: LinkRows, shapes: Array, rates: Array, spins: Array, rows: Array) -> tuple[Array, Array]:
     """Products row . d(I w + L_o), w fixed, by the coordinates of all joints, followers included, and by their rates.
 
-    Parameters
-    ----------
-    shapes, rates : (N, n)
-    spins, rows : (N, S, 3) w, and (N, S, r, 3), axes of the base
-
-    Returns
-    -------
-    (N, S r, k) each
+    (N, S r, k) each, from shapes and rates (N, n), spins w (N, S, 3) and rows (N, S, r, 3), axes of the base.
     """
     coordinates, speeds = tree.coordinates(shapes, rates)
     by_shape, by_rate = np.empty((2, *rows.shape[:3], len(tree.parents)))
@@ -105,9 +98,7 @@ def momentum_gradients(tree: LinkRows, shapes: Array, rates: Array, spins: Array
 def inertial_sums(tree: LinkRows, shapes: Array, rates: Array, spins: Array, rows: Array) -> Array:
     """Sums over the shapes of row . d(I w + L_o) by the parameters of each frame of the tree; arguments as above.
 
-    Returns
-    -------
-    (S r, k + 1, 10) by mass, first moment and inertia xx yy zz yz xz xy, axes of the frame
+    (S r, k + 1, 10), by mass, first moment and inertia xx yy zz yz xz xy, axes of the frame.
     """
     coordinates, speeds = tree.coordinates(shapes, rates)
     spins = np.repeat(spins, rows.shape[2], axis=1)

@@ -121,18 +121,10 @@ class _Group(NamedTuple):
 def rotations_of_each(
     sampler: Sampler, momentum: Array, tolerance: float, *, threads: int | None = None
 ) -> SteppedRotation | GroupedRotations:
-    """Integrate the attitude equation for each momentum as if it were alone.
+    """Integrate the attitude equation for each momentum (B, 3) [kg m^2/s] as if it were alone, to a tolerance [rad].
 
-    Parameters
-    ----------
-    momentum : (B, 3) body angular momentum at the start [kg m^2/s]
-    tolerance : of every attitude over the whole interval [rad]
-    threads : at most, in machine code; None: one for each processor. Results do not depend on it
-
-    Raises
-    ------
-    AccuracyNotReached
-        If an estimate stays above the tolerance; in a batch the message has its row.
+    Machine code uses so many threads at most; None: one for each processor. Results do not depend on it. Raises
+    AccuracyNotReached if an estimate stays above the tolerance; in a batch the message has its row.
     """
     magnitudes, _ = magnitudes_and_directions(momentum)
     ceilings = rounded_up(magnitudes, CLASSES)

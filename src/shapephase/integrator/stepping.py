@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
+from threading import RLock
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import run_progress
+from .. import run_progress, so3
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from .interpolant import Interpolant
 from .kernels import spectra_kernel, step_kernel
 from .machine_code import expect_work
-from .threads import in_threads
 
 _AT_ONCE = 4000  # steps whose channels are in memory: four times as many take some 16 megabytes
 _FEW = 24  # steps of a panel up to which the matrix of their channels is kept: half a megabyte at most
@@ -23,6 +26,8 @@ _TURN = 1e-7  # [rad] of the starts that show the growth of errors: its square i
 _MARKS = 17  # times between which the growth of errors is measured, the start included
 _JOBS = 12  # steps taken side by side for each of the coarsest
 _IMAGINARY = 1e-60  # part of a direction, for derivatives: its square vanishes, and products stay far above underflow
+_LEAST_FOR_A_THREAD = 64  # rows: some tenths of a millisecond of work
+_MOST_AT_ONCE = 8192  # rows in one call: some tenths of a second, after which a run that is watched reports progress
 
 
 class Block(NamedTuple):
@@ -56,11 +61,8 @@ def stage_channels(
 ) -> tuple[Array, Integers]:
     """The channels at the stages of steps, times their lengths, and the steps of each panel: (K, STAGES, 9), (P,).
 
-    Each panel has first its steps, then for each further factor so many times as many.
-
-    Parameters
-    ----------
-    series, widths, steps : (P, n, 9), (P,) [s], (P,) of each panel of one loop
+    Series (P, n, 9), widths (P,) [s] and steps (P,) are those of the panels of one loop. Each panel has first its
+    steps, then for each further factor so many times as many.
     """
     part = slice(block.low, block.high)
     scaled, counts = series[part] * widths[part, None, None], steps[part]
@@ -103,12 +105,8 @@ def stepped_quaternions(
 ) -> Array:
     """Attitudes at the ends of steps of all loops, quaternions xyzw: (B, K + 1, 4).
 
-    Parameters
-    ----------
-    series : (P, n, 9) on the interpolant's panels
-    steps : (P,) on each of them
-    momentum : (B, 3) body angular momentum at the start [kg m^2/s]
-    start : (B, 4) attitudes; None: the identity
+    Series (P, n, 9) and steps (P,) are those of the interpolant's panels, `momentum` (B, 3) the body's at the start
+    [kg m^2/s], `start` (B, 4) its attitudes; None: the identity.
     """
     return _stepped_quaternions(interpolant, series, steps, *magnitudes_and_directions(momentum), start)
 
@@ -228,17 +226,6 @@ def attempted(
     )
 
 
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack(
-        [
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ],
-        axis=-1,
-    )
-
-
 def small_turns(start: Array, end: Array) -> Array:
     """Turns from quaternions xyzw to others near them, body axes: (..., 4), (..., 4) -> (..., 3) [rad]."""
     # A quaternion and its negative are one attitude.
@@ -271,7 +258,7 @@ def momentum_slope(interpolant: Interpolant, steps: Integers, momentum: Array) -
 def _twice_turned(start: Array, end: Array) -> Array:
     """Twice the vector of the quaternion start^-1 end: (..., 4), (..., 4) -> (..., 3)."""
     u, p, v, q = start[..., :3], start[..., 3:], end[..., :3], end[..., 3:]
-    return 2.0 * (p * v - q * u - _cross(u, v))
+    return 2.0 * (p * v - q * u - so3.cross(u, v))
 
 
 def part_channels(interpolant: Interpolant, starts: Array, lengths: Array) -> Array:
@@ -279,3 +266,47 @@ def part_channels(interpolant: Interpolant, starts: Array, lengths: Array) -> Ar
     panel = interpolant.panel_of(starts + 0.5 * lengths)
     times = starts[:, None] + lengths[:, None] * step_kernel.NODES
     return interpolant.channels(times, panel) * lengths[:, None, None]
+
+
+def in_threads(run: Callable[[slice], None], batch: int, threads: int | None = None) -> Iterator[slice]:
+    """Compute all rows, some in each call of `run`, which frees the interpreter; yield the rows after each call.
+
+    Calls run in at most so many threads where there are enough rows; None: one thread for each processor. Each computes
+    rows of its own, so that results do not depend on how many there are.
+    """
+    workers = max(1, min(processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
+    count = max(1, min(-(-batch // workers), _MOST_AT_ONCE))
+    parts = [slice(first, min(first + count, batch)) for first in range(0, max(batch, 1), count)]
+    results = map(run, parts) if workers == 1 or len(parts) == 1 else _pool(workers).map(run, parts)
+    for rows, _ in zip(parts, results, strict=True):
+        yield rows
+
+
+@lru_cache(maxsize=4)
+def _pool(workers: int) -> ThreadPoolExecutor:
+    """Threads that wait for the next call: to start them takes as long as a hundred momenta."""
+    return ThreadPoolExecutor(workers)
+
+
+def _free_after_fork() -> None:
+    """Drop the threads that a child of this process does not have, and the locks that they held."""
+    _pool.cache_clear()
+    if sys.version_info >= (3, 12):
+        return
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] == __name__.partition(".")[0]:
+            for kind in list(vars(module).values()):
+                for attribute in list(vars(kind).values()) if isinstance(kind, type) else ():
+                    if isinstance(attribute, cached_property):
+                        # Held while a value is computed, for all objects of the class (bpo-43468).
+                        vars(attribute)["lock"] = RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_free_after_fork)
+
+
+@lru_cache(maxsize=1)
+def processors() -> int:
+    """Number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

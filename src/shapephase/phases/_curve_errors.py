@@ -86,8 +86,8 @@ class CurveErrors:
     @property
     def attitude(self) -> Array:
         """Error of the attitude of the deformation's own frame at the end: (B,) [rad]."""
-        found = _at_end(self._of_attitude) + self._unseen
-        return np.minimum(found, self.motion.solution.error_estimate)
+        error = _at_end(self._of_attitude) + self._unseen
+        return np.minimum(error, self.motion.solution.error_estimate)
 
     @property
     def lift(self) -> Array:
@@ -107,8 +107,8 @@ class CurveErrors:
     @property
     def between(self) -> Array:
         """Error of the rotation from the lift to the attitude, at the end: (B,) [rad]."""
-        found = _at_end(self._of_attitude - self._of_lift) + self._unseen + self._unseen_of_lift
-        return np.minimum(found, self.motion.solution.error_estimate + self.motion.horizontal_lift.error_estimate)
+        error = _at_end(self._of_attitude - self._of_lift) + self._unseen + self._unseen_of_lift
+        return np.minimum(error, self.motion.solution.error_estimate + self.motion.horizontal_lift.error_estimate)
 
     def of(self, arcs: CurveArcs, residual: Array, targets: Array) -> PhaseErrors:
         """Errors of arcs of the curve, closed by great circles from their ends to targets (B, N, 3), gauge axes.
@@ -206,12 +206,12 @@ class CurveErrors:
 
     @cached_property
     def _unseen_of_gauge(self) -> Array:
-        found = self._unseen if self.curve.lift is None else self._unseen + self._unseen_of_lift
+        unseen = self._unseen if self.curve.lift is None else self._unseen + self._unseen_of_lift
         if self.curve.frames is None and len(self.curve.edges) == self._stepped.quaternions.shape[1]:
-            return found
+            return unseen
         # What is between the ends of steps counts, too.
         grown = _norms(np.diff(self._of_attitude, axis=2)).max(axis=2, initial=0.0)
-        return found + _NOT_LINEAR * np.tensordot(_FACTORS, grown, axes=1)
+        return unseen + _NOT_LINEAR * np.tensordot(_FACTORS, grown, axes=1)
 
     @cached_property
     def _of_gauge(self) -> Array:

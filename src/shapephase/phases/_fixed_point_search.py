@@ -76,12 +76,9 @@ def _examined(points: Array, shifts: Array) -> tuple[Mask, Mask, Mask, Array, Ar
     In the tangent plane at the middle the shift is taken as linear between the corners; the midpoints show its bend,
     which, through the inverse of the slope, is the uncertainty of a zero's place, however much the map shears.
 
-    Returns
-    -------
-    possible, linear, inside : (F,) whether a zero inside cannot be excluded, whether the shift is nearly linear,
-        whether the linear one's zero is inside
-    zero : (F, 3) where the linear one vanishes if that is inside or to be trusted, else the middle
-    width : (F,)
+    Returns possible, linear, inside (F,): whether a zero inside cannot be excluded, the shift is nearly linear, the
+    zero of the linear shift is inside; that zero (F, 3) if it is inside or reliable, else the middle; and the width
+    (F,).
     """
     middle = so3.normalised(points[:, :3].sum(axis=1))
     basis = tangent_basis(middle)

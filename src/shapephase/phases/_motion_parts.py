@@ -17,12 +17,7 @@ Result = TypeVar("Result")
 
 
 class Deferred(Generic[Result]):
-    """A result to be computed at its first use; a pickled copy has it already.
-
-    Parameters
-    ----------
-    compute : called once
-    """
+    """A result to be computed at its first use; a pickled copy has it already."""
 
     def __init__(self, compute: Callable[[], Result]) -> None:
         self._compute = compute
@@ -44,11 +39,8 @@ def _known(value: Result) -> Result:
 def by_parts(motion: Motion, compute: Callable[[Motion], Result], shared: tuple[str, ...] = ()) -> Result:
     """Result of a function of a motion, computed for every part of it.
 
-    Parameters
-    ----------
-    compute : motion of a batch (n,) -> a dataclass whose arrays, also those of dataclasses in it, have that axis in
-        front
-    shared : fields of the result that do not
+    `compute` takes a motion of a batch (n,) to a dataclass whose arrays, also those of dataclasses in it, have that
+    axis in front, but for its `shared` fields.
     """
     return _joined(motion, [(rows, compute(part)) for rows, part in motion.parts], shared)
 

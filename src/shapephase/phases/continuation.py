@@ -120,9 +120,9 @@ def continued_orbits(
         reached.append(orbit)
     return OrbitBranch(
         magnitudes[: len(reached)],
-        np.array([one.direction for one in reached]).reshape(-1, 3),
-        np.array([one.drift for one in reached]).reshape(-1, 3),
-        np.array([2.0 - one.excess for one in reached]),
+        np.array([orbit.direction for orbit in reached]).reshape(-1, 3),
+        np.array([orbit.drift for orbit in reached]).reshape(-1, 3),
+        np.array([2.0 - orbit.excess for orbit in reached]),
         stopped,
         fold,
     )
@@ -196,10 +196,10 @@ def _ending(passed: list[_Orbit], lost: float) -> tuple[str, float | None]:
     At a fold the excess 2 - trace goes through zero evenly along the branch, and the magnitude has its extreme:
     magnitude = fold + a excess^2 + b excess^3, from the last three orbits.
     """
-    magnitude, excess = passed[-1].magnitude, np.array([one.excess for one in passed])
+    magnitude, excess = passed[-1].magnitude, np.array([orbit.excess for orbit in passed])
     if len(passed) == 3 and np.all(np.diff(np.abs(excess)) < 0.0):
         powers = np.stack([np.ones(3), excess**2, excess**3], axis=1)
-        fold = float(np.linalg.solve(powers, np.array([one.magnitude for one in passed]))[0])
+        fold = float(np.linalg.solve(powers, np.array([orbit.magnitude for orbit in passed]))[0])
         if abs(fold - magnitude) < 10.0 * abs(lost - magnitude):
             side = "above" if lost > magnitude else "below"
             return (

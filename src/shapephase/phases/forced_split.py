@@ -63,8 +63,8 @@ class ForcedSplit:
     --------
     >>> push = sp.ExternalTorque(lambda state: [0.0, 0.2, 0.0], axes="space")
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 1.5, 2.0]), 4.0), [0.3, 0.2, 1.0], torque=push)
-    >>> found = sp.split(motion, "base")
-    >>> bool(found.residual < 1e-8)
+    >>> parts = sp.split(motion, "base")
+    >>> bool(parts.residual < 1e-8)
     True
     """
 

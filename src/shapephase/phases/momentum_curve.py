@@ -170,15 +170,8 @@ def momentum_curve(
 ) -> MomentumCurve:
     """The curve of a motion in a gauge, cut at the integrator's steps and at `times` too.
 
-    Parameters
-    ----------
-    gauge : a name of `GAUGES`, "link:NAME", or a function as for `in_gauge`
-    clear_of_start : whether arcs that pass by the point opposite the start are cut finely, too
-
-    Raises
-    ------
-    UnknownNameError, GaugeError, ShapeError
-        For a gauge that does not exist.
+    With `clear_of_start` arcs that pass by the point opposite the start are cut finely, too. Raises UnknownNameError,
+    GaugeError and ShapeError for an unknown or impossible gauge.
     """
     if not isinstance(gauge, str) and (not callable(gauge) or isinstance(gauge, type)):
         raise ShapeError(

@@ -13,8 +13,7 @@ from ..arrays import Array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, TrajectoryError, unknown_name
-from ..integrator.dop853 import dop853_attitude
-from ..integrator.driven_attitude import DrivenAttitude
+from ..integrator.driven_attitude import DrivenAttitude, dop853_attitude
 from ..integrator.many_rotations import rotations_of_each
 from ..rigid_body.euler_top import EulerTop
 

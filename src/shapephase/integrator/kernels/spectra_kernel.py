@@ -47,7 +47,7 @@ def judge(series, widths, spacing, before, momentum, rate, table):
     """
     degree = series.shape[1] - 1
     for panel in range(len(series)):
-        c, found, width = series[panel], table[panel], widths[panel]
+        c, row, width = series[panel], table[panel], widths[panel]
         largest, turn, slope, middle, late, of_inverse, of_drift = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(degree + 1):
             inverse, drift = _sizes(c[k])
@@ -58,10 +58,10 @@ def judge(series, widths, spacing, before, momentum, rate, table):
                 late = max(late, size)
             elif k >= degree // 2:
                 middle = max(middle, size)
-        found[CONDITION], found[INVERSE], found[DRIFT], found[LATE] = _condition(c[0]), of_inverse, of_drift, late
+        row[CONDITION], row[INVERSE], row[DRIFT], row[LATE] = _condition(c[0]), of_inverse, of_drift, late
         if degree == 0:
-            found[GOOD], found[CHANGE], found[NOISY], found[BETWEEN], found[MISSING] = 1.0, 0.0, 0.0, 0.0, 0.0
-            found[ALLOWED] = rate
+            row[GOOD], row[CHANGE], row[NOISY], row[BETWEEN], row[MISSING] = 1.0, 0.0, 0.0, 0.0, 0.0
+            row[ALLOWED] = rate
             continue
         decay = min((max(late, _TINY) / max(middle, late, _TINY)) ** (2.0 / degree), SLOWEST_DECAY)
         rounded = ROUNDED_SAMPLES * EPS * largest + 4.0 * spacing[panel] / width * slope
@@ -69,14 +69,14 @@ def judge(series, widths, spacing, before, momentum, rate, table):
         swings = max(degree - width * turn, 1.0)
         beyond = decay / (1.0 - decay)
         missing = late * beyond
-        found[GOOD] = 1.0 if noisy or missing <= rate * swings else 0.0
-        found[CHANGE] = (
+        row[GOOD] = 1.0 if noisy or missing <= rate * swings else 0.0
+        row[CHANGE] = (
             1.0 if noisy else min(CHANGED_LAST_TERMS * (1.0 + BEYOND_LAST_TERMS / degree) * beyond, 1.0 * degree)
         )
-        found[NOISY] = 1.0 if noisy else 0.0
-        found[BETWEEN] = (max(missing, late) if noisy else missing) * width / swings
-        found[MISSING] = 0.0 if noisy else missing / swings
-        found[ALLOWED] = rate * swings + rounded
+        row[NOISY] = 1.0 if noisy else 0.0
+        row[BETWEEN] = (max(missing, late) if noisy else missing) * width / swings
+        row[MISSING] = 0.0 if noisy else missing / swings
+        row[ALLOWED] = rate * swings + rounded
 
 
 @kernel
@@ -130,7 +130,7 @@ def _adjugate(m, out):
 
 
 @kernel
-def growths(marked, turn, found):
+def growths(marked, turn, largest_growths):
     """Fill the largest growths (B,) of a small turn from one mark to a later one.
 
     The turns by which an error is known, rows of (3, 3), are propagators P; from one mark to a later one an error grows
@@ -159,7 +159,9 @@ def growths(marked, turn, found):
                         squares += entry * entry
                 # No comparison holds for what is not a number.
                 largest = max(largest, 0.5 * (squares - 1.0)) if squares < math.inf else math.inf
-        found[row] = math.sqrt(largest + math.sqrt(largest * largest - 1.0)) if largest < math.inf else math.inf
+        largest_growths[row] = (
+            math.sqrt(largest + math.sqrt(largest * largest - 1.0)) if largest < math.inf else math.inf
+        )
 
 
 def warm() -> None:

@@ -121,14 +121,14 @@ def integrate_steps(channels, loops, magnitudes, directions, first, quaternions)
     """
     for row in range(len(magnitudes)):
         slopes = np.empty((STAGES, 4), quaternions.dtype)
-        found, direction, magnitude = quaternions[row], directions[row], magnitudes[row]
+        attitudes, direction, magnitude = quaternions[row], directions[row], magnitudes[row]
         at = first
         for _ in range(loops):
             for k in range(len(channels)):
-                here = found[at]
+                here = attitudes[at]
                 x, y, z, w, _ = step(channels[k], magnitude, direction, slopes, here[0], here[1], here[2], here[3])
                 at += 1
-                found[at, 0], found[at, 1], found[at, 2], found[at, 3] = x, y, z, w
+                attitudes[at, 0], attitudes[at, 1], attitudes[at, 2], attitudes[at, 3] = x, y, z, w
 
 
 @inline
@@ -184,7 +184,7 @@ def attempt(
     for row in range(len(magnitudes)):
         slopes = np.empty((STAGES, 4))
         magnitude, direction, state = magnitudes[row], directions[row], states[row]
-        there, found, sight = quaternions[row], measured[row], seen[row]
+        finest, largest, sight = quaternions[row], measured[row], seen[row]
         done, mark, jobs = first, 0, len(_STATES) if len(marks) > 0 else len(_STATES) - 3
         while mark < len(marks) and marks[mark] <= done:
             if marks[mark] == done:
@@ -209,19 +209,19 @@ def attempt(
                         x, y, z, w, along = step(here, magnitude, direction, slopes, s[0], s[1], s[2], s[3])
                         s[0], s[1], s[2], s[3] = x, y, z, w
                         if which == _OF_CHANGED:
-                            found[2] = max(found[2], angle_between(state[_OF_FINER], s))
+                            largest[2] = max(largest[2], angle_between(state[_OF_FINER], s))
                         if which == _OF_FINEST:
                             at = 4 * done + number
-                            there[at + 1, 0], there[at + 1, 1], there[at + 1, 2], there[at + 1, 3] = x, y, z, w
-                            found[3] += angle_between(there[at], s)
+                            finest[at + 1, 0], finest[at + 1, 1], finest[at + 1, 2], finest[at + 1, 3] = x, y, z, w
+                            largest[3] += angle_between(finest[at], s)
                             dynamics[row, at] = along
                             if magnitude != 0.0:
                                 p0, p1, p2 = seen_from(x, y, z, w, direction[0], direction[1], direction[2])
                                 sight[at + 1, 0], sight[at + 1, 1], sight[at + 1, 2] = p0, p1, p2
-                                turns[row, at] = _turn_of_step(there[at], s, sight[at], sight[at + 1])
+                                turns[row, at] = _turn_of_step(finest[at], s, sight[at], sight[at + 1])
                             if number % 2 == 1:
-                                found[1] = max(found[1], angle_between(state[_OF_FINER], s))
-                    found[0] = max(found[0], angle_between(state[0], state[_OF_FINER]))
+                                largest[1] = max(largest[1], angle_between(state[_OF_FINER], s))
+                    largest[0] = max(largest[0], angle_between(state[0], state[_OF_FINER]))
                     done += 1
                     if mark < len(marks) and marks[mark] == done:
                         _mark(state, marked[row, mark])
