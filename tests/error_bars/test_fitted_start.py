@@ -8,7 +8,7 @@ from scipy.stats import binom, chi2
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.error_bars._fit_derivatives import fit_by_inertias, fit_by_knots
+from shapephase.error_bars.result_derivatives import fit_by_inertias, fit_by_knots
 from shapephase.errors import ShapeError
 from shapephase.shape_space.path_samples import path_samples
 

@@ -1,4 +1,4 @@
-"""Noise of what a least-squares fit leaves of recorded attitudes: how far it is correlated, and whether it is noise.
+"""Noise in the residuals of a least-squares fit to recorded attitudes: its correlation, and whether it is noise.
 
 Noise of each axis is taken for a stationary process whose correlation is one of three kinds, of any length: it dies out
 exponentially (a tracker), it is the mean of neighbours, or a filter's bell. The restricted likelihood of each (which
@@ -60,9 +60,9 @@ class ResidualNoise:
         """Probability that the last few parameters come out so far from zero although they are zero: the F test."""
         from scipy.special import fdtrc
 
-        there = self.parameters[:, -last:]
+        parameters = self.parameters[:, -last:]
         known = np.linalg.inv(np.linalg.inv(self.precisions)[:, -last:, -last:])
-        ratios = np.einsum("fa,fab,fb->f", there, known, there) / (last * self.variances)
+        ratios = np.einsum("fa,fab,fb->f", parameters, known, parameters) / (last * self.variances)
         return float(self.weights @ fdtrc(last, self.free, ratios))
 
 
@@ -117,22 +117,21 @@ def _correlations(count: int) -> Array:
     lags = np.arange(count, dtype=np.float64)
     means = np.maximum(1.0 - lags / _LENGTHS[:, None], 0.0)
     bells = np.exp(-((lags / _LENGTHS[:, None]) ** 2))
-    own = (1.0 - _OWN) * np.concatenate([means, bells]) + _OWN * (lags == 0)
-    return np.concatenate([_EXPONENTIAL[:, None] ** lags, own])
+    smoothed = (1.0 - _OWN) * np.concatenate([means, bells]) + _OWN * (lags == 0)
+    return np.concatenate([_EXPONENTIAL[:, None] ** lags, smoothed])
 
 
 def _priors() -> Array:
-    """One half for the exponential ones, which white noise is one of, and a quarter for each of the others."""
-    half, quarter = 0.5 / len(_EXPONENTIAL), 0.25 / len(_LENGTHS)
-    return np.concatenate([np.full(len(_EXPONENTIAL), half), np.full(2 * len(_LENGTHS), quarter)])
+    """One half for the exponential ones, white noise among them, and a quarter for each of the others."""
+    return np.repeat([0.5 / len(_EXPONENTIAL), 0.25 / len(_LENGTHS)], [len(_EXPONENTIAL), 2 * len(_LENGTHS)])
 
 
 def drift_modes(residuals: Array, slopes: Array, by_modes: Array) -> tuple[int, bool]:
-    """How many Legendre polynomials of the momentum in time the residuals ask for, and whether surely.
+    """Number of Legendre polynomials of the momentum in time that the residuals need, and whether surely.
 
     residuals (N, 3) [rad], slopes (3 N, m), by_modes (3 N, 3 K): change of the attitudes by each polynomial's momentum.
     One more polynomial counts where chance brings as much in less than one of 50 cases, also together with the next:
-    bars that are too long cost less than a drift that they do not hold. It is sure in less than one of 1000.
+    bars that are too long cost less than a drift outside of them. It is sure below one case of 1000.
     """
     modes, sure = 0, False
     for tried in range(1, by_modes.shape[1] // 3 + 1):

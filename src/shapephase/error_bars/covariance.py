@@ -22,10 +22,16 @@ from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
-from ._fit_derivatives import fit_by_inertias, fit_by_knots
 from .error_sources import InertiaErrors, Inputs, by_relative_errors, drawn_bodies, inputs_of
 from .recorded_momentum import UNKNOWNS, RecordedMomentum
-from .result_derivatives import Derivatives, ResultDerivative, derivatives, described_by
+from .result_derivatives import (
+    Derivatives,
+    ResultDerivative,
+    derivatives,
+    described_by,
+    fit_by_inertias,
+    fit_by_knots,
+)
 
 _BARS_FROM_THE_ENDS = 5.0  # from an angle to 0 and to 180 degrees, for it to have a bar of its own
 _ROUNDING = 1e-9  # of the largest variance of a rotation: smaller ones about other axes are rounding
@@ -35,7 +41,7 @@ _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """How far the results of a motion may be off, to first order or as drawn.
+    """Error bars of the results of a motion, to first order or from draws.
 
     A rotation D may be exp(hat(e)) D, where e has mean zero and the covariance that is given, inertial axes. Phases are
     those of the horizontal gauge; without momentum they are exactly zero.
@@ -47,10 +53,10 @@ class Uncertainty:
     start : (6, 6) covariance of the turn of the start, base axes [rad^2], and of the momentum [(kg m^2/s)^2], with all
         that moves a fit to a recording
     total_angle, holonomy_angle : standard deviations of the angles of these rotations [rad]; NaN where an angle is
-        less than five of them from 0 or from 180 degrees: there it cannot be said by one number
+        less than five of them from 0 or from 180 degrees: one number cannot state it there
     smoothing_bias : by how much smoothing has shifted the result that it shifts most, as far as that is known, in
         standard deviations of its own, which hold it; 0 where nothing was smoothed or `joints` are exact
-    draws : how many motions this was estimated from; 0: found by derivatives
+    draws : number of motions this was estimated from; 0: by derivatives
 
     Examples
     --------
@@ -87,9 +93,9 @@ def uncertainty(
     attitude: ArrayLike | None = None,
     start: RecordedMomentum | ArrayLike | None = None,
 ) -> Uncertainty:
-    """How far the results of `split` may be off, to first order, by what is not known exactly.
+    """Error bars of the results of `split`, to first order, from the errors of its inputs.
 
-    Sources are independent of each other; what is not given is exact. The cost is that of a few reconstructions,
+    Sources are independent of each other; inputs without errors are exact. The cost is that of a few reconstructions,
     however many samples and links there are.
 
     Parameters

@@ -288,7 +288,8 @@ class _Sampling:
         # Halves of panels come after all first halves.
         if not np.all(left[:-1] < left[1:]):
             order = np.argsort(left)
-            left, right, table, series, degrees = (rows[order] for rows in (left, right, table, series, degrees))
+            left, right, table, series = (rows[order] for rows in (left, right, table, series))
+            degrees = degrees[order]
         loops = self._known.loops
         edges = first = np.append(left, right[-1])
         if loops > 1:

@@ -15,6 +15,7 @@ from ..deformation.deformation import Deformation
 from ..deformation.gauge import horizontal_gauge, in_gauge, named_gauge
 from ..display import short_repr
 from ..errors import AccuracyNotReached, GaugeError
+from ..plain_data import plain
 from ..reconstruction.forced_motion import ForcedMotion
 from ..refinement import halved, settled
 from .momentum_curve import Gauge
@@ -94,40 +95,26 @@ class ForcedSplit:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything for JSON, rotations as lists, units in names."""
-        return {
-            "gauge": self.gauge,
-            "total_rotation": self.total_rotation.tolist(),
-            "holonomy": self.holonomy.tolist(),
-            "dynamical_rotation": self.dynamical_rotation.tolist(),
-            "phase_rad": self.phase,
-            "dynamic_phase_rad": self.dynamic_phase,
-            "body_solid_angle_sr": self.body_solid_angle,
-            "space_solid_angle_sr": self.space_solid_angle,
-            "body_gap_rad": self.body_gap,
-            "space_gap_rad": self.space_gap,
-            "residual_rad": self.residual,
-            "error_estimate_rad": self.error_estimate,
-            "work_J": self.work,
-            "energy_change_J": self.energy_change,
-            "is_loop": self.is_loop,
-        }
+        units = {"body_solid_angle": "_sr", "space_solid_angle": "_sr", "work": "_J", "energy_change": "_J"}
+        units |= dict.fromkeys(("gauge", "total_rotation", "holonomy", "dynamical_rotation", "is_loop"), "")
+        return {name + units.get(name, "_rad"): value for name, value in plain(self).items()}
 
 
 def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
-    """Split a motion under a torque, as `split` says."""
+    """Split of a motion under a torque."""
     deformation = motion.deformation
     least, when = _least_momentum(motion)
     most = float(np.linalg.norm(motion.momentum(motion.solution.times), axis=-1).max())
     if least <= _NO_MOMENTUM * most or least * _DOUBT <= motion.momentum_error:
         raise GaugeError(
             f"the momentum passes through zero at t = {when:.6g} s ({least:.3g} kg m^2/s of {most:.3g}): it has no "
-            "direction there, and the motion no phase; split the stretches before and after"
+            "direction there, and the motion no phase; split the parts before and after"
         )
     frames = _frames(deformation, gauge)
     edges = np.union1d(motion.solution.times, motion.breaks)
 
     def in_body(times: Array) -> tuple[Array, Array]:
-        """Direction of the momentum in the gauge, and its rate: that of m, less what the frame turns by."""
+        """Direction of the momentum in the gauge, and its rate: that of m, less the frame's turn."""
         turn, spin, magnitude = _seen(motion, frames, times)
         pi = so3.apply(turn, motion.body_momentum(times))
         change = so3.apply(turn, motion.torque(times)) + np.cross(pi, spin)
@@ -142,15 +129,15 @@ def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
     body_area, space_area = (float(sphere.curve_area(curve, edges, _SETTLED)) for curve in (in_body, in_space))
     ends = np.array([0.0, motion.duration])
     (u, v), (m, n) = in_body(ends)[0], in_space(ends)[0]
-    own = motion.attitude(ends)
-    first, last = own @ so3.transpose(frames(ends)[0])
+    attitudes = motion.attitude(ends)
+    first, last = attitudes @ so3.transpose(frames(ends)[0])
     phase = dynamic - body_area + space_area
     turned = so3.between(n, m) @ last @ so3.between(v, u).T @ first.T
     read_off = float(so3.angle_about(turned, m))
     closure = np.eye(3) if deformation.closure is None else deformation.closure
     lift = horizontal_gauge(deformation).frame(motion.duration) @ deformation.frame(motion.duration).T
-    total = own[1] @ closure @ own[0].T
-    holonomy = own[0] @ lift @ closure @ own[0].T
+    total = attitudes[1] @ closure @ attitudes[0].T
+    holonomy = attitudes[0] @ lift @ closure @ attitudes[0].T
     # The curve in the body is displaced by both errors, by which areas and read-off angle change about as much.
     doubt = motion.error_estimate + motion.momentum_error / least + _ROUNDING
     gaps = so3.angle_between(np.stack([v, n]), np.stack([u, m]))
