@@ -314,42 +314,27 @@ def _on_its_back(bend: float = 0.0) -> tuple[float, float, float, float]:
 
 MOTIONS: Mapping[str, NamedMotion] = {
     "kane_scher": NamedMotion(
-        body="cat_two_halves",
-        path=lambda: kane_scher(np.radians(20.0), np.radians(61.813873)),
-        about="the cat of Kane and Scher rights itself, bend 81.8 to 41.8 degrees",
-        attitude=_on_its_back(np.radians(20.0 + 61.813873)),
+        "cat_two_halves",
+        lambda: kane_scher(np.radians(20.0), np.radians(61.813873)),
+        "the cat of Kane and Scher rights itself, bend 81.8 to 41.8 degrees",
+        _on_its_back(np.radians(20.0 + 61.813873)),
     ),
     "cat_righting": NamedMotion(
-        body="cat",
-        path=cat_righting,
-        about="a realistic cat rights itself from its back, legs tucked, rest to rest",
-        attitude=_on_its_back(),
+        "cat", cat_righting, "a realistic cat rights itself from its back, legs tucked, rest to rest", _on_its_back()
     ),
     "cat_righting_twist": NamedMotion(
-        body="cat",
-        path=cat_righting_twist,
-        about="the same with a waist that twists, too, and bends less",
-        attitude=_on_its_back(),
+        "cat",
+        cat_righting_twist,
+        "a realistic cat rights itself; its waist twists, too, and bends less",
+        _on_its_back(),
     ),
-    "astronaut_arm_circles": NamedMotion(
-        body="astronaut", path=astronaut_arm_circles, about="pitch turn by one circle of the arms"
-    ),
-    "astronaut_leg_swing": NamedMotion(
-        body="astronaut", path=astronaut_leg_swing, about="pitch turn by one swing of legs and trunk"
-    ),
-    "antenna_deployment": NamedMotion(
-        body="satellite", path=antenna_deployment, about="the boom antenna comes out, an open path"
-    ),
-    "satellite_sweep": NamedMotion(
-        body="satellite", path=satellite_sweep, about="boom out and in, arm to and fro: turn about z"
-    ),
-    "diver_twist": NamedMotion(
-        body="diver", path=diver_twist, about="1.5 somersaults with a twist by one arm, momentum 0 61.558831 0"
-    ),
+    "astronaut_arm_circles": NamedMotion("astronaut", astronaut_arm_circles, "pitch turn by one circle of the arms"),
+    "astronaut_leg_swing": NamedMotion("astronaut", astronaut_leg_swing, "pitch turn by one swing of legs and trunk"),
+    "antenna_deployment": NamedMotion("satellite", antenna_deployment, "the boom antenna comes out, an open path"),
+    "satellite_sweep": NamedMotion("satellite", satellite_sweep, "boom out and in, arm to and fro: turn about z"),
+    "diver_twist": NamedMotion("diver", diver_twist, "1.5 somersaults with a twist by one arm, momentum 0 61.558831 0"),
     "five_stage_dive": NamedMotion(
-        body="diver",
-        path=five_stage_dive,
-        about="1.5 somersaults with a twist, into the plane again, momentum 0 57.735688525 0",
+        "diver", five_stage_dive, "1.5 somersaults with a twist, into the plane again, momentum 0 57.735688525 0"
     ),
 }
 

@@ -85,7 +85,7 @@ class Motion(MotionViews):
 
     Attributes
     ----------
-    deformation : what moved
+    deformation : the body's shape in time
     momentum : batch + (3,), about the centre of mass, inertial axes [kg m^2/s]
     initial_attitude : batch + (3, 3), base axes to inertial axes
     tolerance : the one requested [rad]
@@ -194,11 +194,10 @@ class Motion(MotionViews):
         The deformation is evaluated again at 20 times, so an error of sampling or stepping shows here.
         """
         if len(self.parts) > 1:
-            each = [(rows, np.atleast_1d(part.equation_residual)) for rows, part in self.parts]
-            return assembled(each).reshape(self.batch)
-        inner = np.repeat(self.solution.times[:-1], 2) + np.repeat(np.diff(self.solution.times), 2) * np.tile(
-            [0.3, 0.7], len(self.solution.times) - 1
-        )
+            residuals = [(rows, np.atleast_1d(part.equation_residual)) for rows, part in self.parts]
+            return assembled(residuals).reshape(self.batch)
+        ends = self.solution.times
+        inner = np.repeat(ends[:-1], 2) + np.repeat(np.diff(ends), 2) * np.tile([0.3, 0.7], len(ends) - 1)
         times = inner[np.linspace(0, len(inner) - 1, 20).astype(int)]
         inertia, internal = self.deformation.description.sample(times)
         omega = self._differentiated(times)
@@ -214,8 +213,8 @@ class Motion(MotionViews):
             return ((np.arange(len(self._flat_attitude)), self),)
         momentum = self.momentum.reshape(-1, 3)
         return tuple(
-            (rows, replace(self, momentum=momentum[rows], initial_attitude=self._flat_attitude[rows], solution=one))
-            for rows, one in self.solution.parts
+            (rows, replace(self, momentum=momentum[rows], initial_attitude=self._flat_attitude[rows], solution=part))
+            for rows, part in self.solution.parts
         )
 
     @cached_property
@@ -269,12 +268,9 @@ class Motion(MotionViews):
         stepped = self.stepped
         slope = stepped.momentum_slope
         start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
-        attitude = so3.transpose(stepped.end) + slope @ so3.hat(start)
-        matrix = (*self.batch, 3, 3)
-        return Sensitivity(
-            (slope @ so3.transpose(self._flat_attitude)).reshape(matrix),
-            attitude.reshape(matrix),
-        )
+        by_momentum = slope @ so3.transpose(self._flat_attitude)
+        by_attitude, matrix = so3.transpose(stepped.end) + slope @ so3.hat(start), (*self.batch, 3, 3)
+        return Sensitivity(by_momentum.reshape(matrix), by_attitude.reshape(matrix))
 
     def dynamic_phase(self, t: ArrayLike) -> Array:
         """Integral of omega . Pi/|Pi| from 0 to t: times (...) -> batch + (...) [rad]; zero without momentum.
@@ -337,7 +333,7 @@ class MotionFamily(Sequence[Motion]):
 
     Attributes
     ----------
-    deformations : what moved
+    deformations : those of the bodies
     momentum : (N, 3) of each about its centre of mass, inertial axes [kg m^2/s]
     initial_attitude : (N, 3, 3) base axes to inertial axes
     tolerance : the one requested [rad]
