@@ -69,19 +69,13 @@ class Part(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RigidPart:
-    """A rigid part that is fixed in the frame; made by `rigid_part`.
+    """A rigid part that is fixed in the frame. Made by `rigid_part`.
 
     Attributes
     ----------
     mass : [kg]
     centre : (3,) its centre of mass in the frame [m]
     moment : (3, 3) integral of r r^T dm about its centre, tr(I)/2 - I [kg m^2]
-
-    Examples
-    --------
-    >>> hub = sp.deformation.rigid_part(400.0, np.diag([300.0, 350.0, 500.0]), (0.1, 0.0, 0.0))
-    >>> hub.mass, hub.centre.tolist()
-    (400.0, [0.1, 0.0, 0.0])
     """
 
     mass: float
@@ -108,18 +102,12 @@ class RigidPart:
 
 @dataclass(frozen=True, eq=False)
 class MovingMass:
-    """A point mass that moves in the frame; made by `moving_mass`.
+    """A point mass that moves in the frame. Made by `moving_mass`.
 
     Attributes
     ----------
     mass : [kg]
     path : x, y, z in the frame [m]
-
-    Examples
-    --------
-    >>> path = sp.ShapePath.waypoints([0.0, 2.0], [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    >>> sp.deformation.moving_mass(80.0, path).path.shape(2.0).tolist()
-    [2.0, 0.0, 0.0]
     """
 
     mass: float
@@ -145,7 +133,7 @@ class MovingMass:
 
 @dataclass(frozen=True, eq=False)
 class Boom:
-    """A uniform straight boom that comes out of a point of the body; made by `boom`.
+    """A uniform straight boom that comes out of a point of the body. Made by `boom`.
 
     The share length/full_length of its `mass` is out, a rod that moves along itself; the rest is stowed at the root, a
     point mass at rest. The boom's mass is constant.
@@ -156,13 +144,6 @@ class Boom:
     full_length : of the whole boom [m]
     root, direction : (3,) where it comes out [m], and the unit vector of where to, in the frame
     path : the length that is out, one column [m]
-
-    Examples
-    --------
-    >>> path = sp.ShapePath.waypoints([0.0, 2.0], [[0.0], [3.0]])
-    >>> boom = sp.deformation.boom(6.0, 3.0, (0.0, 0.0, 0.0), (0.0, 0.0, 2.0), path)
-    >>> boom.mass, boom.direction.tolist()
-    (6.0, [0.0, 0.0, 1.0])
     """
 
     mass: float

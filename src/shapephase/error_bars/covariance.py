@@ -41,7 +41,7 @@ _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """Error bars of the results of a motion, to first order or from draws.
+    """Error bars of the results of a motion, to first order or from draws. Made by `uncertainty`.
 
     A rotation D may be exp(hat(e)) D, where e has mean zero and the covariance that is given, inertial axes. Phases are
     those of the horizontal gauge; without momentum they are exactly zero.
@@ -57,14 +57,6 @@ class Uncertainty:
     smoothing_bias : by how much smoothing has shifted the result that it shifts most, as far as that is known, in
         standard deviations of its own, which hold it; 0 where nothing was smoothed or `joints` are exact
     draws : number of motions this was estimated from; 0: by derivatives
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> bars = sp.uncertainty(motion, attitude=0.01)
-    >>> print(np.sqrt(bars.final_attitude.diagonal()).round(3))
-    [0.012 0.009 0.01 ]
     """
 
     final_attitude: Array

@@ -43,6 +43,8 @@ _CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller chan
 class RecordedMomentum:
     """The momentum and start with which a body comes nearest to the attitudes that were recorded.
 
+    Made by `momentum_from_recording`.
+
     Attributes
     ----------
     momentum : (3,) about the centre of mass, the recorder's axes [kg m^2/s]
@@ -65,14 +67,6 @@ class RecordedMomentum:
     times : (N,) of the recorded attitudes [s]
     base_axes : (3, 3) base axes to those whose attitude was recorded; the identity where these were the base's
     axes_covariance : (3, 3) of their turn, base axes [rad^2]; zero where they were given
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion, times = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), np.linspace(0.0, 1.0, 9)
-    >>> fit = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times), noise=1e-3)
-    >>> print(fit.momentum_covariance.shape, f"{fit.noise:.3f}")
-    (3, 3) 0.001
     """
 
     momentum: Array

@@ -25,19 +25,14 @@ from ._along_motion import AlongMotion, BodyAlong, along_motion, responses
 class ResultDerivative:
     """Derivatives of the results of `split` by m numbers, whose change c changes the results by derivative @ c.
 
+    Made by `derivatives`.
+
     A rotation D becomes exp(hat(derivative @ c)) D: the vectors are in inertial axes.
 
     Attributes
     ----------
     final_attitude, total_rotation, holonomy, dynamical_rotation : (3, m) [rad per unit]
     dynamic_phase, solid_angle, montgomery_phase : (m,) in the horizontal gauge [rad per unit]; without momentum zero
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> sp.derivatives(motion).by_momentum.dynamic_phase.shape
-    (3,)
     """
 
     final_attitude: Array
@@ -62,7 +57,7 @@ class _Changes:
 
 
 class Derivatives:
-    """The exact derivatives of a motion's results, each computed at its first use.
+    """The exact derivatives of a motion's results, each computed at its first use. Made by `derivatives`.
 
     One integral along the motion serves all numbers of a kind, however many there are: its integrand is carried to
     the end by the adjoint of the attitude equation.
@@ -75,14 +70,6 @@ class Derivatives:
     Notes
     -----
     Source: theory.md section 8.
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> by_momentum = sp.derivatives(motion).by_momentum
-    >>> print(f"{by_momentum.dynamic_phase[2]:.3f} rad per kg m^2/s")
-    58.372 rad per kg m^2/s
     """
 
     def __init__(self, motion: Motion) -> None:

@@ -20,7 +20,7 @@ from .split_text import split_lines
 
 @dataclass(frozen=True, eq=False)
 class SplitMotion:
-    """Properties of the motion that was split.
+    """Properties of the motion that was split. Made by `split`.
 
     Attributes
     ----------
@@ -29,12 +29,6 @@ class SplitMotion:
     momentum : batch + (3,), inertial axes [kg m^2/s]
     error_estimate : of the attitude at all times: batch [rad]
     evaluations : how often the locked inertia and internal momentum were computed
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
-    >>> sp.split(motion).about.duration
-    4.0
     """
 
     label: str

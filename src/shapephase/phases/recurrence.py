@@ -35,19 +35,12 @@ _TANGENT = 1e-6  # [rad] passages at a smaller angle touch and do not cross
 
 @dataclass(frozen=True, eq=False)
 class Returns:
-    """When the momentum's direction is nearest its start again.
+    """When the momentum's direction is nearest its start again. Made by `momentum_returns`.
 
     Attributes
     ----------
     times : (n,) ascending, above 0 [s]
     gaps : (n,) angle to the start then [rad]
-
-    Examples
-    --------
-    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.5 * top.period), [0.6, 0.9, 0.5])
-    >>> sp.momentum_returns(motion).gaps.round(6).tolist()
-    [0.0]
     """
 
     times: Array
@@ -58,7 +51,7 @@ class Returns:
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Where the momentum's curve crosses itself, each pair of passages by itself.
+    """Where the momentum's curve crosses itself, each pair of passages by itself. Made by `momentum_crossings`.
 
     Attributes
     ----------
@@ -67,12 +60,6 @@ class Crossings:
     angles : (n,) from the first passage's heading to the second's, between 0 and pi [rad]
     gaps : (n,) angle between the two passages: of the order of rounding [rad]
     retraced : (m, 2) from when to when the curve goes along an earlier part of itself, either way [s]
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 3.0), [0.6, 0.9, 0.5])
-    >>> sp.momentum_crossings(motion).angles.shape
-    (0,)
     """
 
     first: Array

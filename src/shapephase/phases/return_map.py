@@ -42,17 +42,13 @@ _STABILITIES = ("elliptic", "hyperbolic", "inverse hyperbolic", "parabolic")
 class ReturnMap:
     """Directions of the body momentum before and after one loop of shapes, in the deformation's frame.
 
+    Made by `stroboscopic_map`.
+
     Attributes
     ----------
     magnitude : of the momentum [kg m^2/s]
     start, end : (..., 3) u(0) and u(T), unit vectors
     solution : the motions themselves, with the leading axes made one
-
-    Examples
-    --------
-    >>> steady = sp.stroboscopic_map(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), 1.0, [0.0, 0.0, 1.0])
-    >>> print(steady.end.round(9) + 0.0)
-    [0. 0. 1.]
     """
 
     magnitude: float
