@@ -315,7 +315,7 @@ class ResultFileError(ShapePhaseError, ValueError):
     ...     sp.load_motion("bad.npz")
     ... except sp.errors.ResultFileError as error:
     ...     print(str(error)[:72])
-    bad.npz: no motion that can be read ('header')
+    bad.npz: not a readable motion ('header')
     """
 
 
