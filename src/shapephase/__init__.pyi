@@ -38,7 +38,7 @@ from .dynamics.swinging import FreeHinges, free_hinges
 from .dynamics.torque_noise import TorqueErrors, torque_errors
 from .dynamics.torques import JointTorques, joint_torques
 from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
-from .error_bars.inertia_errors import InertiaErrors
+from .error_bars.error_sources import InertiaErrors
 from .error_bars.recorded_flight import RecordedFlight, motion_from_recording
 from .error_bars.recorded_momentum import RecordedMomentum, momentum_from_recording
 from .error_bars.result_derivatives import Derivatives, ResultDerivative, derivatives
@@ -71,8 +71,14 @@ from .phases.whole_turns import TurnCounts, turn_counts
 from .plots.viewer import view
 from .reconstruction.external_torque import ExternalTorque, TorqueState
 from .reconstruction.forced_motion import ForcedMotion
-from .reconstruction.motion_family import MotionFamily
-from .reconstruction.reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
+from .reconstruction.reconstruction import (
+    Motion,
+    MotionFamily,
+    Sensitivity,
+    load_motion,
+    momentum_from_rate,
+    reconstruct,
+)
 from .reconstruction.recorded_base import BaseDifference, base_difference
 from .rigid_body import geodesics
 from .rigid_body.euler_top import EulerTop

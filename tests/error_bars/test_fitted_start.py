@@ -8,7 +8,7 @@ from scipy.stats import binom, chi2
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.error_bars._fit_answers import fit_by_inertias, fit_by_knots
+from shapephase.error_bars.result_derivatives import fit_by_inertias, fit_by_knots
 from shapephase.errors import ShapeError
 from shapephase.shape_space.path_samples import path_samples
 
@@ -39,7 +39,7 @@ def exact() -> sp.RecordedMomentum:
     return fitted(deformation, times, motion.attitude(times))
 
 
-def test_a_fit_answers_to_samples_as_fits_to_others_show(exact: sp.RecordedMomentum):
+def test_a_fit_derivatives_to_samples_as_fits_to_others_show(exact: sp.RecordedMomentum):
     """Central differences of fits to one recording; the recorded times are no knots of the path."""
     samples = path_samples(exact.motion.deformation.description.path).values
     found = fit_by_knots(exact.motion, exact.times, exact.by_attitudes)

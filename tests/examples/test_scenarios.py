@@ -10,7 +10,6 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.body.catalog import robots_folder
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
-from shapephase.examples.dives import full_dive
 from shapephase.examples.scenarios import (
     CLOSED_ORBITS,
     MOTIONS,
@@ -18,6 +17,7 @@ from shapephase.examples.scenarios import (
     cat_righting_twist,
     closed_orbit,
     diver_twist,
+    full_dive,
     kane_scher,
     named_motion,
 )

@@ -1,7 +1,7 @@
 """Frames of principal axes on panels of time, each a polynomial, found without regard to its neighbours.
 
-A panel is taken when its frame makes the inertia diagonal at and between the nodes; else it is halved. How the panels
-go on from each other is the business of `principal_frame`.
+A panel is taken when its frame makes the inertia diagonal at and between the nodes; else it is halved. The module
+`_principal_frame` joins the panels.
 """
 
 from __future__ import annotations
@@ -18,36 +18,19 @@ from ..chebyshev import chebyshev, exact_local_coordinate, inside
 from ..errors import GaugeError
 from .deformation import Deformation
 
-# Nodes of a panel: five more than coefficients, so that a fit that misses something shows.
-_NODES = 25
-# Coefficients of each polynomial on a panel.
-COUNT = 20
-# Part of a loop: narrower panels may be less exact, since little time is spent on them.
-_NARROW = 1e-3
-# Part of a loop: only a limited number of panels may be narrower, so that a hopeless search does not fill the memory.
-_TINY = 1e-6
-# Part of a loop: no panel is narrower, for the digits of time end there.
-_LEAST_WIDTH = 1e-13
-# Part of the trace: entries off the diagonal that are allowed on wide panels, some hundred roundings.
-_DIAGONAL = 2e-14
-# Part of the trace: the same on narrow panels, where the axes turn fast.
-NEARLY_DIAGONAL = 2e-12
-# Part of the trace: moments nearer than that are equal, a few thousand roundings.
-EQUAL = 4e-13
-# Weight, beside certain values, with which the first coefficient is drawn to zero; of the last one it is 1e14 times it.
-_ROUNDING = 1e-16
-# [rad] in a loop: axes that turn faster count as a jump.
-_FASTEST = 2e8
-# Kind of a panel on which all moments are apart.
-SEPARATE = 0
-# Kind of a panel on which two moments are equal.
-SYMMETRIC = 1
-# Kind of a panel on which all moments are equal.
-SPHERICAL = 2
-# The quaternion xyzw of no turn.
-_NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
-# The third axis: the distinct one of a panel with two equal moments.
-_THIRD = np.array([0.0, 0.0, 1.0])
+COUNT = 20  # coefficients of each polynomial on a panel
+_NODES = COUNT + 5  # of a panel: five more than coefficients, so that the error of a fit shows
+_NARROW = 1e-3  # of a loop: narrower panels may be less exact, since little time is spent on them
+_TINY = 1e-6  # of a loop: the number of narrower panels is limited, so that a failing search does not fill the memory
+_LEAST_WIDTH = 1e-13  # of a loop, for panels: the digits of time end there
+_DIAGONAL = 2e-14  # of the trace, for entries off the diagonal on wide panels: some hundred roundings
+NEARLY_DIAGONAL = 2e-12  # of the trace, for these entries on narrow panels, where the axes turn fast
+EQUAL = 4e-13  # of the trace, between equal moments: a few thousand roundings
+_ROUNDING = 1e-16  # weight of zero as the first coefficient, beside certain values; for the last one 1e14 times as much
+_FASTEST = 2e8  # [rad] in a loop: axes that turn faster count as a jump
+SEPARATE, SYMMETRIC, SPHERICAL = range(3)  # kinds of panels: all moments apart, two equal, all equal
+NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])  # quaternion xyzw
+THIRD = np.array([0.0, 0.0, 1.0])  # the distinct axis of a panel with two equal moments
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +103,7 @@ def in_order(parts: list[AxisPanels]) -> AxisPanels:
 
 
 def moments_at(deformation: Deformation, time: float) -> str:
-    """For messages."""
+    """Principal moments at a time, for messages."""
     moments = np.linalg.eigvalsh(deformation.inertia(time))
     return f"where the principal moments are {moments} kg m^2"
 
@@ -133,7 +116,7 @@ def _fitted(deformation: Deformation, left: Array, right: Array) -> tuple[AxisPa
     kind = np.where(np.all(np.minimum(low, high) <= EQUAL, axis=-1), SYMMETRIC, SEPARATE)
     kind[np.all(low + high <= EQUAL, axis=-1)] = SPHERICAL
     series = np.zeros((len(left), COUNT, 4))
-    series[:, 0] = _NO_TURN
+    series[:, 0] = NO_TURN
     for which, at_nodes in ((SEPARATE, _separate_axes), (SYMMETRIC, _distinct_axis)):
         rows = kind == which
         if rows.any():
@@ -208,12 +191,12 @@ def _separate_axes(low: Array, high: Array, axes: Array) -> tuple[Array, Array]:
 
 
 def _distinct_axis(low: Array, high: Array, axes: Array) -> tuple[Array, Array]:
-    """As `_separate_axes` where two moments are equal: the third axis is the distinct one, the others any."""
+    """Quaternions and weights where two moments are equal: the third axis is the distinct one, the others any."""
     upper = (low <= high)[..., None]
     axis, gap = np.where(upper, axes[..., 2], axes[..., 0]), np.maximum(low, high)
     axis = _same_sign(axis)
     best = np.take_along_axis(axis, np.argmax(gap, axis=1)[:, None, None], axis=1)
-    upright = so3.quat_from_matrix(so3.between(best, _THIRD))
+    upright = so3.quat_from_matrix(so3.between(best, THIRD))
     return so3.quat_product(upright, so3.quat_from_matrix(so3.between(axis, best))), gap
 
 
@@ -250,7 +233,7 @@ def _without_spin(series: Array) -> Array:
     norm = np.linalg.norm(quats, axis=-1, keepdims=True)
     rate = so3.apply(so3.matrix_from_quat(quats / norm), so3.turn_of(quats, slope) / norm**2)
     spin = np.polynomial.chebyshev.chebint((to_series() @ rate[..., 2:])[:, :-1], axis=1)
-    return to_series() @ so3.quat_product(so3.quat_from_rotation_vector(-(basis @ spin) * _THIRD), quats / norm)
+    return to_series() @ so3.quat_product(so3.quat_from_rotation_vector(-(basis @ spin) * THIRD), quats / norm)
 
 
 def _least_squares(values: Array, weights: Array) -> Array:

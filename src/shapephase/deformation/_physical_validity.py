@@ -1,4 +1,4 @@
-"""What a body's inertia can be at every time: never on one line, and within the triangle inequality."""
+"""Checks of a body's inertia at every time: not all mass on one line, and the triangle inequality."""
 
 from __future__ import annotations
 
@@ -12,22 +12,15 @@ from ..errors import SingularInertiaError, UnphysicalInertiaError, UnphysicalIne
 from ..inertia_tensor import triangle_defect
 from ..refinement import least_over
 
-# A flat body stands exactly at the limit of the triangle inequality, and rounding puts it on either side.
-_ROUNDING = 1e-9
-# As `inverse_inertia` has it: of I's least eigenvalue to its largest.
-_LINE = 1e-12
+_ROUNDING = 1e-9  # of the triangle inequality: a flat body is at its limit, and rounding puts it on either side
+_LINE = 1e-12  # ratio of I's least eigenvalue to its largest, the limit of `inverse_inertia`
 
 
 def line_measure(moment: Array) -> Array:
     """Zero where all mass is on one line, else up to 1/3: sum of the minors of a second moment over its squared trace.
 
-    Parameters
-    ----------
-    moment : (N, 3, 3), the integral of r r^T dm about the centre of mass [kg m^2]
-
-    Returns
-    -------
-    (N,); zero too where all mass is in one place. Source: theory.md A2.
+    `moment` (N, 3, 3) is the integral of r r^T dm about the centre of mass [kg m^2]. The result (N,) is also zero where
+    all mass is in one place. Source: theory.md A2.
     """
     a, b, c = moment[:, 0, 0], moment[:, 1, 1], moment[:, 2, 2]
     trace = a + b + c
@@ -43,7 +36,7 @@ def check_not_on_a_line(moment: Array, times: Array) -> None:
 
 
 def check_never_on_a_line(moment: Callable[[Array], Array], breaks: Array) -> None:
-    """As `check_not_on_a_line` for all times; `moment` is a function of times (N,)."""
+    """Raise `SingularInertiaError` if all mass is on one line at any time; `moment` is a function of times (N,)."""
     least, when = least_over(lambda t: line_measure(moment(t)), breaks)
     if least <= _LINE:
         _refuse_line(when)
@@ -52,14 +45,8 @@ def check_never_on_a_line(moment: Callable[[Array], Array], breaks: Array) -> No
 def check_triangle(inertia: Array, times: Array | None, on_unphysical: str) -> None:
     """Refuse, or warn of, tensors (N, 3, 3) that no distribution of mass has, with the worst of the times (N,).
 
-    Raises
-    ------
-    UnphysicalInertiaError
-        Where `on_unphysical` is "error" and the triangle inequality fails by more than rounding.
-
-    Notes
-    -----
-    Source: theory.md A4.
+    Raises UnphysicalInertiaError where `on_unphysical` is "error" and the triangle inequality fails by more than
+    rounding. Source: theory.md A4.
     """
     if on_unphysical == "allow" or not len(inertia):
         return

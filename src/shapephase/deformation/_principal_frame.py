@@ -22,9 +22,11 @@ from ._axis_panels import (
     COUNT,
     EQUAL,
     NEARLY_DIAGONAL,
+    NO_TURN,
     SEPARATE,
     SPHERICAL,
     SYMMETRIC,
+    THIRD,
     AxisPanels,
     cube_turns,
     halves,
@@ -42,22 +44,12 @@ from .deformation import Deformation
 
 Frames = Callable[[Array], tuple[Array, Array]]
 
-# Panels that a loop begins with, at least: each is halved until its polynomials fit.
-_PANELS_OF_A_LOOP = 4
-# Part of a loop: moments that are equal for less than that meet at an instant.
-_INTERVAL = 1e-4
-# Part of the trace: entries off the diagonal that are accepted where panels meet, where their polynomials are worst.
-_AT_JOINTS = 1e-11
-# Part of the trace: a jump of the inertia up to this is taken for inexact data, as of a loop read from a file.
-_SLOPPY = 1e-7
-# [rad] Neighbouring panels further apart than that are not joined: the axes jump there.
-_JUMP = 0.1
-# Points of a panel in [-1, 1] at which another loop is compared with the first: apart from nodes and from symmetry.
-_SPOT_CHECKS = np.array([-0.91, -0.43, 0.17, 0.71])
-# The quaternion xyzw of no turn.
-_NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
-# The third axis: the distinct one of panels with two equal moments.
-_THIRD = np.array([0.0, 0.0, 1.0])
+_PANELS_OF_A_LOOP = 4  # at first, at least: each is halved until its polynomials fit
+_INTERVAL = 1e-4  # of a loop: moments that are equal for less meet at an instant
+_AT_JOINTS = 1e-11  # of the trace, for entries off the diagonal where panels meet: their polynomials are worst there
+_SLOPPY = 1e-7  # of the trace: a smaller jump of the inertia is inexact data, like a loop read from a file
+_JUMP = 0.1  # [rad] between neighbouring panels: farther apart the axes jump
+_SPOT_CHECKS = np.array([-0.91, -0.43, 0.17, 0.71])  # in [-1, 1], to compare loops: apart from nodes and symmetry
 
 
 def principal_frames(deformation: Deformation) -> Frames:
@@ -68,18 +60,12 @@ def principal_frames(deformation: Deformation) -> Frames:
     interval the frame turns least: with the distinct axis, and about it only if separate moments before and after the
     interval ask for it, then uniformly.
 
-    Of the 24 frames one is chosen at t = 0: moments ascend (moments that meet there as just after they part), the first
+    At t = 0 one of the 24 frames is chosen: moments ascend (moments that meet there as just after they part), the first
     two axes each point along their largest base component, the third completes a proper frame. If two moments are
     equal for all time, one of their axes lies in the plane of the distinct axis and the base axis farthest from it, and
     the one that lies along the earlier base axis comes first; if all three are, U is the identity.
 
-    Raises
-    ------
-    GaugeError
-        If the axes jump where moments meet, or turn by more than 2e8 rad per loop.
-
-    Notes
-    -----
+    Raises GaugeError if the axes jump where moments meet, or turn by more than 2e8 rad per loop.
     Source: Cabrera 2006, section 2.3.1 (b); theory.md B3.
     """
     panels, freedom = _joined(deformation)
@@ -160,14 +146,14 @@ def _over_loops(deformation: Deformation) -> AxisPanels:
 
 @dataclass(frozen=True)
 class _Freedom:
-    """By which turns the whole frame may still be turned from the left: all, those about an axis, or none."""
+    """Turns from the left that the whole frame may still make: all, those about an axis, or none."""
 
     kind: int
     axis: Array
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class _EqualMoments:
     """Panels `first` to `last` where moments are equal, all of one kind and one distinct axis."""
 
     first: int
@@ -181,10 +167,10 @@ class _Orientation:
 
     def __init__(self, panels: AxisPanels, shortest: float) -> None:
         self._panels, self._shortest = panels, shortest
-        self.turns = np.tile(_NO_TURN, (len(panels.left), 1))
-        self.spins: list[tuple[_Stretch, Array]] = []
-        self.freedom = _Freedom(int(panels.kind[0]), _THIRD)
-        self._stretches: list[_Stretch] = []
+        self.turns = np.tile(NO_TURN, (len(panels.left), 1))
+        self.spins: list[tuple[_EqualMoments, Array]] = []
+        self.freedom = _Freedom(int(panels.kind[0]), THIRD)
+        self._intervals: list[_EqualMoments] = []
         self._first, self._last = (so3.normalised(end) for end in _ends(panels.series))
 
     def run(self) -> None:
@@ -207,7 +193,7 @@ class _Orientation:
                 self.turns[panel] = group[label]
             elif kinds[panel] == SYMMETRIC:
                 # The distinct axis becomes one of the frame's.
-                seen = so3.matrix_from_quat(ideal) @ _THIRD
+                seen = so3.matrix_from_quat(ideal) @ THIRD
                 axis = np.sign(seen) * (np.arange(3) == np.argmax(np.abs(seen)))
                 self.turns[panel] = so3.quat_product(so3.quat_from_matrix(so3.between(seen, axis)), ideal)
             else:
@@ -215,46 +201,46 @@ class _Orientation:
             self._absorb(so3.quat_product(self.turns[panel], so3.quat_inverse(ideal)), panel)
             self._enter(panel, kinds[panel])
 
-    def _wide(self, stretch: _Stretch) -> bool:
-        return self._panels.right[stretch.last] - self._panels.left[stretch.first] >= self._shortest
+    def _wide(self, interval: _EqualMoments) -> bool:
+        return self._panels.right[interval.last] - self._panels.left[interval.first] >= self._shortest
 
     def _absorb(self, excess: Array, panel: int) -> None:
-        """Turn the frames before this panel by what is missing, where equal moments leave it open."""
+        """Turn the frames before this panel by the missing turn, where equal moments leave it open."""
         part = _part(excess, self.freedom.kind, self.freedom.axis)
         if part is not None:
             self.turns[:panel] = so3.quat_product(part, self.turns[:panel])
-            self.spins = [(stretch, so3.matrix_from_quat(part) @ spin) for stretch, spin in self.spins]
+            self.spins = [(interval, so3.matrix_from_quat(part) @ spin) for interval, spin in self.spins]
             excess = so3.quat_product(excess, so3.quat_inverse(part))
-        for stretch in reversed(self._stretches):
-            part = _part(excess, stretch.kind, stretch.axis)
-            if part is not None and self._wide(stretch):
-                self.spins.append((stretch, so3.rotation_vector_from_quat(part)))
-                after = slice(stretch.last + 1, panel)
+        for interval in reversed(self._intervals):
+            part = _part(excess, interval.kind, interval.axis)
+            if part is not None and self._wide(interval):
+                self.spins.append((interval, so3.rotation_vector_from_quat(part)))
+                after = slice(interval.last + 1, panel)
                 self.turns[after] = so3.quat_product(part, self.turns[after])
                 return
-            if stretch.kind == SYMMETRIC:
+            if interval.kind == SYMMETRIC:
                 return
 
     def _enter(self, panel: int, kind: int) -> None:
         if kind == SEPARATE:
-            self._stretches, self.freedom = [], _Freedom(SEPARATE, _THIRD)
+            self._intervals, self.freedom = [], _Freedom(SEPARATE, THIRD)
             return
-        axis = np.round(so3.matrix_from_quat(self.turns[panel]) @ _THIRD)
+        axis = np.round(so3.matrix_from_quat(self.turns[panel]) @ THIRD)
         first = panel
-        if self._stretches:
-            before = self._stretches[-1]
+        if self._intervals:
+            before = self._intervals[-1]
             if before.kind == kind and abs(before.axis @ axis) > 0.5:
-                first, axis = self._stretches.pop().first, before.axis
-        self._stretches.append(_Stretch(first, panel, kind, axis))
+                first, axis = self._intervals.pop().first, before.axis
+        self._intervals.append(_EqualMoments(first, panel, kind, axis))
         if kind == SYMMETRIC:
             if self.freedom.kind == SPHERICAL:
                 self.freedom = _Freedom(SYMMETRIC, axis)
             elif abs(self.freedom.axis @ axis) < 0.5:
-                self.freedom = _Freedom(SEPARATE, _THIRD)
+                self.freedom = _Freedom(SEPARATE, THIRD)
 
 
 def _part(turn: Array, kind: int, axis: Array) -> Array | None:
-    """The part (4,) of a turn that frames of a kind may make; None where that is nothing to speak of."""
+    """The part (4,) of a turn that frames of a kind may make; None where it is rounding."""
     if kind == SYMMETRIC:
         turn = so3.quat_from_rotation_vector(2.0 * np.arctan2(turn[:3] @ axis, turn[3]) * axis)
     return None if kind == SEPARATE or np.linalg.norm(turn[:3]) < 1e-9 else turn
@@ -265,18 +251,18 @@ def _oriented(panels: AxisPanels, shortest: float) -> tuple[AxisPanels, _Freedom
 
     Moments that are equal for less than `shortest` [s] meet at an instant, in which the frame cannot turn.
     """
-    found = _Orientation(panels, shortest)
-    found.run()
-    series = so3.quat_product(found.turns[:, None], panels.series)
-    for stretch, turn in found.spins:
-        rows = slice(stretch.first, stretch.last + 1)
+    orientation = _Orientation(panels, shortest)
+    orientation.run()
+    series = so3.quat_product(orientation.turns[:, None], panels.series)
+    for interval, turn in orientation.spins:
+        rows = slice(interval.first, interval.last + 1)
         left, right = panels.left[rows, None], panels.right[rows, None]
         times = 0.5 * (left + right) + 0.5 * (right - left) * panel_nodes()
         part = (times - left[0]) / (right[-1] - left[0])
         spin = so3.quat_from_rotation_vector(part[..., None] * turn)
         series[rows] = to_series() @ so3.quat_product(spin, chebyshev(panel_nodes(), COUNT) @ series[rows])
-    strength = so3.apply(so3.matrix_from_quat(found.turns) ** 2, panels.strength)
-    return replace(panels, series=series, strength=strength), found.freedom
+    strength = so3.apply(so3.matrix_from_quat(orientation.turns) ** 2, panels.strength)
+    return replace(panels, series=series, strength=strength), orientation.freedom
 
 
 def _ends(series: Array) -> tuple[Array, Array]:
@@ -335,7 +321,7 @@ def _settled(panels: AxisPanels, freedom: _Freedom) -> Array:
     if freedom.kind == SPHERICAL:
         return so3.quat_inverse(start)
     if freedom.kind == SEPARATE:
-        return _NO_TURN
+        return NO_TURN
     axes = so3.matrix_from_quat(start)
     distinct = freedom.axis @ axes
     farthest = np.eye(3)[np.argmin(np.round(np.abs(distinct), 9))]
@@ -348,7 +334,7 @@ def _settled(panels: AxisPanels, freedom: _Freedom) -> Array:
 def _labels_at_start(deformation: Deformation, panels: AxisPanels, freedom: _Freedom) -> Array:
     """The one of the 24 turns from the left that names the axes at t = 0 by the rule of `principal_frames`: (4,)."""
     if freedom.kind == SPHERICAL:
-        return _NO_TURN
+        return NO_TURN
     times = np.append(0.0, deformation.duration * 2.0 ** np.arange(-45.0, 0.5))
     frames, _ = _track(panels)(times)
     moments = np.einsum("tij,tjk,tik->ti", frames, deformation.inertia(times), frames)

@@ -1,15 +1,15 @@
-"""What deformations are made of as functions that are looked at once, and how much of an attitude a column is worth.
+"""Functions of time that deformations are made of, to be scanned once, with the attitude error of each column.
 
-A body turns by R' = R hat(I^-1 (Pi - L_o)). What is off by dI, dL_o in the integrand turns the attitude wrongly, to
-first order and at most, by
+A body turns by R' = R hat(I^-1 (Pi - L_o)). Errors dI, dL_o of the integrand turn the attitude, to first order and at
+most, by
     |dI|/I_1 (|Pi|/I_1 + |L_o|/I_1) dt + |dL_o|/I_1 dt
 with I_1 the least principal moment. So an entry of I is judged relative to I_1, times one plus the turn that L_o alone
 makes in all the time (the sampler multiplies by the turn that Pi makes: it knows Pi, the scan does not), and an entry
 of L_o is a rate of turning when divided by I_1. A particle that is off by dx changes I by 2 m r dx and L_o by m r dx':
 its lever is m r/I_1, which for a compact body is its share of the mass over its distance. A turn of a frame by one rad
 is one rad. In these units columns are what joints are in theirs: a unit of a column turns the body by a rad at most.
-A bound that is too large costs a digit of a series, one that is too small an error that nobody sees; I_1 is the least
-that every eighth sample of the scan shows.
+A bound that is too large costs a digit of a series, one that is too small hides an error; I_1 is the least moment in
+every eighth sample of the scan.
 """
 
 from __future__ import annotations
@@ -23,25 +23,16 @@ from ..shape_space.scan.function_scan import Judge, ScannedFunction, Words
 
 Pair = Callable[[Array], tuple[Array, Array]]
 
-# Of the six entries of a symmetric tensor.
-_ROWS = np.array([0, 1, 2, 1, 0, 0])
-_COLUMNS = np.array([0, 1, 2, 2, 2, 1])
-_ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")
+_ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")  # of a symmetric tensor, in these rows and columns
+_ROWS, _COLUMNS = np.array([[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])
 _AXES = ("x", "y", "z")
-# Of the largest moment: a body thinner than this cannot be integrated, and is refused there.
-_LEAST_MOMENT = 1e-9
-# More are looked at by sums over all of them, so that memory stays bounded.
-_FEW_PARTICLES = 32
-# Sums of all positions with signs like those of a coin: what is wrong with one of them shows in every sum.
-_SUMS = 4
-# Numbers of an array of positions at a time.
-_CHUNK = 4_000_000
-# Of the samples of the scan: that many times fewer say how large the body is.
-_STRIDE = 8
-# Times at which the positions are looked at before their centre of mass is taken off.
-_RAW_SIZES = 64
-# Of U without its rates: a series of this degree on a panel has slopes that are so much larger than its values.
-_SLOPES = 32.0
+_LEAST_MOMENT = 1e-9  # of the largest moment: the integrator refuses a thinner body
+_FEW_PARTICLES = 32  # more are scanned by sums over all of them, so that memory stays bounded
+_SUMS = 4  # of all positions with random signs: an error of one position shows in every sum
+_CHUNK = 4_000_000  # numbers of an array of positions at a time
+_STRIDE = 8  # of the samples of the scan from which the size of the body is taken
+_RAW_SIZES = 64  # times at which positions are sized before their centre of mass is subtracted
+_SLOPES = 32.0  # ratio of slopes to values of U without rates: the degree of the series on a panel
 
 
 def inertia_and_momentum(sample: Pair, subject: str) -> ScannedFunction:
@@ -82,10 +73,8 @@ def inertia_and_momentum(sample: Pair, subject: str) -> ScannedFunction:
 def positions_and_velocities(masses: Array, motion: Pair, raw_size: Callable[[Array], float]) -> ScannedFunction:
     """Particles from their centre of mass, each coordinate a column; of many, sums that hold all of them.
 
-    Parameters
-    ----------
-    motion : times (N,) -> positions and velocities (N, m, 3) from the centre of mass
-    raw_size : times (N,) -> the largest number among the positions as they are given [m]
+    `motion` gives positions and velocities (N, m, 3) from the centre of mass at times (N,), `raw_size` the largest
+    number among the user's positions there [m].
     """
     few = len(masses) <= _FEW_PARTICLES
     signs = np.where(np.random.default_rng(7).random((_SUMS, len(masses))) < 0.5, -masses, masses)

@@ -28,7 +28,6 @@ from .assembly_parts import Boom, Moments, MovingMass, Part, RigidPart
 from .deformation import Deformation
 from .descriptions import UngaugedDescription, inertia_of
 
-_SUBJECT = "what moves the parts of the assembly"
 _PART_WORDS = Words(
     units=("m", "m/s"),
     continuous="parts move continuously",
@@ -36,10 +35,8 @@ _PART_WORDS = Words(
     values="places",
     returned="(places, velocities)",
 )
-# Times at which the whole is looked at to know its size.
-_SIZE_SAMPLES = 64
-# Of the part at the distance at which it alone would be the body's inertia: a lever is no shorter.
-_LEAST_ARM = 0.1
+_SIZE_SAMPLES = 64  # times at which the size of the whole is taken
+_LEAST_ARM = 0.1  # of the distance at which a part alone would make the body's inertia: the least lever
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,21 +77,17 @@ class AssemblyDescription(UngaugedDescription):
         return self.about_centre(times).second
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """See `Description`."""
         total = self.about_centre(times)
         return inertia_of(total.second), so3.vee(np.swapaxes(total.flow, -1, -2) - total.flow)
 
     def inertia_rate(self, times: Array) -> Array:
-        """See `Description`."""
         flow = self.about_centre(times).flow
         return inertia_of(flow + np.swapaxes(flow, -1, -2))
 
     def centre_of_mass(self, times: Array) -> Array:
-        """See `Description`."""
         return self.origin + self.about_centre(times).first / self.mass
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
-        """See `Description`."""
         pairs = [part.correlation(times, reference, self.origin) for part in self.parts]
         total = self.about_centre(times)
         there = self.about_centre(np.array([reference])).first[0] / self.mass
@@ -103,14 +96,12 @@ class AssemblyDescription(UngaugedDescription):
         return value, rate
 
     def kinetic_energy(self, times: Array, turning: Array) -> Array:
-        """See `Description`."""
         inertia, momentum = self.sample(times)
         turned = 0.5 * so3.apply(inertia, turning) + momentum
         return np.sum(turning * turned, axis=-1) + 0.5 * self.about_centre(times).vis_viva
 
     @property
     def scan(self) -> FunctionScan | None:
-        """See `Description`."""
         return self._scan
 
     @cached_property
@@ -122,7 +113,10 @@ class AssemblyDescription(UngaugedDescription):
 
     def depends_on(self) -> ScannedFunction:
         """See `Description`: the paths of all parts, judged by the angular momentum that their rates are worth."""
-        return side_by_side([self._moved(k) for k, part in enumerate(self.parts) if part.path is not None], _SUBJECT)
+        return side_by_side(
+            [self._moved(k) for k, part in enumerate(self.parts) if part.path is not None],
+            "the motion of the parts of the assembly",
+        )
 
     def _moved(self, number: int) -> ScannedFunction:
         part, path = self.parts[number], self.parts[number].path
@@ -142,7 +136,6 @@ class AssemblyDescription(UngaugedDescription):
         return replace(moved, judge=judge, angles=angles, columns=columns, quantities=quantities, words=_PART_WORDS)
 
     def smoothness(self, breaks: Array) -> Smoothness:
-        """See `Description`."""
         scan = self.scan
         return Smoothness(
             breaks=breaks,
@@ -307,8 +300,8 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     lengths = [path.duration for path in paths] + ([] if duration is None else [positive_argument(duration)])
     if not lengths:
         raise TrajectoryError("an assembly without moving parts needs a duration [s]")
-    for one, other in pairwise(lengths):
-        if abs(one - other) > 1e-9 * one:
+    for first, second in pairwise(lengths):
+        if abs(first - second) > 1e-9 * first:
             raise TrajectoryError(f"all parts must move for one time, got {lengths} s; stretch or extend the paths")
     length = lengths[0]
     inner = [path.breaks[1:-1] for path in paths]

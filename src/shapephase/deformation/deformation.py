@@ -24,8 +24,9 @@ from ..arrays import Array, finite_array, lock_arrays
 from ..body.body import Body
 from ..body.family import BodyFamily
 from ..body.particles.point_masses import ParticleBody
-from ..display import card_html, card_text, short_repr
-from ..errors import ShapeError, SingularInertiaError
+from ..card_pictures import MOST_POINTS, curves_picture
+from ..display import Card, card_html, card_text, numbers, short_repr
+from ..errors import ShapeError, ShapePhaseError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
 from ..integrator.limited_steps import StepLimits
@@ -35,7 +36,6 @@ from ..refinement import least_over
 from ..shape_space.body_path import FamilyVariants, path_gap, users_route_along
 from ..shape_space.scan.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
-from ._card import deformation_card
 from ._physical_validity import check_never_on_a_line, check_triangle
 from .descriptions import (
     ArticulatedDescription,
@@ -65,7 +65,7 @@ class Deformation:
     ----------
     description : the functions themselves
     duration : [s]
-    declared_breaks : (M,) times between which all is said to be smooth, first 0, last `duration` [s]
+    declared_breaks : (M,) times between which all is declared to be smooth, first 0, last `duration` [s]
     closure : (3, 3) where the shape at the end is the one at the start turned by it (the identity for a closed
         joint path seen from the base), else None
     shape_gap : how far the end shape is from the start shape [largest joint difference, or relative change]
@@ -93,7 +93,6 @@ class Deformation:
 
     __post_init__ = lock_arrays
     __repr__, _repr_html_ = card_text, card_html
-    _card = deformation_card
 
     @property
     def breaks(self) -> Array:
@@ -105,7 +104,7 @@ class Deformation:
 
     @cached_property
     def _scanned_breaks(self) -> Array:
-        """The declared breaks and those found: the step in which functions of a user are looked at."""
+        """The declared breaks and those found by the scan of a user's functions."""
         scan = self.scan
         if scan is None or not len(scan.found_breaks):
             return self.declared_breaks
@@ -114,13 +113,13 @@ class Deformation:
 
     @property
     def scan(self) -> FunctionScan | None:
-        """What one look at the user's functions of time found, and what it cost; None where no such function is.
+        """Result of the scan of the user's functions of time, and its cost; None without such a function.
 
-        Functions are looked at before they are integrated: a path of joints known only as a function, inertia and
-        internal momentum, positions of particles, what drives the parts of an assembly, the frame of a gauge. Whatever
-        is wider than 1/2,000 of the duration is found (of a path in loops, of a loop); what is narrower has to be
-        declared as a break. Done when first needed, at some 5,500 times, and kept. In rad: columns are judged by how
-        far they turn the body.
+        Functions are scanned before they are integrated: a path of joints known only as a function, inertia and
+        internal momentum, positions of particles, the paths of an assembly's parts, the frame of a gauge. It finds what
+        is wider than 1/2,000 of the duration (of one loop, in a path of loops); narrower features have to be declared
+        as breaks. Done when first needed, at some 5,500 times, and kept. In rad: columns are scaled by the turn of the
+        body that they cause.
 
         Raises
         ------
@@ -132,7 +131,7 @@ class Deformation:
         Warns
         -----
         UndeclaredBreakWarning
-            Of kinks that were not declared; they are among the `breaks` from then on.
+            For kinks that were not declared; they are among the `breaks` from then on.
         """
         return self.description.scan
 
@@ -212,7 +211,7 @@ class Deformation:
         return -least, when
 
     def sampler(self) -> Sampler:
-        """A fresh sampler for the integrator, after a look at the functions of time that a user gave.
+        """A fresh sampler for the integrator, after the scan of a user's functions of time.
 
         Raises SingularInertiaError for particles that are on one line at some time; raises and warns as `scan`.
         """
@@ -227,6 +226,24 @@ class Deformation:
             known = known.original
             limits = limits.combined(known.smoothness(self.breaks).step_limits)
         return limits
+
+    def _card(self) -> Card:
+        """Duration, least and largest moments, internal momentum; with the principal moments in time."""
+        rows = [("duration", numbers(self.duration, "s") + (f", {self.loops} loops" if self.loops > 1 else ""))]
+        title = f"Deformation: {self.label}"
+        times = np.linspace(0.0, self.duration, MOST_POINTS)
+        try:
+            inertia, internal = self.inertia(times), self.internal_momentum(times)
+        except ShapePhaseError as error:
+            return Card(title, [*rows, ("cannot be evaluated", str(error))])
+        moments = np.asarray(np.linalg.eigvalsh(inertia), dtype=np.float64)
+        rows += [
+            ("principal moments", f"{moments.min():.6g} to {moments.max():.6g} kg m^2"),
+            ("internal momentum", f"up to {np.linalg.norm(internal, axis=-1).max():.6g} kg m^2/s"),
+            ("shape closes", "yes" if self.closure is not None else f"no, by {self.shape_gap:.4g}"),
+            ("breaks", f"{len(self.declared_breaks)}"),
+        ]
+        return Card(title, rows, curves_picture(moments, "principal moments in time"))
 
 
 @made_by(Deformation="take one of them, family[0]")
@@ -243,7 +260,7 @@ class DeformationFamily(Sequence[Deformation]):
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> family = cat.with_inertias(masses=np.outer([1.0, 2.0], [part.mass for part in cat.moving_parts]))
-    >>> print([float(one.inertia(0.0).trace().round(6)) for one in sp.articulated(family, loop)])
+    >>> print([float(member.inertia(0.0).trace().round(6)) for member in sp.articulated(family, loop)])
     [0.045, 0.045]
     """
 
@@ -253,7 +270,7 @@ class DeformationFamily(Sequence[Deformation]):
     __repr__ = short_repr
 
     def __len__(self) -> int:
-        """N."""
+        """Number of deformations."""
         return len(self.bodies)
 
     @overload
@@ -263,12 +280,12 @@ class DeformationFamily(Sequence[Deformation]):
     def __getitem__(self, index: slice) -> DeformationFamily: ...
 
     def __getitem__(self, index: int | slice) -> Deformation | DeformationFamily:
-        """One of them, made when it is asked for, or those of a slice."""
+        """One of them, made at every call, or those of a slice."""
         return articulated(self.bodies[index], self.path)
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """Duration [s]."""
         return self.path.duration
 
     def inertia(self, t: ArrayLike) -> Array:
@@ -311,9 +328,9 @@ def articulated(
     rotors: Mapping[str, float] | None = None,
     rotor_speeds: Mapping[str, float] | None = None,
 ) -> Deformation | DeformationFamily:
-    """The deformation of a body whose joints follow a path; of a `BodyFamily` those of all its bodies.
+    """The deformation of a body whose joints follow a path, or those of all bodies of a `BodyFamily`.
 
-    Joints are matched by name where the path has names, else by order. Of a `ParticleBody` it is one of `particles`.
+    Joints are matched by name where the path has names, else by order. A `ParticleBody` gives one of `particles`.
     Wheels are left out of the path: those that no motor turns keep their momentum, others the speed that a motor
     holds. On a joint of the path they make a control-moment gyroscope. What a wheel turns the body by depends on how
     long the motion takes: `split` states it apart from the holonomy. A wheel among the joints of the path is part of
@@ -364,25 +381,22 @@ def articulated(
 
 
 def deformation_along(body: Body, route: ShapePath, wheels: tuple[Rotor, ...] = ()) -> Deformation:
-    """As `articulated`, along a route as `route_along` makes it, whose angles are in radians without a doubt."""
+    """The deformation of `articulated` along a route by `route_along`, whose angles are certainly in radians."""
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None
     description = RotorDescription(body, route, wheels) if wheels else ArticulatedDescription(body, route)
     files = {"body": body.sha256, "path": route.sha256}
     inputs = {name: digest for name, digest in files.items() if digest}
     label = f"{body.name} along a path"
-    made_from = _origin(body, route)
+    made_from: dict[str, Any] = {
+        "body": {"name": body.name, "sha256": body.sha256},
+        "joints": list(body.joint_names),
+    }
+    if route.sha256 is not None:
+        made_from["path"] = {"sha256": route.sha256}
+    if route.record is not None:
+        made_from["recording"] = dict(route.record)
     return Deformation(description, route.duration, route.breaks, closure, gap, label, route.loops, inputs, made_from)
-
-
-def _origin(body: Body, path: ShapePath | None = None) -> dict[str, Any]:
-    """The body, its joints and the recording of a path, with the hashes of their files, as JSON can hold it."""
-    found: dict[str, Any] = {"body": {"name": body.name, "sha256": body.sha256}, "joints": list(body.joint_names)}
-    if path is not None and path.sha256 is not None:
-        found["path"] = {"sha256": path.sha256}
-    if path is not None and path.record is not None:
-        found["recording"] = dict(path.record)
-    return found
 
 
 def rigid(inertia: ArrayLike, duration: float) -> Deformation:
@@ -421,7 +435,7 @@ def prescribed(
         whatever is evaluated later, too. The equations of motion need only positive definite tensors
 
     The shape is taken to be a loop when the inertia at the end is that at the start, to 1e-9. Before they are
-    integrated the functions are looked at once (`Deformation.scan`, which has its own errors and warnings).
+    integrated the functions are scanned once (`Deformation.scan`, which has its own errors and warnings).
 
     Raises
     ------
@@ -476,7 +490,7 @@ def particles(
     breaks : interior times where a derivative jumps [s]
 
     The shape is a loop when the particles at the end are those at the start turned by some rotation, which
-    is then the closure. A function is looked at once before it is integrated (`Deformation.scan`, which has its own
+    is then the closure. A function is scanned once before it is integrated (`Deformation.scan`, which has its own
     errors and warnings): velocities that are not those of the positions are refused.
 
     Raises

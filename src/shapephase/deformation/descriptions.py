@@ -1,4 +1,4 @@
-"""What deformations are made of: joints that follow a path, particles, functions of time, samples."""
+"""Descriptions of deformations: joints that follow a path, particles, functions of time, samples."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ._scanned_functions import inertia_and_momentum, positions_and_velocities
 
 
 class Description(Protocol):
-    """What a deformation is made of; all functions take times (N,) in [0, duration].
+    """The functions of a deformation; all take times (N,) in [0, duration].
 
     Examples
     --------
@@ -77,23 +77,20 @@ class Description(Protocol):
 
     @property
     def scan(self) -> FunctionScan | None:
-        """What one look at the user's functions found, found when first needed; None where all is known.
+        """Scan of the user's functions, done when first needed; None where all is known.
 
-        Of a motion in loops, that of the first. Raises and warns as `ShapePath.scan`.
+        A motion in loops has that of the first. Raises and warns as `ShapePath.scan`.
         """
         ...
 
     def depends_on(self) -> ScannedFunction:
-        """The functions of time of which all else is a smooth function, for a look at them."""
+        """The functions of time of which all else is a smooth function, for their scan."""
         ...
 
     def smoothness(self, breaks: Array, /) -> Smoothness:
-        """By which the integrator chooses how to sample it, given the deformation's breaks [s].
+        """Smoothness, by which the integrator chooses how to sample it, given the deformation's breaks [s].
 
-        Raises
-        ------
-        SingularInertiaError
-            If the inertia is known to be singular at some time.
+        Raises SingularInertiaError if the inertia is known to be singular at some time.
         """
         ...
 
@@ -180,7 +177,7 @@ class ArticulatedDescription(UngaugedDescription):
         return self.path.smoothness
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled: what was found out about the path is found out again."""
+        """Body and path alone are pickled: the scan is repeated."""
         return {"body": self.body, "path": self.path}
 
 
@@ -228,7 +225,7 @@ class PrescribedDescription(UngaugedDescription):
         return self.__dict__
 
     def __deepcopy__(self, _: dict[int, Any]) -> PrescribedDescription:
-        """The description itself: nothing of it changes."""
+        """The description itself, which is immutable."""
         return self
 
     def sample(self, times: Array) -> tuple[Array, Array]:
@@ -274,7 +271,7 @@ class ParticleDescription(UngaugedDescription):
         return self.__dict__
 
     def __deepcopy__(self, _: dict[int, Any]) -> ParticleDescription:
-        """The description itself: nothing of it changes."""
+        """The description itself, which is immutable."""
         return self
 
     def as_given(self, times: Array) -> tuple[Array, Array]:

@@ -1,6 +1,6 @@
 """Frames in time: a gauge as the rotation U(t) and its body rates, wherever they come from.
 
-The frames of the horizontal gauge are those of the lift; the principal ones are in `principal_frame`.
+The frames of the horizontal gauge are those of the lift; the principal ones are in `_principal_frame`.
 """
 
 from __future__ import annotations
@@ -32,25 +32,21 @@ from ._scanned_functions import rates_alone, turns_alone, turns_and_rates
 from .deformation import Deformation
 from .descriptions import Description
 
-# A gauge that is named so is the frame of a link: "link:torso".
-_LINK = "link:"
-_LIFT_TOLERANCE = 1e-12
-"""[rad]; tighter than any motion that is seen from these frames."""
-# Of a coefficient of U.
-_ROUNDING = 8.0 * float(np.finfo(float).eps)
-# Of the fastest turn: rates that are less certain, found by differentiating U, are refused.
-_RATE_DOUBT = 1e-9
+_LINK = "link:"  # beginning of a gauge named after a link: "link:torso"
+LIFT_TOLERANCE = 1e-12  # [rad] tighter than any motion that is seen from these frames
+_ROUNDING = 8.0 * float(np.finfo(float).eps)  # of a coefficient of U
+_RATE_DOUBT = 1e-9  # of the fastest turn: uncertainty allowed to rates by differentiation
 
 
-class _OfUser(Protocol):
+class UserGauge(Protocol):
     """A gauge that a user gives as a function of time."""
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """U(t) and its body rates."""
         ...
 
-    def looked_at(self) -> ScannedFunction:
-        """What the user gave, for a look at it."""
+    def scanned_function(self) -> ScannedFunction:
+        """The user's function, for its scan."""
         ...
 
 
@@ -64,19 +60,19 @@ class GivenFrames:
     breaks : (M,) times between which they are smooth, as far as is known [s]
     """
 
-    frames: _OfUser
+    frames: UserGauge
     breaks: Array
 
     __repr__ = short_repr
 
     @property
     def function(self) -> ScannedFunction:
-        """What the user gave, for a look at it."""
-        return self.frames.looked_at()
+        """The user's function, for its scan."""
+        return self.frames.scanned_function()
 
     @property
     def panel_ends(self) -> Array:
-        """Times between which U is a short series, found by a look at it: (P + 1,) [s]. Raises and warns as it."""
+        """Times between which U is a short series, found by its scan: (P + 1,) [s]. Raises and warns as `scanned`."""
         return scanned(self.function, self.breaks).resolved.edges
 
 
@@ -92,9 +88,9 @@ def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]
 
 
 def _turns_of(u: Callable[[Array], Any], times: Array) -> tuple[Array, Array | None]:
-    """What a user's function returns: U, and its body rates if it gives them. Raises ShapeError."""
-    answer = u(times)
-    turns, rates = answer if isinstance(answer, tuple) and len(answer) == 2 else (answer, None)
+    """U by a user's function, and its body rates if it returns them. Raises ShapeError."""
+    returned = u(times)
+    turns, rates = returned if isinstance(returned, tuple) and len(returned) == 2 else (returned, None)
     turned = so3.rotation_argument(turns, "U")
     rate = None if rates is None else finite_array(rates, "body rates of U", unit="rad/s")
     if turned.shape != (len(times), 3, 3) or (rate is not None and rate.shape != (len(times), 3)):
@@ -106,8 +102,8 @@ def _turns_of(u: Callable[[Array], Any], times: Array) -> tuple[Array, Array | N
 
 
 @dataclass(frozen=True, eq=False)
-class _OfFunction:
-    """Frames that a function of a user gives."""
+class _GaugeFunction:
+    """Frames by a user's function."""
 
     function: Callable[[Array], Any]
 
@@ -117,13 +113,13 @@ class _OfFunction:
         return self.__dict__
 
     def __deepcopy__(self, _: dict[int, Any]) -> Self:
-        """The frames themselves: nothing of them changes."""
+        """The frames themselves, which are immutable."""
         return self
 
 
 @dataclass(frozen=True, eq=False)
-class _TurnsWithRates(_OfFunction):
-    """U and its body rates as the function gives them."""
+class _TurnsWithRates(_GaugeFunction):
+    """U and its body rates by the function."""
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         turned, rate = _turns_of(self.function, times)
@@ -131,13 +127,13 @@ class _TurnsWithRates(_OfFunction):
             raise ShapeError("u returned body rates at the start, and U alone later on")
         return turned, rate
 
-    def looked_at(self) -> ScannedFunction:
+    def scanned_function(self) -> ScannedFunction:
         return turns_and_rates(self)
 
 
 @dataclass(frozen=True, eq=False)
-class _TurnsAlone(_OfFunction):
-    """U as a function gives it, with the slopes of a series of it: times (N,) -> (N, 9)."""
+class _TurnsAlone(_GaugeFunction):
+    """U by the function, and the slopes of a series of U: times (N,) -> (N, 9)."""
 
     slopes: PiecewiseChebyshev
 
@@ -147,13 +143,13 @@ class _TurnsAlone(_OfFunction):
         turned, _ = _turns_of(self.function, times)
         return turned, so3.vee(so3.transpose(turned) @ self.slopes(times).reshape(-1, 3, 3))
 
-    def looked_at(self) -> ScannedFunction:
-        return _look_at_turns(self.function)
+    def scanned_function(self) -> ScannedFunction:
+        return _scanned_turns(self.function)
 
 
 @dataclass(frozen=True, eq=False)
-class _TurnsOfRates(_OfFunction):
-    """U from the body rates that a function gives: a start, and how it goes on."""
+class _TurnsOfRates(_GaugeFunction):
+    """U from its body rates by the function, and a start."""
 
     start: Array
     turned: SteppedRotation
@@ -161,21 +157,21 @@ class _TurnsOfRates(_OfFunction):
     def __call__(self, times: Array) -> tuple[Array, Array]:
         return self.start @ self.turned.rotation(times)[0], _spins_of(self.function, times)
 
-    def looked_at(self) -> ScannedFunction:
-        return _look_at_rates(self.function)
+    def scanned_function(self) -> ScannedFunction:
+        return _scanned_rates(self.function)
 
 
-def _look_at_turns(u: Callable[[Array], Any]) -> ScannedFunction:
+def _scanned_turns(u: Callable[[Array], Any]) -> ScannedFunction:
     return turns_alone(lambda times: _turns_of(u, times)[0])
 
 
-def _look_at_rates(rates: Callable[[Array], ArrayLike]) -> ScannedFunction:
+def _scanned_rates(rates: Callable[[Array], ArrayLike]) -> ScannedFunction:
     return rates_alone(lambda times: _spins_of(rates, times))
 
 
 def _differentiated(u: Callable[[Array], Any], breaks: Array) -> GivenFrames:
-    """Rotations with their rates: the slopes of the series that a look at them finds."""
-    function = _look_at_turns(u)
+    """Rotations with their rates: the slopes of the series that a scan finds."""
+    function = _scanned_turns(u)
     scan = scanned(function, breaks)
     edges = scan.resolved.edges
     series = scan.resolved.coefficients[:, :, :9] / function.judge(breaks, np.zeros((1, 18)))[0][0]
@@ -211,10 +207,10 @@ def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start:
     first = np.eye(3) if start is None else so3.rotation_argument(start, "start").copy()
     if first.shape != (3, 3):
         raise ShapeError(f"start: one rotation (3, 3) is needed, got {first.shape}")
-    scan = scanned(_look_at_rates(rates), breaks)
+    scan = scanned(_scanned_rates(rates), breaks)
     edges = np.union1d(breaks, scan.found_breaks)
     turned = stepped_rotation(
-        Sampler(unit_body, Smoothness(edges, resolved=scan.resolved)), np.zeros((1, 3)), _LIFT_TOLERANCE
+        Sampler(unit_body, Smoothness(edges, resolved=scan.resolved)), np.zeros((1, 3)), LIFT_TOLERANCE
     )
     return GivenFrames(_TurnsOfRates(rates, first, turned), edges)
 
@@ -255,13 +251,10 @@ def link_frames(deformation: Deformation, link: str) -> Frames:
 
 @dataclass(frozen=True, eq=False)
 class _LinkFrames:
-    """The frame of a link."""
-
     description: Description
     link: str
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """U and its rates."""
         turned, turning = self.description.link_frames(times, self.link)
         return so3.transpose(turned), -turning
 
@@ -282,13 +275,10 @@ def mean_body_frames(deformation: Deformation, reference: float = 0.0) -> Frames
 
 @dataclass(frozen=True, eq=False)
 class _MeanBodyFrames:
-    """The frame of the mean body."""
-
     description: Description
     reference: float
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
-        """U and its rates."""
         correlation, slope = self.description.correlation(times, self.reference)
         left, singular, right = np.linalg.svd(correlation)
         sign = np.sign(np.linalg.det(left @ right))
@@ -332,7 +322,7 @@ def _check_unbroken(frames: Frames, deformation: Deformation, reference: float) 
         turned = np.concatenate([turned, frames(middles)[0]])[order]
 
 
-# A gauge that follows from the deformation alone is one line here.
+# Gauges that follow from the deformation alone.
 _NAMED: dict[str, Callable[[Deformation], Frames]] = {"principal": principal_frames, "mean_body": mean_body_frames}
 GAUGES = ("horizontal", "base", *_NAMED)
 

@@ -29,6 +29,7 @@ from ..shape_space.scan.scanning import scanned
 from .deformation import Deformation
 from .descriptions import Description
 from .frames import (
+    LIFT_TOLERANCE,
     Frames,
     GivenFrames,
     frames_argument,
@@ -40,15 +41,8 @@ from .frames import (
     principal_frames,
 )
 
-# In messages: everything that a gauge of a user and what is seen from it depend on.
-_SUBJECT = "the deformation seen from the gauge"
-# Of a path in more loops the scan of the first is not copied: the gauge is then checked between its nodes only.
-_MOST_LOOPS = 100
-# Breaks of a recorded motion from which on a look at what is between them would take longer than all else: there the
-# sampler begins with panels of at most so many parts of the duration, on which it sees as much as the look does.
-_MOST_BREAKS = 2001
-_LIFT_TOLERANCE = 1e-12
-"""[rad]; tighter than any motion that is seen from this frame."""
+_MOST_LOOPS = 100  # for which the scan of the first loop is copied: with more the gauge is checked between its nodes
+_MOST_BREAKS = 2001  # of a recorded motion: with more the sampler begins with panels as short as a scan's, without one
 
 
 def in_gauge(
@@ -85,7 +79,7 @@ def in_gauge(
     Warns
     -----
     UndeclaredBreakWarning
-        Of kinks that are no breaks of the deformation; they are taken as breaks.
+        For kinks that are no breaks of the deformation; they are taken as breaks.
 
     Notes
     -----
@@ -200,7 +194,7 @@ def horizontal_gauge(deformation: Deformation) -> Deformation:
     0.000000000
     """
     check_object(deformation, "Deformation", "deformation")
-    rotation = stepped_rotation(deformation.sampler(), np.zeros((1, 3)), _LIFT_TOLERANCE)
+    rotation = stepped_rotation(deformation.sampler(), np.zeros((1, 3)), LIFT_TOLERANCE)
     lift = lift_along(rotation, deformation.stored_momentum if deformation.has_wheels else None).rotation
     return _seen_from(deformation, _HorizontalFrames(deformation.description, lift), "horizontal")
 
@@ -268,7 +262,7 @@ def _seen_from(deformation: Deformation, frames: Frames, name: str, turning: Giv
 
 @dataclass(frozen=True, eq=False)
 class _Gauged:
-    """A description seen from frames, those of a user (`turning`) or such as follow from it; smooth between breaks."""
+    """A description seen from frames, a user's (`turning`) or derived ones; smooth between breaks."""
 
     original: Description
     frames: Frames
@@ -318,7 +312,7 @@ class _Gauged:
 
     @property
     def scan(self) -> FunctionScan | None:
-        """Of the frame and of what is seen from it at once, where the frame is a user's."""
+        """Scan of a user's frame together with what is seen from it; without one that of the original."""
         return self._scan
 
     @cached_property
@@ -331,7 +325,7 @@ class _Gauged:
     def depends_on(self) -> ScannedFunction:
         if self.turning is None:
             return self.original.depends_on()
-        return side_by_side([self.original.depends_on(), self.turning.function], _SUBJECT)
+        return side_by_side([self.original.depends_on(), self.turning.function], "the deformation seen from the gauge")
 
     def smoothness(self, breaks: Array) -> Smoothness:
         known = self.original.smoothness(breaks)
@@ -341,7 +335,7 @@ class _Gauged:
             if scan is None:
                 return Smoothness(np.union1d(edges, np.linspace(0.0, breaks[-1], _MOST_BREAKS)))
             return Smoothness(edges, resolved=scan.resolved)
-        # A frame that follows from the inertia can turn faster than the shape: what is hidden in it is not resolved.
+        # A frame that follows from the inertia can turn faster than the shape, unresolved by the scan.
         resolved = known.resolved
         if resolved is not None and known.loops > 1:
             resolved = joined([resolved] * known.loops) if known.loops <= _MOST_LOOPS else None

@@ -20,8 +20,7 @@ from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path
 from ..shape_space.shape_path import ShapePath
 from .descriptions import UngaugedDescription
 
-# Of the inertia of a wheel, and of its radius of gyration: a wheel in a file is round to the digits that it has.
-_ROUND = 1e-6
+_ROUND = 1e-6  # of a wheel's inertia, and of its radius of gyration: the digits of a wheel in a file
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,20 +29,11 @@ class Rotor:
 
     Attributes
     ----------
-    joint, link : names of the axle, and of what turns on it
+    joint, link : names of the axle and of the wheel
     inertia : J about the axle [kg m^2]
     axle : (3,) unit vector in the axes of the link
     value : the momentum p = J (a . omega_link + spin), or the spin itself [kg m^2/s] or [rad/s]
-    is_momentum : which of both it is
-
-    Examples
-    --------
-    >>> satellite = sp.load_body("satellite")
-    >>> rest = [name for name in satellite.joint_names if name != "wheel_spin"]
-    >>> still = sp.ShapePath.waypoints([0.0, 1.0], np.zeros((2, len(rest))), joint_names=rest)
-    >>> deformation = sp.articulated(satellite, still, rotors={"wheel_spin": 2.0})
-    >>> deformation.description.rotors[0].joint, deformation.internal_momentum(0.5).round(9).tolist()
-    ('wheel_spin', [0.0, 0.0, 2.0])
+    is_momentum : True for the momentum
     """
 
     joint: str
@@ -73,7 +63,6 @@ class RotorDescription(UngaugedDescription):
     __repr__ = short_repr
 
     def sample(self, times: Array) -> tuple[Array, Array]:
-        """See `Description`."""
         shapes, rates = self.route.curve(times)
         inertia, internal = self.platform.sample(shapes, rates)
         for rotor in self.rotors:
@@ -87,15 +76,14 @@ class RotorDescription(UngaugedDescription):
         return inertia, internal
 
     def inertia_rate(self, times: Array) -> Array:
-        """See `Description`."""
         shapes, rates = self.route.curve(times)
-        found = self.platform.inertia_rate(shapes, rates)
+        rate = self.platform.inertia_rate(shapes, rates)
         for rotor in self.rotors:
             if rotor.is_momentum:
                 axle, turning = self._axle(rotor, shapes, rates)
                 product = np.cross(turning, axle)[:, :, None] * axle[:, None, :]
-                found = found - rotor.inertia * (product + so3.transpose(product))
-        return found
+                rate = rate - rotor.inertia * (product + so3.transpose(product))
+        return rate
 
     def stored_momentum(self, times: Array) -> Array | None:
         """See `Description`: p a of each wheel that keeps its momentum, J s a at a held speed."""
@@ -107,21 +95,19 @@ class RotorDescription(UngaugedDescription):
         return np.sum(held, axis=0) if held else None
 
     def spins(self, times: Array, omega: Array) -> Array:
-        """Of the wheels on their axles, while the base turns at omega (..., N, 3): -> (..., N, wheels) [rad/s]."""
+        """Speeds of the wheels on their axles, the base turning at omega (..., N, 3): -> (..., N, wheels) [rad/s]."""
         shapes, rates = self.route.curve(times)
-        found = []
+        speeds = []
         for rotor in self.rotors:
             axle, turning = self._axle(rotor, shapes, rates)
             free = rotor.value / rotor.inertia - np.sum(axle * (omega + turning), axis=-1)
-            found.append(free if rotor.is_momentum else np.full(free.shape, rotor.value))
-        return np.stack(found, axis=-1)
+            speeds.append(free if rotor.is_momentum else np.full(free.shape, rotor.value))
+        return np.stack(speeds, axis=-1)
 
     def centre_of_mass(self, times: Array) -> Array:
-        """See `Description`."""
         return self.platform.centre_of_mass(self.route.curve(times)[0])
 
     def correlation(self, times: Array, reference: float) -> tuple[Array, Array]:
-        """See `Description`."""
         still = self.route.curve(np.array([reference]))[0][0]
         return self.platform.mass_correlation(*self.route.curve(times), still)
 
@@ -135,22 +121,18 @@ class RotorDescription(UngaugedDescription):
 
     @property
     def scan(self) -> FunctionScan | None:
-        """See `Description`."""
         return self.route.scan
 
     def depends_on(self) -> ScannedFunction:
-        """See `Description`."""
         return path_function(self.route.curve, self.route.n_shape, self.route.joint_names)
 
     def link_frames(self, times: Array, link: str) -> tuple[Array, Array]:
-        """See `Description`."""
         shapes, rates = self.route.curve(times)
         return self.platform.link_pose(shapes, link)[:, :3, :3], self.platform.link_angular_velocity(
             shapes, rates, link
         )
 
     def smoothness(self, breaks: Array) -> Smoothness:  # noqa: ARG002 (the path's own)
-        """See `Description`."""
         return self.route.smoothness
 
     def _axle(self, rotor: Rotor, shapes: Array, rates: Array) -> tuple[Array, Array]:
@@ -170,13 +152,13 @@ def mapping_of_joints(value: Any, name: str) -> Mapping[str, Any]:
 def rotors_argument(body: Body, momenta: Mapping[str, Any], speeds: Mapping[str, Any]) -> tuple[Rotor, ...]:
     """Wheels by the names of their axles. Raises UnknownNameError, ShapeError for a wheel that is not symmetric."""
     check_object(body, "Body", "body")
-    found = []
+    rotors = []
     for name, given, unit in (("rotors", momenta, "kg m^2/s"), ("rotor_speeds", speeds, "rad/s")):
         for joint, value in given.items():
             if name == "rotor_speeds" and joint in momenta:
                 raise ShapeError(f"rotor_speeds: {joint} is among the rotors, too; say one of both")
-            found.append(_rotor(body, joint, number_argument(value, f"{name}, {joint}", unit), name == "rotors"))
-    return tuple(found)
+            rotors.append(_rotor(body, joint, number_argument(value, f"{name}, {joint}", unit), name == "rotors"))
+    return tuple(rotors)
 
 
 def _rotor(body: Body, joint: str, value: float, is_momentum: bool) -> Rotor:
@@ -192,8 +174,8 @@ def _rotor(body: Body, joint: str, value: float, is_momentum: bool) -> Rotor:
     tensor, centre = chain.inertias[frame], chain.centres[frame]
     about = float(axle @ tensor @ axle)
     across = float(np.trace(tensor) - about) / 2.0
-    round_one = across * np.eye(3) + (about - across) * np.outer(axle, axle)
-    uneven = float(np.abs(tensor - round_one).max()) / about if about > 0.0 else np.inf
+    symmetric = across * np.eye(3) + (about - across) * np.outer(axle, axle)
+    uneven = float(np.abs(tensor - symmetric).max()) / about if about > 0.0 else np.inf
     arm = float(np.linalg.norm(np.cross(axle, centre)))
     off = arm * np.sqrt(chain.masses[frame] / about) if about > 0.0 else np.inf
     if max(uneven, off) > _ROUND:
@@ -206,8 +188,8 @@ def _rotor(body: Body, joint: str, value: float, is_momentum: bool) -> Rotor:
         raise ShapeError(f"rotors: another joint follows {joint}; give its angle by the path")
     # Links in the order of the joints, the base first.
     link = body.moving_parts[frame].links[0]
-    own = body.link_pose(body.shape(), link)[:3, :3].T @ column / about
-    return Rotor(joint=joint, link=link, inertia=about, axle=own, value=value, is_momentum=is_momentum)
+    axle = body.link_pose(body.shape(), link)[:3, :3].T @ column / about
+    return Rotor(joint=joint, link=link, inertia=about, axle=axle, value=value, is_momentum=is_momentum)
 
 
 def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> ShapePath:

@@ -1,5 +1,5 @@
 from .covariance import Uncertainty, sampled_uncertainty, uncertainty
-from .inertia_errors import InertiaErrors
+from .error_sources import InertiaErrors
 from .recorded_flight import RecordedFlight, motion_from_recording
 from .recorded_momentum import RecordedMomentum, momentum_from_recording
 from .result_derivatives import Derivatives, ResultDerivative, derivatives

@@ -1,37 +1,39 @@
-"""What the derivatives of a motion's results are integrals of, at the nodes of a quadrature.
+"""Integrands of the derivatives of a motion's results, at the nodes of a quadrature.
 
 With eta the turn of the attitude by a small change, inertial axes, and G = R I^-1 R^T,
 
     eta' = G (l x eta + s),
 
-where s is what the change adds to the angular momentum, seen from inertial axes. Its adjoint Lambda' = l x (G Lambda),
+where s is the change of the angular momentum, inertial axes. Its adjoint Lambda' = l x (G Lambda),
 Lambda = 1 at the end, makes one integral of every change: eta(T) = integral of Lambda^T G s.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ..body.body import Body
+from ..body.couplings.coordinate_map import check_smooth
+from ..body.inertial_regressor import LinkMotions, by_link_parameters, link_motions
+from ..body.momentum_gradients import by_independent, by_shape_and_rate
+from ..integrator import link_tree, machine_code
 from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
+from ..shape_space.path_samples import PathSamples
 from ..shape_space.shape_path import ShapePath
 
-# Gauss nodes on each piece: their rule has the order ten, a step of the motion's eight.
-_NODES = 5
-# Steps of the motion's in one piece, at first.
-_STEPS = 4
-# The factor by which the coefficients of what is integrated fall, from one Legendre polynomial to the next, at most.
-# What is integrated is multiplied by cubics of the path, so that the rule misses the factor's seventh power; with this
-# one that was never more than 5e-8 of a derivative's norm.
+_NODES = 5  # of Gauss's rule on each piece: its order is ten, that of a step of the motion eight
+_STEPS = 4  # of the motion in one piece, at first
+# Ratio of neighbouring Legendre coefficients of the integrands, at most. They are multiplied by cubics of the path, so
+# that the rule misses the ratio's seventh power, never more than 5e-8 of a derivative's norm.
 _LARGEST_FACTOR = 0.15
-# Times that pieces where they fall more slowly are cut in halves.
-_MOST_HALVINGS = 4
+_MOST_HALVINGS = 4  # of pieces with a larger ratio
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +67,14 @@ class AlongMotion:
 def along_motion(motion: Motion, path: ShapePath, breaks: Array | None = None) -> AlongMotion:
     """A motion that is no batch, of an articulated body; no piece of the quadrature has one of the breaks within."""
     edges = _pieces(one_rotation(motion), path.breaks if breaks is None else np.union1d(path.breaks, breaks))
-    found = _at_nodes(motion, path, edges)
+    along = _at_nodes(motion, path, edges)
     for _ in range(_MOST_HALVINGS):
-        rough = _factors(found) > _LARGEST_FACTOR
+        rough = _factors(along) > _LARGEST_FACTOR
         if not rough.any():
             break
         edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
-        found = _at_nodes(motion, path, edges)
-    return found
+        along = _at_nodes(motion, path, edges)
+    return along
 
 
 def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
@@ -102,15 +104,15 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
 
 
 def _factors(along: AlongMotion) -> Array:
-    """By which Legendre coefficients fall in each piece, of the slowest of what is integrated: (P,)."""
+    """Ratio of neighbouring Legendre coefficients in each piece, for the integrand where they fall least: (P,)."""
     count = len(along.times)
     turned = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse, along.lifted @ along.inverse
-    vectors = [*(one.reshape(count, 9) for one in turned), along.spins, along.lifted_spins]
+    vectors = [*(matrices.reshape(count, 9) for matrices in turned), along.spins, along.lifted_spins]
     whole = np.concatenate([*vectors, np.cos(along.shapes), np.sin(along.shapes)], axis=1)
     at_nodes = whole.reshape(-1, _NODES, whole.shape[1])
     squares = (_last_polynomials() @ at_nodes) ** 2
     # Vectors by their length; cosine and sine by one.
-    starts, joints = np.cumsum([0, *(one.shape[1] for one in vectors)]), along.shapes.shape[1]
+    starts, joints = np.cumsum([0, *(rows.shape[1] for rows in vectors)]), along.shapes.shape[1]
     sizes = np.add.reduceat(at_nodes[..., : starts[-1]] ** 2, starts[:-1], axis=2).max(axis=1)[:, None]
     last = np.add.reduceat(squares[..., : starts[-1]], starts[:-1], axis=2)
     shares = np.divide(last, sizes, out=np.zeros_like(last), where=sizes > 0.0).max(axis=2)
@@ -135,7 +137,7 @@ def one_rotation(motion: Motion) -> SteppedRotation:
 
 
 def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
-    """How the attitude turns at each time by turns of the start and by changes of the momentum, inertial axes.
+    """Turns of the attitude at each time by turns of the start and by changes of the momentum, inertial axes.
 
     (N,) ascending -> (N, 3, 6 + 3 modes): the first three columns by the start, the next three by the momentum, each
     three more by one that changes like the next Legendre polynomial from the first to the last of the times.
@@ -151,32 +153,31 @@ def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
     scaled = widths[:, None, None, None] * turning.reshape(len(widths), _NODES, 3, 3)
     slopes = scaled @ so3.hat(motion.momentum)
     # Within a piece: from its start, and by a unit of momentum.
-    changes = (scaled[..., None, :] * legendre(at, times, modes).reshape(len(widths), _NODES, 1, -1, 1)).reshape(
-        len(widths), _NODES, 3, -1
-    )
+    shapes = legendre(at, times, modes).reshape(len(widths), _NODES, 1, -1, 1)
+    changes = (scaled[..., None, :] * shapes).reshape(len(widths), _NODES, 3, -1)
     from_start, by_momentum = _within(slopes), _within(slopes, np.einsum("ij,pjab->piab", matrix, changes))
     across = np.eye(3) + np.einsum("j,pjab->pab", shares, slopes @ from_start)
     added = np.einsum("j,pjab->pab", shares, changes + slopes @ by_momentum)
     columns = 6 + 3 * modes
-    found, reached = np.empty((len(edges), 3, columns)), np.eye(3, columns)
-    found[0] = reached
+    at_edges, reached = np.empty((len(edges), 3, columns)), np.eye(3, columns)
+    at_edges[0] = reached
     for piece in range(len(widths)):
         reached = across[piece] @ reached
         reached[:, 3:] += added[piece]
-        found[piece + 1] = reached
+        at_edges[piece + 1] = reached
     # Times that differ from an edge by rounding are that edge.
-    return found[np.searchsorted(0.5 * (edges[1:] + edges[:-1]), times)]
+    return at_edges[np.searchsorted(0.5 * (edges[1:] + edges[:-1]), times)]
 
 
 def legendre(at: Array, times: Array, modes: int) -> Array:
     """Legendre polynomials of orders 0 to `modes` from the first to the last of the times: (M,) -> (M, 1 + modes)."""
     since = 2.0 * (at - times[0]) / max(float(times[-1] - times[0]), np.finfo(float).tiny) - 1.0
-    # Before and after, nothing was recorded that could say how they go on.
+    # Constant before and after: nothing was recorded there.
     return np.polynomial.legendre.legvander(np.clip(since, -1.0, 1.0), modes)
 
 
 def _pieces(stepped: SteppedRotation, breaks: Array) -> Array:
-    """The edges of what Gauss's rule is used on: steps, a few together, that no break is within."""
+    """Edges of the pieces for Gauss's rule: a few steps each, without a break inside."""
     first = np.flatnonzero(np.diff(stepped.panel, prepend=-1))
     counts = np.diff(first, append=len(stepped.panel))
     within = np.arange(len(stepped.panel)) - np.repeat(first, counts)
@@ -223,3 +224,57 @@ def _rule() -> tuple[Array, Array, Array]:
     exponents = np.arange(1.0, _NODES + 1.0)
     matrix = (powers * (0.5 * (nodes + 1.0))[:, None] / exponents) @ np.linalg.inv(powers)
     return 0.5 * (nodes + 1.0), 0.5 * weights, matrix
+
+
+@dataclass(frozen=True, eq=False)
+class BodyAlong:
+    """A body at N shapes and rates of a path.
+
+    Attributes
+    ----------
+    body : the body of the path
+    times : (N,) [s]
+    shapes, rates : (N, n)
+    """
+
+    body: Body
+    times: Array
+    shapes: Array
+    rates: Array
+
+    def by_knots(self, samples: PathSamples, spins: Array, rows: Array, momenta: Array) -> Array:
+        """Sums of row . d(I w + J rate), w staying, by the path at its knots.
+
+        (S r, m), from spins (N, S, 3), rows (N, S, r, 3) and momenta I w + J rate (N, S, 3), which are minus the
+        derivative by the duration's logarithm where a path is closed.
+        """
+        chain, closing = self.body.chain, samples.is_closing(self.times)
+        check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
+        if self._has_kernels:
+            of_all = link_tree.momentum_gradients(chain.rows, self.shapes, self.rates, spins, rows)
+            parts = by_independent(chain, *of_all, self.shapes, self.rates)
+        else:
+            parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
+        by_knots = samples.by_knots(self.times, *parts)
+        if closing.any():
+            by_duration = -np.einsum("nsrc,nsc->sr", rows[closing], momenta[closing]).ravel()
+            by_knots += by_duration[:, None] * samples.seconds_by_knots()
+        return by_knots
+
+    def by_inertias(self, spins: Array, rows: Array) -> Array:
+        """Derivatives by mass, first moment and inertia of each frame: (S r, 10 (k + 1))."""
+        chain = self.body.chain
+        if not self._has_kernels:
+            pairs = zip(np.moveaxis(rows, 1, 0), np.moveaxis(spins, 1, 0), strict=True)
+            return np.concatenate([by_link_parameters(self._links, row, spin) for row, spin in pairs])
+        sums = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
+        return chain.rows.in_chain_axes(sums).reshape(len(sums), -1)
+
+    @property
+    def _has_kernels(self) -> bool:
+        """True where kernels serve: bodies with ball joints have no rows, and interpreted kernels are slower."""
+        return self.body.chain.has_rows and machine_code.is_used()
+
+    @cached_property
+    def _links(self) -> LinkMotions:
+        return link_motions(self.body.chain, self.shapes, self.rates)

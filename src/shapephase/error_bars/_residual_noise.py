@@ -1,4 +1,4 @@
-"""Noise of what a least-squares fit leaves of recorded attitudes: how far it is correlated, and whether it is noise.
+"""Noise in the residuals of a least-squares fit to recorded attitudes: its correlation, and whether it is noise.
 
 Noise of each axis is taken for a stationary process whose correlation is one of three kinds, of any length: it dies out
 exponentially (a tracker), it is the mean of neighbours, or a filter's bell. The restricted likelihood of each (which
@@ -16,30 +16,26 @@ import numpy as np
 
 from ..arrays import Array
 
+# Correlations of neighbours, even in their arcsines: there the reference prior is flat. The last is 0.999.
 _EXPONENTIAL = np.sin((np.arange(36) + 0.5) / 36.0 * np.pi - 0.5 * np.pi)
-"""Correlations of neighbours, even in their arcsines: there the reference prior is flat. The last is 0.999."""
+# Samples of a mean, or until a bell is 1/e: shorter is nearly white, longer hardly noise.
 _LENGTHS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0, 24.0, 32.0])
-"""Samples of a mean, or until a bell is 1/e: shorter is nearly white, longer hardly noise."""
 _OWN = 0.01  # white share of the variance of smoothed noise: digits of recordings are rounded
-_BLOCK = 128
-"""Samples that are weighed together, four times the longest mean; blocks count as independent."""
-_CHANCE = 0.02
-"""With which residuals that are noise make bars longer."""
-_SURE = 0.001
-"""With which residuals that are noise are taken for a momentum that changes."""
-_MOST_MODES = 6
-"""Legendre polynomials of a momentum in time: more resolve less than a tenth of the flight."""
+_BLOCK = 128  # samples weighed together, four times the longest mean; blocks count as independent
+_CHANCE = 0.02  # probability with which noise makes bars longer
+_SURE = 0.001  # probability with which noise is taken for a momentum that changes
+_MOST_MODES = 6  # Legendre polynomials of a momentum in time: more resolve less than a tenth of the flight
 
 
 @dataclass(frozen=True, eq=False)
 class ResidualNoise:
-    """How likely each kind and length of correlation is, and what follows of the parameters with it.
+    """Probability of each kind and length of correlation, and the parameters of the fit that follow.
 
     Attributes
     ----------
     weights : (F,) of the correlations; their sum is one
     variances : (F,) of each residual [rad^2], the larger of what is left of whitened and of plain residuals: where the
-        kind does not fit, as of a filter's stop band, whitened ones say too little
+        kind does not fit, as of a filter's stop band, whitened ones are too small
     parameters : (F, m) by generalised least squares
     precisions : (F, m, m) inverse covariances of the parameters, where residuals have variance one
     free : numbers less parameters
@@ -64,9 +60,9 @@ class ResidualNoise:
         """Probability that the last few parameters come out so far from zero although they are zero: the F test."""
         from scipy.special import fdtrc
 
-        there = self.parameters[:, -last:]
+        parameters = self.parameters[:, -last:]
         known = np.linalg.inv(np.linalg.inv(self.precisions)[:, -last:, -last:])
-        ratios = np.einsum("fa,fab,fb->f", there, known, there) / (last * self.variances)
+        ratios = np.einsum("fa,fab,fb->f", parameters, known, parameters) / (last * self.variances)
         return float(self.weights @ fdtrc(last, self.free, ratios))
 
 
@@ -106,10 +102,10 @@ def residual_noise(residuals: Array, slopes: Array) -> ResidualNoise:
 
 def _by_correlation(slopes: Array) -> Array:
     """Covariances of an ordinary least-squares fit, where residuals have variance one: (3 N, m) -> (m, m, F)."""
-    answers = np.linalg.pinv(slopes).reshape(slopes.shape[1], -1, 3)
-    count = answers.shape[1]
+    inverse = np.linalg.pinv(slopes).reshape(slopes.shape[1], -1, 3)
+    count = inverse.shape[1]
     size = 1 << (2 * count - 1).bit_length()
-    waves = np.fft.rfft(answers, size, axis=1)
+    waves = np.fft.rfft(inverse, size, axis=1)
     by_lag = np.fft.irfft(np.einsum("afc,bfc->abf", waves, waves.conj()), size, axis=2)[:, :, :count]
     by_lag += np.swapaxes(by_lag, 0, 1)
     by_lag[:, :, 0] *= 0.5
@@ -121,22 +117,21 @@ def _correlations(count: int) -> Array:
     lags = np.arange(count, dtype=np.float64)
     means = np.maximum(1.0 - lags / _LENGTHS[:, None], 0.0)
     bells = np.exp(-((lags / _LENGTHS[:, None]) ** 2))
-    own = (1.0 - _OWN) * np.concatenate([means, bells]) + _OWN * (lags == 0)
-    return np.concatenate([_EXPONENTIAL[:, None] ** lags, own])
+    smoothed = (1.0 - _OWN) * np.concatenate([means, bells]) + _OWN * (lags == 0)
+    return np.concatenate([_EXPONENTIAL[:, None] ** lags, smoothed])
 
 
 def _priors() -> Array:
-    """One half for the exponential ones, which white noise is one of, and a quarter for each of the others."""
-    half, quarter = 0.5 / len(_EXPONENTIAL), 0.25 / len(_LENGTHS)
-    return np.concatenate([np.full(len(_EXPONENTIAL), half), np.full(2 * len(_LENGTHS), quarter)])
+    """One half for the exponential ones, white noise among them, and a quarter for each of the others."""
+    return np.repeat([0.5 / len(_EXPONENTIAL), 0.25 / len(_LENGTHS)], [len(_EXPONENTIAL), 2 * len(_LENGTHS)])
 
 
 def drift_modes(residuals: Array, slopes: Array, by_modes: Array) -> tuple[int, bool]:
-    """How many Legendre polynomials of the momentum in time the residuals ask for, and whether surely.
+    """Number of Legendre polynomials of the momentum in time that the residuals need, and whether surely.
 
     residuals (N, 3) [rad], slopes (3 N, m), by_modes (3 N, 3 K): change of the attitudes by each polynomial's momentum.
     One more polynomial counts where chance brings as much in less than one of 50 cases, also together with the next:
-    bars that are too long cost less than a drift that they do not hold. It is sure in less than one of 1000.
+    bars that are too long cost less than a drift outside of them. It is sure below one case of 1000.
     """
     modes, sure = 0, False
     for tried in range(1, by_modes.shape[1] // 3 + 1):

@@ -22,23 +22,26 @@ from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
-from ._error_sources import Inputs, by_relative_errors, drawn_bodies, inputs_of
-from ._fit_answers import fit_by_inertias, fit_by_knots
-from .inertia_errors import InertiaErrors
+from .error_sources import InertiaErrors, Inputs, by_relative_errors, drawn_bodies, inputs_of
 from .recorded_momentum import UNKNOWNS, RecordedMomentum
-from .result_derivatives import Derivatives, ResultDerivative, derivatives, described_by
+from .result_derivatives import (
+    Derivatives,
+    ResultDerivative,
+    derivatives,
+    described_by,
+    fit_by_inertias,
+    fit_by_knots,
+)
 
-# An angle has a bar of its own where it is this many of them from 0 and from 180 degrees.
-_BARS_FROM_THE_ENDS = 5.0
-# Variances along other axes of a rotation than its worst, as a part of that, that are rounding.
-_ROUNDING = 1e-9
+_BARS_FROM_THE_ENDS = 5.0  # from an angle to 0 and to 180 degrees, for it to have a bar of its own
+_ROUNDING = 1e-9  # of the largest variance of a rotation: smaller ones about other axes are rounding
 _ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation")
 _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
 
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """How far the results of a motion may be off, to first order or as drawn.
+    """Error bars of the results of a motion, to first order or from draws. Made by `uncertainty`.
 
     A rotation D may be exp(hat(e)) D, where e has mean zero and the covariance that is given, inertial axes. Phases are
     those of the horizontal gauge; without momentum they are exactly zero.
@@ -50,18 +53,10 @@ class Uncertainty:
     start : (6, 6) covariance of the turn of the start, base axes [rad^2], and of the momentum [(kg m^2/s)^2], with all
         that moves a fit to a recording
     total_angle, holonomy_angle : standard deviations of the angles of these rotations [rad]; NaN where an angle is
-        less than five of them from 0 or from 180 degrees: there it cannot be said by one number
+        less than five of them from 0 or from 180 degrees: one number cannot state it there
     smoothing_bias : by how much smoothing has shifted the result that it shifts most, as far as that is known, in
         standard deviations of its own, which hold it; 0 where nothing was smoothed or `joints` are exact
-    draws : how many motions this was estimated from; 0: found by derivatives
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.uncertainty(motion, attitude=0.01)
-    >>> print(np.sqrt(found.final_attitude.diagonal()).round(3))
-    [0.012 0.009 0.01 ]
+    draws : number of motions this was estimated from; 0: by derivatives
     """
 
     final_attitude: Array
@@ -90,9 +85,9 @@ def uncertainty(
     attitude: ArrayLike | None = None,
     start: RecordedMomentum | ArrayLike | None = None,
 ) -> Uncertainty:
-    """How far the results of `split` may be off, to first order, by what is not known exactly.
+    """Error bars of the results of `split`, to first order, from the errors of its inputs.
 
-    Sources are independent of each other; what is not given is exact. The cost is that of a few reconstructions,
+    Sources are independent of each other; inputs without errors are exact. The cost is that of a few reconstructions,
     however many samples and links there are.
 
     Parameters
@@ -132,23 +127,23 @@ def uncertainty(
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.uncertainty(motion, momentum=1e-5)
-    >>> print(f"{found.dynamic_phase:.6f} rad")
+    >>> bars = sp.uncertainty(motion, momentum=1e-5)
+    >>> print(f"{bars.dynamic_phase:.6f} rad")
     0.000813 rad
     """
     if inertias is not None:
         check_object(inertias, "InertiaErrors", "inertias")
-    found = derivatives(motion)
+    derived = derivatives(motion)
     inputs = inputs_of(motion, joints, inertias, momentum, attitude, start)
     covariances = [np.zeros((3, 3)) for _ in _ROTATIONS]
     variances, of_start = np.zeros(len(_PHASES)), np.zeros((UNKNOWNS, UNKNOWNS))
-    for cause in _causes(found, inputs):
+    for cause in _causes(derived, inputs):
         for total, name in zip(covariances, _ROTATIONS, strict=True):
             total += _carried(getattr(cause.derivative, name), cause.covariance)
         variances += [_carried(getattr(cause.derivative, name)[None], cause.covariance)[0, 0] for name in _PHASES]
         of_start += _carried(cause.start, cause.covariance)
     deviations = np.sqrt(variances)
-    bias = 0.0 if inputs.samples is None else _smoothing_bias(found, covariances, deviations)
+    bias = 0.0 if inputs.samples is None else _smoothing_bias(derived, covariances, deviations)
     return _uncertainty(split(motion), covariances, deviations, of_start, smoothing_bias=bias, draws=0)
 
 
@@ -185,8 +180,8 @@ def sampled_uncertainty(
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.sampled_uncertainty(motion, momentum=1e-5, draws=10)
-    >>> print(f"{found.draws} draws, {found.dynamic_phase:.4f} rad")
+    >>> bars = sp.sampled_uncertainty(motion, momentum=1e-5, draws=10)
+    >>> print(f"{bars.draws} draws, {bars.dynamic_phase:.4f} rad")
     10 draws, 0.0008 rad
     """
     if inertias is not None:
@@ -199,7 +194,7 @@ def sampled_uncertainty(
     paths, bodies, changes = [path] * draws, [body] * draws, np.zeros((draws, UNKNOWNS))
     if inputs.samples is not None:
         samples, errors = path_samples(path), normal(inputs.samples)
-        paths = [samples.path_through(samples.values + one.reshape(samples.values.shape)) for one in errors]
+        paths = [samples.path_through(samples.values + row.reshape(samples.values.shape)) for row in errors]
         changes += errors @ samples.by_samples(_fit_by_knots(motion, inputs)).T
     if inputs.links is not None:
         errors = normal(inputs.links)
@@ -221,7 +216,7 @@ def sampled_uncertainty(
         for which, (rotation, usual) in enumerate(zip(rotations, expected, strict=True)):
             turns[which, row] = so3.log(rotation @ usual.T)
         phases[row] = angles
-    covariances = [np.cov(one, rowvar=False) for one in turns]
+    covariances = [np.cov(vectors, rowvar=False) for vectors in turns]
     return _uncertainty(middle, covariances, phases.std(axis=0, ddof=1), np.cov(changes, rowvar=False), draws=draws)
 
 
@@ -243,38 +238,37 @@ class _Cause(NamedTuple):
     covariance: Array
 
 
-def _causes(found: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
-    by_start = _combined(np.hstack, found.by_attitude, found.by_momentum)
+def _causes(derived: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
+    by_start = _combined(np.hstack, derived.by_attitude, derived.by_momentum)
 
     def moving_the_fit(derivative: ResultDerivative, start: Array, covariance: Array) -> _Cause:
         return _Cause(_combined(lambda pair: pair[0] + pair[1] @ start, derivative, by_start), start, covariance)
 
     if inputs.samples is not None:
-        samples, by_fit = path_samples(found.path), _fit_by_knots(found.motion, inputs)
+        samples, by_fit = path_samples(derived.path), _fit_by_knots(derived.motion, inputs)
         for rule in samples.rules:
-            yield moving_the_fit(found.at_knots(rule), rule(by_fit), inputs.samples)
-        # What is known of the bias is one number of variance one, times itself.
+            yield moving_the_fit(derived.at_knots(rule), rule(by_fit), inputs.samples)
+        # The bias is one unknown of variance one, times its estimate.
         taken = samples.bias[:, None]
-        yield moving_the_fit(found.at_knots(lambda by_knots: by_knots @ taken), by_fit @ taken, np.ones(1))
+        yield moving_the_fit(derived.at_knots(lambda by_knots: by_knots @ taken), by_fit @ taken, np.ones(1))
     if inputs.links is not None:
-        by_links = _combined(lambda only: by_relative_errors(found.body, only[0]), found.by_inertias)
-        yield moving_the_fit(by_links, _fit_by_links(found.motion, inputs), inputs.links)
+        by_links = _combined(lambda only: by_relative_errors(derived.body, only[0]), derived.by_inertias)
+        yield moving_the_fit(by_links, _fit_by_links(derived.motion, inputs), inputs.links)
     if inputs.momentum is not None:
-        yield _Cause(found.by_momentum, np.eye(UNKNOWNS)[:, 3:], inputs.momentum)
+        yield _Cause(derived.by_momentum, np.eye(UNKNOWNS)[:, 3:], inputs.momentum)
     if inputs.attitude is not None:
-        yield _Cause(found.by_attitude, np.eye(UNKNOWNS)[:, :3], inputs.attitude)
+        yield _Cause(derived.by_attitude, np.eye(UNKNOWNS)[:, :3], inputs.attitude)
     if inputs.start is not None:
         yield _Cause(by_start, np.eye(UNKNOWNS), inputs.start)
 
 
 def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivative) -> ResultDerivative:
-    """What a rule makes of each derivative of the parts."""
+    """Result of a rule for each derivative of the parts."""
     return ResultDerivative(*(rule(tuple(getattr(part, name) for part in parts)) for name in (*_ROTATIONS, *_PHASES)))
 
 
 def _fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
-    """How values at the knots of the path move attitude and momentum at the start, where these were fitted:
-    (6, knots n)."""
+    """Derivatives of fitted attitude and momentum at the start by the path at its knots: (6, knots n)."""
     if inputs.fit is None:
         _, path = described_by(motion)
         return np.zeros((UNKNOWNS, path_samples(path).bias.size))
@@ -303,20 +297,20 @@ def _carried(derivative: Array, covariance: Array) -> Array:
     return (derivative * covariance if covariance.ndim == 1 else derivative @ covariance) @ derivative.T
 
 
-def _smoothing_bias(found: Derivatives, covariances: list[Array], deviations: Array) -> float:
+def _smoothing_bias(derived: Derivatives, covariances: list[Array], deviations: Array) -> float:
     """The largest shift of a result by smoothing, in standard deviations: of a rotation about its worst axis."""
-    taken = path_samples(found.path).bias
+    taken = path_samples(derived.path).bias
     if not taken.any():
         return 0.0
     shifts = []
     for name, covariance in zip(_ROTATIONS, covariances, strict=True):
         values, vectors = np.linalg.eigh(covariance)
         known = values > _ROUNDING * max(float(values[-1]), 0.0)
-        turn = vectors.T @ (getattr(found.by_knots, name) @ taken)
+        turn = vectors.T @ (getattr(derived.by_knots, name) @ taken)
         shifts.append(float(np.sqrt((turn[known] ** 2 / values[known]).sum())))
     for name, deviation in zip(_PHASES, deviations, strict=True):
         if deviation:
-            shifts.append(abs(float(getattr(found.by_knots, name) @ taken)) / float(deviation))
+            shifts.append(abs(float(getattr(derived.by_knots, name) @ taken)) / float(deviation))
     return max(shifts)
 
 

@@ -59,7 +59,7 @@ def motion_from_recording(
     find_axes: bool = False,
     progress: ProgressCallback | None = None,
 ) -> RecordedFlight:
-    """The motion of a recorded body: what every command makes of a recording.
+    """The motion of a recorded body, as every command makes it.
 
     Where the attitude of the base was recorded, the momentum is fitted to it. A momentum that is given wins; the motion
     then starts at the recorded attitude. Zero is taken only where nothing of the base was recorded, or one attitude in
@@ -79,10 +79,10 @@ def motion_from_recording(
     ShapeError
         For an attitude beside a momentum that is fitted, or axes to be found without a fit.
     TrajectoryError
-        If nobody said that the recording is a flight, and its base is none: the fit does not settle, or what it leaves
-        is no noise.
+        If the recording was not declared to be a flight, and its base is none: the fit does not settle, or what it
+        leaves is no noise.
     AccuracyNotReached
-        If the fit to a flight that was asked for does not settle.
+        If the fit to a requested flight does not settle.
 
     Warns
     -----
@@ -142,7 +142,7 @@ def _fit(body: Body, recorded: RecordedMotion, tolerance: float, *, find_axes: b
         ) from error
     if not fitted.conserved:
         if assumed and (flight is None or flight.by == ALL):
-            raise _no_flight(recorded, "what the fit leaves of the recorded base is no noise")
+            raise _no_flight(recorded, "the residuals of the recorded base are no noise")
         warn_of_drift(fitted)
     return fitted
 

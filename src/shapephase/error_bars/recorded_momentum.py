@@ -22,26 +22,18 @@ from ..reconstruction.recorded_base import W_FIRST, read_w_first
 from ._along_motion import legendre, responses
 from ._residual_noise import drift_modes, held, most_modes, residual_noise
 
-# Rounds of Gauss and Newton; a flight of many turns takes ten.
-_MOST_ROUNDS = 40
-# After so many, one that is no flight of the body is known to be none.
-_ENOUGH_ROUNDS = 12
+_MOST_ROUNDS = 40  # of Gauss and Newton; a flight of many turns takes ten
+_ENOUGH_ROUNDS = 12  # after which a recording far from any flight of the body is refused
 _SMALL_STEP = 1e-3  # of the standard deviations of the fit: a smaller step is the last
-# [rad] and of the momentum: where there is no noise.
-_NO_STEP = 1e-11
-# A step is halved so many times, at most, to come nearer to the recording.
-_MOST_HALVINGS = 12
+_NO_STEP = 1e-11  # [rad], and of the momentum: the last step without noise
+_MOST_HALVINGS = 12  # of a step that leads away from the recording
 UNKNOWNS = 6  # turn of the start and momentum
-# [rad] Ways on that differ by less are one; and how many are tried.
-_SAME_AXES = 0.2
-_MOST_LIKELY = 4
-_ROUGH_ROUNDS = 15
-# [rad] Axes that are known no better are not found.
-_VAGUE_AXES = 0.3
-# Attitudes that are fitted first, or up to twice as many.
-_FIRST_TIMES = 6
-# [rad] A recording that stays so far from every motion of the body is none of its flights.
-_NO_FLIGHT = 0.5
+_SAME_AXES = 0.2  # [rad] between equal candidates for the axes
+_MOST_LIKELY = 4  # candidates for the axes that are fitted
+_ROUGH_ROUNDS = 15  # of least squares for a candidate
+_VAGUE_AXES = 0.3  # [rad] uncertainty of axes that the recording leaves open
+_FIRST_TIMES = 6  # attitudes that are fitted first, or up to twice as many
+_NO_FLIGHT = 0.5  # [rad] rms from every motion of the body, beyond which a recording is none of its flights
 _ROUNDED = 10.0  # tolerances of the reconstruction: smaller residuals are rounding
 _CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller change is not reported
 
@@ -50,6 +42,8 @@ _CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller chan
 @dataclass(frozen=True, eq=False)
 class RecordedMomentum:
     """The momentum and start with which a body comes nearest to the attitudes that were recorded.
+
+    Made by `momentum_from_recording`.
 
     Attributes
     ----------
@@ -73,14 +67,6 @@ class RecordedMomentum:
     times : (N,) of the recorded attitudes [s]
     base_axes : (3, 3) base axes to those whose attitude was recorded; the identity where these were the base's
     axes_covariance : (3, 3) of their turn, base axes [rad^2]; zero where they were given
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion, times = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), np.linspace(0.0, 1.0, 9)
-    >>> found = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times), noise=1e-3)
-    >>> print(found.momentum_covariance.shape, f"{found.noise:.3f}")
-    (3, 3) 0.001
     """
 
     momentum: Array
@@ -105,7 +91,7 @@ class RecordedMomentum:
 
     @property
     def angles(self) -> Array:
-        """How far the reconstructed attitude is from the recorded one at each time: (N,) [rad]."""
+        """Angles from reconstructed to recorded attitudes: (N,) [rad]."""
         return np.linalg.norm(self.residuals, axis=1)
 
 
@@ -161,8 +147,8 @@ def momentum_from_recording(
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> motion, times = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), np.linspace(0.0, 1.0, 9)
-    >>> found = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times))
-    >>> print(found.momentum.round(6) + 0.0)
+    >>> result = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times))
+    >>> print(result.momentum.round(6) + 0.0)
     [0.    0.    0.005]
     """
     check_flag(find_axes, "find_axes")
@@ -181,19 +167,19 @@ def momentum_from_recording(
         if _is_flight_with_w_first(deformation, at, recorded, tolerance, find_axes=find_axes):
             raise TrajectoryError(f"the recorded base is no flight of this body; {W_FIRST}") from error
         raise
-    found = _estimated(fit, at, noise, tolerance)
-    if not found.conserved:
-        warn_of_drift(found)
-    return found
+    result = _estimated(fit, at, noise, tolerance)
+    if not result.conserved:
+        warn_of_drift(result)
+    return result
 
 
 def _estimated(fit: _Fitted, times: Array, noise: float | None, tolerance: float) -> RecordedMomentum:
-    """The fit with what its residuals say about noise and about a momentum that changes."""
+    """The fit with the noise and the change of the momentum that its residuals show."""
     residuals, slopes, motion = fit.residuals, fit.slopes, fit.motion
     white = np.asarray(np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
     seen = float(np.sqrt((residuals**2).sum() / (residuals.size - slopes.shape[1])))
     modes, sure, by_modes = 0, False, np.empty((residuals.size, 0))
-    # What the tolerance of the reconstruction leaves is rounding.
+    # Residuals near the tolerance of the reconstruction are rounding.
     if _spread(residuals) > _ROUNDED * tolerance:
         turned = responses(motion, times, most_modes(len(times)))[:, :, UNKNOWNS:]
         by_modes = (so3.transpose(motion.attitude(times)) @ turned).reshape(residuals.size, -1)
@@ -235,7 +221,7 @@ def _estimated(fit: _Fitted, times: Array, noise: float | None, tolerance: float
 
 
 def warn_of_drift(fit: RecordedMomentum) -> None:
-    """Issue a TrajectoryWarning that says from where to where a momentum goes."""
+    """Issue a TrajectoryWarning with the first and the last momentum."""
     first, last = (" ".join(f"{value:.4g}" for value in fit.momenta[row]) for row in (0, -1))
     warnings.warn(
         f"the momentum is not constant: it goes from ({first}) to ({last}) kg m^2/s, so that nothing conserved was "
@@ -269,7 +255,7 @@ def _flight_fitted(
 def _is_flight_with_w_first(
     deformation: Deformation, times: Array, recorded: Array, tolerance: float, *, find_axes: bool
 ) -> bool:
-    """Whether a flight is near once quaternions are read with w first; axes that are to be found leave that open."""
+    """True where a flight is near with quaternions read w first; False for axes to be found, which leave it open."""
     if find_axes:
         return False
     try:
@@ -280,10 +266,7 @@ def _is_flight_with_w_first(
 
 
 def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: float, axes: Array) -> _Fitted:
-    """To the first few attitudes, then to ever more of them.
-
-    So that a momentum that is a little off never loses count of the turns.
-    """
+    """Fit to the first few attitudes, then to more and more, so that a wrong momentum never loses count of turns."""
     fit = _Least(deformation, times, recorded, tolerance)
     half = len(times) // 2
     if half < _FIRST_TIMES:
@@ -294,7 +277,7 @@ def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: 
 
 
 def _momenta(deformation: Deformation, times: Array, recorded: Array) -> tuple[Array, Array]:
-    """What the turns between neighbouring attitudes say, each at the middle of its time: (N - 1, 3), their times."""
+    """Momenta by the turns between neighbouring attitudes (N - 1, 3), and the middles of their times (N - 1,)."""
     middle = 0.5 * (times[1:] + times[:-1])
     turns = so3.log(so3.transpose(recorded[:-1]) @ recorded[1:])
     rates = turns / np.diff(times)[:, None]
@@ -304,7 +287,7 @@ def _momenta(deformation: Deformation, times: Array, recorded: Array) -> tuple[A
 
 
 def _with_axes(deformation: Deformation, times: Array, recorded: Array, tolerance: float) -> _Fitted:
-    """The nearest of all, from each of the likely axes; of a body that is nearly symmetric several are."""
+    """The nearest fit from each of the likely axes, of which a nearly symmetric body has several."""
     fits, vague = [], False
     free = _Least(deformation, times, recorded, tolerance, find_axes=True)
     for axes in _likely_axes(deformation, times, recorded):
@@ -316,7 +299,7 @@ def _with_axes(deformation: Deformation, times: Array, recorded: Array, toleranc
                 continue
             fits.append(free.settled(near.motion, near.axes))
     if vague and not fits:
-        raise AccuracyNotReached("the flight does not tell the axes of the base; give them: base_axes (--base-axes)")
+        raise AccuracyNotReached("the flight leaves the axes of the base open; give them: base_axes (--base-axes)")
     if not fits:
         raise AccuracyNotReached("with no axes of the base the recording comes near to a free flight of this body")
     return min(fits, key=lambda fit: _spread(fit.residuals))
@@ -330,15 +313,15 @@ def _likely_axes(deformation: Deformation, times: Array, recorded: Array) -> lis
         momenta, _ = _momenta(deformation, times, recorded @ about @ so3.exp(turn))
         return ((momenta - momenta.mean(axis=0)) / np.sqrt((momenta**2).sum(axis=1).mean())).ravel()
 
-    found: list[tuple[float, Array]] = []
+    candidates: list[tuple[float, Array]] = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
             axes = np.eye(3)[:, order] * signs
             if np.linalg.det(axes) > 0.0:
                 near = least_squares(wander, np.zeros(3), args=(axes,), max_nfev=_ROUGH_ROUNDS)
-                found.append((float(near.cost), axes @ so3.exp(near.x)))
+                candidates.append((float(near.cost), axes @ so3.exp(near.x)))
     kept: list[Array] = []
-    for _, axes in sorted(found, key=lambda one: one[0]):
+    for _, axes in sorted(candidates, key=lambda candidate: candidate[0]):
         if all(so3.angle(so3.transpose(axes) @ other) > _SAME_AXES for other in kept):
             kept.append(axes)
     return kept[:_MOST_LIKELY]
@@ -361,7 +344,7 @@ class _Least:
     find_axes: bool = False
 
     def settled(self, motion: Motion, axes: Array) -> _Fitted:
-        """By steps of Gauss and Newton from a motion and axes, halved where they go too far."""
+        """Fit by steps of Gauss and Newton from a motion and axes, halved where they go too far."""
         residuals = self._residuals(motion, axes)
         for number in range(_MOST_ROUNDS):
             if number == _ENOUGH_ROUNDS:
@@ -374,7 +357,7 @@ class _Least:
         raise AccuracyNotReached(f"the momentum did not settle within {_MOST_ROUNDS} rounds; {_apart(residuals)}")
 
     def leaves_axes_open(self, near: _Fitted) -> bool:
-        """Whether the recording allows other axes, too, by what a fit to given axes leaves."""
+        """True where the recording allows other axes, too, by the residuals of a fit to given axes."""
         slopes = self._slopes(near.motion)
         # A turn of the axes that start and momentum undo.
         ours, others = slopes[:, UNKNOWNS:], slopes[:, :UNKNOWNS]
@@ -383,15 +366,15 @@ class _Least:
         return _spread(near.residuals) > _VAGUE_AXES * weakest
 
     def first_motion(self, axes: Array) -> Motion:
-        """By the mean of what neighbouring attitudes say."""
+        """Motion with the mean of the momenta by neighbouring attitudes."""
         momenta, _ = _momenta(self.deformation, self.times, self.recorded @ axes)
         return self._reconstructed(momenta.mean(axis=0), self.recorded[0] @ axes)
 
     def _slopes(self, motion: Motion) -> Array:
         """The change of all attitudes by start, momentum and, backwards, axes, base axes: (3 N, 6 or 9)."""
-        found = responses(motion, self.times)
-        found[:, :, :3] = found[:, :, :3] @ motion.initial_attitude
-        slopes = (so3.transpose(motion.attitude(self.times)) @ found).reshape(-1, UNKNOWNS)
+        turns = responses(motion, self.times)
+        turns[:, :, :3] = turns[:, :, :3] @ motion.initial_attitude
+        slopes = (so3.transpose(motion.attitude(self.times)) @ turns).reshape(-1, UNKNOWNS)
         return np.hstack([slopes, np.tile(-np.eye(3), (len(self.times), 1))]) if self.find_axes else slopes
 
     def _nearer(self, motion: Motion, axes: Array, step: Array, before: float) -> tuple[Motion, Array, Array]:
@@ -407,13 +390,13 @@ class _Least:
         return trial, turned, residuals
 
     def _is_small(self, step: Array, slopes: Array, motion: Motion, residuals: Array) -> bool:
-        """Whether a step is far below what the recording leaves open, or next to nothing."""
+        """True where a step is far below the uncertainty of the fit, or rounding."""
         unknowns = slopes.shape[1]
         by_unit = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
         noise = float(np.sqrt((residuals**2).sum() / (residuals.size - unknowns)))
         floor = np.full(unknowns, _NO_STEP)
         floor[3:UNKNOWNS] *= float(np.linalg.norm(motion.momentum))
-        # What the tolerance of the reconstruction moves the fit by counts for nothing either.
+        # The tolerance of the reconstruction also bounds the last step.
         return bool(np.all(np.abs(step) <= (_SMALL_STEP * noise + self.tolerance) * by_unit + floor))
 
     def _reconstructed(self, momentum: Array, attitude: Array) -> Motion:
@@ -429,7 +412,7 @@ def _spread(residuals: Array) -> float:
 
 
 def _check_near(residuals: Array, times: Array) -> None:
-    """Raise AccuracyNotReached where what is left of attitudes at these times is no noise."""
+    """Raise AccuracyNotReached where the residuals of attitudes at these times are too large for noise."""
     if _spread(residuals) > _NO_FLIGHT:
         raise AccuracyNotReached(
             f"{_apart(residuals)} from {times[0]:.6g} to {times[-1]:.6g} s: no free flight of this body, or the axes "

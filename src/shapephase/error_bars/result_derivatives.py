@@ -1,4 +1,4 @@
-"""How the results of a motion answer to small changes of everything that they depend on."""
+"""Derivatives of the results of a motion by everything that they depend on."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ from ..errors import ShapeError, WrongObjectError
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
-from ._along_motion import along_motion
-from ._body_along import BodyAlong
+from ._along_motion import AlongMotion, BodyAlong, along_motion, responses
 
 
 @dataclass(frozen=True, eq=False)
 class ResultDerivative:
-    """The derivatives of what `split` gives by m numbers; a change c of these changes the results by derivative @ c.
+    """Derivatives of the results of `split` by m numbers, whose change c changes the results by derivative @ c.
+
+    Made by `derivatives`.
 
     A rotation D becomes exp(hat(derivative @ c)) D: the vectors are in inertial axes.
 
@@ -32,13 +33,6 @@ class ResultDerivative:
     ----------
     final_attitude, total_rotation, holonomy, dynamical_rotation : (3, m) [rad per unit]
     dynamic_phase, solid_angle, montgomery_phase : (m,) in the horizontal gauge [rad per unit]; without momentum zero
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> sp.derivatives(motion).by_momentum.dynamic_phase.shape
-    (3,)
     """
 
     final_attitude: Array
@@ -55,7 +49,7 @@ class ResultDerivative:
 
 @dataclass(frozen=True, eq=False)
 class _Changes:
-    """By m numbers: turns of the ends of the motion and of its lift, inertial axes (3, m), and of l . G l (m,)."""
+    """Derivatives by m numbers: of the ends of motion and lift (3, m), inertial axes, and of l . G l (m,)."""
 
     end: Array
     lifted: Array
@@ -63,27 +57,19 @@ class _Changes:
 
 
 class Derivatives:
-    """The exact derivatives of a motion's results, each found when it is first needed.
+    """The exact derivatives of a motion's results, each computed at its first use. Made by `derivatives`.
 
     One integral along the motion serves all numbers of a kind, however many there are: its integrand is carried to
     the end by the adjoint of the attitude equation.
 
     Attributes
     ----------
-    motion : whose they are
-    body, path : what moved, and how
+    motion : the motion
+    body, path : its body and path
 
     Notes
     -----
     Source: theory.md section 8.
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.derivatives(motion).by_momentum
-    >>> print(f"{found.dynamic_phase[2]:.3f} rad per kg m^2/s")
-    58.372 rad per kg m^2/s
     """
 
     def __init__(self, motion: Motion) -> None:
@@ -93,7 +79,7 @@ class Derivatives:
 
     @cached_property
     def by_momentum(self) -> ResultDerivative:
-        """By the momentum, inertial axes: m = 3 [per kg m^2/s]."""
+        """Derivatives by the momentum, inertial axes: m = 3 [per kg m^2/s]."""
         along = self._along
         turning = along.attitudes @ along.inverse @ so3.transpose(along.attitudes)
         end = np.einsum("n,nba,nbc->ac", along.weights, along.adjoint, turning)
@@ -101,7 +87,7 @@ class Derivatives:
 
     @cached_property
     def by_attitude(self) -> ResultDerivative:
-        """By a turn of the start, R(0) exp(hat(delta)): m = 3, base axes."""
+        """Derivatives by a turn of the start, R(0) exp(hat(delta)): m = 3, base axes."""
         start = self.motion.initial_attitude
         end = self._along.adjoint_at_start.T @ start
         momentum = self.motion.momentum
@@ -110,7 +96,7 @@ class Derivatives:
 
     @cached_property
     def by_samples(self) -> ResultDerivative:
-        """By the samples that the path was put through: m = N n, row by row of the (N, n) samples [per rad or m].
+        """Derivatives by the samples of the path: m = N n, row by row of the (N, n) samples [per rad or m].
 
         For a recording that was closed, smoothed or resampled, by all recorded samples at a fixed smoothing penalty.
 
@@ -129,7 +115,7 @@ class Derivatives:
         return self._results(_changes(self._body.by_knots(self._samples, *self._weights, momenta)))
 
     def at_knots(self, rule: Callable[[Array], Array]) -> ResultDerivative:
-        """By whatever the values at the knots follow from, of which a rule makes (k, m) of (k, knots n)."""
+        """Derivatives by the inputs of the values at the knots, by a rule (k, knots n) -> (k, m)."""
         parts = (getattr(self.by_knots, field.name) for field in fields(ResultDerivative))
         return ResultDerivative(
             *(rule(part.reshape(-1, part.shape[-1])).reshape(*part.shape[:-1], -1) for part in parts)
@@ -137,7 +123,7 @@ class Derivatives:
 
     @cached_property
     def by_inertias(self) -> ResultDerivative:
-        """By masses, first moments and inertias of the frames of `body.chain`: m = 10 (k + 1).
+        """Derivatives by the masses, first moments and inertias of `body.chain`: m = 10 (k + 1).
 
         For each frame: mass [kg], first moment (3) [kg m] and inertia xx yy zz yz xz xy [kg m^2], both about its centre
         of mass, axes of the frame.
@@ -154,15 +140,15 @@ class Derivatives:
 
     @cached_property
     def _weights(self) -> tuple[Array, Array]:
-        """The spins of the motion and of its lift at each node, (N, 2, 3), and what a unit of angular momentum that is
-        added to either, base axes, does to the end of each, and to the action: (N, 2, 4, 3)."""
+        """Spins of motion and lift at each node (N, 2, 3), and changes of both ends and of the action by a unit
+        of angular momentum added to either, base axes (N, 2, 4, 3)."""
         along = self._along
         turned = -along.weights[:, None, None] * along.inverse
         ends = so3.transpose(along.adjoint) @ along.attitudes @ turned, along.lifted @ turned
         weighted = along.weights[:, None] * (along.spins - along.lifted_spins)
         rows = np.empty((len(weighted), 2, 4, 3))
         rows[:, 0, :3], rows[:, 1, :3] = ends
-        # The action is quadratic in what is between the two: half of its change goes with each.
+        # The action is quadratic in the difference of both: half of its change goes with each.
         rows[:, 0, 3] = 2.0 * (self.motion.momentum @ ends[0]) + weighted
         rows[:, 1, 3] = weighted
         return np.stack([along.spins, along.lifted_spins], axis=1), rows
@@ -219,16 +205,16 @@ class Derivatives:
 
     @property
     def _dynamic_phase(self) -> float:
-        """In the horizontal gauge [rad]."""
+        """Dynamic phase in the horizontal gauge [rad]."""
         along, momentum = self._along, self.motion.momentum
         relative = along.spins - along.lifted_spins
         body_momentum = so3.apply(so3.transpose(along.attitudes), momentum)
         return float(along.weights @ (relative * body_momentum).sum(axis=-1) / np.linalg.norm(momentum))
 
 
-def _changes(found: Array) -> _Changes:
-    """From sums of the products with `Derivatives._weights`: (8, m)."""
-    return _Changes(found[:3], found[4:7], found[3] + found[7])
+def _changes(sums: Array) -> _Changes:
+    """Changes from the sums of products with `Derivatives._weights`: (8, m)."""
+    return _Changes(sums[:3], sums[4:7], sums[3] + sums[7])
 
 
 def derivatives(motion: Motion) -> Derivatives:
@@ -249,8 +235,7 @@ def derivatives(motion: Motion) -> Derivatives:
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.derivatives(motion).by_momentum
-    >>> found.final_attitude.shape
+    >>> sp.derivatives(motion).by_momentum.final_attitude.shape
     (3, 3)
     """
     return Derivatives(motion)
@@ -265,3 +250,38 @@ def described_by(motion: Motion) -> tuple[Body, ShapePath]:
     if not isinstance(description, ArticulatedDescription):
         raise WrongObjectError("derivatives by path and inertias need an articulated body, made by `articulated`")
     return description.body, description.path
+
+
+def fit_by_knots(motion: Motion, times: Array, by_attitudes: Array) -> Array:
+    """Derivative of the fit by the path at its knots: (6, knots n); `by_attitudes` is that of `RecordedMomentum`."""
+    body, path = described_by(motion)
+    along = along_motion(motion, path, times)
+    rows = _by_added_momentum(motion, along, times, by_attitudes)
+    samples, body_along = path_samples(path), BodyAlong(body, along.times, along.shapes, along.rates)
+    momenta = motion.momentum @ along.attitudes
+    return body_along.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None])
+
+
+def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:
+    """Derivative of the fit by the ten parameters of each frame, in the order of `by_inertias`: (6, 10 (k + 1))."""
+    body, path = described_by(motion)
+    along = along_motion(motion, path, times)
+    rows = _by_added_momentum(motion, along, times, by_attitudes)
+    return BodyAlong(body, along.times, along.shapes, along.rates).by_inertias(along.spins[:, None], rows[:, None])
+
+
+def _by_added_momentum(motion: Motion, along: AlongMotion, times: Array, by_attitudes: Array) -> Array:
+    """Change of the fit by a unit of internal angular momentum at each node, base axes: (M, 6, 3).
+
+    A change turns the attitude at each recorded time by eta(t_k) of `_along_motion`. The recording stays, so that the
+    fit moves like one to attitudes turned by -eta(t_k).
+    """
+    # Turns at the recorded times from the turn at the end by an equal change.
+    from_end = np.linalg.inv(along.adjoint_at_start.T)
+    at_times = responses(motion, times)[:, :, :3] @ from_end
+    by_turn = np.moveaxis(by_attitudes.reshape(len(by_attitudes), -1, 3), 1, 0)
+    by_end = by_turn @ so3.transpose(motion.attitude(times)) @ at_times
+    # A change at a node turns only the attitudes recorded later.
+    later = np.concatenate([np.cumsum(by_end[::-1], axis=0)[::-1], np.zeros((1, *by_end.shape[1:]))])
+    carried = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse
+    return along.weights[:, None, None] * (later[np.searchsorted(times, along.times)] @ carried)

@@ -8,7 +8,6 @@ from ._closed_form_motions import (
     expansion,
     pulsation,
 )
-from .dives import diver_twist, five_stage_dive, full_dive
 from .example_deformations import (
     EXAMPLES,
     astronaut,
@@ -33,6 +32,9 @@ from .scenarios import (
     cat_righting,
     cat_righting_twist,
     closed_orbit,
+    diver_twist,
+    five_stage_dive,
+    full_dive,
     kane_scher,
     named_motion,
     satellite_sweep,

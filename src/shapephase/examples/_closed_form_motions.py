@@ -20,18 +20,12 @@ from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
 from ..letters import what_came
 from ..rigid_body.euler_top import EulerTop
 
-# Of the first guess of a time: a function that has not reached its target by then is taken never to reach it.
-_MAX_STRETCH = 2.0**30
-# Relative error [1] allowed to the clock by quadrature; the closed forms are compared to about 1e-10.
-_QUADRATURE = 1e-11
-# Goal of that quadrature, absolute [s] and relative: as near to rounding as it gets.
-_QUADRATURE_GOAL = 1e-14
-# Of the duration: the step of the differences by which a given clock is checked; their error is about 1e-9.
-_CHECK_STEP = 1e-7
-# Of the rate of a given clock: finds any wrong formula, and passes an interpolated clock.
-_CHECK_RATE = 1e-3
-# Of the duration: how far from zero a given clock may start.
-_CHECK_START = 1e-9
+_MAX_STRETCH = 2.0**30  # of the first guess of a time, up to which a function has to reach its target
+_QUADRATURE = 1e-11  # relative error of the clock by quadrature; closed forms are compared to about 1e-10
+_QUADRATURE_GOAL = 1e-14  # absolute [s] and relative: as near to rounding as it gets
+_CHECK_STEP = 1e-7  # of the duration, for differences of a given clock: their error is about 1e-9
+_CHECK_RATE = 1e-3  # of the rate of a given clock: finds any wrong formula, and passes an interpolated clock
+_CHECK_START = 1e-9  # of the duration, for the start of a given clock
 
 
 class KnownMotion(Protocol):
@@ -55,7 +49,7 @@ class KnownMotion(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """A deformation, a momentum, and what is known about the motion that results.
+    """A deformation, a momentum, and known facts about the motion that results.
 
     Attributes
     ----------
@@ -63,7 +57,7 @@ class Example:
     momentum : (3,) inertial axes, which are the body's axes at the start [kg m^2/s]
     known : the motion in closed form, or None
     phase : theta_M of the whole duration in the base gauge, modulo 2 pi, if Pi is back at its start by then [rad]
-    turn : the angle of the total rotation, if that is what is known of the example [rad]
+    turn : the angle of the total rotation, if known [rad]
     rigid : the rigid body with the inertia of the start, if the example is compared with it
 
     Examples
@@ -270,14 +264,8 @@ def _clock_by_quadrature(factor: Callable[[Array], Array]) -> Callable[[Array], 
     """The integral of a^-2 from 0 to t, for all times in one adaptive quadrature."""
 
     def clock(times: Array) -> Array:
-        value, error = quad_vec(
-            lambda s: times * factor(times * s) ** -2.0,
-            0.0,
-            1.0,
-            epsabs=_QUADRATURE_GOAL,
-            epsrel=_QUADRATURE_GOAL,
-            limit=500,
-        )
+        goal = _QUADRATURE_GOAL
+        value, error = quad_vec(lambda s: times * factor(times * s) ** -2.0, 0.0, 1.0, goal, goal, limit=500)
         scale = np.linalg.norm(value) + 1.0
         if not error <= _QUADRATURE * scale:
             raise AccuracyNotReached(

@@ -43,9 +43,8 @@ from ._closed_form_motions import (
 from .scenarios import astronaut_arm_circles, astronaut_leg_swing, cat_righting, kane_scher
 from .slow_deformation import slow_antenna
 
+_HALF_TURN_CONE = 59.426458741516  # [degrees] half angle by which Kane and Scher's cat turns by exactly 180 degrees
 _DEGREE = np.pi / 180.0
-# Half angle of the cone [degrees] by which Kane and Scher's cat turns by exactly 180 degrees; from their equation.
-_HALF_TURN_CONE = 59.426458741516
 
 
 def homothety(
@@ -99,14 +98,8 @@ def homothety(
     deformation = prescribed(
         lambda t: growing.at(t)[:, None, None] ** 2 * top.inertia, None, length, breaks, on_unphysical="error"
     )
-    phase = top.montgomery_phase if duration is None else None
-    return Example(
-        deformation=deformation,
-        momentum=top.momentum,
-        known=TimeReparametrisedRigid(top=top, clock=clock),
-        phase=phase,
-        rigid=top,
-    )
+    phase, known = top.montgomery_phase if duration is None else None, TimeReparametrisedRigid(top=top, clock=clock)
+    return Example(deformation=deformation, momentum=top.momentum, known=known, phase=phase, rigid=top)
 
 
 def axial_as_printed(

@@ -23,14 +23,10 @@ from ..rigid_body import separatrix_solid_angle
 from ..rigid_body.euler_top import EulerTop
 from ._closed_form_motions import Example, diagonal, positive
 
-# One revolution of the angle along an orbit [rad].
-_REVOLUTION = (0.0, 2.0 * np.pi)
-# Degrees of the Chebyshev series tried for an integral, in turn; the last is reached only very near the separatrix.
-_DEGREES = (14, 28, 56, 112, 224, 448)
-# Last coefficients of a series over the largest one at which its integral is known to about ten digits.
-_RESOLVED = 1e-11
-# Angles from the axis [rad] between which an orbit of given area is sought: nearer to either end the area is rounding.
-_END_MARGIN = 1e-9
+_REVOLUTION = (0.0, 2.0 * np.pi)  # [rad] of the angle along an orbit
+_DEGREES = tuple(14 * 2**k for k in range(6))  # of Chebyshev series, tried in turn; the last very near the separatrix
+_RESOLVED = 1e-11  # of the largest coefficient, for the last ones: the integral is then known to about ten digits
+_END_MARGIN = 1e-9  # [rad] from the axis and from the separatrix: nearer, the area of an orbit is rounding
 
 _LAWS: Mapping[str, Callable[[Array], Array]] = {
     "even": lambda s: s,
@@ -186,8 +182,8 @@ def orbit_of_area(moments: ArrayLike, magnitude: float, solid_angle: float) -> E
         raise ShapeError(
             f"solid_angle: the orbits about axis 3 have areas from 0 to {limit:.9g} sr, got {what_came(solid_angle)}"
         )
-    found = root_scalar(lambda x: orbit(x).solid_angle - solid_angle, bracket=(nearest, farthest), xtol=1e-15)
-    return orbit(float(found.root))
+    tilt = root_scalar(lambda x: orbit(x).solid_angle - solid_angle, bracket=(nearest, farthest), xtol=1e-15)
+    return orbit(float(tilt.root))
 
 
 def adiabatic_precession(deformation: Deformation, momentum: ArrayLike, until: float) -> float:

@@ -1,4 +1,4 @@
-from .dop853 import dop853_rotation
+from .driven_attitude import dop853_rotation
 from .integrate import stepped_rotation
 from .interpolant import Interpolant
 from .kept_code import code_folder

@@ -11,24 +11,19 @@ from ..arrays import Array, Integers
 
 
 class ClosedCurves(NamedTuple):
-    """Of B curves, each closed by the great circle from its end to its start."""
+    """Areas and turns of B curves, each closed by the great circle from its end to its start."""
 
     area: Array  # (B,) of the polygon of the corners, counted from the region opposite the reference [sr]
-    closing: Array  # (B,) what the closing arc has of it [sr]
+    closing: Array  # (B,) the closing arc's part of the area [sr]
     tilt: Array  # (B, 3, 3) transport along the closing arc, inertial axes
     gap: Array  # (B,) angle between the ends [rad]
     turn: Array  # (B,) about the axis, from the tilt to the turn of the attitude, in (-pi, pi] [rad]
 
 
 def closed_curves(corners: Array, references: Array, axes: Array, first: Array, last: Array) -> ClosedCurves:
-    """Close them.
+    """Close curves with corners (B, K + 1, 3), seen from references (B, 3).
 
-    Parameters
-    ----------
-    corners : (B, K + 1, 3) of the curves
-    references : (B, 3)
-    axes : (B, 3) of the momenta, inertial axes
-    first, last : (B, 3, 3) attitudes of the gauge's frame at both ends
+    `axes` (B, 3) are those of the momenta, inertial axes; `first` and `last` (B, 3, 3) the gauge's frame at both ends.
     """
     departing, arriving = corners[:, 0], corners[:, -1]
     arcs = sphere.arc_areas(corners, references)
@@ -43,7 +38,7 @@ def closed_curves(corners: Array, references: Array, axes: Array, first: Array, 
 
 
 def far_references(curves: Array) -> Array:
-    """`sphere.far_reference` of each of some curves: (B, N, 3) -> (B, 3)."""
+    """`sphere.far_reference` of each curve: (B, N, 3) -> (B, 3)."""
     return np.array([sphere.far_reference(curve) for curve in curves]).reshape(-1, 3)
 
 
@@ -54,9 +49,9 @@ def areas_back(references: Array, ends: Array, starts: Array) -> Array:
 
 
 def jumps_between(starts: Array, first: Array, second: Array, grown: Array) -> Integers:
-    """By how many spheres a closed area jumps between two corners of its curve: (..., 3) each, (...) -> (...).
+    """Number of spheres by which a closed area jumps between two corners of its curve: (..., 3) each -> (...).
 
-    `grown` is what it grows by, the great circles back to `starts` included [sr]. Seen from the start the same triangle
-    has no great circles beside it: it grows continuously, so that what differs is a whole number.
+    `grown` (...) is the growth of the area, the great circles back to `starts` included [sr]. From the start the
+    triangle has no great circles beside it and grows continuously: the difference is a whole number.
     """
     return np.rint((grown - sphere.triangle_area(starts, first, second)) / (4.0 * np.pi)).astype(np.int64)

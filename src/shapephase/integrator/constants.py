@@ -2,49 +2,31 @@
 
 from __future__ import annotations
 
-EPS = 2.0**-52
-"""Of rounding."""
+EPS = 2.0**-52  # rounding of a number near 1
 
 # ---- Samples ---------------------------------------------------------------------------------------------------------
-SAMPLING_SHARE = 0.2
-"""Of the tolerance: what the terms that are missing from series may turn the body by, as far as it is foreseen."""
-HIDDEN_SHARE = 0.1
-"""Of the tolerance: what the first panels may leave unseen of a path that is resolved."""
-SLOWEST_DECAY = 0.97
-"""Of terms from one degree to the next: of what falls more slowly the sum beyond the last is 30 times that at most."""
-CHANGED_LAST_TERMS = 3.0
-"""Times what is missing beyond the last terms, by which they are changed to see what that does to an attitude."""
-BEYOND_LAST_TERMS = 10.0
-"""Over the degree: few terms show their decay less well."""
-ROUNDED_SAMPLES = 30.0
-"""Units of rounding: what the inverse of an inertia of condition 10 leaves in the terms of a series."""
-RANDOM_SUM = 4.0
-"""Standard deviations of a sum of errors that are independent of each other."""
+SAMPLING_SHARE = 0.2  # of the tolerance, for the predicted turn by missing terms of series
+HIDDEN_SHARE = 0.1  # of the tolerance, for what the first panels may miss of a resolved path
+SLOWEST_DECAY = 0.97  # from degree to degree: the sum beyond the last term is then at most 30 times that term
+CHANGED_LAST_TERMS = 3.0  # times what is missing beyond the last terms: their change, whose effect is measured
+BEYOND_LAST_TERMS = 10.0  # over the degree, relative to 1: few terms show their decay less well
+ROUNDED_SAMPLES = 30.0  # units of rounding in the terms of a series, by the inverse of an inertia of condition 10
+RANDOM_SUM = 4.0  # standard deviations of a sum of independent errors
 
 # ---- Steps -----------------------------------------------------------------------------------------------------------
-ORDER = 8
-"""Of the formula: half as long steps have 2^-8 of the error."""
+ORDER = 8  # of the formula: half as long steps have 2^-8 of the error
+# The error of finer steps is STEPPING times the distance between two step sizes, times its fall from the pair before;
+# the order alone would make it 1. With 4 one motion of harmonics in 70 exceeds it, with 8 one of all kinds in 700, by
+# a sixth.
 STEPPING = 10.0
-"""Times the distance between two step sizes, times by how much it fell from the pair before, is the error of the finer
-steps; the formula's order alone would make it 1. Measured: with 4 one motion of harmonics in 70 exceeds it, with 8 one
-of all kinds in 700, by a sixth."""
-ANGLE_OF_STEP = 2.5
-"""[rad] that a body turns in one of the coarsest steps at a tolerance of 1e-9."""
-TERMS_OF_STEP = 10.0
-"""Of a panel's series, that one such step follows."""
-SMALL_TERM = 0.05
-"""Of the tolerance: terms that turn the body by less are not followed."""
-STEPPING_SHARE = 0.4
-"""Of the tolerance: what the error of steps may take."""
+ANGLE_OF_STEP = 2.5  # [rad] turned in one of the coarsest steps, at a tolerance of 1e-9
+TERMS_OF_STEP = 10.0  # of a panel's series, for one of the coarsest steps at a tolerance of 1e-9
+SMALL_TERM = 0.05  # of the tolerance: steps ignore terms that turn the body by less
+STEPPING_SHARE = 0.4  # of the tolerance, for the error of steps
 
 # ---- Rounding --------------------------------------------------------------------------------------------------------
-ROUNDING_OF_START = 4.0
-"""Units of rounding in the start and the last product."""
-ROUNDING_OF_STEP = 2.0
-"""Units of rounding of a step, which add up as the root of their number."""
-MEASURED_ROUNDING = 4.0
-"""Times the distance between two marches, which round differently: their rounding is not larger."""
-ROUNDED_INERTIA = 3.0
-"""Units of rounding of an inertia, relative to its largest moment: of its sums, of its inverse, and one for chance."""
-ROUNDING_SHARE = 0.05
-"""Of the tolerance: a bound of rounding above it is measured."""
+ROUNDING_OF_START = 4.0  # units of rounding in the start and the last product
+ROUNDING_OF_STEP = 2.0  # units of rounding in a step; they add up as the root of the number of steps
+MEASURED_ROUNDING = 4.0  # times the distance between two marches, which round differently: bound of their rounding
+ROUNDED_INERTIA = 3.0  # units of rounding of an inertia's largest moment: its sums, its inverse, and one for chance
+ROUNDING_SHARE = 0.05  # of the tolerance: rounding is measured where its bound is larger

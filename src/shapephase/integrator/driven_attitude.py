@@ -13,40 +13,25 @@ from ..arrays import Array, lock_arrays
 from ..display import short_repr
 from ..errors import AccuracyNotReached
 from ..sphere import gauss_nodes
+from .channels import Evaluate
 from .limited_steps import Run, StepLimits, limited_run
 
+# Times (N,), attitudes (N, 3, 3), other states (N, k) -> angular velocities, body axes (N, 3), and rates (N, k).
 Rates = Callable[[Array, Array, Array], tuple[Array, Array]]
-"""Times (N,), attitudes (N, 3, 3), other states (N, k) -> angular velocities, body axes (N, 3), and rates (N, k)."""
-# Tolerance of the first run as a part of what is asked for: its error is about as large as that then.
-_FIRST = 0.01
-# Of a run against the one before it: the difference of both is the error of the first, ten times that of the second.
-_SHARPER = 0.1
-# SciPy takes no smaller relative tolerance; below, that of small numbers gains as much again.
-_LEAST_RELATIVE = 3e-14
-_LEAST = 3e-15
-# [rad] Rounding of some thousand steps.
-_ROUNDING = 1e-13
-# Of the duration: longer steps gain nothing.
-_LONGEST = 1.0 / 64.0
-# Of the longest step, in each run that is ten times as sharp: the method is of order eight, and two runs with the same
-# steps would make the same errors.
-_SHORTER = 0.75
-# Of the difference before: with the least tolerance, steps are made shorter as long as that gains as much.
-_GAIN = 0.4
-# Times at which two runs are compared.
-_MOST_COMPARED = 4000
-# Of the duration: largest distance of times at which a run is checked, as of the scan of a path; what lasts twice as
-# long is found.
-_SAMPLE_GAP = 1.0 / 4000.0
-# Of an interval: largest gap between eight Gauss points.
-_GAUSS_GAP = 0.1835
-# In units of a run's tolerance: by how much the change over a step may differ from the integral of the slope along it;
-# up to 2, for work 14, where nothing was stepped over.
-_DEFECT_LIMIT = 20.0
-# Parts of a step that passed over something.
-_PARTS = 8.0
-# Rounds in which something was passed over: so many narrow stretches can follow from each other.
-_MOST_ROUNDS = 100
+_FIRST = 0.01  # tolerance of the first run over the requested one: its error is then about the requested tolerance
+_SHARPER = 0.1  # ratio of tolerances from run to run: their difference is the error of the first
+_LEAST_RELATIVE = 3e-14  # least relative tolerance of SciPy
+_LEAST = 3e-15  # least absolute tolerance: it gains as much again for small numbers
+_ROUNDING = 1e-13  # [rad] in some thousand steps
+_LONGEST = 1.0 / 64.0  # of the duration: longer steps gain nothing
+_SHORTER = 0.75  # ratio of longest steps from run to run, 10^(-1/8): runs with equal steps make equal errors
+_GAIN = 0.4  # ratio of differences up to which, with the least tolerance, shorter steps are tried
+_MOST_COMPARED = 4000  # times at which two runs are compared
+_SAMPLE_GAP = 1.0 / 4000.0  # of the duration, between times that are checked: as in the scan of a path
+_GAUSS_GAP = 0.1835  # of an interval: largest gap between eight Gauss points
+_DEFECT_LIMIT = 20.0  # tolerances of a run between step and integral of the slope; up to 2, for work 14, where resolved
+_PARTS = 8.0  # of a step that passed over something
+_MOST_ROUNDS = 100  # in which something was passed over: so many narrow intervals can follow from each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,15 +65,15 @@ class DrivenAttitude:
 
     @property
     def error_estimate(self) -> Array:
-        """Of the attitude, over all times: (1,) [rad]."""
+        """Estimate of the attitude's error over all times: (1,) [rad]."""
         return self.attitude_errors[-1:]
 
     def attitude(self, t: Array) -> Array:
-        """(N,) -> (N, 3, 3)."""
+        """Attitudes at times: (N,) -> (N, 3, 3)."""
         return so3.matrix_from_quat(self.run(t)[:, :4])
 
     def states(self, t: Array) -> Array:
-        """(N,) -> (N, k)."""
+        """Other states at times: (N,) -> (N, k)."""
         return self.run(t)[:, 4:] * self.scales
 
 
@@ -122,15 +107,6 @@ def driven_attitude(
     ------
     AccuracyNotReached
         If the sharpest two runs disagree by more than the tolerance, or the rates change too often in short times.
-
-    Examples
-    --------
-    >>> from shapephase.integrator.driven_attitude import driven_attitude
-    >>> def rates(t, attitude, states):
-    ...     return np.column_stack([0.0 * t, 0.0 * t, states[:, 0]]), np.ones((len(t), 1))  # a turn that speeds up
-    >>> found = driven_attitude(rates, np.array([0.0, 1.0]), np.eye(3), np.zeros(1), np.ones(1), 1e-9)
-    >>> print(f"{float(sp.so3.angle(found.attitude(np.array([1.0]))[0])):.9f}")
-    0.500000000
     """
 
     def slopes(times: Array, values: Array) -> Array:
@@ -138,7 +114,7 @@ def driven_attitude(
         # By the quaternion as it is: the turn is then right whatever its length has drifted to.
         (a, b, c, w), (p, q, r) = values[:, :4].T, omega.T
         turning = [w * p + b * r - c * q, w * q + c * p - a * r, w * r + a * q - b * p, -a * p - b * q - c * r]
-        return np.column_stack([*(0.5 * one for one in turning), others / scales])
+        return np.column_stack([*(0.5 * rate for rate in turning), others / scales])
 
     start = np.concatenate([so3.quat_from_matrix(attitude), states / scales])
     whole = StepLimits.even(breaks[[0, -1]], 1.0 / _LONGEST)
@@ -155,9 +131,9 @@ def driven_attitude(
     for _ in range(_MOST_ROUNDS):
         last, run, times, errors = _agreeing_runs(run_of, tolerance, limits)
         worst = float(errors[-1].max())
-        # One of two that disagree may have passed over what the other one met.
-        shorter = [_shorter_steps(slopes, one) for one in ((run,) if worst <= tolerance else (last, run))]
-        tighter = [one for one in shorter if one is not None]
+        # Either of two runs that disagree may have passed over what the other met.
+        shorter = [_shorter_steps(slopes, checked) for checked in ((run,) if worst <= tolerance else (last, run))]
+        tighter = [narrower for narrower in shorter if narrower is not None]
         if not tighter:
             break
         limits = reduce(StepLimits.combined, tighter, limits)
@@ -192,9 +168,9 @@ def _agreeing_runs(
         times = np.union1d(run.times, 0.5 * (run.times[:-1] + run.times[1:]))
         if len(times) > _MOST_COMPARED:
             times = times[np.unique(np.linspace(0, len(times) - 1, _MOST_COMPARED).astype(int))]
-        one, other = last(times), run(times)
-        apart = so3.angle(so3.transpose(so3.matrix_from_quat(one[:, :4])) @ so3.matrix_from_quat(other[:, :4]))
-        errors = np.maximum.accumulate(np.column_stack([apart, np.abs(one - other)[:, 4:]]), axis=0) + _ROUNDING
+        coarse, sharp = last(times), run(times)
+        apart = so3.angle(so3.transpose(so3.matrix_from_quat(coarse[:, :4])) @ so3.matrix_from_quat(sharp[:, :4]))
+        errors = np.maximum.accumulate(np.column_stack([apart, np.abs(coarse - sharp)[:, 4:]]), axis=0) + _ROUNDING
         worst = float(errors[-1].max())
         if worst <= tolerance or (sharpness * _SHARPER < 0.9 * _LEAST and worst > _GAIN * before):
             return last, run, times, errors
@@ -210,7 +186,7 @@ def _shorter_steps(slopes: Callable[[Array, Array], Array], run: Run) -> StepLim
 
 
 def _defects(slopes: Callable[[Array, Array], Array], run: Run) -> Array:
-    """By how much the changes over steps miss the integral of the slope along them: (K, 4 + k).
+    """Differences between the changes over steps and the integrals of the slope along them: (K, 4 + k).
 
     Zero for steps that are too short to pass over anything.
     """
@@ -227,3 +203,39 @@ def _defects(slopes: Callable[[Array, Array], Array], run: Run) -> Array:
         integrals = np.add.reduceat(np.einsum("pm,pmk->pk", weights, at_nodes), first, axis=0)
         defects[long] = np.abs(run(run.times[long + 1]) - run(run.times[long]) - integrals)
     return defects
+
+
+def dop853_rotation(
+    evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float
+) -> tuple[Callable[[Array], Array], int]:
+    """S(t) for one Pi_0 by SciPy's DOP853 on the quaternion, restarted at the breaks.
+
+    Every stage evaluates the deformation itself; the library's interpolation and stepping are not used.
+
+    Returns a function of times (N,) -> quaternions (N, 4), and the number of evaluations of I and L_o. Raises the
+    errors of `driven_attitude`. An independent check of `integrate`.
+
+    Examples
+    --------
+    >>> def evaluate(t):
+    ...     return np.broadcast_to(np.diag([1.0, 2.0, 2.5]), (len(t), 3, 3)), np.zeros((len(t), 3))
+    >>> turn, _ = sp.integrator.dop853_rotation(evaluate, np.array([0.0, 1.0]), np.array([0.0, 0.0, 5.0]), 1e-9)
+    >>> print(f"{np.linalg.norm(sp.so3.rotation_vector_from_quat(turn(np.array([1.0])))):.6f}")
+    2.000000
+    """
+    driven = dop853_attitude(evaluate, breaks, momentum, tolerance)
+    return driven.run, driven.evaluations
+
+
+def dop853_attitude(
+    evaluate: Evaluate, breaks: Array, momentum: Array, tolerance: float, limits: StepLimits | None = None
+) -> DrivenAttitude:
+    """S(t) of `dop853_rotation` with its measured error, by steps within limits; errors as `driven_attitude`."""
+
+    def rates(times: Array, attitudes: Array, states: Array) -> tuple[Array, Array]:
+        inertia, internal = evaluate(times)
+        pi = so3.apply(so3.transpose(attitudes), momentum)
+        return np.asarray(np.linalg.solve(inertia, (pi - internal)[..., None])[..., 0], dtype=np.float64), states
+
+    nothing = np.zeros(0)
+    return driven_attitude(rates, breaks, np.eye(3), nothing, nothing, tolerance, limits)

@@ -16,17 +16,15 @@ from .. import run_progress
 from ..arrays import Array, Integers, Mask
 from ..errors import AccuracyNotReached, ShapeError, SingularInertiaError
 from .channels import inverted
-from .fresh_times import fresh_times
+from .integrate import fresh_times
 from .many_rotations import CLASSES, GroupedRotations, rotations_of_each, rounded_up
 from .samples import Panels
 from .sampling import Sampler, nodes_of_panels
 from .stepped import SteppedRotation
 from .stepping import magnitudes_and_directions
 
-# Deformations that are evaluated together: enough for what they share to cost little.
-_AT_ONCE = 64
-# Numbers of the series of all, which are kept: eight gigabytes.
-_MOST_KEPT = 1_000_000_000
+_AT_ONCE = 64  # deformations evaluated together: enough for the shared work to cost little
+_MOST_KEPT = 1_000_000_000  # numbers of all series, which are kept: eight gigabytes
 
 
 class Variants(Protocol):
@@ -38,15 +36,15 @@ class Variants(Protocol):
 
     @property
     def model(self) -> Sampler:
-        """Of the deformation by which they are planned."""
+        """Sampler of the deformation by which they are planned."""
         ...
 
     def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
-        """I^-1 and I^-1 L_o of some at times, and which can be relied on: (V,), (S,) -> (V, S, 9), (V,)."""
+        """I^-1 and I^-1 L_o of some at times, and which are reliable: (V,), (S,) -> (V, S, 9), (V,)."""
         ...
 
     def alone(self, row: int) -> Sampler:
-        """Of one of them."""
+        """Sampler of one of them."""
         ...
 
 
@@ -57,63 +55,56 @@ class VariantRotations:
     rotations: tuple[SteppedRotation, ...]
 
     def __getitem__(self, row: int) -> SteppedRotation:
-        """Of one deformation."""
+        """Rotation of one deformation."""
         return self.rotations[row]
 
     @property
     def error_estimate(self) -> Array:
-        """(N,) [rad]."""
-        return np.array([one.error_estimate[0] for one in self.rotations])
+        """Estimates of the attitude errors: (N,) [rad]."""
+        return np.array([rotation.error_estimate[0] for rotation in self.rotations])
 
     @property
     def end(self) -> Array:
         """S at the end of the interval: (N, 3, 3)."""
-        return np.array([one.end[0] for one in self.rotations]).reshape(-1, 3, 3)
+        return np.array([rotation.end[0] for rotation in self.rotations]).reshape(-1, 3, 3)
 
     @property
     def evaluations(self) -> Integers:
         """How many times each deformation was evaluated: (N,)."""
-        return np.array([one.interpolant.evaluations for one in self.rotations], dtype=np.int64)
+        return np.array([rotation.interpolant.evaluations for rotation in self.rotations], dtype=np.int64)
 
 
 def rotations_of_variants(variants: Variants, momentum: Array, tolerance: float) -> VariantRotations:
-    """Integrate the attitude equation of each deformation as if there were no others.
+    """Integrate the attitude equation of each deformation as if there were no others, to a tolerance [rad].
 
-    Parameters
-    ----------
-    momentum : (N, 3) body angular momentum at the start of each [kg m^2/s]
-    tolerance : of every attitude over the whole interval [rad]
-
-    Raises
-    ------
-    AccuracyNotReached, SingularInertiaError
-        As of one deformation, with its number.
+    `momentum` (N, 3) is the body's at the start of each [kg m^2/s]. Raises AccuracyNotReached and SingularInertiaError
+    where one deformation alone would; the message has its number.
     """
     count = len(momentum)
     ceilings = rounded_up(magnitudes_and_directions(momentum)[0], CLASSES)
     run_progress.begin(run_progress.STEPPING, max(count, 1))
-    found: dict[int, SteppedRotation] = {}
+    rotations: dict[int, SteppedRotation] = {}
     for lot in list(_lots(variants, ceilings, tolerance)):
         for row, sampler in lot.samplers(variants):
             try:
-                one = rotations_of_each(sampler, momentum[row : row + 1], tolerance)
+                rotation = rotations_of_each(sampler, momentum[row : row + 1], tolerance)
             except (AccuracyNotReached, SingularInertiaError) as error:
                 raise type(error)(f"body {row} of {count}: {error}") from error
-            found[row] = one.finest if isinstance(one, GroupedRotations) else one
+            rotations[row] = rotation.finest if isinstance(rotation, GroupedRotations) else rotation
         run_progress.advance(len(lot.rows))
-    return VariantRotations(tuple(found[row] for row in range(count)))
+    return VariantRotations(tuple(rotations[row] for row in range(count)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Lot:
-    """Some that begin on the same panels; None: each on its own."""
+    """Deformations that begin on the same panels; None: each on its own."""
 
     rows: Integers
     panels: Panels | None
     times: tuple[Array, ...] = ()
 
     def samplers(self, variants: Variants) -> Iterator[tuple[int, Sampler]]:
-        """Of each, with what is known of it."""
+        """Number and sampler of each, with its channels on the shared panels."""
         rows = self.rows.tolist()
         if self.panels is None:
             yield from ((row, variants.alone(row)) for row in rows)
@@ -152,7 +143,7 @@ def _lots(variants: Variants, ceilings: Array, tolerance: float) -> Iterator[_Lo
 
 
 def many_inverted(inertia: Array, momentum: Array, times: Array) -> tuple[Array, Mask]:
-    """I^-1 and I^-1 L_o, and which can be relied on: (V, S, 3, 3), (V, S, 3), (S,) -> (V, S, 9), (V,)."""
+    """I^-1 and I^-1 L_o, and which are reliable: (V, S, 3, 3), (V, S, 3), (S,) -> (V, S, 9), (V,)."""
     channels, reliable = np.zeros((*momentum.shape[:2], 9)), np.ones(len(inertia), dtype=np.bool_)
     for place in range(len(inertia)):
         try:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..errors import AccuracyNotReached
+from .channels import rates_of
 from .constants import (
     ANGLE_OF_STEP,
     EPS,
@@ -28,7 +29,6 @@ from .constants import (
     STEPPING_SHARE,
     TERMS_OF_STEP,
 )
-from .fresh_times import compare, fresh_times
 from .interpolant import Interpolant
 from .kernels import spectra_kernel
 from .machine_code import plain
@@ -37,24 +37,17 @@ from .sampling import Sampler
 from .stepped import SteppedRotation
 from .stepping import Attempt, attempted, largest_angle, magnitudes_and_directions, stepped_quaternions
 
-# Steps of one motion: some ten seconds, and a gigabyte of results.
-_MOST_STEPS = 4_000_000
-# Rounds of samples and steps before a tolerance is given up.
-_MOST_ROUNDS = 10
-# Of the best estimate so far: a round that gains less was no use; two of them end it.
-_GAINS = 0.9
-# The tolerance [rad] of the steps that ANGLE_OF_STEP and TERMS_OF_STEP are for.
-_USUAL = 1e-9
-# Refinements are made stricter by less than this factor, so that momenta of a batch share them.
-_QUARTERS = 4
-# Of the tolerance: samples are not made denser than for this.
-_LEAST_TOLERANCE = 1e-9
-# How many times their rounding samples are changed by, to see what it does.
-_EXAGGERATED = 1024.0
-# Keeps quotients defined where marches agree to the last bit.
-_TINY = 1e-300
-# [rad] Marches farther apart than this tell nothing of how errors fall.
-_LOST = 0.1
+_MOST_STEPS = 4_000_000  # of one motion: some ten seconds, and a gigabyte of results
+_MOST_ROUNDS = 10  # of samples and steps
+_GAINS = 0.9  # ratio to the best estimate so far above which a round has failed; two failures end the run
+_USUAL = 1e-9  # [rad] tolerance that ANGLE_OF_STEP and TERMS_OF_STEP are for
+_QUARTERS = 4  # refinements in each factor of two: few, so that momenta of a batch share them
+_LEAST_TOLERANCE = 1e-9  # of the tolerance: samples are not made denser
+_EXAGGERATED = 1024.0  # roundings by which samples are changed, so that the effect stands out of the marches' own
+_TINY = 1e-300  # keeps quotients defined where marches agree to the last bit
+_LOST = 0.1  # [rad] between marches, beyond which their distance does not show how errors fall
+_TERMS_A_TIME = 12  # terms of series for each fresh time: 8 % of the evaluations at most
+_GOLDEN = 0.6180339887498949  # step of the shares of panels at which neighbours are compared: never a node
 
 
 class Refinement(NamedTuple):
@@ -64,12 +57,12 @@ class Refinement(NamedTuple):
     steps: int = 0
 
     def sampling_tolerance(self, tolerance: float) -> float:
-        """Of samples [rad]."""
+        """Tolerance of the samples [rad]."""
         return tolerance * 2.0 ** (-self.samples / _QUARTERS)
 
     @property
     def factor(self) -> float:
-        """Of the number of steps."""
+        """Factor of the number of steps."""
         return 2.0 ** (self.steps / _QUARTERS)
 
 
@@ -107,7 +100,7 @@ def stepped_rotation(sampler: Sampler, momentum: Array, tolerance: float) -> Ste
 
 
 class Progress(NamedTuple):
-    """What rounds have come to."""
+    """State of the rounds so far."""
 
     refinement: Refinement = Refinement()
     best: float = np.inf
@@ -115,7 +108,7 @@ class Progress(NamedTuple):
     in_vain: int = 0
 
     def after(self, rotation: SteppedRotation, row: int, tolerance: float, level: float) -> Progress:
-        """What the next round does for a row; `level` as of `Samples`. Raises AccuracyNotReached if none will help."""
+        """Refinement of a row's next round; `level` from `Samples`. Raises AccuracyNotReached if none will help."""
         estimate = float(rotation.error_estimate[row])
         in_vain = self.in_vain + (estimate > _GAINS * self.best)
         refinement = refined(self.refinement, rotation, row, tolerance, level)
@@ -131,12 +124,12 @@ class Progress(NamedTuple):
 
 
 def refined(last: Refinement, rotation: SteppedRotation, row: int, tolerance: float, level: float) -> Refinement:
-    """What the parts of an error ask for: more samples, more steps, or both."""
+    """Refinement by the parts of an error: more samples, more steps, or both."""
     sampling, stepping = float(rotation.sampling_error[row]), float(rotation.stepping_error[row])
     samples, steps = last
     spare = max(tolerance - float(rotation.rounding_error[row]), 0.5 * tolerance)
     if sampling > STEPPING_SHARE * spare and level:
-        # Below the level at which there would be more of them, by as much as they turn the body too far.
+        # Below the level at which there would be more samples, by the ratio of spare tolerance to their error.
         needed = min(level, last.sampling_tolerance(tolerance)) * min(0.25 * spare / sampling, 0.5)
         samples = max(samples + 1, ceil(_QUARTERS * log2(tolerance / max(needed, _LEAST_TOLERANCE * tolerance))))
     if stepping > STEPPING_SHARE * spare:
@@ -156,15 +149,15 @@ def one_round(
     refinement: Refinement,
     threads: int | None = None,
 ) -> tuple[SteppedRotation, float]:
-    """Sample and step momenta (B, 3) up to a ceiling [kg m^2/s], with error estimates, within the tolerance or not.
+    """Rotations of momenta (B, 3) up to a ceiling [kg m^2/s] with error estimates, and the level of the samples.
 
-    With it comes the level of the samples. What is within the tolerance has been compared with the body at fresh times.
+    Rotations within the tolerance have been compared with the body at fresh times.
     """
     needed = refinement.sampling_tolerance(tolerance)
     samples = sampler.samples(ceiling, needed, strict=not refinement.samples)
     steps = planned(samples.interpolant, ceiling, tolerance, refinement.factor)
-    found = attempted(samples.interpolant, samples.perturbed.coefficients, steps, momentum, threads)
-    rotation = rotation_of(samples, found, momentum, tolerance)
+    attempt = attempted(samples.interpolant, samples.perturbed.coefficients, steps, momentum, threads)
+    rotation = rotation_of(samples, attempt, momentum, tolerance)
     done = rotation.error_estimate <= tolerance
     if done.any():
         times, _ = fresh_times(samples.interpolant)
@@ -180,7 +173,7 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
     least = SMALL_TERM * tolerance
     spectra_kernel.plan(plain(interpolant.coefficients), interpolant.widths, ceiling, least, turn, terms)
     finer = (_USUAL / tolerance) ** (1.0 / ORDER)
-    # However loose the tolerance, steps that do not follow the terms do not show by what they err.
+    # However loose the tolerance, only steps that follow the terms show their error.
     steps = np.maximum(max(finer, 1.0) * terms / TERMS_OF_STEP, finer * turn / ANGLE_OF_STEP)
     steps = factor * np.maximum(steps, 1.0)
     total = 4.0 * interpolant.loops * float(steps.sum())
@@ -194,32 +187,32 @@ def planned(interpolant: Interpolant, ceiling: float, tolerance: float, factor: 
     return np.ceil(steps).astype(np.int64)
 
 
-def rotation_of(samples: Samples, found: Attempt, momentum: Array, tolerance: float) -> SteppedRotation:
+def rotation_of(samples: Samples, attempt: Attempt, momentum: Array, tolerance: float) -> SteppedRotation:
     """Steps with their error estimates."""
-    interpolant, growth = samples.interpolant, found.amplification
-    # Twice as fast a fall as by the order or more is no order yet: as much as it is faster it may be slower next time.
-    ratio = 2.0**ORDER * found.fine / np.maximum(found.coarse, _TINY)
+    interpolant, growth = samples.interpolant, attempt.amplification
+    # A fall twice as fast as by the order, or faster, is not asymptotic: the next may be slower by the same factor.
+    ratio = 2.0**ORDER * attempt.fine / np.maximum(attempt.coarse, _TINY)
     fell = 2.0**-ORDER * np.clip(np.maximum(ratio, 0.5 / np.maximum(ratio, _TINY)), 1.0, 2.0**ORDER)
-    committed = _committed(found.dynamics.shape[1], found.turned)
+    committed = _committed(attempt.dynamics.shape[1], attempt.turned)
     rounding = growth * committed * samples.condition
-    # What rounding alone may set two marches apart says nothing of their steps.
-    apart = np.maximum(found.fine - rounding, 0.0)
-    stepping = np.where(found.fine < _LOST, STEPPING * fell * apart, np.pi)
-    large = np.flatnonzero((rounding > ROUNDING_SHARE * tolerance) & (found.fine < _LOST))
+    # Marches also differ by their rounding, which is no error of steps.
+    apart = np.maximum(attempt.fine - rounding, 0.0)
+    stepping = np.where(attempt.fine < _LOST, STEPPING * fell * apart, np.pi)
+    large = np.flatnonzero((rounding > ROUNDING_SHARE * tolerance) & (attempt.fine < _LOST))
     if len(large):
-        measured = committed[large] + MEASURED_ROUNDING * found.fine[large]
-        measured += rounding_of_samples(samples, found.steps // 4, momentum[large])
+        measured = committed[large] + MEASURED_ROUNDING * attempt.fine[large]
+        measured += rounding_of_samples(samples, attempt.steps // 4, momentum[large])
         rounding[large] = np.minimum(rounding[large], measured)
     rounding += rounding_of_times(samples, momentum)
-    sampling = np.maximum(found.sampling, samples.between) + growth * samples.hidden
+    sampling = np.maximum(attempt.sampling, samples.between) + growth * samples.hidden
     return SteppedRotation(
         interpolant=interpolant,
         momentum=momentum,
-        steps=found.steps,
-        quaternions=found.quaternions,
-        directions=found.directions,
-        turns=found.turns,
-        dynamics=found.dynamics,
+        steps=attempt.steps,
+        quaternions=attempt.quaternions,
+        directions=attempt.directions,
+        turns=attempt.turns,
+        dynamics=attempt.dynamics,
         sampling_error=sampling,
         stepping_error=stepping,
         rounding_error=rounding,
@@ -229,22 +222,19 @@ def rotation_of(samples: Samples, found: Attempt, momentum: Array, tolerance: fl
 
 
 def _committed(steps: int, turned: Array) -> Array:
-    """What steps round, ungrown: (B,) [rad]."""
+    """Rounding of steps, not amplified: (B,) [rad]."""
     return EPS * (ROUNDING_OF_START + ROUNDING_OF_STEP * np.sqrt(steps) + turned)
 
 
 def committed_rounding(quaternions: Array) -> Array:
-    """The same of attitudes at the ends of steps: (B, K + 1, 4) -> (B,) [rad]."""
+    """Rounding of steps that end at these attitudes, not amplified: (B, K + 1, 4) -> (B,) [rad]."""
     chords = np.diff(quaternions, axis=1)
     turned = 2.0 * np.sqrt((chords * chords).sum(axis=2)).sum(axis=1)
     return _committed(quaternions.shape[1] - 1, turned)
 
 
 def rounding_of_samples(samples: Samples, steps: Integers, momentum: Array) -> Array:
-    """Attitude error because inertias are rounded, grown as it grows along the motion: (B,) [rad].
-
-    Of far more units than there are, so that it stands out of the rounding of the marches themselves.
-    """
+    """Attitude error because inertias are rounded, amplified along the motion: (B,) [rad]."""
     interpolant, series = samples.interpolant, samples.interpolant.coefficients
     same = stepped_quaternions(interpolant, series, steps, momentum)
     rounded = stepped_quaternions(interpolant, rounded_series(samples, _EXAGGERATED * ROUNDED_INERTIA), steps, momentum)
@@ -252,7 +242,48 @@ def rounding_of_samples(samples: Samples, steps: Integers, momentum: Array) -> A
 
 
 def rounding_of_times(samples: Samples, momentum: Array) -> Array:
-    """Attitude error because times are rounded, by eps times the duration: (B,) [rad]. No march shows it."""
+    """Attitude error because times are rounded by eps times the duration, which no march shows: (B,) [rad]."""
     magnitudes, _ = magnitudes_and_directions(momentum)
     inverse, drift = samples.rates
     return EPS * float(samples.interpolant.edges[-1]) * (magnitudes * inverse + drift)
+
+
+def fresh_times(interpolant: Interpolant) -> tuple[Array, Integers]:
+    """One time in each panel of the first loop, or in every few of low degree, and the panels: (N,) [s], (N,)."""
+    panels, terms = len(interpolant.coefficients), np.count_nonzero(interpolant.coefficients[:, :, 0])
+    chosen = np.arange(0, panels, -(-_TERMS_A_TIME * panels // max(terms, panels)))
+    share = np.mod(0.5 + _GOLDEN * (chosen + 1.0), 1.0)
+    return interpolant.edges[chosen] + share * interpolant.widths[chosen], chosen
+
+
+def swings(gaps: Array, coefficients: Array, widths: Array, momentum: float) -> Array:
+    """Angles by which gaps between series and body swing the attitude: (..., N) [rad].
+
+    The terms that a series of degree d lacks swing at least d half-times over its panel, so a gap of r rad/s in the
+    rate of turning swings the attitude by about r width/d.
+
+    `gaps` (..., N, 9) are those of the channels, `coefficients` (..., N, n, 9) those of the series, `widths` (N,) those
+    of their panels [s], `momentum` is a magnitude [kg m^2/s].
+    """
+    is_term = np.abs(coefficients).max(axis=-1) > 0.0
+    degrees = is_term.shape[-1] - 1 - np.argmax(is_term[..., ::-1], axis=-1)
+    return rates_of(gaps, momentum) * widths / np.maximum(degrees, 1)
+
+
+def compare(interpolant: Interpolant, body: Array, momentum: float, tolerance: float) -> None:
+    """Compare an interpolant with the body's channels (N, 9) at its fresh times.
+
+    Error estimates come from an interpolant's own series; only this comparison shows a fault in how these were put
+    together. Series within their estimates are off by swings of at most a third of the tolerance [rad], over all loops
+    and for momenta up to a magnitude [kg m^2/s]. Raises AccuracyNotReached for a swing above the tolerance.
+    """
+    times, chosen = fresh_times(interpolant)
+    gaps = interpolant.channels(times[:, None], chosen)[:, 0] - body
+    angles = interpolant.loops * swings(gaps, interpolant.coefficients[chosen], interpolant.widths[chosen], momentum)
+    worst = int(np.argmax(angles))
+    if not angles[worst] <= tolerance:
+        raise AccuracyNotReached(
+            f"the samples near t = {times[worst]:.9g} s do not give the body there: the attitude may be off by "
+            f"{angles[worst]:.3g} rad, which no error estimate shows. Either a function of yours gives other values "
+            'when it is called again, or this is a fault of shapephase; method="dop853" takes no samples'
+        )

@@ -1,4 +1,4 @@
-"""The rotation by the shape alone beside a motion, and how far both may be off at every time."""
+"""The rotation by the shape alone beside a motion, and the error estimates of both at every time."""
 
 from __future__ import annotations
 
@@ -18,26 +18,22 @@ from .samples import Perturbed
 from .stepped import SteppedRotation
 from .stepping import largest_angle, small_turns, stepped_quaternions
 
-# Of the motion's error estimate: what the steps of its lift are to err by at most.
-_SHARE = 0.1
-# [rad] the same where the motion is as good as exact.
-_ROUNDING = 1e-14
-# Of the distance from twice as many steps, which shows the error of steps but for a part in two hundred.
-_SAFETY_FACTOR = 2.0
-# Times that the steps of a lift are halved to err no more than that.
-_MOST_HALVINGS = 3
+_SHARE = 0.1  # of the motion's error estimate: error allowed for the steps of its lift
+_ROUNDING = 1e-14  # [rad] that error where the motion is as good as exact
+_SAFETY_FACTOR = 2.0  # times the distance from twice as many steps, which is their error to 1/255
+_MOST_HALVINGS = 3  # of the steps of a lift
 
 
 @dataclass(frozen=True, eq=False)
 class Lift:
-    """How the shape alone would turn the frame, on the samples of a motion; where its steps end own steps end.
+    """Rotation of the frame by the shape alone, on the samples of a motion, whose steps end where some of its own end.
 
     Attributes
     ----------
-    motion : the attitude beside which it is
-    interpolant : on which it is stepped: the motion's own, or that without the drift by the momentum of wheels
-    perturbed : the same with errors like those that it probably has
-    steps : (P,) of its own on each of the interpolant's panels
+    motion : the attitude by shape and momentum
+    interpolant : the motion's own, or that without the drift by the momentum of wheels
+    perturbed : the interpolant's series with their probable errors
+    steps : (P,) of the lift, on each of the interpolant's panels
     quaternions : (1, M + 1, 4) xyzw at their ends
     finer : (1, 2 M + 1, 4) by twice as many
     ends : (K + 1,) which ends of its steps are those of the motion's
@@ -57,16 +53,16 @@ class Lift:
 
     @cached_property
     def end(self) -> Array:
-        """Where it ends: (3, 3)."""
+        """Rotation at the end: (3, 3)."""
         return read_only(so3.matrix_from_quat(self.quaternions[0, -1]))
 
     def at_ends(self, place: Integers | slice) -> Array:
-        """At these ends of the motion's steps: (N,) -> (N, 3, 3)."""
+        """Rotations at these ends of the motion's steps: (N,) -> (N, 3, 3)."""
         return so3.matrix_from_quat(self.quaternions[0, self.ends[place]])
 
     @cached_property
     def turns(self) -> Array:
-        """As of `error_turns`, at the ends of the motion's steps: (2, 1, K + 1, 3)."""
+        """The lift's `error_turns`, at the ends of the motion's steps: (2, 1, K + 1, 3)."""
         ends = self.ends
         other = _alone(self.interpolant, self.perturbed.coefficients, self.steps)
         better = np.stack([self.finer[:, 2 * ends], other[:, ends]])
@@ -74,7 +70,7 @@ class Lift:
 
     @cached_property
     def rotation(self) -> SteppedRotation:
-        """It at all times, and how far it may be off; of a motion without momentum that itself."""
+        """The lift at all times, with error estimates; the motion itself where it has no momentum."""
         motion, quaternions = self.motion, self.quaternions
         if _is_at_rest(motion) and self.is_without_wheels:
             return motion
@@ -108,7 +104,7 @@ class Lift:
 
 
 def lift_along(rotation: SteppedRotation, wheels: Callable[[Array], Array] | None = None) -> Lift:
-    """The lift of a motion, in steps that err little beside it; how little is found when it is asked for.
+    """The lift of a motion, in steps with small errors beside the motion's.
 
     `wheels` : the momentum that wheels store, (N,) [s] -> (N, 3) [kg m^2/s], which is no part of the shape's drift
     """
@@ -118,11 +114,10 @@ def lift_along(rotation: SteppedRotation, wheels: Callable[[Array], Array] | Non
         interpolant = replace(interpolant, coefficients=_less(interpolant.coefficients, by_wheels))
         perturbed = Perturbed(_less(perturbed.coefficients, by_wheels), perturbed.hidden)
     series = interpolant.coefficients
-    at_rest, times_finer = _is_at_rest(rotation), 1
-    own = at_rest and wheels is None
-    quaternions = rotation.quaternions[:1] if own else _alone(interpolant, series, rotation.steps)
+    is_motion, times_finer = _is_at_rest(rotation) and wheels is None, 1
+    quaternions = rotation.quaternions[:1] if is_motion else _alone(interpolant, series, rotation.steps)
     finer = _alone(interpolant, series, 2 * rotation.steps)
-    tolerance = np.inf if own else _tolerance(rotation)
+    tolerance = np.inf if is_motion else max(_SHARE * float(np.min(rotation.error_estimate)), _ROUNDING)
     for _ in range(_MOST_HALVINGS):
         if _SAFETY_FACTOR * float(largest_angle(quaternions, finer[:, ::2])[0]) <= tolerance:
             break
@@ -151,18 +146,13 @@ def _drift_by(wheels: Callable[[Array], Array], interpolant: Interpolant) -> Arr
 
 def _less(coefficients: Array, drift: Array) -> Array:
     """The nine channels without a part of the drift: (P, n, 9), (P, n, 3) -> (P, n, 9)."""
-    found = coefficients.copy()
-    found[:, :, 6:] -= drift
-    return found
+    remaining = coefficients.copy()
+    remaining[:, :, 6:] -= drift
+    return remaining
 
 
 def _is_at_rest(rotation: SteppedRotation) -> bool:
     return not rotation.directions.shape[1]
-
-
-def _tolerance(rotation: SteppedRotation) -> float:
-    """How far the lift's steps may be off [rad]."""
-    return max(_SHARE * float(np.min(rotation.error_estimate)), _ROUNDING)
 
 
 def error_turns(rotation: SteppedRotation, lift: Lift) -> Array:
@@ -173,9 +163,6 @@ def error_turns(rotation: SteppedRotation, lift: Lift) -> Array:
     if _is_at_rest(rotation):
         return np.broadcast_to(lift.turns, (2, len(rotation.momentum), *lift.turns.shape[2:]))
     interpolant, perturbed = rotation.interpolant, rotation.perturbed
-    better = np.empty((2, *rotation.quaternions.shape))
-    better[0] = stepped_quaternions(interpolant, interpolant.coefficients, 2 * rotation.steps, rotation.momentum)[
-        :, ::2
-    ]
-    better[1] = stepped_quaternions(interpolant, perturbed.coefficients, rotation.steps, rotation.momentum)
-    return small_turns(rotation.quaternions, better)
+    finer = stepped_quaternions(interpolant, interpolant.coefficients, 2 * rotation.steps, rotation.momentum)
+    other = stepped_quaternions(interpolant, perturbed.coefficients, rotation.steps, rotation.momentum)
+    return small_turns(rotation.quaternions, np.stack([finer[:, ::2], other]))

@@ -16,12 +16,12 @@ from ..errors import AccuracyNotReached
 
 @dataclass(frozen=True, eq=False)
 class StepLimits:
-    """The longest steps, stretch by stretch of the time.
+    """The longest steps, interval by interval.
 
     Attributes
     ----------
-    edges : (P + 1,) ends of the stretches, first 0 [s]
-    longest : (P,) a step is no longer within a stretch, and reaches no farther into it [s]
+    edges : (P + 1,) ends of the intervals, first 0 [s]
+    longest : (P,) a step is no longer within an interval, and reaches no farther into it [s]
     """
 
     edges: Array
@@ -31,7 +31,7 @@ class StepLimits:
 
     @staticmethod
     def even(edges: Array, steps: float) -> StepLimits:
-        """Limits by which every stretch takes at least this number of steps."""
+        """Limits by which every interval takes at least this number of steps."""
         return StepLimits(edges, np.diff(edges) / steps)
 
     def repeated(self, loops: int) -> StepLimits:
@@ -51,7 +51,7 @@ class StepLimits:
         return StepLimits(edges, np.minimum(self.at(middle), other.at(middle)))
 
     def at(self, times: Array) -> Array:
-        """The longest step of the stretch of each time: (N,) -> (N,) [s]."""
+        """The longest step of the interval of each time: (N,) -> (N,) [s]."""
         place = np.searchsorted(self.edges, times, side="right") - 1
         return self.longest[np.clip(place, 0, len(self.longest) - 1)]
 
@@ -88,7 +88,7 @@ class Run:
     rtol: float
 
     def __call__(self, t: Array) -> Array:
-        """(N,) -> (N, 4 + k)."""
+        """State at times: (N,) -> (N, 4 + k)."""
         piece = np.clip(np.searchsorted(self.breaks, t, side="right") - 1, 0, len(self.pieces) - 1)
         values: Array = np.empty((len(t), len(self.pieces[0](self.breaks[:1])[:, 0])))
         for number in np.unique(piece):
@@ -108,15 +108,8 @@ def limited_run(
 ) -> Run:
     """Integrate by SciPy's DOP853, restarted at the breaks, with steps within limits.
 
-    Parameters
-    ----------
-    slope : time, state (4 + k,) -> (4 + k,); a unit quaternion comes first
-    breaks : (M,) between which the slope is smooth, and at whose inner sides it is evaluated [s]
-
-    Raises
-    ------
-    AccuracyNotReached
-        If the steps become too short.
+    `slope` is a function of time and state (4 + k,), of which a unit quaternion comes first, smooth between the breaks
+    (M,) [s] and evaluated at their inner sides. Raises AccuracyNotReached if the steps become too short.
     """
     from scipy.integrate import DOP853, OdeSolution
 
@@ -128,7 +121,7 @@ def limited_run(
             return slope(min(max(t, left), right), y)
 
         ends, outputs = [a], []
-        # SciPy asks for the float next to zero, which is an underflow to those who want to be told.
+        # SciPy computes the float next to zero, which raises where a caller made underflow an error.
         with np.errstate(under="ignore"):
             solver = DOP853(within, a, state, b, rtol=rtol, atol=atol, max_step=longest(a))
             while solver.status == "running":

@@ -41,7 +41,7 @@ class LinkRows(Protocol):
         ...
 
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
-        """Of all joints: (N, n), (N, n) -> (N, k), (N, k)."""
+        """Coordinates and rates of all joints: (N, n), (N, n) -> (N, k), (N, k)."""
         ...
 
 
@@ -61,15 +61,9 @@ def tree_inertia_and_momentum(tree: LinkRows, shapes: Array, rates: Array) -> tu
 
 
 def trees_channels(tree: LinkRows, rows: Array, masses: Array, shapes: Array, rates: Array) -> tuple[Array, Mask]:
-    """`tree_channels` of trees that differ from one in their masses, each as if alone, and which can be relied on.
+    """`tree_channels` of trees that differ in their masses, each as if alone, and which are reliable: (V, N, 9), (V,).
 
-    Parameters
-    ----------
-    rows, masses : (V, k + 1, 22), (V,) as in `LinkRows`
-
-    Returns
-    -------
-    (V, N, 9), (V,)
+    `rows` (V, k + 1, 22) and `masses` (V,) are those of each tree, as in `LinkRows`.
     """
     return _sampled(tree, rows, masses, shapes, rates, inverted=True)
 
@@ -89,14 +83,7 @@ def _sampled(
 def momentum_gradients(tree: LinkRows, shapes: Array, rates: Array, spins: Array, rows: Array) -> tuple[Array, Array]:
     """Products row . d(I w + L_o), w fixed, by the coordinates of all joints, followers included, and by their rates.
 
-    Parameters
-    ----------
-    shapes, rates : (N, n)
-    spins, rows : (N, S, 3) w, and (N, S, r, 3), axes of the base
-
-    Returns
-    -------
-    (N, S r, k) each
+    (N, S r, k) each, from shapes and rates (N, n), spins w (N, S, 3) and rows (N, S, r, 3), axes of the base.
     """
     coordinates, speeds = tree.coordinates(shapes, rates)
     by_shape, by_rate = np.empty((2, *rows.shape[:3], len(tree.parents)))
@@ -111,9 +98,7 @@ def momentum_gradients(tree: LinkRows, shapes: Array, rates: Array, spins: Array
 def inertial_sums(tree: LinkRows, shapes: Array, rates: Array, spins: Array, rows: Array) -> Array:
     """Sums over the shapes of row . d(I w + L_o) by the parameters of each frame of the tree; arguments as above.
 
-    Returns
-    -------
-    (S r, k + 1, 10) by mass, first moment and inertia xx yy zz yz xz xy, axes of the frame
+    (S r, k + 1, 10), by mass, first moment and inertia xx yy zz yz xz xy, axes of the frame.
     """
     coordinates, speeds = tree.coordinates(shapes, rates)
     spins = np.repeat(spins, rows.shape[2], axis=1)

@@ -28,12 +28,11 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 _F = TypeVar("_F", bound=Callable[..., Any])
 
+# Modules of `kernels/`, each with a function `warm` that calls its kernels once.
 _MODULES = ("step_kernel", "spectra_kernel", "curve_kernel", "tree_kernel", "gradient_kernel")
-"""Of `kernels/`, those with a function `warm`, which calls each kernel of its module once."""
+# Without `forceinline` loops over lanes take half as long again; the compiler takes as long with as without.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "forceinline": True, "no_cfunc_wrapper": True}
-"""Without `forceinline` loops over lanes take half as long again; the compiler takes as long with as without."""
-_NUMBA_DOES_NOT_WORK = (ImportError, AttributeError, SystemError)
-"""What the import of a Numba raises that does not go with this NumPy or this Python."""
+_NUMBA_DOES_NOT_WORK = (ImportError, AttributeError, SystemError)  # raised by a Numba for another NumPy or Python
 _MANY_STEPS = 5000  # of the formula, of 110 us interpreted each; a motion takes some 400 in its three marches
 _MANY_MOMENTA = 20  # about 0.8 s interpreted
 _MANY_ROWS = 200  # of a recording, about 1.5 s interpreted

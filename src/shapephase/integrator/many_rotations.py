@@ -21,8 +21,7 @@ from .sampling import Sampler
 from .stepped import SteppedRotation, for_whole_batch, of_rows
 from .stepping import magnitudes_and_directions
 
-# Classes of magnitudes in each factor of two: finer ones are more, coarser ones take more steps than needed.
-CLASSES = 4
+CLASSES = 4  # of magnitudes in each factor of two: finer ones are more, coarser ones take more steps than needed
 
 
 class RotationPart(NamedTuple):
@@ -67,12 +66,12 @@ class GroupedRotations:
 
     @property
     def error_estimate(self) -> Array:
-        """As of `SteppedRotation`: (B,) [rad]."""
+        """Estimates of the largest attitude errors: (B,) [rad]."""
         return self._assembled(lambda rotation: rotation.error_estimate)
 
     @property
     def amplification(self) -> Array:
-        """As of `SteppedRotation`: (B,)."""
+        """Largest growths of an attitude error from one time to a later one: (B,)."""
         return self._assembled(lambda rotation: rotation.amplification)
 
     @property
@@ -82,7 +81,7 @@ class GroupedRotations:
 
     @property
     def momentum_slope(self) -> Array:
-        """As of `SteppedRotation`: (B, 3, 3)."""
+        """`SteppedRotation.momentum_slope` of all rows: (B, 3, 3)."""
         return self._assembled(lambda rotation: rotation.momentum_slope)
 
     def rotation(self, t: Array) -> Array:
@@ -90,11 +89,11 @@ class GroupedRotations:
         return self._assembled(lambda rotation: rotation.rotation(t))
 
     def dynamic_phase(self, t: Array) -> Array:
-        """As of `SteppedRotation`: (N,) -> (B, N) [rad]."""
+        """`SteppedRotation.dynamic_phase` of all rows: (N,) -> (B, N) [rad]."""
         return self._assembled(lambda rotation: rotation.dynamic_phase(t))
 
     def solid_angle(self, t: Array) -> Array:
-        """As of `SteppedRotation`: (N,) -> (B, N) [sr]."""
+        """`SteppedRotation.solid_angle` of all rows: (N,) -> (B, N) [sr]."""
         return self._assembled(lambda rotation: rotation.solid_angle(t))
 
     def _assembled(self, of_part: Callable[[SteppedRotation], Array]) -> Array:
@@ -122,18 +121,10 @@ class _Group(NamedTuple):
 def rotations_of_each(
     sampler: Sampler, momentum: Array, tolerance: float, *, threads: int | None = None
 ) -> SteppedRotation | GroupedRotations:
-    """Integrate the attitude equation for each momentum as if it were alone.
+    """Integrate the attitude equation for each momentum (B, 3) [kg m^2/s] as if it were alone, to a tolerance [rad].
 
-    Parameters
-    ----------
-    momentum : (B, 3) body angular momentum at the start [kg m^2/s]
-    tolerance : of every attitude over the whole interval [rad]
-    threads : at most, in machine code; None: one for each processor. Results do not depend on it
-
-    Raises
-    ------
-    AccuracyNotReached
-        If an estimate stays above the tolerance; in a batch the message has its row.
+    Machine code uses so many threads at most; None: one for each processor. Results do not depend on it. Raises
+    AccuracyNotReached if an estimate stays above the tolerance; in a batch the message has its row.
     """
     magnitudes, _ = magnitudes_and_directions(momentum)
     ceilings = rounded_up(magnitudes, CLASSES)
@@ -143,8 +134,8 @@ def rotations_of_each(
         first = Progress()
         waiting = [_Group(rows, ceiling, first.refinement, (first,) * max(len(rows), 1))]
         while waiting:
-            found, further = _integrated(sampler, waiting.pop(), momentum, tolerance, threads)
-            parts += found
+            finished, further = _integrated(sampler, waiting.pop(), momentum, tolerance, threads)
+            parts += finished
             waiting += further
     if len(parts) == 1:
         return parts[0].rotation
@@ -154,12 +145,12 @@ def rotations_of_each(
 def _integrated(
     sampler: Sampler, group: _Group, momentum: Array, tolerance: float, threads: int | None
 ) -> tuple[list[RotationPart], list[_Group]]:
-    """One round for a group: the rows that are within the tolerance now, and those that have to go on."""
+    """One round for a group: rows that are within the tolerance, and groups that need another round."""
     rows, starts = group.rows, momentum[group.rows]
-    # At rest all turn alike.
-    taken = starts if group.ceiling else np.zeros((1, 3))
     try:
-        rotation, level = one_round(sampler, taken, tolerance, group.ceiling, group.refinement, threads)
+        # Without momentum all turn alike.
+        different = starts if group.ceiling else np.zeros((1, 3))
+        rotation, level = one_round(sampler, different, tolerance, group.ceiling, group.refinement, threads)
     except AccuracyNotReached as error:
         raise _of_row(error, rows[:1], len(momentum)) from error
     done = rotation.error_estimate <= tolerance
@@ -173,11 +164,10 @@ def _integrated(
             raise _of_row(error, rows[place : place + 1], len(momentum)) from error
         together.setdefault(progress.refinement, []).append((place, progress))
     further = [
-        _Group(
-            rows[[place for place, _ in members]] if group.ceiling else rows,
-            group.ceiling,
-            refinement,
-            tuple(progress for _, progress in members),
+        group._replace(
+            rows=rows[[place for place, _ in members]] if group.ceiling else rows,
+            refinement=refinement,
+            progress=tuple(progress for _, progress in members),
         )
         for refinement, members in together.items()
     ]
@@ -186,12 +176,12 @@ def _integrated(
 
 
 def rounded_up(numbers: Array, steps: int) -> Array:
-    """To the next of `steps` geometric steps in each factor of two, exactly alike for equal numbers; zero is zero."""
+    """Numbers rounded up to the next of `steps` geometric steps in each factor of two; zero stays zero."""
     mantissa, exponent = np.frexp(numbers)
     marks = 2.0 ** (np.arange(-steps, 1) / steps)
     return np.where(numbers == 0.0, 0.0, np.ldexp(marks[np.searchsorted(marks, mantissa)], exponent))
 
 
 def _of_row(error: AccuracyNotReached, row: Integers, count: int) -> AccuracyNotReached:
-    """`row` : the row in an array, or none."""
+    """The error with the row (1,) of the momentum in its message, if there are several."""
     return error if count <= 1 else AccuracyNotReached(f"momentum {row[0]} of {count}: {error}")

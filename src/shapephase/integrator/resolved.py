@@ -1,4 +1,4 @@
-"""A function of time resolved to rounding: Chebyshev series on panels, which say where a function of it is sampled."""
+"""A function of time resolved to rounding: Chebyshev series on panels, by which functions of it are sampled."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from ..arrays import Array, Integers, lock_arrays
 
-DEGREE = 32
-"""Degree of the series on every panel."""
+DEGREE = 32  # of the series on every panel
 _AT_REST = 1e-14  # [rad]: values without rates, like a given inertia, scatter by this much through rounding
 
 

@@ -1,4 +1,4 @@
-"""A deformation as it was sampled, and what its series may be off by."""
+"""Samples of a deformation, and the probable errors of their series."""
 
 from __future__ import annotations
 
@@ -16,18 +16,17 @@ from .interpolant import Interpolant
 from .kernels import spectra_kernel as spectra
 from .machine_code import plain
 
-# Panels at once: some megabytes.
-_AT_ONCE = 2048
+_AT_ONCE = 2048  # panels: some megabytes
 
 
 @dataclass(frozen=True, eq=False)
 class Perturbed:
-    """An interpolant's series with errors like those that they probably have.
+    """The interpolant with its last coefficients perturbed by the estimated truncation error.
 
     Attributes
     ----------
-    coefficients : (P, n, 9) the last terms of each series changed by as much as is missing beyond them
-    hidden : attitude error of what they do not show, without amplification [rad]
+    coefficients : (P, n, 9)
+    hidden : attitude error that the coefficients do not show, without amplification [rad]
     """
 
     coefficients: Array
@@ -54,20 +53,20 @@ class Panels:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A deformation as it was sampled for momenta up to a magnitude.
+    """Samples of a deformation for momenta up to a magnitude.
 
     Attributes
     ----------
     interpolant : the series through the samples
-    panels : on which they are
-    change : (P,) by how much of themselves the last two terms of each series may be wrong
+    panels : those of the series
+    change : (P,) relative errors of the last two terms of each series
     noisy : (P,) one where these terms are noise, which all others have as well, else zero
     between : attitude error within a panel that its ends do not show [rad]
-    hidden : what no series shows, without amplification [rad]
-    level : tolerance below which there would be more samples [rad]; 0: all that is missing is noise
-    condition : a bound of that of the inertia
+    hidden : attitude error that no series shows, without amplification [rad]
+    level : tolerance below which there would be more samples [rad]; 0: only noise is missing
+    condition : a bound of the inertia's condition number
     rates : the largest of I^-1 [1/(kg m^2)] and of I^-1 L_o [rad/s], as sums over the terms of a panel
-    too_rough : why the samples are not as dense as they were to be; None: they are
+    too_rough : why the samples are less dense than requested; None: they are not
     """
 
     interpolant: Interpolant
@@ -85,27 +84,22 @@ class Samples:
 
     @cached_property
     def perturbed(self) -> Perturbed:
-        """The series changed by what is probably missing."""
-        return Perturbed(changed_series(self), self.hidden)
-
-
-def changed_series(samples: Samples) -> Array:
-    """The series with errors like those they probably have: (P, n, 9)."""
-    series = samples.interpolant.coefficients
-    changed = np.empty_like(series)
-    degrees, signs = samples.panels.degrees, _signs(len(series))
-    spectra.change(plain(series), degrees, plain(samples.change), plain(samples.noisy), signs, changed)
-    return read_only(changed)
+        """The series with their probable errors."""
+        series = self.interpolant.coefficients
+        changed = np.empty_like(series)
+        degrees, signs = self.panels.degrees, _signs(len(series))
+        spectra.change(plain(series), degrees, plain(self.change), plain(self.noisy), signs, changed)
+        return Perturbed(read_only(changed), self.hidden)
 
 
 def rounded_series(samples: Samples, units: float) -> Array:
-    """Series (P, n, 9) of inertias and momenta that are rounded otherwise, by so many units of their largest entries.
+    """Series (P, n, 9) of inertias and momenta with random roundings of so many units of their largest entries.
 
     With L the largest moment, a rounding eps L E of the inertia, E of size one in any direction, changes I^-1 by
     -I^-1 eps L E I^-1: of a body that hardly resists turning about one axis, by more than units of its own.
     """
     series, degrees, rng = samples.interpolant.coefficients, samples.panels.degrees, np.random.default_rng(0)
-    found, terms = series.copy(), series.shape[1]
+    rounded, terms = series.copy(), series.shape[1]
     for first in range(0, len(series), _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
         inverse, drift = series[part, 0][:, MATRIX].reshape(-1, 1, 3, 3), series[part, :, 6:]
@@ -115,13 +109,13 @@ def rounded_series(samples: Samples, units: float) -> Array:
         tensors, vectors = rng.standard_normal((count, terms, 3, 3)), rng.standard_normal((count, terms, 3))
         turned = inverse @ (tensors + np.swapaxes(tensors, -1, -2))
         vectors *= np.abs(drift).max(axis=(1, 2))[:, None, None]
-        found[part, :, :6] += unit * (turned @ inverse).reshape(count, terms, 9)[:, :, VOIGT]
+        rounded[part, :, :6] += unit * (turned @ inverse).reshape(count, terms, 9)[:, :, VOIGT]
         of_drift = (turned @ drift[:, None, 0, :, None])[..., 0] + (inverse @ vectors[..., None])[..., 0]
-        found[part, :, 6:] += unit * of_drift
-    return found
+        rounded[part, :, 6:] += unit * of_drift
+    return rounded
 
 
 @lru_cache(maxsize=64)
 def _signs(count: int) -> Array:
-    """By chance: (count,)."""
+    """Random signs: (count,)."""
     return np.where(np.random.default_rng(0).random(count) < 0.5, -1.0, 1.0)

@@ -22,25 +22,21 @@ from .kernels import spectra_kernel as spectra
 from .samples import Panels, Samples
 from .smoothness import DEGREES, Smoothness
 
-# Panels before halving ends, besides 40 for every break: a motion that needs more is rough, not merely long.
-_MOST_PANELS = 4000
-# Panels that are sampled together: their samples take some ten megabytes.
-_AT_ONCE = 4096
-# Of a panel, relative to the interval: narrower ones would consist of rounding.
-_LEAST_WIDTH = 1e-13
-# Where the samples of a panel are compared with its series: none is near a node of a degree in use.
-_BETWEEN = np.array([0.0411, 0.2677, 0.5573, 0.8219])
+_MOST_PANELS = 4000  # before halving ends, besides 40 for every break: a motion that needs more is rough
+_AT_ONCE = 4096  # panels sampled together: their samples take some ten megabytes
+_LEAST_WIDTH = 1e-13  # of a panel, relative to the interval: narrower ones would consist of rounding
+_BETWEEN = np.array([0.0411, 0.2677, 0.5573, 0.8219])  # shares of a panel where series are checked: far from any node
 
 
 class Sampler:
-    """A deformation that is sampled as often as is asked for; what was evaluated is kept.
+    """A deformation to be sampled, which keeps what was evaluated.
 
     Parameters
     ----------
     evaluate : times (N,) -> I (N, 3, 3), L_o (N, 3)
     known : what is known of it before it is sampled
-    directly : times (N,) -> I^-1 and I^-1 L_o (N, 9) as channels, sooner than by `evaluate`; None, or None as its
-        result: `evaluate` is asked
+    directly : times (N,) -> I^-1 and I^-1 L_o (N, 9), faster than `evaluate`, which is called where it is or returns
+        None
 
     Examples
     --------
@@ -54,11 +50,11 @@ class Sampler:
     def __init__(self, evaluate: Evaluate, known: Smoothness, directly: Directly | None = None) -> None:
         self.channels = Channels(evaluate, directly)
         self.known = known
-        self._found: dict[tuple[float, float], Samples] = {}
+        self._samples: dict[tuple[float, float], Samples] = {}
         self._first: Panels | None = None
 
     def begin_with(self, panels: Panels, known: Iterable[tuple[Array, Array]]) -> None:
-        """Take these panels for the first; `known` : times (S,) [s] and the channels (S, 9) there."""
+        """Begin with these panels; `known` : times (S,) [s] and the channels (S, 9) there."""
         self._first = panels
         for times, channels in known:
             self.channels.know(times, channels)
@@ -75,12 +71,12 @@ class Sampler:
     def samples(self, momentum: float, tolerance: float, *, strict: bool = True) -> Samples:
         """Sample until the attitude error for momenta up to this magnitude is probably below `tolerance` [rad].
 
-        The result depends on the arguments alone, whatever was asked for before.
+        The result depends on the arguments alone, whatever was sampled before.
 
         Parameters
         ----------
         momentum : magnitude of the largest [kg m^2/s]
-        strict : whether samples that cannot be dense enough are an error; else they say so
+        strict : whether samples that cannot be dense enough are an error, not only marked
 
         Raises
         ------
@@ -88,12 +84,12 @@ class Sampler:
             If the motion is too rough between its breaks.
         """
         key = float(momentum), float(tolerance)
-        found = self._found.get(key)
-        if found is None:
-            found = self._found[key] = _Sampling(self, *key).samples()
-        if strict and found.too_rough is not None:
-            raise found.too_rough
-        return found
+        samples = self._samples.get(key)
+        if samples is None:
+            samples = self._samples[key] = _Sampling(self, *key).samples()
+        if strict and samples.too_rough is not None:
+            raise samples.too_rough
+        return samples
 
 
 def nodes_of_panels(panels: Panels) -> Array:
@@ -103,10 +99,10 @@ def nodes_of_panels(panels: Panels) -> Array:
 
 
 def _by_degree(panels: Panels) -> list[_Panels]:
-    """Of one degree together."""
+    """Panels of one degree together."""
     left, right = panels.edges[:-1], panels.edges[1:]
-    each = [(degree, panels.degrees == degree) for degree in sorted(set(panels.degrees.tolist()))]
-    return [_Panels.new(degree, left[rows], right[rows]) for degree, rows in each]
+    groups = [(degree, panels.degrees == degree) for degree in sorted(set(panels.degrees.tolist()))]
+    return [_Panels.new(degree, left[rows], right[rows]) for degree, rows in groups]
 
 
 def _parts(waiting: list[_Panels]) -> Iterator[list[_Panels]]:
@@ -126,8 +122,8 @@ class _Panels:
     Attributes
     ----------
     left, right : (P,) [s]
-    values : (P, degree/2 + 1, 9) at every second node; None: nothing is known yet
-    parents : (P,) the last terms of the panels, at the highest degree, that each is a half of [rad/s]
+    values : (P, degree/2 + 1, 9) at every second node; None: unknown
+    parents : (P,) the last terms of the panels that each is a half of, at the highest degree [rad/s]
     """
 
     degree: int
@@ -143,7 +139,7 @@ class _Panels:
 
     @classmethod
     def new(cls, degree: int, left: Array, right: Array) -> _Panels:
-        """Of which nothing is known."""
+        """Panels without values."""
         return cls(degree, left, right, None, np.full(len(left), inf))
 
     def of(self, rows: slice) -> _Panels:
@@ -203,8 +199,8 @@ class _Sampling:
         while waiting:
             further: list[_Panels] = []
             for part in _parts(waiting):
-                for panels, there in zip(part, self._sampled(part), strict=True):
-                    further += self._sampled_next(panels, there)
+                for panels, values in zip(part, self._sampled(part), strict=True):
+                    further += self._sampled_next(panels, values)
             finer = sum(len(panels.left) for panels in further)
             narrow = min((float((p.right - p.left).min()) for p in further), default=inf)
             if narrow < _LEAST_WIDTH * self._end or self._count + finer > most:
@@ -217,15 +213,15 @@ class _Sampling:
 
     def _sampled(self, waiting: list[_Panels]) -> list[Array]:
         times = [panels.times(self._end) for panels in waiting]
-        found = self._sampler.channels(np.concatenate([one.ravel() for one in times]))
-        stops = np.cumsum([one.size for one in times])[:-1]
+        channels = self._sampler.channels(np.concatenate([nodes.ravel() for nodes in times]))
+        stops = np.cumsum([nodes.size for nodes in times])[:-1]
         return [
-            panels.with_fresh(part.reshape(*one.shape, 9), self._end)
-            for panels, one, part in zip(waiting, times, np.split(found, stops), strict=True)
+            panels.with_fresh(values.reshape(*nodes.shape, 9), self._end)
+            for panels, nodes, values in zip(waiting, times, np.split(channels, stops), strict=True)
         ]
 
     def _sampled_next(self, panels: _Panels, values: Array) -> list[_Panels]:
-        """Keep the panels that are dense enough; the others as they are sampled next."""
+        """Keep the panels that are dense enough; return the others, finer."""
         degree, left, right = panels.degree, panels.left, panels.right
         series, table = values_to_coefficients(degree) @ values, np.empty((len(left), spectra.COLUMNS))
         spectra.judge(series, right - left, np.spacing(right), panels.before, self._momentum, self._rate, table)
@@ -239,14 +235,14 @@ class _Sampling:
         rough = ~good
         left, right, late = left[rough], right[rough], table[rough, spectra.LATE]
         if degree < DEGREES[-1]:
-            # Of no noise is known before the highest degree.
+            # Noise is detected at the highest degree only.
             return [_Panels(2 * degree, left, right, values[rough], panels.parents[rough])]
         middle = 0.5 * (left + right)
         ends = np.concatenate([left, middle]), np.concatenate([middle, right])
         return [_Panels(DEGREES[1], *ends, None, np.tile(late, 2))]
 
     def _check_between(self, panels: _Panels, series: Array, table: Array) -> None:
-        """Look between the nodes of the panels that are good there, and take those for bad that are wrong."""
+        """Compare good panels with the body between their nodes, and mark those that differ as bad."""
         rows = np.flatnonzero(table[:, spectra.GOOD])
         width = (panels.right - panels.left)[rows]
         times = panels.left[rows, None] + width[:, None] * _BETWEEN
@@ -255,7 +251,7 @@ class _Sampling:
         gap = rates_of(here - body, self._momentum).max(axis=1)
         fits = gap <= table[rows, spectra.ALLOWED]
         table[rows[~fits], spectra.GOOD] = 0.0
-        # What is seen there swings to both sides.
+        # The gap swings to both sides.
         self._gap += 0.5 * float((gap * width)[fits].sum())
 
     def _keep(self, left: Array, right: Array, series: Array, table: Array) -> None:
@@ -264,7 +260,7 @@ class _Sampling:
             self._count += len(left)
 
     def _keep_as_it_is(self, panels: _Panels) -> None:
-        """Panels that cannot be finer, by samples of the least degree: their estimates say how far they are off."""
+        """Keep panels that cannot be finer, by samples of their degree, with estimates of their errors."""
         (values,) = self._sampled([_Panels.new(panels.degree, panels.left, panels.right)])
         series, table = values_to_coefficients(panels.degree) @ values, np.empty((len(values), spectra.COLUMNS))
         ends = panels.right - panels.left, np.spacing(panels.right), panels.before
@@ -292,7 +288,7 @@ class _Sampling:
         # Halves of panels come after all first halves.
         if not np.all(left[:-1] < left[1:]):
             order = np.argsort(left)
-            left, right, table, series = (each[order] for each in (left, right, table, series))
+            left, right, table, series = (rows[order] for rows in (left, right, table, series))
             degrees = degrees[order]
         loops = self._known.loops
         edges = first = np.append(left, right[-1])
@@ -315,7 +311,7 @@ class _Sampling:
         )
 
     def _noise_of_path(self, interpolant: Interpolant) -> float:
-        """What noise of a resolved path turns the body by in one loop: that of panels is independent of each other."""
+        """Attitude error by noise of a resolved path in one loop, independent from panel to panel [rad]."""
         resolved = self._known.resolved
         if resolved is None or not resolved.noise.any():
             return 0.0

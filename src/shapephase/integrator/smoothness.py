@@ -12,20 +12,13 @@ from ..display import short_repr
 from .limited_steps import StepLimits
 from .resolved import ResolvedPath
 
-# A resolved panel has at most five swings above rounding (degree 32): each then has ten evaluations or more.
-_STEPS_OF_A_PANEL = 4.0
-# Per period of the fastest swing.
-_STEPS_OF_A_SWING = 4.0
-# Of the duration: times nearer to each other are one.
-_SAME_TIME = 1e-12
-# Pieces between breaks that are many: each is then short beside the motion, and begins with few samples.
-_MANY_PIECES = 64
-# Tolerance [rad] below which the highest degree is tried first, where pieces are few: its samples hold all others.
-_SHARP = 1e-8
-# Degrees of a path up to which a body along it begins with 8, 16 and 32: its inertia swings up to half as fast again.
-_TERMS = np.array([5, 10, 21])
-DEGREES = (8, 16, 32)
-"""Of panels, nested; beyond the last a panel is halved."""
+_STEPS_OF_A_PANEL = 4.0  # at most five swings above rounding (degree 32): ten evaluations or more for each
+_STEPS_OF_A_SWING = 4.0  # per period of the fastest swing
+_SAME_TIME = 1e-12  # of the duration: times nearer to each other are one
+_MANY_PIECES = 64  # between breaks: each is then short beside the motion, and begins with few samples
+_SHARP = 1e-8  # [rad] tolerance below which few pieces begin with degree 32, whose samples contain the others
+_TERMS = np.array([5, 10, 21])  # highest degrees of a path for 8, 16 and 32: an inertia swings up to half as fast again
+DEGREES = (8, 16, 32)  # of panels, nested; beyond the last a panel is halved
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +32,7 @@ class Smoothness:
     loops : the interval is its first part, this many times
     smooth_loop : whether it also goes smoothly from the end of a loop to its start
     resolved : the first loop of what it depends on as series; None: unknown
-    checked : whether there is more to know, so that it is compared with its samples between the nodes
+    checked : whether the function is compared with its series between the nodes
 
     Examples
     --------
@@ -59,17 +52,18 @@ class Smoothness:
 
     @property
     def period(self) -> float:
-        """Of one loop [s]."""
+        """Duration of one loop [s]."""
         return float(self.breaks[-1]) / self.loops
 
     @property
     def is_checked(self) -> bool:
-        """Whether samples between the nodes are looked at, since nothing else says what is there."""
+        """True where the series are checked between the nodes, since nothing else is known there."""
         return self.checked or (self.oscillations is None and self.resolved is None)
 
     def first_panels(self, tolerance: float) -> tuple[Array, Integers]:
         """Edges (P + 1,) [s] and degrees (P,) of the panels of the first loop to begin with, for a tolerance [rad]."""
-        ends = self._ends
+        inner = self.breaks[self.breaks <= self.period * (1.0 - _SAME_TIME)]
+        ends = np.append(inner, self.period)
         if self.resolved is not None:
             return self._resolved_panels(self.resolved, ends, tolerance)
         if self.oscillations == 0.0:
@@ -81,13 +75,6 @@ class Smoothness:
         first = DEGREES[0] if len(ends) > _MANY_PIECES else DEGREES[1 + (tolerance < _SHARP)]
         return edges, np.full(len(edges) - 1, first)
 
-    @property
-    def _ends(self) -> Array:
-        """The breaks of the first loop."""
-        period = self.period
-        ends = self.breaks[self.breaks <= period * (1.0 - _SAME_TIME)]
-        return np.append(ends, period)
-
     def _resolved_panels(self, resolved: ResolvedPath, ends: Array, tolerance: float) -> tuple[Array, Integers]:
         inner = resolved.edges[1:-1]
         near = np.searchsorted(ends, inner).clip(1, len(ends) - 1)
@@ -95,7 +82,7 @@ class Smoothness:
         edges = np.union1d(ends, inner[apart])
         middle = 0.5 * (edges[:-1] + edges[1:])
         leaf = np.clip(np.searchsorted(resolved.edges, middle) - 1, 0, len(resolved.left) - 1)
-        # What all panels leave unseen adds up.
+        # The errors of all panels add up.
         terms = resolved.terms(tolerance / len(resolved.left))[leaf]
         degrees = np.where(terms == 0, 0, np.array([*DEGREES, DEGREES[-1]])[np.searchsorted(_TERMS, terms)])
         halved = terms > _TERMS[-1]

@@ -1,4 +1,4 @@
-"""S(t) as it was stepped: the attitudes at the ends of steps, and all that is made of them."""
+"""S(t) by its steps: the attitudes at their ends, and all that follows from them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ from .kernels.curve_kernel import within_steps
 from .samples import Perturbed
 from .stepping import magnitudes_and_directions, momentum_slope, part_channels
 
-# Times at which attitudes are found at once: the channels there take some fifteen megabytes.
-_AT_ONCE = 4096
+_AT_ONCE = 4096  # times, at which channels take some fifteen megabytes
 _BATCHED_FIELDS = (
     "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error",
     "rounding_error", "amplification",
@@ -40,7 +39,7 @@ class SteppedRotation:
     sampling_error, stepping_error : (B,) estimates of the attitude error over the whole interval [rad]
     rounding_error : (B,) error due to rounding alone [rad]
     amplification : (B,) largest growth of an attitude error from one time to a later one
-    perturbed : the interpolant's series with errors like those that they probably have
+    perturbed : the interpolant's series with their probable errors
 
     Examples
     --------
@@ -69,8 +68,8 @@ class SteppedRotation:
     @cached_property
     def panel(self) -> Integers:
         """The interpolant's panel of each step: (K,)."""
-        each = self._steps_of_all_loops
-        return read_only(np.repeat(np.arange(len(each)), each))
+        counts = self._steps_of_all_loops
+        return read_only(np.repeat(np.arange(len(counts)), counts))
 
     @property
     def times(self) -> Array:
@@ -79,10 +78,10 @@ class SteppedRotation:
 
     @cached_property
     def _times(self) -> Array:
-        edges, each = self.interpolant.edges, self._steps_of_all_loops
-        done = np.cumsum(each)
-        of_panels = np.array([edges[:-1], edges[1:] - edges[:-1], done - each, each])
-        starts, widths, before, counts = np.repeat(of_panels, each, axis=1)
+        edges, steps = self.interpolant.edges, self._steps_of_all_loops
+        done = np.cumsum(steps)
+        of_panels = np.array([edges[:-1], edges[1:] - edges[:-1], done - steps, steps])
+        starts, widths, before, counts = np.repeat(of_panels, steps, axis=1)
         return np.append(starts + widths * ((np.arange(done[-1]) - before) / counts), edges[-1])
 
     @property
@@ -110,11 +109,11 @@ class SteppedRotation:
         return _from_zero(self.dynamics)[:, index] + along
 
     def solid_angle(self, t: Array) -> Array:
-        """Of the momentum's curve from 0 to t, closed by the great circle: (N,) -> (B, N) [sr]; without momentum zero.
+        """Solid angle of the momentum's curve from 0 to t, closed by the great circle: (N,) -> (B, N) [sr].
 
-        Seen from this description's frame, positive where the curve goes counter-clockwise seen from outside. It
-        grows continuously from zero as long as the curve keeps away from the point opposite its start, at which
-        it jumps by 4 pi.
+        Seen from this description's frame, positive where the curve goes counter-clockwise seen from outside; zero
+        without momentum. It grows continuously from zero as long as the curve keeps away from the point opposite its
+        start, at which it jumps by 4 pi.
         """
         if not self.directions.shape[1]:
             return np.zeros((len(self.momentum), len(t)))
@@ -158,16 +157,16 @@ class SteppedRotation:
             part = slice(first, first + _AT_ONCE)
             starts = self.quaternions[:, index[part]]
             channels = part_channels(self.interpolant, ends[index[part]], t[part] - ends[index[part]])
-            found, phase = np.empty_like(starts), np.empty(starts.shape[:2])
-            within_steps(channels, magnitudes, directions, starts, found, phase)
+            after, phase = np.empty_like(starts), np.empty(starts.shape[:2])
+            within_steps(channels, magnitudes, directions, starts, after, phase)
             at_start = t[part] == ends[index[part]]
-            # There nothing is to be stepped, and nothing rounded.
-            quaternions[:, part] = np.where(at_start[:, None], starts, found)
+            # No step is taken there, and nothing rounded.
+            quaternions[:, part] = np.where(at_start[:, None], starts, after)
             along[:, part] = np.where(at_start, 0.0, phase)
         return index, quaternions, along
 
     def with_rotations(self, rotations: Array, error: Array) -> SteppedRotation:
-        """The same steps with the rotations at their ends (B, K + 1, 3, 3) found by another method."""
+        """These steps with rotations at their ends (B, K + 1, 3, 3) by another method, and their error (B,)."""
         directions = self.directions
         if directions.shape[1]:
             directions = so3.apply(so3.transpose(rotations), directions[:, :1])

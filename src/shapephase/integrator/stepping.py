@@ -2,38 +2,36 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
+from threading import RLock
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .. import run_progress
+from .. import run_progress, so3
 from ..arrays import Array, Integers
 from ..chebyshev import chebyshev
 from .interpolant import Interpolant
 from .kernels import spectra_kernel, step_kernel
 from .machine_code import expect_work
-from .threads import in_threads
 
-# Steps of which the channels are there at once: four times as many take some 16 megabytes.
-_AT_ONCE = 4000
-# Steps of a panel up to which the matrix that gives their channels is kept: half a megabyte at most.
-_FEW = 24
-# [rad] of the starts that show how errors grow: what is neglected is as small as rounding, relative to it.
-_TURN = 1e-7
-# Times between which the growth of errors is known, the start included.
-_MARKS = 17
-# Steps that are taken side by side, for each that is asked for.
-_JOBS = 12
-_NO_MARKS = np.zeros(0, dtype=np.int64)
-# Of a direction, for derivatives: its products with whatever grows stay far from the smallest and the largest numbers.
-_IMAGINARY = 1e-60
+_AT_ONCE = 4000  # steps whose channels are in memory: four times as many take some 16 megabytes
+_FEW = 24  # steps of a panel up to which the matrix of their channels is kept: half a megabyte at most
+_TURN = 1e-7  # [rad] of the starts that show the growth of errors: its square is as small as rounding
+_MARKS = 17  # times between which the growth of errors is measured, the start included
+_JOBS = 12  # steps taken side by side for each of the coarsest
+_IMAGINARY = 1e-60  # part of a direction, for derivatives: its square vanishes, and products stay far above underflow
+_LEAST_FOR_A_THREAD = 64  # rows: some tenths of a millisecond of work
+_MOST_AT_ONCE = 8192  # rows in one call: some tenths of a second, after which a run that is watched reports progress
 
 
 class Block(NamedTuple):
-    """Steps whose channels are there at once: of panels `low` to `high`, or some of one panel's."""
+    """Steps whose channels are in memory together: those of panels `low` to `high`, or some of one panel's."""
 
     low: int
     high: int
@@ -63,11 +61,8 @@ def stage_channels(
 ) -> tuple[Array, Integers]:
     """The channels at the stages of steps, times their lengths, and the steps of each panel: (K, STAGES, 9), (P,).
 
-    Of each panel first its steps, then for each further factor so many times as many.
-
-    Parameters
-    ----------
-    series, widths, steps : (P, n, 9), (P,) [s], (P,) of each panel of one loop
+    Series (P, n, 9), widths (P,) [s] and steps (P,) are those of the panels of one loop. Each panel has first its
+    steps, then for each further factor so many times as many.
     """
     part = slice(block.low, block.high)
     scaled, counts = series[part] * widths[part, None, None], steps[part]
@@ -78,17 +73,20 @@ def stage_channels(
     distinct = sorted(set(counts.tolist()))
     if len(distinct) == 1:
         return (_matrix_of_panel(terms, distinct[0], factors) @ scaled).reshape(-1, step_kernel.STAGES, 9), counts
-    each = sum(factors)
-    found, starts = np.empty((each * int(counts.sum()), step_kernel.STAGES, 9)), each * (np.cumsum(counts) - counts)
+    sizes = sum(factors)
+    channels, starts = (
+        np.empty((sizes * int(counts.sum()), step_kernel.STAGES, 9)),
+        sizes * (np.cumsum(counts) - counts),
+    )
     for count in distinct:
         rows = np.flatnonzero(counts == count)
-        values = (_matrix_of_panel(terms, count, factors) @ scaled[rows]).reshape(len(rows), each * count, -1, 9)
-        found[starts[rows, None] + np.arange(each * count)] = values
-    return found, counts
+        values = (_matrix_of_panel(terms, count, factors) @ scaled[rows]).reshape(len(rows), sizes * count, -1, 9)
+        channels[starts[rows, None] + np.arange(sizes * count)] = values
+    return channels, counts
 
 
 def _matrix(terms: int, count: int, begin: int, end: int) -> Array:
-    """From the series of a panel to its channels at the stages of some of `count` steps, times their share of it."""
+    """Matrix from a panel's series to its channels at the stages of some of `count` steps, times their share of it."""
     places = (np.arange(begin, end)[:, None] + step_kernel.NODES).ravel()
     return chebyshev(np.clip(2.0 * places / count - 1.0, -1.0, 1.0), terms) / count
 
@@ -107,12 +105,8 @@ def stepped_quaternions(
 ) -> Array:
     """Attitudes at the ends of steps of all loops, quaternions xyzw: (B, K + 1, 4).
 
-    Parameters
-    ----------
-    series : (P, n, 9) on the interpolant's panels
-    steps : (P,) on each of them
-    momentum : (B, 3) body angular momentum at the start [kg m^2/s]
-    start : (B, 4) attitudes; None: the identity
+    Series (P, n, 9) and steps (P,) are those of the interpolant's panels, `momentum` (B, 3) the body's at the start
+    [kg m^2/s], `start` (B, 4) its attitudes; None: the identity.
     """
     return _stepped_quaternions(interpolant, series, steps, *magnitudes_and_directions(momentum), start)
 
@@ -120,7 +114,7 @@ def stepped_quaternions(
 def _stepped_quaternions(
     interpolant: Interpolant, series: Array, steps: Integers, magnitudes: Array, directions: Any, start: Array | None
 ) -> Any:
-    """As `stepped_quaternions`; directions may be complex, for a derivative."""
+    """Attitudes of `stepped_quaternions`; directions may be complex, for a derivative."""
     count = interpolant.loops * int(steps.sum())
     quaternions = np.zeros((len(magnitudes), count + 1, 4), dtype=directions.dtype)
     quaternions[:, 0] = [0.0, 0.0, 0.0, 1.0] if start is None else start
@@ -156,14 +150,14 @@ def magnitudes_and_directions(momentum: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Attempt:
-    """Steps of some momenta, and how far they are from others.
+    """Steps of some momenta, and their distances from coarser ones and from those on perturbed series.
 
     Attributes
     ----------
-    steps : (P,) on each panel of a loop, four times those that were asked for
-    quaternions, directions, turns, dynamics : as `SteppedRotation` has them
+    steps : (P,) on each panel of a loop, four times those requested
+    quaternions, directions, turns, dynamics : those of `SteppedRotation`
     coarse, fine : (B,) largest angle between a fourth and half as many steps, and between these and all [rad]
-    sampling : (B,) between steps on the series and on those changed by what is probably missing [rad]
+    sampling : (B,) between steps on the series and on those with their probable errors [rad]
     turned : (B,) the sum of all turns [rad]
     amplification : (B,) of an error, from one time to a later one
     """
@@ -188,7 +182,7 @@ def attempted(
     series, widths, loops = interpolant.coefficients, interpolant.widths, interpolant.loops
     moving = bool(magnitudes.any())
     batch, count = len(momentum), loops * int(steps.sum())
-    marks = np.unique(np.linspace(0, count, _MARKS).astype(np.int64)) if moving else _NO_MARKS
+    marks = np.unique(np.linspace(0, count, _MARKS if moving else 0).astype(np.int64))
     states = np.zeros((batch, 7, 4))
     states[:, :, 3] = 1.0
     states[:, [4, 5, 6], [0, 1, 2]] = 0.5 * _TURN
@@ -232,33 +226,22 @@ def attempted(
     )
 
 
-def _cross(a: Array, b: Array) -> Array:
-    return np.stack(
-        [
-            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
-            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
-        ],
-        axis=-1,
-    )
-
-
 def small_turns(start: Array, end: Array) -> Array:
-    """From quaternions xyzw to others near them, body axes: (..., 4), (..., 4) -> (..., 3) [rad]."""
+    """Turns from quaternions xyzw to others near them, body axes: (..., 4), (..., 4) -> (..., 3) [rad]."""
     # A quaternion and its negative are one attitude.
     return np.copysign(1.0, (start * end).sum(axis=-1, keepdims=True)) * _twice_turned(start, end)
 
 
 def largest_angle(first: Array, second: Array) -> Array:
-    """Between quaternions near each other: (B, K, 4), (B, K, 4) -> (B,) [rad]."""
+    """Largest angle between quaternions near each other: (B, K, 4), (B, K, 4) -> (B,) [rad]."""
     turns = small_turns(first, second)
     return np.sqrt((turns * turns).sum(axis=-1).max(axis=-1, initial=0.0))
 
 
 def momentum_slope(interpolant: Interpolant, steps: Integers, momentum: Array) -> Array:
-    """How the end turns, S exp(hat(slope dPi)), by a change dPi of the momentum at the start: (B, 3) -> (B, 3, 3).
+    """Turn of the end, S exp(hat(slope dPi)), by a change dPi of the momentum at the start: (B, 3) -> (B, 3, 3).
 
-    By an imaginary change so small that its square is nothing: what is imaginary in the result is the derivative.
+    An imaginary change so small that its square vanishes: the imaginary part of the result is the derivative.
     """
     magnitudes, directions = magnitudes_and_directions(momentum)
     still = magnitudes == 0.0
@@ -275,7 +258,7 @@ def momentum_slope(interpolant: Interpolant, steps: Integers, momentum: Array) -
 def _twice_turned(start: Array, end: Array) -> Array:
     """Twice the vector of the quaternion start^-1 end: (..., 4), (..., 4) -> (..., 3)."""
     u, p, v, q = start[..., :3], start[..., 3:], end[..., :3], end[..., 3:]
-    return 2.0 * (p * v - q * u - _cross(u, v))
+    return 2.0 * (p * v - q * u - so3.cross(u, v))
 
 
 def part_channels(interpolant: Interpolant, starts: Array, lengths: Array) -> Array:
@@ -283,3 +266,47 @@ def part_channels(interpolant: Interpolant, starts: Array, lengths: Array) -> Ar
     panel = interpolant.panel_of(starts + 0.5 * lengths)
     times = starts[:, None] + lengths[:, None] * step_kernel.NODES
     return interpolant.channels(times, panel) * lengths[:, None, None]
+
+
+def in_threads(run: Callable[[slice], None], batch: int, threads: int | None = None) -> Iterator[slice]:
+    """Compute all rows, some in each call of `run`, which frees the interpreter; yield the rows after each call.
+
+    Calls run in at most so many threads where there are enough rows; None: one thread for each processor. Each computes
+    rows of its own, so that results do not depend on how many there are.
+    """
+    workers = max(1, min(processors() if threads is None else threads, batch // _LEAST_FOR_A_THREAD))
+    count = max(1, min(-(-batch // workers), _MOST_AT_ONCE))
+    parts = [slice(first, min(first + count, batch)) for first in range(0, max(batch, 1), count)]
+    results = map(run, parts) if workers == 1 or len(parts) == 1 else _pool(workers).map(run, parts)
+    for rows, _ in zip(parts, results, strict=True):
+        yield rows
+
+
+@lru_cache(maxsize=4)
+def _pool(workers: int) -> ThreadPoolExecutor:
+    """Threads that wait for the next call: to start them takes as long as a hundred momenta."""
+    return ThreadPoolExecutor(workers)
+
+
+def _free_after_fork() -> None:
+    """Drop the threads that a child of this process does not have, and the locks that they held."""
+    _pool.cache_clear()
+    if sys.version_info >= (3, 12):
+        return
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] == __name__.partition(".")[0]:
+            for kind in list(vars(module).values()):
+                for attribute in list(vars(kind).values()) if isinstance(kind, type) else ():
+                    if isinstance(attribute, cached_property):
+                        # Held while a value is computed, for all objects of the class (bpo-43468).
+                        vars(attribute)["lock"] = RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_free_after_fork)
+
+
+@lru_cache(maxsize=1)
+def processors() -> int:
+    """Number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,7 +1,7 @@
-"""Error estimates of phases: what the errors of an attitude and of its samples do to what is made of them.
+"""Error estimates of phases, from the errors of an attitude and of its samples.
 
-Both are known at every time, from finer steps and from a perturbed series (`integrator.lift.error_turns`), and so is
-what they do to a curve. No bound is needed but for what no series shows, and for rounding.
+Both are known at every time, from finer steps and from a perturbed series (`integrator.lift.error_turns`), and so are
+the displacements of a curve by them. Only rounding, and errors that no series shows, are bounded.
 """
 
 from __future__ import annotations
@@ -20,53 +20,47 @@ from ..reconstruction.reconstruction import Motion
 from .error_estimates import ArcErrors, RunningErrors, SplitErrors
 from .momentum_curve import MomentumCurve
 
-# The difference to finer steps is their error to 0.5 %; the perturbed series bounds the error of samples.
-_FACTORS = np.array([2.0, 1.0])
+_FACTORS = np.array([2.0, 1.0])  # of the difference to finer steps (their error to 0.5 %), of the perturbed series
 _OF_LARGEST = 0.03  # of the largest error so far, added: the last value may be small by chance
-# Uncertainty of integrals of the turns (steps, samples), for each radian along the curve up to one, where they cancel.
-_LEAST = np.array([0.05, 0.01])
+_LEAST = np.array([0.05, 0.01])  # error of integrals of turns (steps, samples) per radian of curve, up to one radian
 _AT_ANY_TIME = 0.1  # of errors at unknown times, for each radian of the curve: most cancels as the curve goes round
 _NOT_LINEAR = 0.68  # of the growth in a step: max of x - x^9, since errors grow as the ninth power of the part taken
-# Units of rounding: of any sum of angles; and of each radian that is summed up.
-_ROUNDING = 32.0
-_ROUNDING_OF_RADIANS = 8.0
+_ROUNDING = 32.0  # units of rounding in a sum of angles
+_ROUNDING_OF_RADIANS = 8.0  # units of rounding for each radian of the sum
 _EPS = float(np.finfo(float).eps)
 _BEYOND_LINEAR = 1.05  # tangent over sine up to half the distance from the opposite point
-# What the area beside the closing great circles adds to the dynamic phase, to the area, and to the phase.
-_CLOSING_SIGNS = np.array([0.0, 1.0, -1.0, -1.0])
-# Keeps quotients defined where there are no errors, and at the point opposite the start.
-_TINY = 1e-300
+_CLOSING_SIGNS = np.array([0.0, 1.0, -1.0, -1.0])  # of the closing area in dynamic phase, area, and both phases
+_TINY = 1e-300  # keeps quotients defined without errors, and at the point opposite the start
 
 
-class Stretches(NamedTuple):
+class CurveArcs(NamedTuple):
     """Parts of a curve between edges: (N,) places of their starts and ends."""
 
     first: Integers
     last: Integers
 
     @classmethod
-    def of(cls, edges: Array, starts: Array, ends: Array) -> Stretches:
+    def of(cls, edges: Array, starts: Array, ends: Array) -> CurveArcs:
         """Between times that are edges."""
         return cls(*np.broadcast_arrays(np.searchsorted(edges, starts), np.searchsorted(edges, ends)))
 
     def added(self, sums: Array) -> Array:
-        """What is added along each stretch to sums since the start: (..., K + 1) -> (..., N)."""
+        """What is added along each arc to sums since the start: (..., K + 1) -> (..., N)."""
         return sums[..., self.last] - sums[..., self.first]
 
     def largest(self, sums: Array) -> Array:
         """The largest |growth| on the way: (..., K + 1) -> (..., N)."""
         if not self.first.any():
-            # All from the start.
             return np.maximum.accumulate(np.abs(sums), axis=-1)[..., self.last]
-        # Every second one is of a stretch; what lies between two does not count.
+        # Every second extreme is one of an arc; the others lie between two arcs.
         both = np.stack([self.first, self.last], axis=-1).ravel()
         high, low = (extreme.reduceat(sums, both, axis=-1)[..., ::2] for extreme in (np.maximum, np.minimum))
         start = sums[..., self.first]
         return np.maximum(np.maximum(high - start, start - low), np.abs(self.added(sums)))
 
 
-class Errors(NamedTuple):
-    """Errors of phases along stretches of a curve, closed by great circles: (B, N) each [rad]."""
+class PhaseErrors(NamedTuple):
+    """Errors of phases along arcs of a curve, closed by great circles: (B, N) each [rad]."""
 
     dynamic: Array
     area: Array
@@ -92,8 +86,8 @@ class CurveErrors:
     @property
     def attitude(self) -> Array:
         """Error of the attitude of the deformation's own frame at the end: (B,) [rad]."""
-        found = _at_end(self._of_attitude) + self._unseen
-        return np.minimum(found, self.motion.solution.error_estimate)
+        error = _at_end(self._of_attitude) + self._unseen
+        return np.minimum(error, self.motion.solution.error_estimate)
 
     @property
     def lift(self) -> Array:
@@ -113,13 +107,13 @@ class CurveErrors:
     @property
     def between(self) -> Array:
         """Error of the rotation from the lift to the attitude, at the end: (B,) [rad]."""
-        found = _at_end(self._of_attitude - self._of_lift) + self._unseen + self._unseen_of_lift
-        return np.minimum(found, self.motion.solution.error_estimate + self.motion.horizontal_lift.error_estimate)
+        error = _at_end(self._of_attitude - self._of_lift) + self._unseen + self._unseen_of_lift
+        return np.minimum(error, self.motion.solution.error_estimate + self.motion.horizontal_lift.error_estimate)
 
-    def of(self, stretches: Stretches, residual: Array, targets: Array) -> Errors:
-        """Errors of stretches of the curve, closed by great circles from their ends to targets (B, N, 3), gauge axes.
+    def of(self, arcs: CurveArcs, residual: Array, targets: Array) -> PhaseErrors:
+        """Errors of arcs of the curve, closed by great circles from their ends to targets (B, N, 3), gauge axes.
 
-        Targets are the starts of the stretches, or fixed where all begin with the curve. The residuals (B, N) are those
+        Targets are the starts of the arcs, or fixed where all begin with the curve. The residuals (B, N) are those
         between two ways to their phases.
         """
         curve = self.curve
@@ -128,28 +122,28 @@ class CurveErrors:
         # body about its momentum by the phase.
         body = displaced if curve.lift is None else curve.displaced(self._at_edges(self._of_attitude[:1]))
         dynamic = np.stack([body.area[0] + body.phase[0], displaced.area[1] + displaced.along[1]])
-        ends = curve.corners[:, stretches.last]
+        ends = curve.corners[:, arcs.last]
         # The area beside a great circle grows by so much for each radian by which an end is displaced across it.
         factor = _BEYOND_LINEAR * _norms(targets - ends) / (_norms(targets + ends) + _TINY)
-        beside, closing = self._beside(stretches, targets, ends), np.multiply.outer(_CLOSING_SIGNS**2, factor)
+        beside, closing = self._beside(arcs, targets, ends), np.multiply.outer(_CLOSING_SIGNS**2, factor)
         # Dynamic phase, area, phase by its integral, and as it could be read off the attitude.
         responses = np.stack([dynamic, displaced.area, dynamic - displaced.area, displaced.along])
-        lengths, swings, summed = stretches.added(self._lengths)
+        lengths, swings, summed = arcs.added(self._lengths)
         paths = np.stack([lengths + swings, lengths, swings, np.ones_like(lengths)])
         largest = sizes.max(axis=2, keepdims=True)
-        on_the_way = stretches.largest(responses) + closing[:, None] * largest
-        grown = stretches.added(responses) + np.multiply.outer(_CLOSING_SIGNS, beside)
+        on_the_way = arcs.largest(responses) + closing[:, None] * largest
+        grown = arcs.added(responses) + np.multiply.outer(_CLOSING_SIGNS, beside)
         errors = np.einsum("s,qsbn->qbn", _FACTORS, np.abs(grown) + _OF_LARGEST * on_the_way)
         errors += self._unseen_of_gauge[:, None] * (1.0 + _AT_ANY_TIME * paths + closing)
         errors += np.tensordot(_LEAST, largest, axes=1) * np.minimum(paths, 1.0)
         errors += _EPS * (_ROUNDING * (1.0 + closing) + _ROUNDING_OF_RADIANS * (summed + lengths))
         errors += curve.error[:, None] + residual
         turned = _seen_so_far(sizes) + self._unseen_of_gauge[:, None]
-        gap = turned[:, stretches.first] + turned[:, stretches.last] + _EPS * _ROUNDING
+        gap = turned[:, arcs.first] + turned[:, arcs.last] + _EPS * _ROUNDING
         # Near the point opposite the target any displacement turns the great circle round.
         near, whole = gap > np.arctan2(1.0, factor), 2.0 * np.pi
         tilt = np.minimum(_BEYOND_LINEAR * gap * np.sqrt(1.0 + factor * factor), np.pi)
-        return Errors(
+        return PhaseErrors(
             dynamic=errors[0],
             area=np.where(near, whole, np.minimum(errors[1], whole)),
             phase=np.where(near, whole, np.minimum(np.minimum(errors[2], errors[3]), whole)),
@@ -157,14 +151,14 @@ class CurveErrors:
             gap=np.minimum(gap, np.pi),
         )
 
-    def _beside(self, stretches: Stretches, targets: Array, ends: Array) -> Array:
+    def _beside(self, arcs: CurveArcs, targets: Array, ends: Array) -> Array:
         """What the turns do to the area beside the great circles: (2, B, N) [sr]."""
         # One and the cosine between them, without the cancellation near the opposite point.
         total = targets + ends
         versed = 0.5 * np.einsum("bni,bni->bn", total, total)[..., None]
-        across = np.einsum("sbni,bni->sbn", self._in_gauge(stretches.last), total - versed * ends)
-        if stretches.first.any():
-            across += np.einsum("sbni,bni->sbn", self._in_gauge(stretches.first), versed * targets - total)
+        across = np.einsum("sbni,bni->sbn", self._in_gauge(arcs.last), total - versed * ends)
+        if arcs.first.any():
+            across += np.einsum("sbni,bni->sbn", self._in_gauge(arcs.first), versed * targets - total)
         return -across / (versed[..., 0] + _TINY)
 
     def _in_gauge(self, place: Integers) -> Array:
@@ -212,12 +206,12 @@ class CurveErrors:
 
     @cached_property
     def _unseen_of_gauge(self) -> Array:
-        found = self._unseen if self.curve.lift is None else self._unseen + self._unseen_of_lift
+        unseen = self._unseen if self.curve.lift is None else self._unseen + self._unseen_of_lift
         if self.curve.frames is None and len(self.curve.edges) == self._stepped.quaternions.shape[1]:
-            return found
+            return unseen
         # What is between the ends of steps counts, too.
         grown = _norms(np.diff(self._of_attitude, axis=2)).max(axis=2, initial=0.0)
-        return found + _NOT_LINEAR * np.tensordot(_FACTORS, grown, axes=1)
+        return unseen + _NOT_LINEAR * np.tensordot(_FACTORS, grown, axes=1)
 
     @cached_property
     def _of_gauge(self) -> Array:
@@ -268,9 +262,9 @@ def _at_end(turns: Array) -> Array:
 def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> SplitErrors:
     """Errors of a split with its `residual` (B,)."""
     errors, batch, edges = CurveErrors(motion, curve), motion.batch, curve.edges
-    whole = errors.of(Stretches.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.corners[:, :1])
+    whole = errors.of(CurveArcs.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.corners[:, :1])
     # What the momentum sweeps itself is joined to the reference; the closing is the rest.
-    swept = errors.of(Stretches.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.references[:, None])
+    swept = errors.of(CurveArcs.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.references[:, None])
 
     def of(error: Array) -> Array:
         return (error.reshape(-1) * curve.has_phase).reshape(batch)[()]
@@ -304,9 +298,9 @@ def running_errors(
 
     `residual` (B, N) is that of the phases at each time; results have the `shape`.
     """
-    stretches = Stretches.of(curve.edges, np.zeros(1), times)
+    arcs = CurveArcs.of(curve.edges, np.zeros(1), times)
     targets = np.broadcast_to(references[:, None], (*residual.shape, 3))
-    parts = CurveErrors(motion, curve).of(stretches, residual, targets)
+    parts = CurveErrors(motion, curve).of(arcs, residual, targets)
 
     def of(error: Array) -> Array:
         return (error * curve.has_phase[:, None]).reshape(shape)[()]
@@ -323,7 +317,7 @@ def arc_errors(motion: Motion, curve: MomentumCurve, cuts: Array, residuals: tup
     """Errors of the arcs between edges of the curve (K + 1,), and of all as one; `residuals`: (B, K) and (B, 1)."""
     errors, batch = CurveErrors(motion, curve), motion.batch
     parts, whole = (
-        errors.of(Stretches.of(curve.edges, starts, ends), residual, curve.directions(starts))
+        errors.of(CurveArcs.of(curve.edges, starts, ends), residual, curve.directions(starts))
         for starts, ends, residual in zip((cuts[:-1], cuts[:1]), (cuts[1:], cuts[-1:]), residuals, strict=True)
     )
 

@@ -9,26 +9,18 @@ from ..arrays import Array, Integers, Mask
 from ..sphere import fibonacci_directions
 from ._loop_map import MomentumLoop, tangent_basis
 
-# [rad] Cells narrower than this are not divided: Newton's method starts from them as they are.
-_SMALLEST_CELL = 0.002
-# More such cells than this are thinned out: they line a curve of fixed points.
-_MANY_SMALL_CELLS = 300
-# Newton's method starts from this many directions at most.
-_MOST_STARTS = 1000
-# [rad] Tolerance of the loops run while searching: cells are far wider, and Newton's method ends with exact runs.
-SEARCH_TOLERANCE = 1e-6
-# [rad] Distance of the points that represent a curve of fixed points: about twenty along a great circle.
-FAMILY_SPACING = 0.3
-# A cell counts as linear when its sides bend by less than this share of its width.
-_BEND = 0.06
-# Where the midpoints show how much the sides bend, this many times as much is allowed for.
-_SAFETY_FACTOR = 3.0
-# [rad] Images of half sides longer than this show nothing.
-_WIDE = 0.7
+_SMALLEST_CELL = 0.002  # [rad] narrower cells are not divided: Newton's method starts from them
+_MANY_SMALL_CELLS = 300  # more are thinned out: they line a curve of fixed points
+_MOST_STARTS = 1000  # of Newton's method
+SEARCH_TOLERANCE = 1e-6  # [rad] of the loops while searching: cells are far wider, and Newton's method ends exactly
+FAMILY_SPACING = 0.3  # [rad] of points that represent a curve of fixed points: about twenty along a great circle
+_BEND = 0.06  # of a cell's width: sides that bend less count as linear
+_SAFETY_FACTOR = 3.0  # times the bend that midpoints show
+_WIDE = 0.7  # [rad] images of longer half sides show nothing
 
 
 def search(loop: MomentumLoop, magnitude: float, count: int, most: int) -> tuple[Array, bool]:
-    """Where Newton's method shall start (n, 3), and whether some of the sphere was left out.
+    """Starts of Newton's method (n, 3), and whether some of the sphere was left out.
 
     Triangles between even directions are divided where a fixed point may be and the map is not yet linear.
     """
@@ -81,16 +73,12 @@ def search(loop: MomentumLoop, magnitude: float, count: int, most: int) -> tuple
 def _examined(points: Array, shifts: Array) -> tuple[Mask, Mask, Mask, Array, Array]:
     """Triangles, by corners and midpoints of sides with their shifts u(T) - u(0), (F, 6, 3) each.
 
-    In the tangent plane at the middle the shift is taken as linear between the corners; how far it is not, the
-    midpoints tell. Seen through the inverse of its slope, this says how well the place of a zero is known, however
-    much the map shears.
+    In the tangent plane at the middle the shift is taken as linear between the corners; the midpoints show its bend,
+    which, through the inverse of the slope, is the uncertainty of a zero's place, however much the map shears.
 
-    Returns
-    -------
-    possible, linear, inside : (F,) whether a zero inside cannot be excluded, whether the shift is nearly linear,
-        whether the linear one's zero is inside
-    zero : (F, 3) where the linear one vanishes if that is inside or to be trusted, else the middle
-    width : (F,)
+    Returns possible, linear, inside (F,): whether a zero inside cannot be excluded, the shift is nearly linear, the
+    zero of the linear shift is inside; that zero (F, 3) if it is inside or reliable, else the middle; and the width
+    (F,).
     """
     middle = so3.normalised(points[:, :3].sum(axis=1))
     basis = tangent_basis(middle)

@@ -20,17 +20,15 @@ from ..integrator.many_rotations import GroupedRotations, RotationPart
 from ..integrator.sampling import Sampler
 from ..integrator.stepped import SteppedRotation
 
-# Directions that are run through the loop together, for memory: more are taken in parts, each with samples of its own,
-# so that it does not matter who computes them.
-_ROWS_AT_ONCE = 2048
+_ROWS_AT_ONCE = 2048  # directions run through the loop together: parts have own samples, whichever process runs them
 _SLOPES_AT_ONCE = 128  # directions with derivatives, some milliseconds each
 
-_Found = TypeVar("_Found")
+_PartResult = TypeVar("_PartResult")
 
 
 @dataclass(frozen=True)
 class MomentumLoop:
-    """A loop of shapes, sampled once for all that is asked of its map, but for very many directions.
+    """A loop of shapes, sampled once for all evaluations of its map, but for very many directions.
 
     Attributes
     ----------
@@ -63,10 +61,10 @@ class MomentumLoop:
         """Return the motions from any number of directions, some thousand at a time."""
         if len(points) <= _ROWS_AT_ONCE:
             return self.run(magnitude, points)
-        found = self._in_parts(MomentumLoop.run, _ROWS_AT_ONCE, magnitude, points, None)
+        solutions = self._in_parts(MomentumLoop.run, _ROWS_AT_ONCE, magnitude, points, None)
         places = np.split(np.arange(len(points)), range(_ROWS_AT_ONCE, len(points), _ROWS_AT_ONCE))
-        parts = tuple(RotationPart(rows, part) for rows, part in zip(places, found, strict=True))
-        return GroupedRotations(parts, sum(part.interpolant.evaluations for part in found))
+        parts = tuple(RotationPart(rows, part) for rows, part in zip(places, solutions, strict=True))
+        return GroupedRotations(parts, sum(part.interpolant.evaluations for part in solutions))
 
     def shift(self, magnitude: float, points: Array, tolerance: float) -> Array:
         """u(T) - u(0): (N, 3)."""
@@ -77,8 +75,8 @@ class MomentumLoop:
     def exactly(self, magnitude: float, points: Array, tolerance: float | None = None) -> tuple[Array, Array, Array]:
         """u(T) (N, 3), its derivatives by u(0) (N, 3, 3) and by the momentum's magnitude (N, 3)."""
         if len(points) > _SLOPES_AT_ONCE:
-            found = self._in_parts(MomentumLoop.exactly, _SLOPES_AT_ONCE, magnitude, points, tolerance)
-            ends, by_start, by_magnitude = (np.concatenate(part) for part in zip(*found, strict=True))
+            parts = self._in_parts(MomentumLoop.exactly, _SLOPES_AT_ONCE, magnitude, points, tolerance)
+            ends, by_start, by_magnitude = (np.concatenate(part) for part in zip(*parts, strict=True))
             return ends, by_start, by_magnitude
         solution = self.run(magnitude, points, tolerance)
         ends = ends_of(solution, points)
@@ -86,12 +84,12 @@ class MomentumLoop:
 
     def _in_parts(
         self,
-        method: Callable[[MomentumLoop, float, Array, float], _Found],
+        method: Callable[[MomentumLoop, float, Array, float], _PartResult],
         most: int,
         magnitude: float,
         points: Array,
         tolerance: float | None,
-    ) -> list[_Found]:
+    ) -> list[_PartResult]:
         """What a method gives for at most so many directions at a time, each time with samples of their own."""
         parts = [points[row : row + most] for row in range(0, len(points), most)]
         compute = map if self.executor is None else self.executor.map
@@ -99,13 +97,13 @@ class MomentumLoop:
 
 
 def _of_part(
-    method: Callable[[MomentumLoop, float, Array, float], _Found],
+    method: Callable[[MomentumLoop, float, Array, float], _PartResult],
     deformation: Deformation,
     goal: float,
     magnitude: float,
     tolerance: float | None,
     points: Array,
-) -> _Found:
+) -> _PartResult:
     """One part, which may be computed in another process."""
     return method(MomentumLoop.of(deformation, goal), magnitude, points, tolerance or goal)
 
@@ -131,7 +129,7 @@ def tangent_basis(points: Array) -> Array:
 
 @dataclass(frozen=True)
 class ClosedPoints:
-    """What Newton's method came to.
+    """Result of Newton's method.
 
     Points (N, 3), gaps and last steps (N,), and the derivatives of u(T) - u(0) by u(0) (N, 2, 2) and by
     magnitude (N, 2).
@@ -151,13 +149,13 @@ class ClosedPoints:
 
     @property
     def excess(self) -> Array:
-        """2 - trace; near the identity the determinant of the derivative minus one, which is the same and sharper."""
+        """2 - trace; near the identity the determinant of the derivative minus one, which is equal and sharper."""
         trace = np.trace(self.slope, axis1=-2, axis2=-1)
         return np.where(self._steepness < 1.0, np.linalg.det(self.slope), -trace)
 
     @property
     def doubt(self) -> Array:
-        """Below this the excess does not tell its sign: points known to 1e-12 tell it to this near a fold."""
+        """Bound below which the sign of the excess is unknown, for points known to 1e-12 near a fold."""
         steep = self._steepness
         return np.where(steep < 1e-9, np.inf, 1e-6 * steep * np.minimum(1.0, np.sqrt(steep)))
 
@@ -177,8 +175,8 @@ def closed_points(
     for left in reversed(range(iterations)):
         if not len(active):
             break
-        ends, slopes, answer = loop.exactly(magnitude, points[active], tolerance)
-        by_magnitude[active] = so3.apply(tangent_basis(points[active]), answer)
+        ends, slopes, drift = loop.exactly(magnitude, points[active], tolerance)
+        by_magnitude[active] = so3.apply(tangent_basis(points[active]), drift)
         slope[active], missing = in_tangent_planes(points[active], ends, slopes)
         step = newton_step(slope[active], missing, 1e-7)
         before, length[active] = length[active], np.linalg.norm(step, axis=-1)
@@ -205,7 +203,7 @@ def newton_step(slope: Array, missing: Array, least: float) -> Array:
 
 
 def solve_linear(slope: Array, right: Array, least: float) -> Array:
-    """slope^-1 right (N, 2); nothing along directions that answer less than `least` of the most."""
+    """slope^-1 right (N, 2); zero along directions with singular values below `least` of the largest."""
     scale = np.maximum(np.linalg.norm(slope, axis=(-1, -2)), 1e-300)[:, None, None]
     return so3.apply(np.linalg.pinv(slope / scale, rcond=least) / scale, right)
 

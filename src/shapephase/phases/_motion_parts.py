@@ -1,29 +1,46 @@
-"""What is computed for a batch of motions whose samples and steps differ: part by part, and put together."""
+"""Results for a batch of motions whose samples and steps differ: computed part by part, and deferred to first use."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from typing import Any, TypeVar
+from functools import cached_property, partial
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from ..arrays import Array
 from ..integrator.many_rotations import assembled
 from ..reconstruction.reconstruction import Motion
-from ._deferred import Deferred
 
 Result = TypeVar("Result")
 
 
-def by_parts(motion: Motion, compute: Callable[[Motion], Result], shared: tuple[str, ...] = ()) -> Result:
-    """A function of a motion for every part of it.
+class Deferred(Generic[Result]):
+    """A result to be computed at its first use; a pickled copy has it already."""
 
-    Parameters
-    ----------
-    compute : motion of a batch (n,) -> a dataclass whose arrays, also those of dataclasses in it, have that axis in
-        front
-    shared : fields of the result that do not
+    def __init__(self, compute: Callable[[], Result]) -> None:
+        self._compute = compute
+
+    @cached_property
+    def value(self) -> Result:
+        """The result."""
+        return self._compute()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the result: its inputs may not be picklable."""
+        return Deferred, (partial(_known, self.value),)
+
+
+def _known(value: Result) -> Result:
+    return value
+
+
+def by_parts(motion: Motion, compute: Callable[[Motion], Result], shared: tuple[str, ...] = ()) -> Result:
+    """Result of a function of a motion, computed for every part of it.
+
+    `compute` takes a motion of a batch (n,) to a dataclass whose arrays, also those of dataclasses in it, have that
+    axis in front, but for its `shared` fields.
     """
     return _joined(motion, [(rows, compute(part)) for rows, part in motion.parts], shared)
 
@@ -33,12 +50,12 @@ def _joined(motion: Motion, parts: list[Any], shared: tuple[str, ...] = ()) -> A
     if isinstance(first, np.ndarray):
         return _whole(motion, parts)
     if isinstance(first, Deferred):
-        return Deferred(lambda: _joined(motion, [(rows, one.value) for rows, one in parts]))
+        return Deferred(lambda: _joined(motion, [(rows, deferred.value) for rows, deferred in parts]))
     if not is_dataclass(first):
         return first
     names = [field.name for field in fields(first) if field.name not in shared]
-    each = {name: [(rows, getattr(one, name)) for rows, one in parts] for name in names}
-    return type(first)(**vars(first) | {name: _joined(motion, values) for name, values in each.items()})
+    joined = {name: _joined(motion, [(rows, getattr(result, name)) for rows, result in parts]) for name in names}
+    return type(first)(**vars(first) | joined)
 
 
 def array_by_parts(motion: Motion, compute: Callable[[Motion], Array]) -> Array:

@@ -15,12 +15,9 @@ from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 from ._loop_map import MomentumLoop, closed_points, solve_linear, tangent_basis
 
-# The inertial direction of the momentum.
-_UP = np.array([0.0, 0.0, 1.0])
-# [rad] The direction moves by this at most from one orbit to the next, so that Newton's method stays with it.
-_LARGEST_STEP = 0.1
-# Share of the range followed: an orbit that needs shorter steps is lost, as at a fold.
-_SMALLEST_STEP = 1e-6
+_UP = np.array([0.0, 0.0, 1.0])  # inertial direction of the momentum
+_LARGEST_STEP = 0.1  # [rad] of the direction from orbit to orbit, so that Newton's method stays on the branch
+_SMALLEST_STEP = 1e-6  # of the range: an orbit that needs shorter steps is lost, as at a fold
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,11 +26,11 @@ class OrbitBranch:
 
     Attributes
     ----------
-    magnitudes : (k,) of those asked for, the ones reached [kg m^2/s]
+    magnitudes : (k,) reached, of those requested [kg m^2/s]
     directions : (k, 3) u(0), unit vectors, the deformation's frame
     drift : (k, 3) how the direction moves with the magnitude, its derivative [per kg m^2/s]
     trace : (k,) of the linearised map
-    stopped : why the branch ends before the last magnitude asked for; None when it does not
+    stopped : why the branch ends before the last requested magnitude; None when it does not
     fold : the magnitude at which it meets another orbit and both vanish, to about 1e-8 of the range followed
         [kg m^2/s]; None when it does not
 
@@ -123,9 +120,9 @@ def continued_orbits(
         reached.append(orbit)
     return OrbitBranch(
         magnitudes[: len(reached)],
-        np.array([one.direction for one in reached]).reshape(-1, 3),
-        np.array([one.drift for one in reached]).reshape(-1, 3),
-        np.array([2.0 - one.excess for one in reached]),
+        np.array([orbit.direction for orbit in reached]).reshape(-1, 3),
+        np.array([orbit.drift for orbit in reached]).reshape(-1, 3),
+        np.array([2.0 - orbit.excess for orbit in reached]),
         stopped,
         fold,
     )
@@ -199,10 +196,10 @@ def _ending(passed: list[_Orbit], lost: float) -> tuple[str, float | None]:
     At a fold the excess 2 - trace goes through zero evenly along the branch, and the magnitude has its extreme:
     magnitude = fold + a excess^2 + b excess^3, from the last three orbits.
     """
-    magnitude, excess = passed[-1].magnitude, np.array([one.excess for one in passed])
+    magnitude, excess = passed[-1].magnitude, np.array([orbit.excess for orbit in passed])
     if len(passed) == 3 and np.all(np.diff(np.abs(excess)) < 0.0):
         powers = np.stack([np.ones(3), excess**2, excess**3], axis=1)
-        fold = float(np.linalg.solve(powers, np.array([one.magnitude for one in passed]))[0])
+        fold = float(np.linalg.solve(powers, np.array([orbit.magnitude for orbit in passed]))[0])
         if abs(fold - magnitude) < 10.0 * abs(lost - magnitude):
             side = "above" if lost > magnitude else "below"
             return (

@@ -15,6 +15,7 @@ from ..deformation.deformation import Deformation
 from ..deformation.gauge import horizontal_gauge, in_gauge, named_gauge
 from ..display import short_repr
 from ..errors import AccuracyNotReached, GaugeError
+from ..plain_data import plain
 from ..reconstruction.forced_motion import ForcedMotion
 from ..refinement import halved, settled
 from .momentum_curve import Gauge
@@ -63,8 +64,8 @@ class ForcedSplit:
     --------
     >>> push = sp.ExternalTorque(lambda state: [0.0, 0.2, 0.0], axes="space")
     >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 1.5, 2.0]), 4.0), [0.3, 0.2, 1.0], torque=push)
-    >>> found = sp.split(motion, "base")
-    >>> bool(found.residual < 1e-8)
+    >>> parts = sp.split(motion, "base")
+    >>> bool(parts.residual < 1e-8)
     True
     """
 
@@ -94,40 +95,26 @@ class ForcedSplit:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything for JSON, rotations as lists, units in names."""
-        return {
-            "gauge": self.gauge,
-            "total_rotation": self.total_rotation.tolist(),
-            "holonomy": self.holonomy.tolist(),
-            "dynamical_rotation": self.dynamical_rotation.tolist(),
-            "phase_rad": self.phase,
-            "dynamic_phase_rad": self.dynamic_phase,
-            "body_solid_angle_sr": self.body_solid_angle,
-            "space_solid_angle_sr": self.space_solid_angle,
-            "body_gap_rad": self.body_gap,
-            "space_gap_rad": self.space_gap,
-            "residual_rad": self.residual,
-            "error_estimate_rad": self.error_estimate,
-            "work_J": self.work,
-            "energy_change_J": self.energy_change,
-            "is_loop": self.is_loop,
-        }
+        units = {"body_solid_angle": "_sr", "space_solid_angle": "_sr", "work": "_J", "energy_change": "_J"}
+        units |= dict.fromkeys(("gauge", "total_rotation", "holonomy", "dynamical_rotation", "is_loop"), "")
+        return {name + units.get(name, "_rad"): value for name, value in plain(self).items()}
 
 
 def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
-    """Split a motion under a torque, as `split` says."""
+    """Split of a motion under a torque."""
     deformation = motion.deformation
     least, when = _least_momentum(motion)
     most = float(np.linalg.norm(motion.momentum(motion.solution.times), axis=-1).max())
     if least <= _NO_MOMENTUM * most or least * _DOUBT <= motion.momentum_error:
         raise GaugeError(
             f"the momentum passes through zero at t = {when:.6g} s ({least:.3g} kg m^2/s of {most:.3g}): it has no "
-            "direction there, and the motion no phase; split the stretches before and after"
+            "direction there, and the motion no phase; split the parts before and after"
         )
     frames = _frames(deformation, gauge)
     edges = np.union1d(motion.solution.times, motion.breaks)
 
     def in_body(times: Array) -> tuple[Array, Array]:
-        """Direction of the momentum in the gauge, and its rate: that of m, less what the frame turns by."""
+        """Direction of the momentum in the gauge, and its rate: that of m, less the frame's turn."""
         turn, spin, magnitude = _seen(motion, frames, times)
         pi = so3.apply(turn, motion.body_momentum(times))
         change = so3.apply(turn, motion.torque(times)) + np.cross(pi, spin)
@@ -142,15 +129,15 @@ def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
     body_area, space_area = (float(sphere.curve_area(curve, edges, _SETTLED)) for curve in (in_body, in_space))
     ends = np.array([0.0, motion.duration])
     (u, v), (m, n) = in_body(ends)[0], in_space(ends)[0]
-    own = motion.attitude(ends)
-    first, last = own @ so3.transpose(frames(ends)[0])
+    attitudes = motion.attitude(ends)
+    first, last = attitudes @ so3.transpose(frames(ends)[0])
     phase = dynamic - body_area + space_area
     turned = so3.between(n, m) @ last @ so3.between(v, u).T @ first.T
     read_off = float(so3.angle_about(turned, m))
     closure = np.eye(3) if deformation.closure is None else deformation.closure
     lift = horizontal_gauge(deformation).frame(motion.duration) @ deformation.frame(motion.duration).T
-    total = own[1] @ closure @ own[0].T
-    holonomy = own[0] @ lift @ closure @ own[0].T
+    total = attitudes[1] @ closure @ attitudes[0].T
+    holonomy = attitudes[0] @ lift @ closure @ attitudes[0].T
     # The curve in the body is displaced by both errors, by which areas and read-off angle change about as much.
     doubt = motion.error_estimate + motion.momentum_error / least + _ROUNDING
     gaps = so3.angle_between(np.stack([v, n]), np.stack([u, m]))
@@ -197,17 +184,15 @@ def _dynamic_phase(motion: ForcedMotion, frames: Any, edges: Array) -> tuple[flo
         nodes, weights = sphere.gauss_nodes(edges[:-1], edges[1:])
         turn, spin, magnitude = _seen(motion, frames, nodes.ravel())
         along = so3.apply(turn, motion.body_momentum(nodes.ravel())) / magnitude[:, None]
-        each = weights.ravel()
-        return float(each @ np.sum(spin * along, axis=-1)), float(each @ np.linalg.norm(spin, axis=-1))
+        weight = weights.ravel()
+        return float(weight @ np.sum(spin * along, axis=-1)), float(weight @ np.linalg.norm(spin, axis=-1))
 
-    found = settled(
-        map(integrals, halved(edges, _HALVINGS)), lambda one, other: abs(one[0] - other[0]), _SETTLED * len(edges)
-    )
-    if found is None:
+    phases = settled(map(integrals, halved(edges, _HALVINGS)), lambda a, b: abs(a[0] - b[0]), _SETTLED * len(edges))
+    if phases is None:
         raise AccuracyNotReached(
-            "the dynamic phase does not settle: the momentum turns too fast, or its torque has breaks that are not said"
+            "the dynamic phase does not settle: the momentum turns too fast, or its torque has undeclared breaks"
         )
-    return found
+    return phases
 
 
 def _direction(vector: Array, change: Array, magnitude: Array) -> tuple[Array, Array]:
@@ -223,14 +208,14 @@ def _least_momentum(motion: ForcedMotion) -> tuple[float, float]:
     sizes = np.linalg.norm(motion.momentum(times), axis=-1)
     place = int(np.argmin(sizes))
     left, right = times[max(place - 1, 0)], times[min(place + 1, len(times) - 1)]
-    found = minimize_scalar(
+    minimum = minimize_scalar(
         lambda t: float(np.sum(np.square(motion.momentum(min(max(t, left), right))))),
         bounds=(left, right),
         method="bounded",
         options={"xatol": 1e-12 * motion.duration},
     )
-    least = float(np.sqrt(found.fun))
-    return (least, float(found.x)) if least < sizes[place] else (float(sizes[place]), float(times[place]))
+    least = float(np.sqrt(minimum.fun))
+    return (least, float(minimum.x)) if least < sizes[place] else (float(sizes[place]), float(times[place]))
 
 
 def _energy_change(motion: ForcedMotion) -> float | None:

@@ -91,9 +91,9 @@ def momentum_curvature(momentum: ArrayLike, attitude: ArrayLike, first: ArrayLik
     1.0
     """
     direction = _direction(momentum, attitude)
-    one, other = finite_array(first, "first", (3,)), finite_array(second, "second", (3,))
-    common_batch(momentum=direction.shape[:-1], first=one.shape[:-1], second=other.shape[:-1])
-    return np.sum(direction * np.cross(one, other), axis=-1)
+    left, right = finite_array(first, "first", (3,)), finite_array(second, "second", (3,))
+    common_batch(momentum=direction.shape[:-1], first=left.shape[:-1], second=right.shape[:-1])
+    return np.sum(direction * np.cross(left, right), axis=-1)
 
 
 def _direction(momentum: ArrayLike, attitude: ArrayLike) -> Array:

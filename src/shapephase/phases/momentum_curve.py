@@ -1,4 +1,4 @@
-"""The curve of the body momentum on its sphere, seen from a gauge, and what is integrated along it."""
+"""The curve of the body momentum on its sphere, seen from a gauge, and integrals along it."""
 
 from __future__ import annotations
 
@@ -21,44 +21,38 @@ from ..integrator.stepped import SteppedRotation
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 
-# Memory and time: a frame that needs more steps along the motion is refused.
-_MOST_STEPS = 20_000
-# Halvings of a step that passes by the point opposite the reference: then it is as short as times can tell apart.
-_HALVINGS = 30
+_MOST_STEPS = 20_000  # along the motion, for memory and time: a frame that needs more is refused
+_HALVINGS = 30  # of a step that passes by the point opposite the reference, down to the resolution of times
 _SHARE = 0.2  # of the motion's error estimate: error allowed for integrals over its steps, which estimates include
 _SHARE_AT_TIMES = 5e-3  # of it, for phases in time
-# [rad] the same where the motion is as good as exact.
-_ROUNDING = 1e-14
+_ROUNDING = 1e-14  # [rad] that error where the motion is as good as exact
 _HALVINGS_AT_START = 8  # of pieces near the point opposite the start, where the area swings by nature
-# Halvings of steps whose integrals add more; each divides what they add by four thousand.
-_MOST_HALVINGS = 3
-# [rad] Longer pieces of a curve are halved: their area is taken between arc and chord, which may hide whole turns.
-_LONGEST_PIECE = 0.5
-# Keeps the decay of terms defined where all are zero.
-_TINY = 1e-300
+_MOST_HALVINGS = 3  # of steps whose integrals add more; each divides the added error by four thousand
+_LONGEST_PIECE = 0.5  # [rad] longer pieces are halved: the area between arc and chord may hide whole turns
+_TINY = 1e-300  # keeps the decay of terms defined where all are zero
 
 Gauge = str | Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]
 
 
 class Displacements(NamedTuple):
-    """Since the start, at the edges of a curve: (..., B, K + 1) each."""
+    """Changes since the start, at the edges of a curve: (..., B, K + 1) each."""
 
-    area: Array  # what more of it is swept [sr]
-    phase: Array  # what the Montgomery phase grows by, found along the displaced curve [rad]
+    area: Array  # of the swept area [sr]
+    phase: Array  # of the Montgomery phase along the displaced curve [rad]
     along: Array  # the turn about the momentum [rad]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CurvePieces:
-    """What is integrated along the curves of a batch of motions, piece by piece.
+    """Integrals along the curves of a batch of motions, piece by piece.
 
     Attributes
     ----------
-    edges : (K + 1,) times between which the curve bends little and its integrals are found to rounding
+    edges : (K + 1,) times between which the curve bends little and its integrals are right to rounding
     dynamic : (B, K) integral of omega . Pi/|Pi| over each piece [rad]
     slivers : (B, K) signed area between each piece's arc and its chord [sr]
     corners : (B, K + 1, 3) directions at the edges
-    error : (B,) estimate of what the integration along the curve adds to the errors of both sums [rad]
+    error : (B,) estimate of the error of both sums by the integration along the curve [rad]
     slopes : (B, K + 1, 3) rates of the directions at the edges, in the gauge but body axes [rad/s]
     by_momentum : (B, K + 1, 3) the part of them that is due to I^-1 Pi [rad/s]
     body_directions : (B, K + 1, 3) directions at the edges in body axes
@@ -118,21 +112,22 @@ class MomentumCurve(CurvePieces):
         start = corners[:, :1]
         back = areas_back(references, corners, start)
         back[:, 0] = 0.0
-        one, other = corners[:, :-1], corners[:, 1:]
-        grown = sphere.triangle_area(references, one, other) + np.diff(back, axis=1)
-        spheres = jumps_between(start, one, other, grown)
+        first, second = corners[:, :-1], corners[:, 1:]
+        grown = sphere.triangle_area(references, first, second) + np.diff(back, axis=1)
+        spheres = jumps_between(start, first, second, grown)
         jumps = np.concatenate([np.zeros((len(corners), 1), dtype=np.int64), np.cumsum(spheres, axis=1)], axis=1)
         place, moving = np.searchsorted(self.edges, times), self.has_phase[:, None]
         return np.where(moving, back[:, place], 0.0), np.where(moving, jumps[:, place], 0)
 
     def directions(self, times: Array) -> Array:
-        """At these edges: (N,) -> (B, N, 3)."""
+        """Directions at these edges: (N,) -> (B, N, 3)."""
         return self.corners[:, np.searchsorted(self.edges, times)]
 
     def attitudes(self, times: Array) -> Array:
         """Attitudes of the gauge's frame: (N,) -> (B, N, 3, 3)."""
-        own, frame = self._own_attitudes(times), self.frame(times)
-        return own if frame is None else own @ so3.transpose(frame)
+        attitudes = self.motion.initial_attitude.reshape(-1, 1, 3, 3) @ self.motion.solution.rotation(times)
+        frame = self.frame(times)
+        return attitudes if frame is None else attitudes @ so3.transpose(frame)
 
     def frame(self, times: Array) -> Array | None:
         """The gauge's frame U(t) in the deformation's own: (N,) -> (N, 3, 3); None where they are the same."""
@@ -147,9 +142,9 @@ class MomentumCurve(CurvePieces):
         return self.frame(self.edges[place])
 
     def displaced(self, turns: Array) -> Displacements:
-        """What small turns of the gauge's frame at the edges (..., B, K + 1, 3), body axes, do to the curve."""
-        # The area grows by what its boundary is displaced across itself; and with omega the rate of turning,
-        # omega . Pi changes by what the direction is displaced along omega and along I^-1 Pi.
+        """Displacements of the curve by small turns of the gauge's frame at the edges (..., B, K + 1, 3), body axes."""
+        # The area changes by the boundary's displacement across itself; and with omega the rate of turning, omega . Pi
+        # changes by the displacements of the direction along omega and along I^-1 Pi.
         parts = np.stack([self.slopes, self.by_momentum, self.body_directions])
         rates = np.einsum("...bki,pbki->p...bk", turns, parts)
         grown = np.zeros((2, *rates.shape[1:]))
@@ -169,24 +164,14 @@ class MomentumCurve(CurvePieces):
         frames = so3.transpose(self.frames(self.edges[[0, -1]])[0])
         return end, start @ frames[0], end @ frames[1]
 
-    def _own_attitudes(self, times: Array) -> Array:
-        return self.motion.initial_attitude.reshape(-1, 1, 3, 3) @ self.motion.solution.rotation(times)
-
 
 def momentum_curve(
     motion: Motion, gauge: Gauge, times: Array | None = None, *, clear_of_start: bool = False
 ) -> MomentumCurve:
     """The curve of a motion in a gauge, cut at the integrator's steps and at `times` too.
 
-    Parameters
-    ----------
-    gauge : a name of `GAUGES`, "link:NAME", or a function as for `in_gauge`
-    clear_of_start : whether arcs that pass by the point opposite the start are cut finely, too
-
-    Raises
-    ------
-    UnknownNameError, GaugeError, ShapeError
-        For a gauge that does not exist.
+    With `clear_of_start` arcs that pass by the point opposite the start are cut finely, too. Raises UnknownNameError,
+    GaugeError and ShapeError for an unknown or impossible gauge.
     """
     if not isinstance(gauge, str) and (not callable(gauge) or isinstance(gauge, type)):
         raise ShapeError(
@@ -203,18 +188,17 @@ def momentum_curve(
     axis = np.where(has_phase[:, None], spatial, [0.0, 0.0, 1.0]) / np.where(has_phase, magnitude, 1.0)[:, None]
     goal = np.maximum((_SHARE if times is None else _SHARE_AT_TIMES) * motion.solution.error_estimate, _ROUNDING)
     integrals = _integrals_of(motion, lift, frames, axis, goal, at_rest=not has_phase.any())
-    found = integrals(edges if times is None else np.union1d(edges, times))
-    # Whatever the times, the region that is not counted is the same.
-    by_steps = times is not None and follows and isinstance(motion.solution, SteppedRotation)
-    if by_steps:
-        ends = found.corners[:, np.searchsorted(found.edges, edges)]
+    pieces = integrals(edges if times is None else np.union1d(edges, times))
+    # Areas are counted from one region, whatever the times.
+    if times is not None and follows and isinstance(motion.solution, SteppedRotation):
+        ends = pieces.corners[:, np.searchsorted(pieces.edges, edges)]
     else:
-        ends = found.corners if times is None else integrals(edges).corners
+        ends = pieces.corners if times is None else integrals(edges).corners
     references = far_references(ends)
     if times is not None:
-        found = _clear(integrals, found, references, _HALVINGS)
+        pieces = _clear(integrals, pieces, references, _HALVINGS)
     if clear_of_start:
-        found = _clear(integrals, found, found.corners[:, 0], _HALVINGS_AT_START)
+        pieces = _clear(integrals, pieces, pieces.corners[:, 0], _HALVINGS_AT_START)
     return MomentumCurve(
         motion=motion,
         lift=lift,
@@ -222,7 +206,7 @@ def momentum_curve(
         has_phase=has_phase,
         axis=axis,
         references=references,
-        **vars(found),
+        **vars(pieces),
     )
 
 
@@ -239,16 +223,16 @@ def _integrals_of(
 
         def still_curve(edges: Array) -> CurvePieces:
             still, nothing = np.zeros((len(start), len(edges) - 1)), np.zeros((len(start), len(edges), 3))
-            there = np.repeat(start[:, None], len(edges), axis=1)
+            corners = np.repeat(start[:, None], len(edges), axis=1)
             return CurvePieces(
                 edges=edges,
                 dynamic=still,
                 slivers=still,
-                corners=there,
+                corners=corners,
                 error=still[:, 0],
                 slopes=nothing,
                 by_momentum=nothing,
-                body_directions=there,
+                body_directions=corners,
             )
 
         return still_curve
@@ -288,7 +272,7 @@ def _curve(motion: Motion, lift: Lift | None, frames: Frames | None, start: Arra
 
 
 def _frames(motion: Motion, gauge: Gauge) -> tuple[Frames, Array]:
-    """The gauge's frames, and the ends of steps that are short enough to see all of what a user's gauge does."""
+    """The gauge's frames, and the ends of steps that are short enough for a user's gauge."""
     if isinstance(gauge, str):
         return named_frames(motion.deformation, gauge), motion.solution.times
     given = frames_argument(gauge, motion.deformation.breaks)
@@ -296,36 +280,34 @@ def _frames(motion: Motion, gauge: Gauge) -> tuple[Frames, Array]:
 
 
 def _from_steps(solution: SteppedRotation, lift: Lift | None, edges: Array, goal: Array) -> CurvePieces:
-    """From derivatives at the edges; in shorter pieces where these add more than a little to the motion's error."""
+    """Integrals by the kernel, in shorter pieces where they would add more than a little to the motion's error."""
     # Where all edges are ends of steps nothing between them is needed.
-    found = curve_integrals(solution, lift, None if len(edges) == solution.quaternions.shape[1] else edges)
+    integrals = curve_integrals(solution, lift, None if len(edges) == solution.quaternions.shape[1] else edges)
     finer = edges
     for halvings in range(1, _MOST_HALVINGS + 1):
-        if np.all(found.error <= goal):
+        if np.all(integrals.error <= goal):
             break
         finer = np.append(np.stack([finer[:-1], 0.5 * (finer[:-1] + finer[1:])], axis=-1).ravel(), finer[-1])
-        last, found = found, curve_integrals(solution, lift, finer)
+        last, integrals = integrals, curve_integrals(solution, lift, finer)
         for _ in range(halvings):
-            found = _joined(found)
-        # What does not fall is rounding.
-        if np.all(found.error > 0.5 * last.error):
+            integrals = _joined(integrals)
+        # An error that does not fall is rounding.
+        if np.all(integrals.error > 0.5 * last.error):
             break
-    fields = found._asdict()
+    fields = integrals._asdict()
     return CurvePieces(edges=edges, body_directions=fields.pop("directions"), **fields)
 
 
-def _joined(found: CurveIntegrals) -> CurveIntegrals:
-    """Pieces in pairs made one."""
-    corners, parts = found.corners, (found.dynamic, found.slivers)
+def _joined(fine: CurveIntegrals) -> CurveIntegrals:
+    """Integrals over pairs of pieces."""
+    corners = fine.corners
     between = sphere.triangle_area(corners[:, :-2:2], corners[:, 1::2], corners[:, 2::2])
-    dynamic, slivers = (part[:, ::2] + part[:, 1::2] for part in parts)
-    return CurveIntegrals(
-        dynamic, slivers + between, corners[:, ::2], found.error, *(part[:, ::2] for part in found[4:])
-    )
+    dynamic, slivers = (pieces[:, ::2] + pieces[:, 1::2] for pieces in (fine.dynamic, fine.slivers))
+    return CurveIntegrals(dynamic, slivers + between, corners[:, ::2], fine.error, *(ends[:, ::2] for ends in fine[4:]))
 
 
 def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> CurvePieces:
-    """By Gauss's rule, in shorter pieces where the gauge's frame turns faster than the integrator's steps follow."""
+    """Integrals by Gauss's rule, in shorter pieces where the gauge's frame turns faster than the steps follow."""
     left, right = edges[:-1], edges[1:]
     count = len(left)
     done: list[tuple[Array, ...]] = []
@@ -380,7 +362,7 @@ def _by_piece(
     length = (np.sqrt(np.einsum("...i,...i", moving, moving)) * weights).sum(axis=-1)
     weighted = np.stack([along, sphere.area_rate(start, direction, moving)]) * weights
     early, late = (np.abs(weighted @ terms).max(axis=-1) for terms in _last_terms())
-    # The rule is right to twice as many degrees as its nodes tell apart: four times two more than the last seen.
+    # The rule is exact to twice as many degrees as its nodes resolve: four times two more than the last terms.
     missed = late * np.minimum(late / (early + _TINY), 1.0) ** 4
     in_body = [part[:, : len(ends)] for part in in_body]
     return *weighted.sum(axis=-1), corners, missed.max(axis=0), length, tuple(in_body)
@@ -396,14 +378,14 @@ def _last_terms() -> tuple[Array, Array]:
 
 
 def _clear(
-    integrals: Callable[[Array], CurvePieces], found: CurvePieces, references: Array, halvings: int
+    integrals: Callable[[Array], CurvePieces], pieces: CurvePieces, references: Array, halvings: int
 ) -> CurvePieces:
     """Pieces so short that the point opposite the reference is never between an arc and its chord."""
     for _ in range(halvings):
-        edges, corners = found.edges, found.corners
+        edges, corners = pieces.edges, pieces.corners
         away = np.linalg.norm(corners[:, :-1] + references[:, None], axis=-1)
         close = np.any(away < 2.0 * np.linalg.norm(np.diff(corners, axis=1), axis=-1), axis=0)
         if not close.any():
             break
-        found = integrals(np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])[close]])))
-    return found
+        pieces = integrals(np.sort(np.concatenate([edges, 0.5 * (edges[:-1] + edges[1:])[close]])))
+    return pieces

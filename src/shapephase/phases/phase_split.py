@@ -5,19 +5,22 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
+from .. import so3
 from ..arguments import made_by
 from ..arrays import Array, Mask
-from ..display import card_html, card_text, short_repr
+from ..card_pictures import bars_picture
+from ..display import Card, angle_text, card_html, card_text, error_text, momentum_text, short_repr
 from ..plain_data import plain
-from ._card import split_card
-from ._deferred import Deferred
+from ._motion_parts import Deferred
 from .error_estimates import SplitErrors
 from .split_text import split_lines
 
 
 @dataclass(frozen=True, eq=False)
 class SplitMotion:
-    """Properties of the motion that was split.
+    """Properties of the motion that was split. Made by `split`.
 
     Attributes
     ----------
@@ -26,12 +29,6 @@ class SplitMotion:
     momentum : batch + (3,), inertial axes [kg m^2/s]
     error_estimate : of the attitude at all times: batch [rad]
     evaluations : how often the locked inertia and internal momentum were computed
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
-    >>> sp.split(motion).about.duration
-    4.0
     """
 
     label: str
@@ -115,7 +112,6 @@ class PhaseSplit:
     _errors: Deferred[SplitErrors] = field(repr=False)
 
     __repr__, _repr_html_ = card_text, card_html
-    _card = split_card
 
     def __str__(self) -> str:
         """Return the table that the command line prints; for a batch the spread of each number."""
@@ -129,3 +125,28 @@ class PhaseSplit:
     def error_estimates(self) -> SplitErrors:
         """Error estimates of these numbers; computed on first use, in one or two times the time of the split."""
         return self._errors.value
+
+    def _card(self) -> Card:
+        """Rotations and phases; with bars of dynamic, geometric and Montgomery phase."""
+        about = self.about
+        whole = "shape holonomy" if self.is_loop else "shape lift (open)"
+        rows = [
+            ("momentum", momentum_text(about.momentum)),
+            ("total rotation", angle_text(so3.angle(self.total_rotation))),
+            (whole, angle_text(so3.angle(self.holonomy))),
+            ("Montgomery phase", angle_text(self.montgomery_phase)),
+            ("  dynamic", angle_text(self.dynamic_phase)),
+            ("  geometric", angle_text(self.geometric_phase)),
+            ("momentum gap", angle_text(self.momentum_gap)),
+            ("error, residual", f"{error_text(about.error_estimate)}, {error_text(self.residual)}"),
+        ]
+        if not np.any(self.has_phase):
+            whose = "total angular momentum" if self.has_wheels else "angular momentum"
+            rows = [*rows[:3], ("phases", f"none: there is no {whose}"), rows[-1]]
+        if self.has_wheels:
+            rows.insert(3, ("turn by wheels alone", angle_text(so3.angle(self.wheel_rotation))))
+        title = f"PhaseSplit of {about.label}, {about.duration:g} s, {self.gauge} gauge"
+        if np.ndim(self.montgomery_phase) or not self.has_phase:
+            return Card(title, rows)
+        phases = [float(phase) for phase in (self.dynamic_phase, self.geometric_phase, self.montgomery_phase)]
+        return Card(title, rows, bars_picture(phases, "dynamic, geometric and Montgomery phase"))

@@ -23,15 +23,13 @@ from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import ProgressCallback, watched
 from ._curve_errors import arc_errors, running_errors, split_errors
-from ._deferred import Deferred
-from ._motion_parts import array_by_parts, by_parts
+from ._motion_parts import Deferred, array_by_parts, by_parts
 from .error_estimates import ArcErrors, RunningErrors
 from .forced_split import ForcedSplit, forced_split
 from .momentum_curve import Gauge, momentum_curve
 from .phase_split import PhaseSplit, SplitMotion
 
-CLOSINGS = ("start", "reference")
-"""Ends of the great circle that closes the momentum's curve so far, for `running_phases`."""
+CLOSINGS = ("start", "reference")  # ends of the great circle that closes the momentum's curve in `running_phases`
 
 
 @overload
@@ -145,7 +143,7 @@ def split(
 
 @dataclass(frozen=True, eq=False)
 class RunningPhases:
-    """Phases of a motion in time, starting from zero; fields are batch + t.shape.
+    """Phases of a motion in time, starting from zero; fields are batch + t.shape. Made by `running_phases`.
 
     Directions of the momentum are joined to `reference` by great circles: with B(u) the shortest turn from there to
     u, and R the attitude of the gauge's frame,
@@ -172,13 +170,6 @@ class RunningPhases:
     reference : batch + (3,), in the gauge's frame; closed to the start, that direction
     residual : batch, the largest |phase - the same angle read off the attitude| modulo 2 pi [rad]
     error_estimates : of the phases at each time
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 10.0), [0.0, 0.0, 5.0])
-    >>> phases = sp.running_phases(motion, [0.0, 5.0, 10.0], "base")
-    >>> phases.montgomery_phase.round(9).tolist(), phases.solid_angle.round(9).tolist()
-    ([0.0, 10.0, 20.0], [0.0, 0.0, 0.0])
     """
 
     times: Array
@@ -281,6 +272,8 @@ def running_phases(
 class ArcPhases:
     """A motion cut into arcs, each with a phase of its own; fields have the motion's batch axes in front.
 
+    Made by `arc_phases`.
+
     With R the attitude of the gauge's frame, arc k of K from times[k] to times[k + 1] turns it by
 
         R(times[k + 1]) R(times[k])^T = exp(montgomery_phase[k] hat(mu)) closing_tilt[k],
@@ -300,13 +293,6 @@ class ArcPhases:
     total_phase : of all arcs as one [rad]
     total_closing_tilt : (3, 3)
     error_estimates : of each of these numbers
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 3.0), [0.0, 0.0, 5.0])
-    >>> arcs = sp.arc_phases(motion, [0.0, 1.0, 3.0], "base")
-    >>> arcs.montgomery_phase.round(9).tolist(), arcs.momentum_gap.round(9).tolist()
-    ([2.0, 4.0], [0.0, 0.0])
     """
 
     times: Array
@@ -375,10 +361,8 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     dynamic, area = np.diff(swept_phase, axis=1), np.diff(swept_area, axis=1) + closing
     phase = dynamic - area
     polygon = whole - closing.sum(axis=1)
-    tilts, tilt = (
-        tilted(attitudes[:, :-1], ends[:, :-1], ends[:, 1:]),
-        tilted(attitudes[:, :1], ends[:, :1], ends[:, -1:]),
-    )
+    tilts = tilted(attitudes[:, :-1], ends[:, :-1], ends[:, 1:])
+    tilt = tilted(attitudes[:, :1], ends[:, :1], ends[:, -1:])
 
     def apart(phases: Array, starts: Array, stops: Array, transports: Array) -> Array:
         """Differences between phases and the angles read off the attitudes."""
@@ -390,8 +374,8 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
         apart(phase, attitudes[:, :-1], attitudes[:, 1:], tilts),
         apart(total[:, None], attitudes[:, :1], attitudes[:, -1:], tilt),
     )
-    batch, count = motion.batch, len(cuts) - 1
-    arcs = (*batch, count)
+    batch = motion.batch
+    arcs = (*batch, len(cuts) - 1)
     return ArcPhases(
         times=cuts,
         gauge=gauge if isinstance(gauge, str) else "given",

@@ -1,7 +1,7 @@
 """When the body momentum of a motion comes back to its start, and where its curve crosses itself.
 
-For shapes that close, `return_map` finds the motions that close with them; here one motion of any body is looked at,
-a rigid one too. The curve is that of u = Pi/|Pi| on the unit sphere, with u' = u x omega.
+For shapes that close, `return_map` finds the motions that close with them; here is one motion of any body, rigid ones
+included. The curve is that of u = Pi/|Pi| on the unit sphere, with u' = u x omega.
 """
 
 from __future__ import annotations
@@ -20,46 +20,27 @@ from ..integrator.interpolant import Interpolant
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 
-# [rad] Length of a piece of the curve at most: two passages through one piece are distinguished by its cubic.
-_LONGEST = 0.05
-# [rad] A piece turns by this at most, so that a cubic is right to a hundredth of its length.
-_BENT = 0.3
-# [rad] Shorter pieces are not divided for their bend: near a cusp the heading turns at once.
-_TOO_SHORT = 1e-6
-# [rad] Where the curve moves on by less than this, its heading is rounding.
-_RESTING = 1e-11
-# Memory: a curve with more pieces is refused.
-_MOST_PIECES = 500_000
-# Memory: pieces whose neighbours are searched for together.
-_AT_ONCE = 2048
-# [rad] A curve that has gone this far along may have come back to where it was.
-_FAR = 1.0
-# [rad] So may a small loop: it turns by more than pi before it meets itself, and this is safely less.
-_TURNED = 2.0
-# [rad] Passages this close along whole pieces are one curve gone through again.
-_SAME_CURVE = 1e-8
-# [rad] Newton's method has brought two passages together: a further step leaves about the square of this, which is
-# below rounding even for passages at 1e-6 rad to each other.
-_MET = 1e-11
-# [rad] Passages at less than this angle touch and do not cross.
-_TANGENT = 1e-6
+_LONGEST = 0.05  # [rad] length of a piece of the curve: its cubic distinguishes two passages through it
+_BENT = 0.3  # [rad] turn of a piece: a cubic is then right to a hundredth of its length
+_TOO_SHORT = 1e-6  # [rad] shorter pieces are not divided for their bend: near a cusp the heading turns at once
+_RESTING = 1e-11  # [rad] between points of a curve, below which its heading is rounding
+_MOST_PIECES = 500_000  # for memory: a curve with more is refused
+_AT_ONCE = 2048  # pieces whose neighbours are searched for together, for memory
+_FAR = 1.0  # [rad] along the curve, after which it may have come back
+_TURNED = 2.0  # [rad] turned, after which a small loop may have come back: it turns by more than pi
+_SAME_CURVE = 1e-8  # [rad] between passages along whole pieces of a retraced curve
+_MET = 1e-11  # [rad] between passages: the next Newton step leaves its square, below rounding even at 1e-6 rad
+_TANGENT = 1e-6  # [rad] passages at a smaller angle touch and do not cross
 
 
 @dataclass(frozen=True, eq=False)
 class Returns:
-    """When the momentum's direction is nearest its start again.
+    """When the momentum's direction is nearest its start again. Made by `momentum_returns`.
 
     Attributes
     ----------
     times : (n,) ascending, above 0 [s]
     gaps : (n,) angle to the start then [rad]
-
-    Examples
-    --------
-    >>> top = sp.EulerTop.principal([1.0, 2.0, 3.0], [0.6, 0.9, 0.5])
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.5 * top.period), [0.6, 0.9, 0.5])
-    >>> sp.momentum_returns(motion).gaps.round(6).tolist()
-    [0.0]
     """
 
     times: Array
@@ -70,7 +51,7 @@ class Returns:
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Where the momentum's curve crosses itself, each pair of passages by itself.
+    """Where the momentum's curve crosses itself, each pair of passages by itself. Made by `momentum_crossings`.
 
     Attributes
     ----------
@@ -79,12 +60,6 @@ class Crossings:
     angles : (n,) from the first passage's heading to the second's, between 0 and pi [rad]
     gaps : (n,) angle between the two passages: of the order of rounding [rad]
     retraced : (m, 2) from when to when the curve goes along an earlier part of itself, either way [s]
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 3.0), [0.6, 0.9, 0.5])
-    >>> sp.momentum_crossings(motion).angles.shape
-    (0,)
     """
 
     first: Array
@@ -163,8 +138,8 @@ def momentum_crossings(motion: Motion) -> Crossings:
     than a hundredth of its length, may be passed over. Passages at less than 1e-6 rad are taken for touching.
 
     Where the curve goes along an earlier part of itself, to 1e-8 rad or thirty times the motion's error, it is
-    listed in `retraced` (stretches of two pieces or more), and what crosses there is not counted again: the crossings
-    are those of the curve without its retraced stretches. The meeting of the curve's two ends is not counted.
+    listed in `retraced` (intervals of two pieces or more), and what crosses there is not counted again: the crossings
+    are those of the curve without its retraced intervals. The meeting of the curve's two ends is not counted.
 
     Raises
     ------
@@ -188,7 +163,7 @@ def momentum_crossings(motion: Motion) -> Crossings:
     pieces = _Pieces.of(curve, _resolved(curve, motion))
     near = max(_SAME_CURVE, 30.0 * float(motion.error_estimate))
     pairs, partner = _neighbours(curve, pieces, near)
-    retraced = _stretches(curve, pieces, partner, near)
+    retraced = _retraced(curve, pieces, partner, near)
     first, second = _refined(curve, pieces, pairs)
     length = motion.duration
     inside = ~((first < 1e-9 * length) & (second > (1.0 - 1e-9) * length))
@@ -290,12 +265,12 @@ class _Pieces:
 
     @cached_property
     def duration(self) -> Array:
-        """(K,) [s]."""
+        """Durations: (K,) [s]."""
         return np.diff(self.times)
 
     @cached_property
     def length(self) -> Array:
-        """(K,) of the chords."""
+        """Lengths of the chords: (K,)."""
         return np.linalg.norm(np.diff(self.points, axis=0), axis=-1)
 
     def apart(self, i: Integers, j: Integers) -> Mask:
@@ -325,9 +300,9 @@ def _neighbours(curve: _Curve, pieces: _Pieces, near: float) -> tuple[Integers, 
     for start in range(0, count, _AT_ONCE):
         part = np.arange(start, min(start + _AT_ONCE, count))
         pool = np.concatenate([kept, part])
-        found = KDTree(pieces.point[pool]).query_ball_point(pieces.point[part], reach)
-        second = np.repeat(part, [len(one) for one in found])
-        first = pool[np.concatenate([np.asarray(one, dtype=np.int64) for one in found])]
+        near_each = KDTree(pieces.point[pool]).query_ball_point(pieces.point[part], reach)
+        second = np.repeat(part, [len(rows) for rows in near_each])
+        first = pool[np.concatenate([np.asarray(rows, dtype=np.int64) for rows in near_each])]
         apart = (first < second) & (
             np.linalg.norm(pieces.point[first] - pieces.point[second], axis=-1)
             < 1.2 * np.maximum(pieces.length[first], pieces.length[second]) + near
@@ -338,7 +313,7 @@ def _neighbours(curve: _Curve, pieces: _Pieces, near: float) -> tuple[Integers, 
         who, guess = _seems_along(pieces, first, second, near)
         when, on = _on_curve(curve, pieces.middle[who], (pieces.point[who], pieces.rate[who]), guess, near)
         partner[who[on]] = when[on]
-        # Of a piece at the end of a stretch, which is known by its middle, the other half may be new.
+        # A piece at the end of a retraced interval is known by its middle: its other half may be new.
         along = np.pad(partner[part] >= 0.0, 1, mode="edge")
         along[0] = partner[start - 1] >= 0.0 if start else True
         kept = np.concatenate([kept, part[~(along[:-2] & along[1:-1] & along[2:])]])
@@ -382,7 +357,7 @@ def _on_curve(
     return when, apart & (so3.angle_between(point, here) < near) & (np.sin(so3.angle_between(rate, slope)) < 1e-3)
 
 
-def _stretches(curve: _Curve, pieces: _Pieces, partner: Array, near: float) -> Array:
+def _retraced(curve: _Curve, pieces: _Pieces, partner: Array, near: float) -> Array:
     """From when to when the curve runs along earlier parts: (m, 2)."""
     on = np.concatenate([[False], partner >= 0.0, [False]])
     change = np.flatnonzero(on[1:] != on[:-1]).reshape(-1, 2)
@@ -406,10 +381,10 @@ def _edge(curve: _Curve, inner: float, partner: float, outer: float, near: float
         middle = 0.5 * (known + outer)
         _, rates = curve.at(np.array([known, when]))
         ratio = float(np.sum(rates[0] * rates[1]) / max(np.sum(rates[1] ** 2), 1e-300))
-        there = np.array([middle])
-        found, on = _on_curve(curve, there, curve.at(there), np.array([when + ratio * (middle - known)]), near)
+        times = np.array([middle])
+        nearest, on = _on_curve(curve, times, curve.at(times), np.array([when + ratio * (middle - known)]), near)
         if on[0]:
-            known, when = middle, float(found[0])
+            known, when = middle, float(nearest[0])
         else:
             outer = middle
     return known
@@ -420,33 +395,33 @@ def _refined(curve: _Curve, pieces: _Pieces, pairs: Integers) -> tuple[Array, Ar
     i, j = pairs.T
     b, d = np.diff(pieces.points, axis=0)[i], np.diff(pieces.points, axis=0)[j]
     across = np.linalg.norm(np.cross(b, d), axis=-1) > 0.5 * pieces.length[i] * pieces.length[j]
-    # Pieces well across each other meet once; of the others each end and the middle are tried.
+    # Pieces well across each other meet once; others are tried from each end and the middle.
     starts = [(i[across], j[across], 0.5, 0.5)]
     starts += [(i[~across], j[~across], p, q) for p in (0.0, 0.5, 1.0) for q in (0.0, 0.5, 1.0)]
     first, second = [], []
-    for one, other, p, q in starts:
-        shares = np.full(len(one), p), np.full(len(one), q)
+    for i, j, p, q in starts:
+        shares = np.full(len(i), p), np.full(len(i), q)
         for _ in range(8):
-            shares = _newton(*pieces.cubic(one, shares[0]), *pieces.cubic(other, shares[1]), shares, -0.5, 1.5)
-        gap = np.linalg.norm(pieces.cubic(one, shares[0])[0] - pieces.cubic(other, shares[1])[0], axis=-1)
-        good = gap < 1e-4 * (pieces.length[one] + pieces.length[other])
-        first.append((pieces.times[one] + shares[0] * pieces.duration[one])[good])
-        second.append((pieces.times[other] + shares[1] * pieces.duration[other])[good])
+            shares = _newton(*pieces.cubic(i, shares[0]), *pieces.cubic(j, shares[1]), shares, -0.5, 1.5)
+        gap = np.linalg.norm(pieces.cubic(i, shares[0])[0] - pieces.cubic(j, shares[1])[0], axis=-1)
+        good = gap < 1e-4 * (pieces.length[i] + pieces.length[j])
+        first.append((pieces.times[i] + shares[0] * pieces.duration[i])[good])
+        second.append((pieces.times[j] + shares[1] * pieces.duration[j])[good])
     end = curve.motion.duration
     times = _distinct(np.concatenate(first), np.concatenate(second), 1e-5 * float(np.median(pieces.duration)))
     for _ in range(6):
         times = _newton(*curve.at(times[0]), *curve.at(times[1]), times, 0.0, end)
     (here, heading), (there, other) = curve.at(times[0]), curve.at(times[1])
-    # Where the curve goes along itself Newton's method has nothing to aim at, and its next step may lead anywhere.
+    # Where the curve goes along itself Newton's method has no target, and its next step may lead anywhere.
     met = (so3.angle_between(here, there) < _MET) & (np.sin(_angles(heading, other)) > _TANGENT)
-    # A start that strayed from elsewhere may only just have come near, and would be taken for a pair already at
-    # rounding. Newton's method squares an error: after one more step all of them are at rounding.
+    # A start that strayed from elsewhere may only just have come near. Newton's method squares an error: after one more
+    # step all pairs are right to rounding.
     times = (times[0][met], times[1][met])
     return _newton(here[met], heading[met], there[met], other[met], times, 0.0, end)
 
 
 def _angles(first: Array, second: Array) -> Array:
-    """Between vectors of any length: (n, 3), (n, 3) -> (n,) [rad]."""
+    """Angles between vectors of any length: (n, 3), (n, 3) -> (n,) [rad]."""
     across = np.linalg.norm(np.cross(first, second), axis=-1)
     return np.arctan2(across, np.sum(first * second, axis=-1))
 
@@ -467,7 +442,7 @@ def _distinct(first: Array, second: Array, spacing: float) -> tuple[Array, Array
     order = np.lexsort([second, first])
     kept: list[int] = []
     for row in order:
-        recent = [one for one in kept[-64:] if first[row] - first[one] < spacing]
-        if all(abs(second[row] - second[one]) > spacing for one in recent):
+        recent = [earlier for earlier in kept[-64:] if first[row] - first[earlier] < spacing]
+        if all(abs(second[row] - second[earlier]) > spacing for earlier in recent):
             kept.append(int(row))
     return first[kept], second[kept]

@@ -18,47 +18,37 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_executor, check_object, direction_argument, made_by, magnitude_argument
 from ..arrays import Array, Integers
+from ..card_pictures import sphere_picture
 from ..deformation.deformation import Deformation
-from ..display import card_html, card_text, short_repr
+from ..display import Card, card_html, card_text, numbers, short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ._card import fixed_points_card
 from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
 from ._loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis
 
-# The inertial direction of the momentum: the attitudes of `closed_orbits` are chosen for it.
-_UP = np.array([0.0, 0.0, 1.0])
-# Tolerances [rad] tried one after the other where none is requested: points are then known to ten times as much.
-_REACHABLE = (1e-11, 1e-10, 1e-9, 1e-8)
-# Sum of the indices of all fixed points: the Lefschetz number of a map of the sphere that deforms to the identity.
-_LEFSCHETZ = 2
-# Directions that the search starts from, finer each time that the indices do not add up.
-_STARTS = (162, 642, 2562)
-# The least `most_directions`: with fewer even the first search would end before its cells are small.
-_FEWEST_DIRECTIONS = 1000
-# [rad] Fixed points nearer than this are one: far above what Newton's method leaves, far below their usual distance.
-_SAME = 1e-6
+_UP = np.array([0.0, 0.0, 1.0])  # inertial direction of the momentum, for the attitudes of `closed_orbits`
+_REACHABLE = (1e-11, 1e-10, 1e-9, 1e-8)  # [rad] tolerances tried in turn; points are then known to ten times as much
+_LEFSCHETZ = 2  # sum of the indices of all fixed points of a map of the sphere that deforms to the identity
+_STARTS = (162, 642, 2562)  # directions that the searches start from, until the indices add up
+_FEWEST_DIRECTIONS = 1000  # with fewer the first search would end before its cells are small
+_SAME = 1e-6  # [rad] between equal fixed points: far above the error of Newton's method, far below usual distances
+_STABILITIES = ("elliptic", "hyperbolic", "inverse hyperbolic", "parabolic")
 
 
 @dataclass(frozen=True, eq=False)
 class ReturnMap:
-    """Where directions of the body momentum are after one loop of shapes, in the deformation's frame.
+    """Directions of the body momentum before and after one loop of shapes, in the deformation's frame.
+
+    Made by `stroboscopic_map`.
 
     Attributes
     ----------
     magnitude : of the momentum [kg m^2/s]
     start, end : (..., 3) u(0) and u(T), unit vectors
     solution : the motions themselves, with the leading axes made one
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> found = sp.stroboscopic_map(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), 1.0, [0.0, 0.0, 1.0])
-    >>> print(found.end.round(9) + 0.0)  # a steady rotation stays
-    [0. 0. 1.]
     """
 
     magnitude: float
@@ -129,7 +119,20 @@ class FixedPoints:
     tolerance: float
 
     __repr__, _repr_html_ = card_text, card_html
-    _card = fixed_points_card
+
+    def _card(self) -> Card:
+        """Number and stability of the directions, and whether these are all; with the sphere they are on."""
+        counts = [f"{self.stability.count(kind)} {kind}" for kind in _STABILITIES if kind in self.stability]
+        largest = float(np.max(self.gap, initial=0.0))
+        rows = [
+            ("momentum", numbers(self.magnitude, "kg m^2/s")),
+            ("directions", f"{len(self.directions)}{': ' if counts else ''}{', '.join(counts)}"),
+            ("complete", "yes: indices sum to 2" if self.complete else f"perhaps not: indices sum to {self.index_sum}"),
+            ("gap", f"{largest:.1e} rad at most"),
+            ("tolerance", f"{self.tolerance:.1e} rad"),
+        ]
+        kinds = [_STABILITIES.index(kind) for kind in self.stability]
+        return Card("FixedPoints", rows, sphere_picture(self.directions, kinds, "directions on the sphere"))
 
 
 def stroboscopic_map(
@@ -164,8 +167,8 @@ def stroboscopic_map(
     Examples
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> found = sp.stroboscopic_map(sp.articulated(cat, loop), 0.005, np.eye(3))
-    >>> print(np.linalg.norm(found.end, axis=-1).round(9))  # still on the sphere
+    >>> axes = sp.stroboscopic_map(sp.articulated(cat, loop), 0.005, np.eye(3))
+    >>> print(np.linalg.norm(axes.end, axis=-1).round(9))  # still on the sphere
     [1. 1. 1.]
     """
     check_object(deformation, "Deformation", "deformation")
@@ -187,10 +190,10 @@ def fixed_points(
 ) -> FixedPoints:
     """Directions of the body momentum that close together with the shape, as many as a search finds.
 
-    The map is evaluated at even directions and halfway between neighbours, 640 together. Of the triangles those are
-    divided, down to 0.002 rad, in which a fixed point cannot be excluded and the map is not yet nearly linear; from
-    what is left Newton's method starts, with exact derivatives. When the indices do not sum to 2, all is done again
-    from four and from sixteen times as many directions.
+    The map is evaluated at even directions and halfway between neighbours, 640 together. Triangles in which a fixed
+    point cannot be excluded and the map is not yet nearly linear are divided, down to 0.002 rad; from the last ones
+    Newton's method starts, with exact derivatives. When the indices do not sum to 2, the search is repeated from four
+    and from sixteen times as many directions.
 
     Every point returned is a fixed point, to its `gap`. That none is missing is likely, not certain: a sum of
     indices other than 2 proves that some are; a sum of 2 does not prove that none is, since two of opposite index may
@@ -238,14 +241,14 @@ def fixed_points(
     loop = MomentumLoop.of(deformation, _REACHABLE[0] if tolerance is None else tolerance, executor)
     looser = _REACHABLE[1:] if tolerance is None else ()
     starts, exhausted = search(loop, magnitude, _STARTS[0], most_directions)
-    found = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
+    points = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
     for count in _STARTS[1:]:
-        if found.index_sum == _LEFSCHETZ or not found.index.all() or exhausted:
+        if points.index_sum == _LEFSCHETZ or not points.index.all() or exhausted:
             break
         starts, exhausted = search(loop, magnitude, count, most_directions)
-        starts = np.concatenate([found.directions, starts])
-        found = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
-    return found
+        starts = np.concatenate([points.directions, starts])
+        points = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
+    return points
 
 
 def _first_reachable(
@@ -263,7 +266,7 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
     """Motions (momentum along inertial z) whose body momentum closes in this deformation's gauge with the shape.
 
     The motions at the `fixed_points`, in their order, the highest first. Every loop and magnitude has at least two
-    (theory.md section 2); whether all were found `fixed_points` tells.
+    (theory.md section 2); `fixed_points` reports whether these are all.
 
     Parameters
     ----------
@@ -283,18 +286,14 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
     (True, 0.0)
     """
     check_object(deformation, "Deformation", "deformation")
-    found = fixed_points(deformation, magnitude, tolerance=tolerance)
-    momentum, attitudes = found.magnitude * _UP, _attitude_of(found.directions)
-    return [reconstruct(deformation, momentum, attitude, tolerance=found.tolerance) for attitude in attitudes]
-
-
-def _attitude_of(direction: Array) -> Array:
-    """An attitude that shows the inertial z axis along a body direction: R^T z = direction."""
-    return so3.transpose(so3.between(np.broadcast_to(_UP, direction.shape), direction))
+    points = fixed_points(deformation, magnitude, tolerance=tolerance)
+    # R^T z is the direction of the momentum in the body.
+    attitudes = so3.transpose(so3.between(np.broadcast_to(_UP, points.directions.shape), points.directions))
+    return [reconstruct(deformation, points.magnitude * _UP, r, tolerance=points.tolerance) for r in attitudes]
 
 
 def _fixed_points_from(loop: MomentumLoop, magnitude: float, starts: Array, *, exhausted: bool) -> FixedPoints:
-    """The fixed points that Newton's method reaches from these starts, and what they are."""
+    """The fixed points that Newton's method reaches from these starts, with their stability."""
     roughly = closed_points(loop, magnitude, starts, max(SEARCH_TOLERANCE, loop.goal), 1e-5)
     near = roughly.points[(roughly.step < 1e-3) | (roughly.gap < 1e-4)]
     closed = closed_points(loop, magnitude, near[spaced(near, 30.0 * _SAME)], loop.goal, 1e-12)

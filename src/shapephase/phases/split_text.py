@@ -14,19 +14,12 @@ from ..arrays import Array
 if TYPE_CHECKING:
     from .phase_split import PhaseSplit
 
-CLOSED_GAP = math.radians(1.0)
-"""[rad] of the momentum, from which on a result says what closes it."""
-DEGREE_DIGITS = 6
-"""After the point of an angle in degrees, or fewer: no more than its error leaves."""
-RADIAN_DIGITS = 9
-"""Digits after the point of an angle in radians."""
+CLOSED_GAP = math.radians(1.0)  # [rad] gap of the momentum above which a result states its closing
+DEGREE_DIGITS = 6  # after the point of an angle in degrees, at most: its error may leave fewer
+RADIAN_DIGITS = 9  # after the point of an angle in radians, at most
 _AXIS_DIGITS = 6  # after the point
-# [rad] A smaller turn has no axis worth showing.
-_NO_TURN = 1e-12
-# Letters of a line of words, as wide as the table.
-_WIDTH = 88
-# A line of the table of a batch.
-_ROW = "{:24}{:16.6f}{:16.6f}{:16.6f}"
+_NO_TURN = 1e-12  # [rad] a smaller turn is printed without its axis
+_WIDTH = 88  # letters of a line, the width of the table
 
 
 def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> list[str]:
@@ -83,17 +76,17 @@ def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> l
 
 
 def wrapped(words: str) -> list[str]:
-    """Words as lines as wide as the table, below an empty one; none where nothing is said."""
+    """Words in lines as wide as the table, below an empty one; none without words."""
     return ["", *textwrap.wrap(words, _WIDTH)] if words else []
 
 
 def is_open(result: PhaseSplit) -> bool:
-    """Whether the momentum of one motion ends so far from its start that what closes it has to be said."""
+    """True where the momentum of one motion ends so far from its start that its closing has to be stated."""
     return bool(result.has_phase) and float(result.momentum_gap) > CLOSED_GAP
 
 
 def closing_text(result: PhaseSplit) -> str:
-    """What closes the momentum's curve and how much that adds, in one sentence; "" where it closes by itself."""
+    """Closing of the momentum's curve and its part of the phase, as a sentence; "" where the curve closes by itself."""
     if not is_open(result):
         return ""
     gap, added = float(result.momentum_gap), float(result.closing_phase)
@@ -169,5 +162,5 @@ def _batch_lines(result: PhaseSplit, heading: str) -> list[str]:
     for name, values in rows.items():
         if values.size:
             spread = np.degrees([values.min(), np.median(values), values.max()])
-            lines.append(_ROW.format(name, *spread))
+            lines.append(f"{name:24}" + "".join(f"{angle:16.6f}" for angle in spread))
     return lines

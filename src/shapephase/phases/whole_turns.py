@@ -35,8 +35,8 @@ class TurnCounts:
     --------
     >>> dive = sp.examples.full_dive()
     >>> motion = sp.reconstruct(dive.deformation, dive.momentum)
-    >>> found = sp.turn_counts(motion, sp.split(motion))
-    >>> print(f"{found.somersaults:.3f} somersaults, {abs(found.twists):.3f} twists")
+    >>> counts = sp.turn_counts(motion, sp.split(motion))
+    >>> print(f"{counts.somersaults:.3f} somersaults, {abs(counts.twists):.3f} twists")
     1.500 somersaults, 1.000 twists
     """
 

@@ -2,8 +2,7 @@ from ._athlete_axes import AthleteAxes
 from ._solvers import Solution
 from .external_torque import ExternalTorque, TorqueState
 from .forced_motion import ForcedMotion
-from .motion_family import MotionFamily
-from .reconstruction import Motion, Sensitivity, load_motion, momentum_from_rate, reconstruct
+from .reconstruction import Motion, MotionFamily, Sensitivity, load_motion, momentum_from_rate, reconstruct
 from .recorded_base import BaseDifference, base_difference
 
 __all__ = [

@@ -133,7 +133,7 @@ class MotionViews:
         --------
         >>> dive = sp.examples.full_dive()
         >>> motion = sp.reconstruct(dive.deformation, dive.momentum)
-        >>> somersault, tilt, twist = (np.ptp(one) for one in motion.somersault_tilt_twist([0.0, motion.duration]))
+        >>> somersault, tilt, twist = (np.ptp(angle) for angle in motion.somersault_tilt_twist([0.0, motion.duration]))
         >>> print(f"{somersault / (2 * np.pi):.4f} somersaults, {twist / (2 * np.pi):.4f} twists")
         1.5000 somersaults, 1.0000 twists
         """

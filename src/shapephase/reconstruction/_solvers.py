@@ -13,8 +13,7 @@ from ..arrays import Array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import RigidDescription
 from ..errors import AccuracyNotReached, TrajectoryError, unknown_name
-from ..integrator.dop853 import dop853_attitude
-from ..integrator.driven_attitude import DrivenAttitude
+from ..integrator.driven_attitude import DrivenAttitude, dop853_attitude
 from ..integrator.many_rotations import rotations_of_each
 from ..rigid_body.euler_top import EulerTop
 
@@ -90,7 +89,7 @@ def rigid_rotation(inertia: Array, momentum: Array, duration: float, tolerance: 
     AccuracyNotReached
         If rounding alone, magnified near a separatrix or over many turns, may exceed the tolerance.
     """
-    tops = tuple(EulerTop(inertia, one) for one in momentum)
+    tops = tuple(EulerTop(inertia, row) for row in momentum)
     turn = max((top.magnitude / top.moments[0] for top in tops), default=0.0) * duration
     estimates = np.array([_rounding(top, duration) for top in tops])
     if estimates.max(initial=0.0) > tolerance:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, overload
@@ -24,8 +24,9 @@ from ..arguments import (
 from ..arrays import Array, Integers, common_batch, copied_when_read, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
 from ..display import short_repr
-from ..errors import WrongObjectError, unknown_name
+from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..inertia_tensor import inverse_inertia
+from ..integrator.families import VariantRotations, rotations_of_variants
 from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
 from ..integrator.lift import Lift, error_turns, lift_along
@@ -39,7 +40,8 @@ from .motion_record import MotionRecord, read_motion_record, write_motion_record
 if TYPE_CHECKING:
     from .external_torque import ExternalTorque, TorqueState
     from .forced_motion import ForcedMotion
-    from .motion_family import MotionFamily
+
+_FAMILY_METHODS = ("auto", "spectral")
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +85,7 @@ class Motion(MotionViews):
 
     Attributes
     ----------
-    deformation : what moved
+    deformation : the body's shape in time
     momentum : batch + (3,), about the centre of mass, inertial axes [kg m^2/s]
     initial_attitude : batch + (3, 3), base axes to inertial axes
     tolerance : the one requested [rad]
@@ -192,11 +194,10 @@ class Motion(MotionViews):
         The deformation is evaluated again at 20 times, so an error of sampling or stepping shows here.
         """
         if len(self.parts) > 1:
-            each = [(rows, np.atleast_1d(part.equation_residual)) for rows, part in self.parts]
-            return assembled(each).reshape(self.batch)
-        inner = np.repeat(self.solution.times[:-1], 2) + np.repeat(np.diff(self.solution.times), 2) * np.tile(
-            [0.3, 0.7], len(self.solution.times) - 1
-        )
+            residuals = [(rows, np.atleast_1d(part.equation_residual)) for rows, part in self.parts]
+            return assembled(residuals).reshape(self.batch)
+        ends = self.solution.times
+        inner = np.repeat(ends[:-1], 2) + np.repeat(np.diff(ends), 2) * np.tile([0.3, 0.7], len(ends) - 1)
         times = inner[np.linspace(0, len(inner) - 1, 20).astype(int)]
         inertia, internal = self.deformation.description.sample(times)
         omega = self._differentiated(times)
@@ -212,8 +213,8 @@ class Motion(MotionViews):
             return ((np.arange(len(self._flat_attitude)), self),)
         momentum = self.momentum.reshape(-1, 3)
         return tuple(
-            (rows, replace(self, momentum=momentum[rows], initial_attitude=self._flat_attitude[rows], solution=one))
-            for rows, one in self.solution.parts
+            (rows, replace(self, momentum=momentum[rows], initial_attitude=self._flat_attitude[rows], solution=part))
+            for rows, part in self.solution.parts
         )
 
     @cached_property
@@ -267,12 +268,9 @@ class Motion(MotionViews):
         stepped = self.stepped
         slope = stepped.momentum_slope
         start = so3.apply(so3.transpose(self._flat_attitude), self.momentum.reshape(-1, 3))
-        attitude = so3.transpose(stepped.end) + slope @ so3.hat(start)
-        matrix = (*self.batch, 3, 3)
-        return Sensitivity(
-            (slope @ so3.transpose(self._flat_attitude)).reshape(matrix),
-            attitude.reshape(matrix),
-        )
+        by_momentum = slope @ so3.transpose(self._flat_attitude)
+        by_attitude, matrix = so3.transpose(stepped.end) + slope @ so3.hat(start), (*self.batch, 3, 3)
+        return Sensitivity(by_momentum.reshape(matrix), by_attitude.reshape(matrix))
 
     def dynamic_phase(self, t: ArrayLike) -> Array:
         """Integral of omega . Pi/|Pi| from 0 to t: times (...) -> batch + (...) [rad]; zero without momentum.
@@ -326,6 +324,92 @@ class Motion(MotionViews):
             ahead, behind = self.solution.rotation(times + k * h), self.solution.rotation(times - k * h)
             total += weight * (so3.vee(so3.transpose(middle) @ ahead) - so3.vee(so3.transpose(middle) @ behind))
         return total / h[:, None]
+
+
+@made_by(Motion="take one of its motions, family[0]")
+@dataclass(frozen=True, eq=False)
+class MotionFamily(Sequence[Motion]):
+    """Motions of N bodies of a family, a sequence made by `reconstruct`.
+
+    Attributes
+    ----------
+    deformations : those of the bodies
+    momentum : (N, 3) of each about its centre of mass, inertial axes [kg m^2/s]
+    initial_attitude : (N, 3, 3) base axes to inertial axes
+    tolerance : the one requested [rad]
+    solution : S(t) of each, the attitude relative to the start
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> family = cat.with_inertias(masses=np.outer([1.0, 2.0], [part.mass for part in cat.moving_parts]))
+    >>> motions = sp.reconstruct(sp.articulated(family, loop), [0.0, 0.0, 0.0])
+    >>> [round(float(sp.so3.angle(motion.final_attitude)), 6) for motion in motions]
+    [1.139791, 1.139791]
+    """
+
+    deformations: DeformationFamily
+    momentum: Array
+    initial_attitude: Array
+    tolerance: float
+    solution: VariantRotations
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+    def __len__(self) -> int:
+        """Number of motions, N."""
+        return len(self.momentum)
+
+    @overload
+    def __getitem__(self, index: int) -> Motion: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Motion, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Motion | tuple[Motion, ...]:
+        """Return one of the motions, or a tuple of those of a slice."""
+        numbers = range(len(self))[index]
+        if isinstance(numbers, range):
+            return tuple(self[number] for number in numbers)
+        solution = self.solution[numbers]
+        return Motion(
+            deformation=self.deformations[numbers],
+            momentum=self.momentum[numbers],
+            initial_attitude=self.initial_attitude[numbers],
+            tolerance=self.tolerance,
+            method="spectral",
+            evaluations=solution.interpolant.evaluations,
+            solution=solution,
+        )
+
+    @property
+    def duration(self) -> float:
+        """Length T of the interval [s]."""
+        return self.deformations.duration
+
+    @property
+    def error_estimate(self) -> Array:
+        """Estimate of the largest attitude error of each over [0, T]: (N,) [rad]."""
+        return self.solution.error_estimate
+
+    @property
+    def evaluations(self) -> Integers:
+        """How often the locked inertia and internal momentum of each were computed: (N,)."""
+        return self.solution.evaluations
+
+    @property
+    def final_attitude(self) -> Array:
+        """R(T) of each: (N, 3, 3)."""
+        return self.initial_attitude @ self.solution.end
+
+    def attitude(self, t: ArrayLike) -> Array:
+        """R(t) of each, base axes to inertial axes: times (...) -> (N, ..., 3, 3)."""
+        times = times_argument(t, self.duration)
+        turned = np.empty((len(self), times.size, 3, 3))
+        for number, start in enumerate(self.initial_attitude):
+            turned[number] = start @ self.solution[number].rotation(times.ravel())[0]
+        return turned.reshape(len(self), *times.shape, 3, 3)
 
 
 @overload
@@ -442,10 +526,8 @@ def reconstruct(
         assert isinstance(deformation, Deformation)
         return reconstruct_forced(deformation, momentum, attitude, torque, goal, method)
     if not isinstance(deformation, Deformation) and isinstance(deformation, DeformationFamily):
-        from .motion_family import reconstruct_family
-
         with watched(progress):
-            return reconstruct_family(deformation, momentum, attitude, goal, method)
+            return _family_motions(deformation, momentum, attitude, goal, method)
     if not isinstance(method, str) or method not in SOLVERS:
         raise unknown_name("method", method, METHODS)
     spatial, start = initial_state_arguments(momentum, attitude)
@@ -460,6 +542,35 @@ def reconstruct(
         tolerance=goal,
         method="spectral" if method == "auto" else method,
         evaluations=evaluations,
+        solution=solution,
+    )
+
+
+def _family_motions(
+    deformations: DeformationFamily,
+    momentum: ArrayLike,
+    attitude: ArrayLike | None,
+    tolerance: float,
+    method: str,
+) -> MotionFamily:
+    """Return the motions of a family of deformations; the tolerance has been checked."""
+    if not isinstance(method, str) or method not in _FAMILY_METHODS:
+        raise unknown_name("method for a family of bodies", method, _FAMILY_METHODS)
+    count = len(deformations)
+    spatial, start = initial_state_arguments(momentum, attitude)
+    if spatial.shape[:-1] not in ((), (count,)):
+        raise ShapeError(
+            f"momentum and attitude: one for all or one for each of {count} bodies is needed, got a batch of "
+            f"{spatial.shape[:-1]}"
+        )
+    spatial, start = np.broadcast_to(spatial, (count, 3)), np.broadcast_to(start, (count, 3, 3))
+    at_start = so3.apply(so3.transpose(start), spatial)
+    solution = rotations_of_variants(deformations.variants(), at_start, tolerance)
+    return MotionFamily(
+        deformations=deformations,
+        momentum=spatial,
+        initial_attitude=start,
+        tolerance=tolerance,
         solution=solution,
     )
 

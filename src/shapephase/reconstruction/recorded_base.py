@@ -17,7 +17,7 @@ from .reconstruction import Motion
 
 W_FIRST = "read as w x y z instead of x y z w, its quaternions agree: were they written with w first?"
 """Hint for a recorded base that agrees with the motion in the other order of its quaternions."""
-_APART = 0.3  # rad: below, an order of quaternions cannot be told from noise
+_APART = 0.3  # [rad] a smaller difference between orders of quaternions is noise
 _NEARER = 0.1  # of the difference, left over in the other order of quaternions, where that order is the reason
 
 

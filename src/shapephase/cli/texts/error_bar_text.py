@@ -36,7 +36,7 @@ def error_bars(
     if fitted is None and all(given is None for given in deviations):
         return None
     from ...error_bars.covariance import uncertainty
-    from ...error_bars.inertia_errors import InertiaErrors
+    from ...error_bars.error_sources import InertiaErrors
 
     masses, centres, inertias = (given or 0.0 for given in relative)
     return uncertainty(

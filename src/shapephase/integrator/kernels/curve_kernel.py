@@ -46,19 +46,19 @@ def _piece(channels, lifted, magnitude, first, slopes, lift_slopes, attitude, li
 
 
 @kernel
-def curve_pieces(channels, halves, lifted, magnitudes, directions, found, differences):
+def curve_pieces(channels, halves, lifted, magnitudes, directions, integrals, differences):
     """Integrals over M pieces of the curves of B momenta, by two steps each, and how far one step is from that.
 
     channels, halves: (M, STAGES, 9), (2 M, STAGES, 9) at the stages of a step over each piece, and of two halves
     lifted: whether the gauge is the horizontal one, not the base
     magnitudes, directions: (B,), (B, M, 3) of the momenta, body axes at the start of each piece
-    found, differences: (B, M, 2) to be filled: of the gauge's omega . Pi/|Pi|, and signed area between arc and chord
+    integrals, differences: (B, M, 2) to be filled: of the gauge's omega . Pi/|Pi|, and areas between arc and chord
     """
     for row in range(len(magnitudes)):
         slopes, lift_slopes = np.empty((STAGES, 4)), np.empty((STAGES, 4))
         attitude, lift, whole = np.empty(4), np.empty(4), np.empty(2)
         for piece in range(len(channels)):
-            first, sums = directions[row, piece], found[row, piece]
+            first, sums = directions[row, piece], integrals[row, piece]
             for number in range(3):
                 if number < 2:
                     # Before the whole, and before its first half.
@@ -75,7 +75,7 @@ def curve_pieces(channels, halves, lifted, magnitudes, directions, found, differ
 
 
 @kernel
-def within_steps(channels, magnitudes, directions, starts, found, along):
+def within_steps(channels, magnitudes, directions, starts, attitudes, along):
     """Attitudes (B, N, 4) after parts of steps, and the integrals (B, N) of omega . Pi/|Pi| along them.
 
     channels: (N, STAGES, 9) at the stages of the parts, times their lengths
@@ -86,7 +86,12 @@ def within_steps(channels, magnitudes, directions, starts, found, along):
         for place in range(len(channels)):
             q = starts[row, place]
             x, y, z, w, phase = step(channels[place], magnitudes[row], directions[row], slopes, q[0], q[1], q[2], q[3])
-            found[row, place, 0], found[row, place, 1], found[row, place, 2], found[row, place, 3] = x, y, z, w
+            attitudes[row, place, 0], attitudes[row, place, 1], attitudes[row, place, 2], attitudes[row, place, 3] = (
+                x,
+                y,
+                z,
+                w,
+            )
             along[row, place] = phase
 
 

@@ -1,4 +1,4 @@
-"""How the angular momentum of a tree of links answers to its joints and to the inertias of its links.
+"""Derivatives of the angular momentum of a tree of links by its joints and by the inertias of its links.
 
 Frames and sums stand in rows of LANES numbers, one lane for each shape, as in `tree_kernel`.
 """
@@ -10,8 +10,7 @@ import numpy as np
 from ..machine_code import inline, kernel
 from .tree_kernel import FRAME, LANES, NUMBERS, TOTAL, add_link, add_point, place_frames
 
-_PARAMETERS = 10
-"""Of a frame: mass, first moment (3), inertia xx yy zz yz xz xy."""
+_PARAMETERS = 10  # of a frame: mass, first moment (3), inertia xx yy zz yz xz xy
 
 
 @inline
@@ -134,7 +133,7 @@ def _write(rows, column, first, which, joint, out):
 
 @kernel
 def momentum_gradients(parents, turning, leads, body, mass, shapes, rates, spins, rows, lanes, by_shape, by_rate):
-    """Products of rows with how the angular momentum answers to the coordinates and to the rates of all joints.
+    """Products of rows with derivatives of the angular momentum by the coordinates and by the rates of all joints.
 
     parents, turning, leads, body, mass: as `LinkRows` has them
     shapes, rates: (N, joints)
@@ -191,7 +190,7 @@ def _by_parameters(f, w, a, out, lanes):
 
 @kernel
 def inertial_sums(parents, turning, leads, body, mass, shapes, rates, spins, rows, lanes, found):
-    """Sums over shapes of products of rows with how the angular momentum answers to the parameters of frames.
+    """Sums over shapes of products of rows with derivatives of the angular momentum by the parameters of frames.
 
     spins, rows: (N, m, 3) one of each for each product
     found: (m, joints + 1, 10) to be filled; the other arguments as for `momentum_gradients`

@@ -1,4 +1,4 @@
-"""What the series of panels say of their own errors, and the same series with errors like those."""
+"""Error estimates from the series of panels, and series changed by such errors."""
 
 from __future__ import annotations
 
@@ -9,28 +9,16 @@ import numpy as np
 from ..constants import BEYOND_LAST_TERMS, CHANGED_LAST_TERMS, EPS, ROUNDED_SAMPLES, SLOWEST_DECAY
 from ..machine_code import inline, kernel
 
-# Columns of what `judge` finds.
-GOOD = 0
-CHANGE = 1
-NOISY = 2
-BETWEEN = 3
-MISSING = 4
-ALLOWED = 5
-LATE = 6
-CONDITION = 7
-INVERSE = 8
-DRIFT = 9
-COLUMNS = 10
-# Of what a panel's parent had beyond its degree: noise is as large in the halves, anything else is smaller.
-_NOISE_STAYS = 0.5
-# Of the largest term: what counts as noise is far below.
-_NOISE = 1e-6
+COLUMNS = 10  # of the table that `judge` fills, in this order
+GOOD, CHANGE, NOISY, BETWEEN, MISSING, ALLOWED, LATE, CONDITION, INVERSE, DRIFT = range(COLUMNS)
+_NOISE_STAYS = 0.5  # ratio of last terms to those of the panel's parent: 1 for noise, smaller for anything smooth
+_NOISE = 1e-6  # of the largest term: noise is far below
 _TINY = 1e-300
 
 
 @inline
 def _sizes(c):
-    """Of the nine channels: |I^-1| by its entries, |I^-1 L_o|."""
+    """|I^-1| by its entries, and |I^-1 L_o|, from the nine channels."""
     inverse = c[0] * c[0] + c[1] * c[1] + c[2] * c[2] + 2.0 * (c[3] * c[3] + c[4] * c[4] + c[5] * c[5])
     return math.sqrt(inverse), math.sqrt(c[6] * c[6] + c[7] * c[7] + c[8] * c[8])
 
@@ -49,9 +37,9 @@ def _condition(c):
 def judge(series, widths, spacing, before, momentum, rate, table):
     """Judge series (P, degree + 1, 9) of one degree, for momenta up to a magnitude; `table` (P, COLUMNS) is filled.
 
-    The two last terms tell what is missing beyond them, by the factor by which terms fall from the middle to the end:
-    single terms are small by chance, or by a motion's symmetry. What is missing swings as often over the panel as its
-    degree says, but for how far the body turns in it.
+    The two last terms bound those missing beyond them, by the factor by which terms fall from the middle to the end:
+    single terms are small by chance, or by a motion's symmetry. Missing terms swing as often over the panel as their
+    degree, less the angle by which the body turns in it.
 
     widths, spacing: (P,) [s] of panels, and of floating-point numbers at their ends
     before: (P,) the last terms, at this degree, of the panel that each is a half of [rad/s]
@@ -59,7 +47,7 @@ def judge(series, widths, spacing, before, momentum, rate, table):
     """
     degree = series.shape[1] - 1
     for panel in range(len(series)):
-        c, found, width = series[panel], table[panel], widths[panel]
+        c, row, width = series[panel], table[panel], widths[panel]
         largest, turn, slope, middle, late, of_inverse, of_drift = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(degree + 1):
             inverse, drift = _sizes(c[k])
@@ -70,10 +58,10 @@ def judge(series, widths, spacing, before, momentum, rate, table):
                 late = max(late, size)
             elif k >= degree // 2:
                 middle = max(middle, size)
-        found[CONDITION], found[INVERSE], found[DRIFT], found[LATE] = _condition(c[0]), of_inverse, of_drift, late
+        row[CONDITION], row[INVERSE], row[DRIFT], row[LATE] = _condition(c[0]), of_inverse, of_drift, late
         if degree == 0:
-            found[GOOD], found[CHANGE], found[NOISY], found[BETWEEN], found[MISSING] = 1.0, 0.0, 0.0, 0.0, 0.0
-            found[ALLOWED] = rate
+            row[GOOD], row[CHANGE], row[NOISY], row[BETWEEN], row[MISSING] = 1.0, 0.0, 0.0, 0.0, 0.0
+            row[ALLOWED] = rate
             continue
         decay = min((max(late, _TINY) / max(middle, late, _TINY)) ** (2.0 / degree), SLOWEST_DECAY)
         rounded = ROUNDED_SAMPLES * EPS * largest + 4.0 * spacing[panel] / width * slope
@@ -81,14 +69,14 @@ def judge(series, widths, spacing, before, momentum, rate, table):
         swings = max(degree - width * turn, 1.0)
         beyond = decay / (1.0 - decay)
         missing = late * beyond
-        found[GOOD] = 1.0 if noisy or missing <= rate * swings else 0.0
-        found[CHANGE] = (
+        row[GOOD] = 1.0 if noisy or missing <= rate * swings else 0.0
+        row[CHANGE] = (
             1.0 if noisy else min(CHANGED_LAST_TERMS * (1.0 + BEYOND_LAST_TERMS / degree) * beyond, 1.0 * degree)
         )
-        found[NOISY] = 1.0 if noisy else 0.0
-        found[BETWEEN] = (max(missing, late) if noisy else missing) * width / swings
-        found[MISSING] = 0.0 if noisy else missing / swings
-        found[ALLOWED] = rate * swings + rounded
+        row[NOISY] = 1.0 if noisy else 0.0
+        row[BETWEEN] = (max(missing, late) if noisy else missing) * width / swings
+        row[MISSING] = 0.0 if noisy else missing / swings
+        row[ALLOWED] = rate * swings + rounded
 
 
 @kernel
@@ -142,7 +130,7 @@ def _adjugate(m, out):
 
 
 @kernel
-def growths(marked, turn, found):
+def growths(marked, turn, largest_growths):
     """Fill the largest growths (B,) of a small turn from one mark to a later one.
 
     The turns by which an error is known, rows of (3, 3), are propagators P; from one mark to a later one an error grows
@@ -171,7 +159,9 @@ def growths(marked, turn, found):
                         squares += entry * entry
                 # No comparison holds for what is not a number.
                 largest = max(largest, 0.5 * (squares - 1.0)) if squares < math.inf else math.inf
-        found[row] = math.sqrt(largest + math.sqrt(largest * largest - 1.0)) if largest < math.inf else math.inf
+        largest_growths[row] = (
+            math.sqrt(largest + math.sqrt(largest * largest - 1.0)) if largest < math.inf else math.inf
+        )
 
 
 def warm() -> None:

@@ -15,22 +15,16 @@ from scipy.integrate import DOP853
 from ..machine_code import inline, kernel
 
 STAGES = 12
-NODES = np.ascontiguousarray(DOP853.C[:STAGES])
-"""Of the stages, in units of the step."""
+NODES = np.ascontiguousarray(DOP853.C[:STAGES])  # times of the stages [steps]
 WEIGHTS = np.ascontiguousarray(DOP853.B[:STAGES])
 _TABLEAU = np.vstack([DOP853.A[:STAGES, :STAGES], WEIGHTS])
 # The entries that are not zero, row after row; row STAGES is the end of the step.
 _VALUES = _TABLEAU[_TABLEAU != 0.0]
 _COLUMNS = np.ascontiguousarray(np.nonzero(_TABLEAU)[1])
 _STARTS = np.concatenate([[0], np.cumsum(np.count_nonzero(_TABLEAU, axis=1))])
-
-
-# The states of `attempt`: by steps, twice and four times as many, on changed series, and from turned starts.
-_OF_FINER = 1
-_OF_FINEST = 2
-_OF_CHANGED = 3
-_OF_TURNED = 4
-# Which of them go on one after another in one step, and by which of their own steps in it.
+# The states of `attempt`: by steps (0), twice and four times as many, on changed series, and from turned starts.
+_OF_FINER, _OF_FINEST, _OF_CHANGED, _OF_TURNED = 1, 2, 3, 4
+# The states that advance one after another within a step, and which of their own steps they take.
 _STATES = np.array([0, 1, 3, 2, 2, 1, 3, 2, 2, 4, 5, 6])
 _NUMBERS = np.array([0, 0, 0, 0, 1, 1, 1, 2, 3, 0, 0, 0])
 
@@ -70,7 +64,7 @@ def turned_at(slopes, row, x, y, z, w, u, v, t):
 
 @inline
 def normalised(x, y, z, w):
-    """Of length one."""
+    """Quaternion scaled to length one."""
     scale = 1.0 / np.sqrt(x * x + y * y + z * z + w * w)
     return scale * x, scale * y, scale * z, scale * w
 
@@ -127,14 +121,14 @@ def integrate_steps(channels, loops, magnitudes, directions, first, quaternions)
     """
     for row in range(len(magnitudes)):
         slopes = np.empty((STAGES, 4), quaternions.dtype)
-        found, direction, magnitude = quaternions[row], directions[row], magnitudes[row]
+        attitudes, direction, magnitude = quaternions[row], directions[row], magnitudes[row]
         at = first
         for _ in range(loops):
             for k in range(len(channels)):
-                here = found[at]
+                here = attitudes[at]
                 x, y, z, w, _ = step(channels[k], magnitude, direction, slopes, here[0], here[1], here[2], here[3])
                 at += 1
-                found[at, 0], found[at, 1], found[at, 2], found[at, 3] = x, y, z, w
+                attitudes[at, 0], attitudes[at, 1], attitudes[at, 2], attitudes[at, 3] = x, y, z, w
 
 
 @inline
@@ -148,8 +142,8 @@ def _mark(state, marked):
 
 @inline
 def _turn_of_step(q, r, p, s):
-    """Of a step from one quaternion to the next, about the direction p at its start: what the shortest rotation that
-    takes the direction s at its end there leaves."""
+    """Turn of a step from one quaternion to the next about the direction p at its start, after the shortest rotation
+    that takes the direction s at its end to p."""
     x = q[3] * r[0] - q[0] * r[3] - (q[1] * r[2] - q[2] * r[1])
     y = q[3] * r[1] - q[1] * r[3] - (q[2] * r[0] - q[0] * r[2])
     z = q[3] * r[2] - q[2] * r[3] - (q[0] * r[1] - q[1] * r[0])
@@ -190,7 +184,7 @@ def attempt(
     for row in range(len(magnitudes)):
         slopes = np.empty((STAGES, 4))
         magnitude, direction, state = magnitudes[row], directions[row], states[row]
-        there, found, sight = quaternions[row], measured[row], seen[row]
+        finest, largest, sight = quaternions[row], measured[row], seen[row]
         done, mark, jobs = first, 0, len(_STATES) if len(marks) > 0 else len(_STATES) - 3
         while mark < len(marks) and marks[mark] <= done:
             if marks[mark] == done:
@@ -215,19 +209,19 @@ def attempt(
                         x, y, z, w, along = step(here, magnitude, direction, slopes, s[0], s[1], s[2], s[3])
                         s[0], s[1], s[2], s[3] = x, y, z, w
                         if which == _OF_CHANGED:
-                            found[2] = max(found[2], angle_between(state[_OF_FINER], s))
+                            largest[2] = max(largest[2], angle_between(state[_OF_FINER], s))
                         if which == _OF_FINEST:
                             at = 4 * done + number
-                            there[at + 1, 0], there[at + 1, 1], there[at + 1, 2], there[at + 1, 3] = x, y, z, w
-                            found[3] += angle_between(there[at], s)
+                            finest[at + 1, 0], finest[at + 1, 1], finest[at + 1, 2], finest[at + 1, 3] = x, y, z, w
+                            largest[3] += angle_between(finest[at], s)
                             dynamics[row, at] = along
                             if magnitude != 0.0:
                                 p0, p1, p2 = seen_from(x, y, z, w, direction[0], direction[1], direction[2])
                                 sight[at + 1, 0], sight[at + 1, 1], sight[at + 1, 2] = p0, p1, p2
-                                turns[row, at] = _turn_of_step(there[at], s, sight[at], sight[at + 1])
+                                turns[row, at] = _turn_of_step(finest[at], s, sight[at], sight[at + 1])
                             if number % 2 == 1:
-                                found[1] = max(found[1], angle_between(state[_OF_FINER], s))
-                    found[0] = max(found[0], angle_between(state[0], state[_OF_FINER]))
+                                largest[1] = max(largest[1], angle_between(state[_OF_FINER], s))
+                    largest[0] = max(largest[0], angle_between(state[0], state[_OF_FINER]))
                     done += 1
                     if mark < len(marks) and marks[mark] == done:
                         _mark(state, marked[row, mark])

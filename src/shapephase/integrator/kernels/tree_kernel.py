@@ -13,18 +13,39 @@ import math
 import numpy as np
 
 from ..machine_code import inline, kernel
-from .trigonometry import MOST_ANGLE, cos_sin
 
 LANES = 8
-FRAME = 24
-"""Rows of a frame."""
-TOTAL = 15
-"""Rows of the sums: mass times place (3), mass times velocity (3), inertia (6), momentum (3)."""
-NUMBERS = 22
-"""Of a frame in the body, as `shapephase.body.joint_chain` has them."""
-_CONDITION = 1e10
-"""Product of the traces of I and I^-1, one to nine times the condition number; what is above it is left to slower
-code, which judges such tensors by their eigenvalues."""
+FRAME = 24  # rows of a frame
+TOTAL = 15  # rows of the sums: mass times place (3), mass times velocity (3), inertia (6), momentum (3)
+NUMBERS = 22  # of a frame in the body, in the order of `shapephase.body.joint_chain`
+_CONDITION = (
+    1e10  # product of the traces of I and I^-1, up to 9 cond(I): slower code judges tensors above by eigenvalues
+)
+
+MOST_ANGLE = 1e5  # [rad]: up to here the products with the first two parts of pi/2 are exact
+_QUARTERS = 2.0 / math.pi
+_HALF_PI_1, _HALF_PI_2, _HALF_PI_3 = 1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21
+
+
+@inline
+def cos_sin(x):
+    """Cosine and sine to an ulp or so for |x| < MOST_ANGLE, without calls or branches, so that loops become vectors.
+
+    Polynomials of fdlibm (k_cos.c, k_sin.c), and the three parts of pi/2 of its e_rem_pio2.c.
+    """
+    quarters = np.floor(x * _QUARTERS + 0.5)
+    r = ((x - quarters * _HALF_PI_1) - quarters * _HALF_PI_2) - quarters * _HALF_PI_3
+    z = r * r
+    s = 2.7557313707070068e-06 + z * (-2.5050760253406863e-08 + z * 1.58969099521155e-10)
+    s = -0.16666666666666632 + z * (0.00833333333332249 + z * (-0.0001984126982985795 + z * s))
+    c = 2.480158728947673e-05 + z * (-2.7557314351390663e-07 + z * (2.087572321298175e-09 - z * 1.1359647557788195e-11))
+    c = 0.0416666666666666 + z * (-0.001388888888887411 + z * c)
+    s, half = r + r * (z * s), 1.0 - 0.5 * z
+    c = half + (((1.0 - half) - 0.5 * z) + z * (z * c))
+    quarter = quarters - 4.0 * np.floor(0.25 * quarters)
+    odd = quarter == 1.0 or quarter == 3.0
+    a, b = s if odd else c, c if odd else s
+    return -a if quarter == 1.0 or quarter == 2.0 else a, -b if quarter >= 2.0 else b
 
 
 @inline
@@ -135,7 +156,7 @@ def _inverse(xx, yy, zz, yz, xz, xy):
 
 @inline
 def _write(total, lane, inverted, out):
-    """A row of results; whether it can be relied on."""
+    """Write a row of results; return whether it is reliable."""
     xx, yy, zz = total[6 * LANES + lane], total[7 * LANES + lane], total[8 * LANES + lane]
     yz, xz, xy = total[9 * LANES + lane], total[10 * LANES + lane], total[11 * LANES + lane]
     u, v, w = total[12 * LANES + lane], total[13 * LANES + lane], total[14 * LANES + lane]
@@ -180,7 +201,7 @@ def place_frames(parents, turning, leads, body, shapes, rates, first, frames, sh
 
 @kernel
 def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted, lanes, values, reliable):
-    """Of trees that differ in their masses, I^-1 and I^-1 L_o, or I and L_o, about the centre of mass, base axes.
+    """I^-1 and I^-1 L_o, or I and L_o, of trees that differ in their masses, about the centre of mass, base axes.
 
     parents, turning, leads: as `LinkRows` has them
     rows: (V, k + 1, NUMBERS) of each tree, their geometry the same
@@ -189,7 +210,7 @@ def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted,
     inverted: whether I^-1 and I^-1 L_o are wanted, not I and L_o
     lanes: LANES
     values: (V, N, 9) to be filled: xx yy zz yz xz xy, and three of the momentum
-    reliable: (V,) to be filled: whether all can be relied on
+    reliable: (V,) to be filled: whether all rows of a tree are reliable
     """
     joints, count = len(parents), len(shapes)
     frames, total, centre = np.empty((joints + 1, FRAME * LANES)), np.empty(TOTAL * LANES), np.empty(6 * LANES)

@@ -1,35 +1,64 @@
-"""What is not known exactly of a motion: noise of its joints, errors of its body's inertias, momentum and start."""
+"""Errors of a motion's inputs: noise of its joints, errors of its body's inertias, momentum and start."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arguments import made_by
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.family import BodyFamily
+from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..letters import what_came
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.files.labels import NO_UNIT, amounts
 from ..shape_space.path_samples import columns_without_samples, path_samples
 from ..shape_space.summaries import body_summary
-from .inertia_errors import InertiaErrors
 from .recorded_momentum import UNKNOWNS, RecordedMomentum
 from .result_derivatives import described_by
 
-# Negative eigenvalues of a covariance, relative to the largest: printed digits.
-_NEGATIVE = 1e-9
-# Relative errors of a link: of its mass, of its centre (3), of its inertia.
-_OF_A_LINK = 5
+_NEGATIVE = 1e-9  # of the largest eigenvalue, for negative ones of a covariance: printed digits
+_OF_A_LINK = 5  # relative errors: of the mass, of the centre (3), of the inertia
 _LEAST_SHARE = 1e-3  # of its own mass and inertia that a link keeps in every draw
 
 
+@made_by("InertiaErrors(masses=0.05), for example")
+@dataclass(frozen=True, kw_only=True)
+class InertiaErrors:
+    """Relative standard deviations of the inertias of links, independent of each other.
+
+    Each is one number for all moving links, or a mapping from names of links.
+
+    Attributes
+    ----------
+    masses : of the mass, with which the rotational inertia grows
+    centres : of each coordinate of the centre of mass, in radii of gyration of the link
+    inertias : of the rotational inertia as a whole, the mass being as it is
+
+    Examples
+    --------
+    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
+    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
+    >>> bars = sp.uncertainty(motion, inertias=sp.InertiaErrors(masses=0.05))
+    >>> print(f"{bars.dynamic_phase:.4f} rad")
+    0.0107 rad
+    """
+
+    masses: float | Mapping[str, float] = 0.0
+    centres: float | Mapping[str, float] = 0.0
+    inertias: float | Mapping[str, float] = 0.0
+
+    __repr__ = short_repr
+
+
 class Inputs(NamedTuple):
-    """Covariances of what is not known exactly: variances (m,) or matrices (m, m); None where it is exact.
+    """Covariances of inexact inputs: variances (m,) or matrices (m, m); None where an input is exact.
 
     Attributes
     ----------
@@ -37,7 +66,7 @@ class Inputs(NamedTuple):
     links : of the relative errors of each frame of the body's chain: mass, centre (3), inertia
     momentum, attitude : (3, 3)
     start : (6, 6) of attitude and momentum together
-    fit : that these come from: what else is not known moves it, too
+    fit : source of these, which the other errors move, too
     """
 
     samples: Array | None
@@ -68,21 +97,23 @@ def inputs_of(
         numbers = through.count * path.n_shape
         given = _by_joint(body, joints) if isinstance(joints, str) else finite_array(joints, "joints")
         if given.shape in ((), (path.n_shape,)):
-            each = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
+            deviations = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
             if given.ndim == 0:
-                # The numbers of a quaternion go by half of its turn.
-                each[np.array(body.joint_units, dtype=str) == NO_UNIT] *= 0.5
+                # The components of a quaternion change by half its turn.
+                deviations[np.array(body.joint_units, dtype=str) == NO_UNIT] *= 0.5
             if given.ndim == 0 or isinstance(joints, str):
-                each[columns_without_samples(path)] = 0.0
-            samples = np.tile(each**2, through.count)
+                deviations[columns_without_samples(path)] = 0.0
+            samples = np.tile(deviations**2, through.count)
         else:
             samples = _covariance(given, "joints", numbers)
     links = None if inertias is None else _link_variances(body, inertias)
     fit, together = None, None
     if isinstance(start, RecordedMomentum):
         fit, together = start, start.covariance
-        own = np.array_equal(fit.momentum, motion.momentum)
-        if not (own and np.array_equal(fit.initial_attitude, motion.initial_attitude)):
+        if not (
+            np.array_equal(fit.momentum, motion.momentum)
+            and np.array_equal(fit.initial_attitude, motion.initial_attitude)
+        ):
             raise ShapeError("start: this fit has another momentum or start than the motion; its own is fit.motion")
     elif start is not None:
         together = _covariance(finite_array(start, "start"), "start", UNKNOWNS)
@@ -91,9 +122,9 @@ def inputs_of(
 
 
 def _by_joint(body: Body, text: str) -> Array:
-    """(n,) standard deviations from a text that says one of angles, of lengths or of both."""
-    said = amounts(text, "joints")
-    return np.array([said[joint.unit] for joint in body_summary(body).joints])
+    """Standard deviations (n,) from a text with one of angles, of lengths or of both."""
+    by_unit = amounts(text, "joints")
+    return np.array([by_unit[joint.unit] for joint in body_summary(body).joints])
 
 
 def _of_vector(given: ArrayLike | None, name: str) -> Array | None:
@@ -124,23 +155,23 @@ def _covariance(given: Array, name: str, numbers: int) -> Array:
 
 
 def _link_variances(body: Body, errors: InertiaErrors) -> Array:
-    """(5 (k + 1),)."""
+    """Variances of the relative errors of all links: (5 (k + 1),)."""
     deviations = np.zeros((len(body.chain.masses), _OF_A_LINK))
     for name, columns in (("masses", slice(0, 1)), ("centres", slice(1, 4)), ("inertias", slice(4, 5))):
         given = getattr(errors, name)
         if isinstance(given, Mapping):
-            for link, one in given.items():
+            for link, deviation in given.items():
                 if link not in body.chain.link_frames:
                     raise unknown_name(f"link of {body.name}", link, body.chain.link_frames)
                 frame, _ = body.chain.link_frames[link]
-                deviations[frame, columns] = _deviations(finite_array(one, f"{name} of link {link!r}", ()), name)
+                deviations[frame, columns] = _deviations(finite_array(deviation, f"{name} of link {link!r}", ()), name)
         else:
             deviations[:, columns] = _deviations(finite_array(given, name, ()), name)
     return (deviations**2).ravel()
 
 
 def by_relative_errors(body: Body, derivative: Array) -> Array:
-    """From derivatives by the ten parameters of each frame (r, 10 (k + 1)) to those by its five relative errors."""
+    """Derivatives by the five relative errors of each frame, from those by its ten parameters (r, 10 (k + 1))."""
     chain = body.chain
     jacobian = np.zeros((len(chain.masses), 10, _OF_A_LINK))
     entries = chain.inertias[:, [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
@@ -161,8 +192,8 @@ def _gyration(body: Body) -> Array:
 def drawn_bodies(body: Body, errors: Array) -> BodyFamily:
     """One body for each row of relative errors (draws, 5 (k + 1))."""
     chain = body.chain
-    each = errors.reshape(len(errors), -1, _OF_A_LINK)
-    growth = np.maximum(1.0 + each[..., 0], _LEAST_SHARE)
-    tensors = (growth * np.maximum(1.0 + each[..., 4], _LEAST_SHARE))[..., None, None] * chain.inertias
-    centres = chain.centres + _gyration(body)[:, None] * each[..., 1:4]
+    by_link = errors.reshape(len(errors), -1, _OF_A_LINK)
+    growth = np.maximum(1.0 + by_link[..., 0], _LEAST_SHARE)
+    tensors = (growth * np.maximum(1.0 + by_link[..., 4], _LEAST_SHARE))[..., None, None] * chain.inertias
+    centres = chain.centres + _gyration(body)[:, None] * by_link[..., 1:4]
     return BodyFamily(body, growth * chain.masses, centres, tensors)
