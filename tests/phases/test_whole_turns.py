@@ -25,7 +25,7 @@ def test_a_dive_is_counted_in_somersaults_and_twists():
     assert abs(np.degrees(sp.so3.angle(parts.total_rotation)) - 180.0) < 1e-6
     assert found.about_momentum == pytest.approx(float(parts.montgomery_phase) / (2.0 * np.pi))
     said = str(found)
-    for words in ("but for whole turns", "1.5000 somersaults", "horizontal part of the momentum", "least inertia"):
+    for words in ("does not count whole turns", "1.5000 somersaults", "horizontal part of the momentum", "least inertia"):
         assert words in said
     assert numbers["somersault_axes"]["up"]["by"] == "z, by default"
 
