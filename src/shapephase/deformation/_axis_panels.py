@@ -170,7 +170,7 @@ def _is_diagonal(tensors: Array, limit: Array) -> Mask:
 
 
 def is_diagonal_at(deformation: Deformation, panels: AxisPanels, points: Array, limit: Array) -> Mask:
-    """Whether the panels' frames make the inertia diagonal at points (K,) of [-1, 1]."""
+    """True where the panels' frames make the inertia diagonal at points (K,) of [-1, 1]."""
     times, inertia = inertia_in(deformation, panels.left, panels.right, points)
     local = exact_local_coordinate(times, panels.left[:, None], panels.right[:, None])
     norm = np.linalg.norm(panels.quats(local), axis=-1)

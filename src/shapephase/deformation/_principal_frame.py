@@ -305,7 +305,7 @@ def _continuous(deformation: Deformation, panels: AxisPanels) -> tuple[AxisPanel
 
 
 def _jumps_of_inertia(deformation: Deformation, panels: AxisPanels) -> Array:
-    """By how much, per trace, the inertia of inexact data jumps at the ends of each panel: (P,)."""
+    """Jumps of the inertia of inexact data at the ends of each panel, per trace: (P,)."""
     _, inertia = inertia_in(deformation, panels.left, panels.right, np.array([-1.0, 1.0]))
     jump = np.abs(inertia[1:, 0] - inertia[:-1, 1]).max(axis=(-1, -2))
     jump = np.where(jump < _SLOPPY, 2.0 * jump, 0.0)

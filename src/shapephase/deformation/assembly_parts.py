@@ -14,7 +14,7 @@ from ..shape_space.shape_path import ShapePath
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """What a part adds to the sums over all mass, about the frame's origin, at times (N,).
+    """Terms of a part in the sums over all mass, about the frame's origin, at times (N,).
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Part(Protocol):
 
     @property
     def path(self) -> ShapePath | None:
-        """What drives it; None: it is fixed in the frame."""
+        """Path of its motion; None: it is fixed in the frame."""
         ...
 
     def moments(self, times: Array, origin: Array, /) -> Moments:

@@ -158,7 +158,7 @@ class Deformation:
 
     @property
     def has_wheels(self) -> bool:
-        """Whether wheels store momentum."""
+        """True where wheels store momentum."""
         return self.description.stored_momentum(np.zeros(1)) is not None
 
     def inertia_rate(self, t: ArrayLike) -> Array:
@@ -202,7 +202,7 @@ class Deformation:
         return self.description.kinetic_energy(times.ravel(), turning).reshape(times.shape)[()]
 
     def triangle_defect(self) -> tuple[float, float]:
-        """By how much the triangle inequality fails at worst, relative to the largest moment, and when [s].
+        """Largest violation of the triangle inequality, relative to the largest moment, and its time [s].
 
         Negative where every inertia of [0, duration] is that of some distribution of mass. Found at 65 points
         between any two breaks and around the worst of them. Source: theory.md A4.

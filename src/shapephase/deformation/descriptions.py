@@ -219,7 +219,7 @@ class PrescribedDescription(UngaugedDescription):
     on_unphysical: str = "allow"
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for a lambda."""
+        """State to pickle. Raises LocalFunctionError for a lambda."""
         for function in (self.inertia, self.momentum):
             check_picklable(function, "a deformation")
         return self.__dict__
@@ -266,7 +266,7 @@ class ParticleDescription(UngaugedDescription):
     __post_init__ = lock_arrays
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for a lambda."""
+        """State to pickle. Raises LocalFunctionError for a lambda."""
         check_picklable(self.positions, "a deformation")
         return self.__dict__
 
@@ -359,7 +359,7 @@ class ParticlesAlong:
 
 @dataclass(frozen=True, eq=False)
 class SampledDescription(UngaugedDescription):
-    """What a file keeps of a deformation: its interpolant, the centre of mass, and what wheels store.
+    """A deformation kept in a file: its interpolant, the centre of mass, and the momentum that wheels store.
 
     Centre and stored momentum are Chebyshev coefficients on the interpolant's panels (P, n, 3).
     """

@@ -108,7 +108,7 @@ class _GaugeFunction:
     function: Callable[[Array], Any]
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled. Raises LocalFunctionError for a lambda."""
+        """State to pickle. Raises LocalFunctionError for a lambda."""
         check_picklable(self.function, "a gauge")
         return self.__dict__
 

@@ -142,7 +142,7 @@ class RotorDescription(UngaugedDescription):
 
 
 def mapping_of_joints(value: Any, name: str) -> Mapping[str, Any]:
-    """From joints to numbers; None: an empty one. Raises ShapeError."""
+    """A user's mapping from joints to numbers; None: an empty one. Raises ShapeError."""
     if value is None:
         return {}
     check_mapping(value, name, "joint -> number")

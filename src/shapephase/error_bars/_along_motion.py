@@ -123,7 +123,7 @@ def _factors(along: AlongMotion) -> Array:
 
 @lru_cache(maxsize=1)
 def _last_polynomials() -> Array:
-    """From values at the nodes to the coefficients of the last two Legendre polynomials: (2, m)."""
+    """Matrix from values at the nodes to the coefficients of the last two Legendre polynomials: (2, m)."""
     nodes, shares, _ = _rule()
     orders = np.arange(_NODES - 2, _NODES)
     values = np.polynomial.legendre.legvander(2.0 * nodes - 1.0, _NODES - 1)[:, orders]

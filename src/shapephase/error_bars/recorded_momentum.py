@@ -421,6 +421,6 @@ def _check_near(residuals: Array, times: Array) -> None:
 
 
 def _apart(residuals: Array) -> str:
-    """How far the reconstruction is from the recording, in words."""
+    """Distance from reconstruction to recording, in words."""
     spread = np.degrees(_spread(residuals))
     return f"the reconstruction stays {spread:.3g} degrees (rms) from {len(residuals)} attitudes"

@@ -1,4 +1,4 @@
-"""From I(t) and L_o(t) to rotations: sampling, interpolation, stepping, and how wrong the result may be.
+"""From I(t) and L_o(t) to rotations: sampling, interpolation, stepping, and error estimates.
 
 A deformation is sampled as Chebyshev series (`sampling`), which are stepped by an eighth-order formula
 (`integrate`); the linearised equation shows how errors grow. Knows nothing of bodies, shapes or phases.

@@ -51,7 +51,7 @@ _GOLDEN = 0.6180339887498949  # step of the shares of panels at which neighbours
 
 
 class Refinement(NamedTuple):
-    """How much stricter samples and steps are than at first: both times 2^(k/4), as whole numbers k."""
+    """Factors 2^(k/4) by which samples and steps are stricter than at first, as whole numbers k."""
 
     samples: int = 0
     steps: int = 0

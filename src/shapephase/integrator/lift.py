@@ -93,7 +93,7 @@ class Lift:
 
     @property
     def is_without_wheels(self) -> bool:
-        """Whether all of the motion's drift is that of the shape."""
+        """True where all of the motion's drift is that of the shape."""
         return self.interpolant is self.motion.interpolant
 
     def drift_of_wheels(self, times: Array) -> Array:

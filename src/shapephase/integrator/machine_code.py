@@ -114,7 +114,7 @@ def plain(array: Array) -> Array:
 
 
 def is_used() -> bool:
-    """Whether kernels are machine code now; imports Numba.
+    """True where kernels are machine code now; imports Numba.
 
     Always in a program that imports the library; in a command once much work is expected. Never with
     NUMBA_DISABLE_JIT=1, nor where Numba cannot be imported.
@@ -216,7 +216,7 @@ def _import_numba() -> None:
 
 
 def _compiler_locks() -> list[Any]:
-    """What a thread holds while it imports Numba or compiles: ours, and Numba's own once it is imported."""
+    """Locks of a thread that imports Numba or compiles: ours, and Numba's own once it is imported."""
     numba = sys.modules.get("numba.core.compiler_lock")
     return [_lock] if numba is None else [_lock, numba.global_compiler_lock]
 

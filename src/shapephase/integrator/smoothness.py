@@ -1,4 +1,4 @@
-"""What is known of a function of time before it is sampled."""
+"""Prior knowledge of a function of time, for its sampling."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ DEGREES = (8, 16, 32)  # of panels, nested; beyond the last a panel is halved
 
 @dataclass(frozen=True, eq=False)
 class Smoothness:
-    """What is known of a function of time before it is sampled, by which its first panels are chosen.
+    """Prior knowledge of a function of time, by which its first panels are chosen.
 
     Attributes
     ----------

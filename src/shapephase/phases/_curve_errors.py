@@ -45,7 +45,7 @@ class CurveArcs(NamedTuple):
         return cls(*np.broadcast_arrays(np.searchsorted(edges, starts), np.searchsorted(edges, ends)))
 
     def added(self, sums: Array) -> Array:
-        """What is added along each arc to sums since the start: (..., K + 1) -> (..., N)."""
+        """Growth along each arc of sums since the start: (..., K + 1) -> (..., N)."""
         return sums[..., self.last] - sums[..., self.first]
 
     def largest(self, sums: Array) -> Array:
@@ -152,7 +152,7 @@ class CurveErrors:
         )
 
     def _beside(self, arcs: CurveArcs, targets: Array, ends: Array) -> Array:
-        """What the turns do to the area beside the great circles: (2, B, N) [sr]."""
+        """Changes of the area beside the great circles by the turns: (2, B, N) [sr]."""
         # One and the cosine between them, without the cancellation near the opposite point.
         total = targets + ends
         versed = 0.5 * np.einsum("bni,bni->bn", total, total)[..., None]
@@ -239,7 +239,7 @@ class CurveErrors:
 
 
 def _unseen_of(lift: Lift) -> Array:
-    """What neither finer steps nor the perturbed series show of a lift: (1,) or (B,) [rad]."""
+    """Error of a lift that neither finer steps nor the perturbed series show: (1,) or (B,) [rad]."""
     return lift.perturbed.hidden + lift.rotation.rounding_error
 
 

@@ -109,7 +109,7 @@ def _examined(points: Array, shifts: Array) -> tuple[Mask, Mask, Mask, Array, Ar
 
 
 def _distance_of_origin(triangles: Array) -> Array:
-    """From plane triangles: (F, 3, 2) -> (F,), zero inside."""
+    """Distance of the origin from plane triangles: (F, 3, 2) -> (F,), zero inside."""
     start, end = triangles, triangles[:, [1, 2, 0]]
     side = end - start
     length = np.maximum(np.sum(side * side, axis=-1), 1e-300)

@@ -90,7 +90,7 @@ class MomentumLoop:
         points: Array,
         tolerance: float | None,
     ) -> list[_PartResult]:
-        """What a method gives for at most so many directions at a time, each time with samples of their own."""
+        """Results of a method for at most so many directions at a time, each time with samples of their own."""
         parts = [points[row : row + most] for row in range(0, len(points), most)]
         compute = map if self.executor is None else self.executor.map
         return list(compute(partial(_of_part, method, self.deformation, self.goal, magnitude, tolerance), parts))

@@ -180,7 +180,7 @@ def _followed(loop: MomentumLoop, orbit: _Orbit, target: float, span: float) -> 
 
 
 def _continues(orbit: _Orbit, following: _Orbit, guess: Array, moved: Array, span: float) -> bool:
-    """Whether a corrected orbit is the same branch: next to the guess, and moving on alike where the index changes."""
+    """True where a corrected orbit is on the branch: next to the guess, and moving on alike where the index changes."""
     length = float(np.linalg.norm(moved))
     if so3.angle_between(following.direction, guess) > 0.3 * length + 1e-3:
         return False
@@ -191,7 +191,7 @@ def _continues(orbit: _Orbit, following: _Orbit, guess: Array, moved: Array, spa
 
 
 def _ending(passed: list[_Orbit], lost: float) -> tuple[str, float | None]:
-    """What stopped a branch: a fold, or an unknown cause.
+    """End of a branch: a fold, or an unknown cause.
 
     At a fold the excess 2 - trace goes through zero evenly along the branch, and the magnitude has its extreme:
     magnitude = fold + a excess^2 + b excess^3, from the last three orbits.

@@ -103,7 +103,7 @@ class MomentumCurve(CurvePieces):
         return np.where(moving, dynamic[:, place], 0.0), np.where(moving, area[:, place], 0.0)
 
     def closing(self, times: Array) -> tuple[Array, Integers]:
-        """What the great circle back to the start adds to the area at each of these edges, and its jumps so far.
+        """Area by the great circle back to the start at each of these edges, and its jumps so far.
 
         (N,) -> (B, N) [sr], (B, N): the sum with what is `swept` grows continuously but for 4 pi, so many times, where
         the great circle passes the point opposite the reference.

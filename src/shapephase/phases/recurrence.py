@@ -274,7 +274,7 @@ class _Pieces:
         return np.linalg.norm(np.diff(self.points, axis=0), axis=-1)
 
     def apart(self, i: Integers, j: Integers) -> Mask:
-        """Whether the curve can have come back from one piece to a later one."""
+        """True where the curve can have come back from a piece to a later one."""
         return (self.along[j] - self.along[i] > _FAR) | (self.turned[j] - self.turned[i] > _TURNED)
 
     def cubic(self, piece: Integers, share: Array) -> tuple[Array, Array]:
@@ -358,7 +358,7 @@ def _on_curve(
 
 
 def _retraced(curve: _Curve, pieces: _Pieces, partner: Array, near: float) -> Array:
-    """From when to when the curve runs along earlier parts: (m, 2)."""
+    """Intervals of time in which the curve runs along earlier parts: (m, 2)."""
     on = np.concatenate([[False], partner >= 0.0, [False]])
     change = np.flatnonzero(on[1:] != on[:-1]).reshape(-1, 2)
     result = []

@@ -72,7 +72,7 @@ def _load(vectors, first, out):
 
 @inline
 def _by_rate(s, f, turning, lead, out, lanes):
-    """What a unit of a joint's rate adds to the angular momentum."""
+    """Angular momentum by a unit of a joint's rate."""
     for i in range(lanes):
         z0, z1, z2 = f[2 * LANES + i], f[5 * LANES + i], f[8 * LANES + i]
         o0, o1, o2 = f[9 * LANES + i], f[10 * LANES + i], f[11 * LANES + i]
@@ -161,7 +161,7 @@ def momentum_gradients(parents, turning, leads, body, mass, shapes, rates, spins
 
 @inline
 def _by_parameters(f, w, a, out, lanes):
-    """What a row adds to the sums by the ten parameters of a frame, the body turning at w: (10 LANES)."""
+    """Terms of the sums by a row for the ten parameters of a frame, the body turning at w: (10 LANES)."""
     for i in range(lanes):
         w0, w1, w2 = w[i], w[LANES + i], w[2 * LANES + i]
         a0, a1, a2 = a[i], a[LANES + i], a[2 * LANES + i]

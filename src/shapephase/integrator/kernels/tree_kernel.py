@@ -122,7 +122,7 @@ def add_link(body, frame, total, lanes):
 
 @inline
 def add_point(mass, frame, centre, total, lanes):
-    """What a link's mass adds as a point, seen from the centre of mass of the whole, which moves."""
+    """Terms of the sums by a link's mass as a point, seen from the centre of mass of the whole, which moves."""
     for i in range(lanes):
         x, y = frame[18 * LANES + i] - centre[i], frame[19 * LANES + i] - centre[LANES + i]
         z = frame[20 * LANES + i] - centre[2 * LANES + i]
