@@ -9,7 +9,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.errors import ShapePhaseError, UnknownNameError, WrongObjectError
-from shapephase.letters import what_came
+from shapephase.letters import value_text
 from support.example_calls import TRUSTING, example_calls, fault_of, trusts, works, wrong_things
 from support.long_runs import full_but
 from test_documentation import LONG, NAMES
@@ -61,13 +61,13 @@ def test_the_calls_of_an_example_are_found(name):
 
 def test_what_came_is_shown_in_a_line():
     path = sp.examples.kane_scher(0.3, 1.0)
-    assert what_came(path) == "a ShapePath"
-    assert what_came(sp.EulerTop) == "the class EulerTop itself"
-    assert what_came(sp.EulerTop.principal((1.0, 2.0, 3.0), (0.7, 0.2, 1.5))) == "an EulerTop"
-    assert what_came("cat") == "'cat'"
-    assert what_came(1.5) == "1.5"
-    assert "\n" not in what_came(np.eye(9))
-    assert len(what_came("x" * 5000)) <= 80
+    assert value_text(path) == "a ShapePath"
+    assert value_text(sp.EulerTop) == "the class EulerTop itself"
+    assert value_text(sp.EulerTop.principal((1.0, 2.0, 3.0), (0.7, 0.2, 1.5))) == "an EulerTop"
+    assert value_text("cat") == "'cat'"
+    assert value_text(1.5) == "1.5"
+    assert "\n" not in value_text(np.eye(9))
+    assert len(value_text("x" * 5000)) <= 80
 
 
 def test_a_name_that_is_none_is_shown_by_its_kind():

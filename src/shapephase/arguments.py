@@ -22,7 +22,7 @@ from .errors import (
     unknown_name,
 )
 from .inertia_tensor import inverse_inertia
-from .letters import article, what_came
+from .letters import article, value_text
 
 Made = TypeVar("Made")
 TIGHTEST_TOLERANCE = 1e-13  # [rad]; a few hundred roundings, which many steps add up to
@@ -66,7 +66,7 @@ def check_object(value: object, kind: str, name: str, *, or_kind: str = "", call
     if kind in names or or_kind in names:
         return
     came = type(value).__name__
-    shown = what_came(value) if isinstance(value, type) else f"{article(came)} {came}"
+    shown = value_text(value) if isinstance(value, type) else f"{article(came)} {came}"
     remedy = _INSIDE.get((came, kind)) or f"make it with {call or _MADE_BY.get(kind) or f'{kind}(...)'}"
     raise WrongObjectError(f"{name}: {article(kind)} {kind} is needed, got {shown}; {remedy}")
 
@@ -74,7 +74,7 @@ def check_object(value: object, kind: str, name: str, *, or_kind: str = "", call
 def check_function(value: object, name: str, what: str) -> None:
     """Raise WrongObjectError where an argument is not a function; `what` describes the function."""
     if not callable(value) or isinstance(value, type):
-        raise WrongObjectError(f"{name}: {what} is needed, got {what_came(value)}")
+        raise WrongObjectError(f"{name}: {what} is needed, got {value_text(value)}")
 
 
 def check_executor(value: object) -> None:
@@ -82,7 +82,7 @@ def check_executor(value: object) -> None:
     if value is not None and not (callable(getattr(value, "map", None)) and callable(getattr(value, "submit", None))):
         raise WrongObjectError(
             "executor: one of concurrent.futures, or of a cluster (client.get_executor()), is needed, got "
-            f"{what_came(value)}"
+            f"{value_text(value)}"
         )
 
 
@@ -108,45 +108,45 @@ def check_flag(value: object, name: str, *, allow_none: bool = False) -> None:
     """Raise ShapeError where an argument is not True or False (or None, where that is allowed)."""
     if not isinstance(value, bool | np.bool_) and not (allow_none and value is None):
         choices = "True, False or None" if allow_none else "True or False"
-        raise ShapeError(f"{name}: {choices} is needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: {choices} is needed, got {value_text(value)}")
 
 
 def check_pair(value: object, name: str, what: str) -> None:
     """Raise ShapeError where an argument is not a pair; `what` describes its entries."""
     if not isinstance(value, tuple | list | np.ndarray) or len(value) != 2:
-        raise ShapeError(f"{name}: {what} are needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: {what} are needed, got {value_text(value)}")
 
 
 def check_file_name(value: object, name: str) -> None:
     """Raise WrongObjectError where an argument is not the name of a file."""
     if not isinstance(value, str | os.PathLike):
-        raise WrongObjectError(f"{name}: the name of a file is needed, got {what_came(value)}")
+        raise WrongObjectError(f"{name}: the name of a file is needed, got {value_text(value)}")
 
 
 def check_text(value: object, name: str, what: str) -> None:
     """Raise WrongObjectError where an argument is not a text; `what` describes the text."""
     if not isinstance(value, str):
-        raise WrongObjectError(f"{name}: {what} is needed, got {what_came(value)}")
+        raise WrongObjectError(f"{name}: {what} is needed, got {value_text(value)}")
 
 
 def check_mapping(value: object, name: str, what: str) -> None:
     """Raise ShapeError where an argument is not a mapping; `what` describes keys and values."""
     if not isinstance(value, Mapping):
-        raise ShapeError(f"{name}: a mapping, {what}, is needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: a mapping, {what}, is needed, got {value_text(value)}")
 
 
 def names_argument(value: object, name: str, what: str) -> tuple[str, ...]:
     """Return a user's names as a tuple. Raises ShapeError for a single text, and for other entries than texts."""
     names = None if isinstance(value, str) or not isinstance(value, Iterable) else tuple(value)
     if names is None or not all(isinstance(one, str) for one in names):
-        raise ShapeError(f"{name}: {what} are needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: {what} are needed, got {value_text(value)}")
     return names
 
 
 def whole_argument(value: object, name: str, least: int) -> int:
     """Return a user's whole number, `least` or more. Raises ShapeError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {value_text(value)}")
     return int(value)
 
 
@@ -174,7 +174,7 @@ def breaks_argument(breaks: ArrayLike, duration: float) -> Array:
     if inner.ndim != 1:
         raise ShapeError(f"breaks: (M,) times are needed, got shape {inner.shape}")
     if np.any((inner < 0.0) | (inner > duration)):
-        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {what_came(inner)}")
+        raise TrajectoryError(f"breaks must lie in [0, {duration:.9g}] s, got {value_text(inner)}")
     return np.unique(np.concatenate([[0.0], inner, [duration]]))
 
 
@@ -182,10 +182,10 @@ def positive_argument(value: float, name: str = "duration", unit: str = "a time 
     """Return a user's number above 0, of a size that does not overflow. Raises TrajectoryError, ShapeError."""
     number = finite_array(value, name)
     if number.ndim or number <= 0.0:
-        raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {what_came(value)}")
+        raise TrajectoryError(f"{name}: {unit} above 0 is needed, got {value_text(value)}")
     if not LEAST_SIZE <= number <= LARGEST_SIZE:
         raise TrajectoryError(
-            f"{name}: {unit} from {LEAST_SIZE:g} to {LARGEST_SIZE:g} is needed, got {what_came(value)}"
+            f"{name}: {unit} from {LEAST_SIZE:g} to {LARGEST_SIZE:g} is needed, got {value_text(value)}"
         )
     return float(number)
 
@@ -208,7 +208,7 @@ def tolerance_argument(tolerance: float) -> float:
     if goal.ndim or not TIGHTEST_TOLERANCE <= goal <= LOOSEST_TOLERANCE:
         raise ShapeError(
             f"tolerance: a number from {TIGHTEST_TOLERANCE:g} to {LOOSEST_TOLERANCE:g} rad is needed, got "
-            f"{what_came(tolerance)}"
+            f"{value_text(tolerance)}"
         )
     return float(goal)
 
@@ -236,7 +236,7 @@ def threads_argument(threads: int | None) -> int | None:
     if threads is None:
         return None
     if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
-        raise ShapeError(f"threads: a whole number above 0 or None is needed, got {what_came(threads)}")
+        raise ShapeError(f"threads: a whole number above 0 or None is needed, got {value_text(threads)}")
     return int(threads)
 
 
@@ -264,7 +264,7 @@ def moments_argument(moments: ArrayLike) -> Array:
     if not values.min() > _LEAST_MOMENT_RATIO * values.max():
         raise ShapeError(
             "moments: three positive principal moments, the least above 1e-12 of the largest, are needed; got "
-            f"{what_came(values)}"
+            f"{value_text(values)}"
         )
     return values.copy()
 
@@ -295,7 +295,7 @@ def magnitude_argument(magnitude: float, *, allow_zero: bool = False) -> float:
     number = finite_array(magnitude, "magnitude", unit="kg m^2/s")
     if number.ndim or number < 0.0 or (number == 0.0 and not allow_zero):
         allowed = "0 or more" if allow_zero else "above 0"
-        raise ShapeError(f"magnitude: a number {allowed} kg m^2/s is needed, got {what_came(magnitude)}")
+        raise ShapeError(f"magnitude: a number {allowed} kg m^2/s is needed, got {value_text(magnitude)}")
     return float(number)
 
 
@@ -306,7 +306,7 @@ def magnitudes_argument(magnitudes: ArrayLike) -> Array:
     if values.ndim != 1 or not len(values) or values.min() < 0.0 or not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise ShapeError(
             "magnitudes: numbers of 0 or more kg m^2/s, all growing or all falling, are needed, got "
-            f"{what_came(magnitudes)}"
+            f"{value_text(magnitudes)}"
         )
     return values
 
@@ -365,7 +365,7 @@ def interval_argument(interval: tuple[float, float] | None, duration: float) -> 
     try:
         start, end = (float(time) for time in interval)
     except (TypeError, ValueError):
-        raise ShapeError(f"interval: two times, start and end [s], are needed, got {what_came(interval)}") from None
+        raise ShapeError(f"interval: two times, start and end [s], are needed, got {value_text(interval)}") from None
     if not 0.0 <= start < end <= duration * (1.0 + 1e-12):
         raise ShapeError(f"interval: 0 <= start < end <= {duration:.9g} s is needed, got ({start:.9g}, {end:.9g})")
     return start, min(end, duration)

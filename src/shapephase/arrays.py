@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import ShapeError
-from .letters import what_came
+from .letters import value_text
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -84,10 +84,10 @@ def real_array(value: Any, name: str, unit: str = "") -> Array:
     except ValueError as error:
         raise ShapeError(f"{name}: expected numbers{_in(unit)} in one rectangular array ({error})") from None
     if raw.dtype.kind not in "fiub":
-        came = what_came(value)
+        came = value_text(value)
         if isinstance(value, list | tuple | np.ndarray):
             odd = next((one for one in raw.flat if not isinstance(one, int | float | np.number)), None)
-            came = f"an array of {raw.dtype}" + ("" if odd is None else f" with {what_came(odd)} in it")
+            came = f"an array of {raw.dtype}" + ("" if odd is None else f" with {value_text(odd)} in it")
         raise ShapeError(f"{name}: expected real numbers{_in(unit)}, got {came}")
     return np.ascontiguousarray(raw, dtype=np.float64).reshape(raw.shape)
 

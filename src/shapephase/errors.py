@@ -10,7 +10,7 @@ import difflib
 from collections.abc import Iterable
 from pickle import PicklingError
 
-from .letters import what_came
+from .letters import value_text
 
 # Characters of a name up to which an error repeats all of it: no name that is meant has more.
 _LONGEST_NAME = 1000
@@ -543,5 +543,5 @@ def unknown_name(
     listed = ", ".join(choices) if choices else "none"
     if isinstance(name, str) and len(name) > _LONGEST_NAME:
         name = f"{name[:_LONGEST_SHOWN]}..."
-    shown = repr(name) if isinstance(name, str) else f"(a name is needed): {what_came(name)}"
+    shown = repr(name) if isinstance(name, str) else f"(a name is needed): {value_text(name)}"
     return error(f"unknown {kind} {shown}.{hint} Valid: {listed}")

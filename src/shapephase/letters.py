@@ -23,7 +23,7 @@ def shortened(name: str, longest: int) -> str:
     return f"{name[: longest - 1 - half]}…{name[len(name) - half :]}"
 
 
-def what_came(value: Any) -> str:
+def value_text(value: Any) -> str:
     """Describe a wrong argument in one line: a plain value itself, any other object by its class."""
     if isinstance(value, type):
         return f"the class {value.__name__} itself"

@@ -13,7 +13,7 @@ from ..arrays import Array, Integers
 from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
-from ..letters import what_came
+from ..letters import value_text
 from ..shape_space.files.flight import flight_choices
 from ..shape_space.free_fall import free_fall
 from ._noise import white_noise
@@ -96,7 +96,7 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
         return _part(times, centres, int(inside[0]), int(inside[-1]) + 1, "between the times given")
     number = flight_choices(flight, None, None).number if isinstance(flight, str) else None
     if not isinstance(flight, str) or (flight != "auto" and number is None):
-        raise ShapeError(f"flight: 'auto', 'auto:2', 'all' or two times are needed, got {what_came(flight)}")
+        raise ShapeError(f"flight: 'auto', 'auto:2', 'all' or two times are needed, got {value_text(flight)}")
     if centres is None:
         return _part(times, None, 0, len(times), "all of it: places are not given, and no fall can be looked for")
     usual = float(np.median(np.diff(times)))

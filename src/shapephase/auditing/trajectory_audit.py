@@ -15,7 +15,7 @@ from ..body.body import Body
 from ..deformation.deformation import articulated
 from ..error_bars.recorded_momentum import momentum_from_recording
 from ..errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import reconstruct
 from ..shape_space.interpolation import ball_columns, near_signs
 from ..shape_space.shape_path import ShapePath
@@ -116,7 +116,7 @@ def audit(
     given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else trajectories
     runs = list(given) if isinstance(given, Iterable) else []
     if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
-        raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {what_came(trajectories)}")
+        raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {value_text(trajectories)}")
     within = None if tolerance is None else positive_argument(tolerance, "tolerance", "a ratio")
     if every is not None:
         many = whole_argument(every, "every", 1)

@@ -23,7 +23,7 @@ from ..card_pictures import sticks_picture
 from ..display import Card, card_html, numbers, short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
-from ..letters import what_came
+from ..letters import value_text
 from ._centroidal_maps import (
     angular_map,
     angular_map_rate,
@@ -230,7 +230,7 @@ class Body(ShapeArguments):
             If a name is not one of `joint_names`.
         """
         if joints is not None and not isinstance(joints, Mapping):
-            raise ShapeError(f"joints by name are needed, a mapping such as {{'elbow': 0.3}}, got {what_came(joints)}")
+            raise ShapeError(f"joints by name are needed, a mapping such as {{'elbow': 0.3}}, got {value_text(joints)}")
         shape = self._joints.neutral.copy()
         for name, value in (joints or {}).items():
             coordinate = finite_array(value, f"joint {name}")
@@ -239,7 +239,7 @@ class Body(ShapeArguments):
                 shape[ball.columns] = coordinate / np.linalg.norm(coordinate)
                 continue
             if name in self.ball_joints:
-                raise ShapeError(f"ball joint {name}: a quaternion x, y, z, w is needed, got {what_came(value)}")
+                raise ShapeError(f"ball joint {name}: a quaternion x, y, z, w is needed, got {value_text(value)}")
             if coordinate.ndim:
                 raise ShapeError(f"joint {name}: one number is needed, got an array of shape {coordinate.shape}")
             shape[self.joint_index(name)] = coordinate
@@ -323,7 +323,7 @@ class Body(ShapeArguments):
         (('waist_pitch', 'waist_yaw'), (3, 2))
         """
         if not isinstance(couplings, Mapping):
-            came = what_came(couplings)
+            came = value_text(couplings)
             raise ShapeError(
                 f"couplings by joint are needed, such as {{'knee': Coupling.linear('hip', 0.5)}}, got {came}"
             )
@@ -332,7 +332,7 @@ class Body(ShapeArguments):
             if name not in joints:
                 raise unknown_name(f"joint of {self.name}", name, joints)
             if not isinstance(coupling, Coupling):
-                raise ShapeError(f"joint {name}: a Coupling is needed, got {what_came(coupling)}")
+                raise ShapeError(f"joint {name}: a Coupling is needed, got {value_text(coupling)}")
         changed = Body(self._model, self.name, {**self.couplings, **couplings})
         for kept in ("joint_orders", "base_joints", "base_angles", "base_slides", "length_unit"):
             setattr(changed, kept, getattr(self, kept))

@@ -16,7 +16,7 @@ from ..arguments import made_by, on_unphysical_argument
 from ..arrays import Array, Integers, Mask, finite_array, lock_arrays, read_only
 from ..errors import ShapeError, UnphysicalInertiaError, UnphysicalInertiaWarning, unknown_name
 from ..inertia_tensor import second_moment
-from ..letters import what_came
+from ..letters import value_text
 from .inertial_regressor import OUTPUTS, PARAMETERS, inertial_regressor
 from .joint_chain import GEOMETRY, JointChain, inertial_numbers
 from .link_tree import LEAST_MASS, MOST_MASS, NEGATIVE, ROUNDING, TRIANGLE
@@ -73,7 +73,7 @@ class BodyFamily(Sequence["Body"]):
         if isinstance(index, slice):
             return self.some(index)
         if not isinstance(index, int | np.integer):
-            raise ShapeError(f"a body of a family is family[0], family[1] ..., got family[{what_came(index)}]")
+            raise ShapeError(f"a body of a family is family[0], family[1] ..., got family[{value_text(index)}]")
         return self.body.with_frame_inertias(self.masses[index], self.centres[index], self.tensors[index])
 
     def some(self, rows: slice | Integers) -> BodyFamily:

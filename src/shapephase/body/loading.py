@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arguments import check_choice, positive_argument
 from ..errors import IgnoredElementWarning, ModelFileError, ShapeError, UnphysicalInertiaWarning, WrongObjectError
-from ..letters import what_came
+from ..letters import value_text
 from ._cross_check import check_against_engine, check_against_file
 from ._model_tree import checked_model, model_of
 from .body import Body
@@ -139,13 +139,13 @@ def loading_options(
     if root is not None:
         check_choice(root, "value of root", ("free",))
     if not isinstance(root_body, str | None):
-        raise WrongObjectError(f"root_body: the name of a body is needed, got {what_came(root_body)}")
+        raise WrongObjectError(f"root_body: the name of a body is needed, got {value_text(root_body)}")
     several = isinstance(packages, Sequence) and not isinstance(packages, str | bytes)
     if not several or not all(isinstance(folder, str | os.PathLike) and os.fspath(folder) for folder in packages):
-        raise WrongObjectError(f"packages: folders in a list are needed, got {what_came(packages)}")
+        raise WrongObjectError(f"packages: folders in a list are needed, got {value_text(packages)}")
     if not isinstance(xacro_args, Mapping | None) or not all(isinstance(name, str) for name in xacro_args or ()):
         raise WrongObjectError(
-            f'xacro_args: values by name are needed, such as {{"payload": "true"}}, got {what_came(xacro_args)}'
+            f'xacro_args: values by name are needed, such as {{"payload": "true"}}, got {value_text(xacro_args)}'
         )
     if length_unit is not None:
         length_unit = positive_argument(length_unit, "length_unit", "a number of metres")

@@ -14,7 +14,7 @@ from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
-from ..letters import what_came
+from ..letters import value_text
 from ._enclosure import ROUND_UP
 from ._energy_bounds import EnergyBounds, cross_product_bound
 from .regimes import Regime, RegimeCertificate
@@ -128,7 +128,7 @@ def azimuth_rate(moments: ArrayLike, momentum: ArrayLike, axis: int = 0) -> Arra
     """
     values, pi = finite_array(moments, "moments", (3,), unit="kg m^2"), finite_array(momentum, "momentum", (3,))
     if isinstance(axis, bool) or not isinstance(axis, int | np.integer) or axis not in (0, 1, 2):
-        raise ShapeError(f"axis: 0, 1 or 2 is needed, got {what_came(axis)}")
+        raise ShapeError(f"axis: 0, 1 or 2 is needed, got {value_text(axis)}")
     if np.any(values <= 0.0):
         raise ShapeError(f"moments: all must be above 0 [kg m^2], got {values.min():.6g}")
     second, third = (axis + 1) % 3, (axis + 2) % 3

@@ -16,7 +16,7 @@ from ..arrays import Array, finite_array
 from ..errors import ShapeError, TrajectoryError, UnphysicalInertiaError, WrongObjectError
 from ..inertia_tensor import second_moment
 from ..integrator.smoothness import Smoothness
-from ..letters import what_came
+from ..letters import value_text
 from ..refinement import least_over
 from ..shape_space.curves import Swings, most_swings
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, Words, path_function, side_by_side
@@ -293,7 +293,7 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     check_object(spacecraft, "RigidPart", "spacecraft")
     if not isinstance(parts, Sequence) or not all(hasattr(part, "path") and hasattr(part, "mass") for part in parts):
         raise WrongObjectError(
-            f"parts: several by moving_mass, boom or rigid_part are needed in a list, got {what_came(parts)}"
+            f"parts: several by moving_mass, boom or rigid_part are needed in a list, got {value_text(parts)}"
         )
     everything = (spacecraft, *parts)
     paths = [part.path for part in everything if part.path is not None]

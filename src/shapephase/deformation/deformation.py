@@ -31,7 +31,7 @@ from ..inertia_tensor import triangle_defect
 from ..integrator.interpolant import Interpolant
 from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler
-from ..letters import what_came
+from ..letters import value_text
 from ..refinement import least_over
 from ..shape_space.body_path import FamilyVariants, path_gap, users_route_along
 from ..shape_space.scan.function_scan import FunctionScan
@@ -515,7 +515,7 @@ def particles(
     """
     weights = finite_array(masses, "masses", (None,), unit="kg").copy()
     if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
-        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {what_came(weights)}")
+        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {value_text(weights)}")
     if callable(positions):
         if duration is None:
             raise ShapeError("positions given by a function need a duration [s]")
@@ -526,7 +526,7 @@ def particles(
         path = _sampled_positions(positions, weights)
         length = path.duration
         if duration is not None and abs(positive_argument(duration) - length) > 1e-9 * length:
-            raise ShapeError(f"duration: the samples last {length:.9g} s, got {what_came(duration)}; leave it out")
+            raise ShapeError(f"duration: the samples last {length:.9g} s, got {value_text(duration)}; leave it out")
         edges = np.union1d(path.breaks, breaks_argument(breaks, length))
         description = ParticleDescription(weights, ParticlePath(path), edges, path.swings.most)
     ends, _ = description.centred(np.array([0.0, length]))
@@ -546,7 +546,7 @@ def _sampled_positions(samples: tuple[ArrayLike, ArrayLike], masses: Array) -> S
     if not isinstance(samples, tuple | list) or len(samples) != 2:
         raise ShapeError(
             "positions: a function of times, or the pair times (K,), positions (K, m, 3) is needed, got "
-            f"{what_came(samples)}"
+            f"{value_text(samples)}"
         )
     points = finite_array(samples[1], "positions", (None, len(masses), 3), unit="m")
     if points.ndim != 3:

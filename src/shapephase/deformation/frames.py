@@ -24,7 +24,7 @@ from ..integrator.resolved import DEGREE
 from ..integrator.sampling import Sampler
 from ..integrator.smoothness import Smoothness
 from ..integrator.stepped import SteppedRotation
-from ..letters import what_came
+from ..letters import value_text
 from ..shape_space.scan.function_scan import ScannedFunction
 from ..shape_space.scan.scanning import scanned
 from ._principal_frame import Frames, principal_frames
@@ -79,7 +79,7 @@ class GivenFrames:
 def frames_argument(u: Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]] | None, breaks: Array) -> GivenFrames:
     """A user's U(t) with its rates, differentiated where it comes without. Raises as `in_gauge`."""
     if not callable(u) or isinstance(u, type):
-        raise ShapeError(f"a gauge u is a function of times, got {what_came(u)}")
+        raise ShapeError(f"a gauge u is a function of times, got {value_text(u)}")
     if _turns_of(u, breaks[:1])[1] is None:
         return _differentiated(u, breaks)
     frames = _TurnsWithRates(u)
@@ -199,7 +199,7 @@ def _differentiated(u: Callable[[Array], Any], breaks: Array) -> GivenFrames:
 def integrated_frames(breaks: Array, rates: Callable[[Array], ArrayLike], start: ArrayLike | None) -> GivenFrames:
     """U(t) from its body rates: the lift of a unit inertia that carries minus the rate. Raises as `in_gauge`."""
     if not callable(rates):
-        raise ShapeError(f"the body rates of a gauge are a function of times, got {what_came(rates)}")
+        raise ShapeError(f"the body rates of a gauge are a function of times, got {value_text(rates)}")
 
     def unit_body(times: Array) -> tuple[Array, Array]:
         return np.broadcast_to(np.eye(3), (len(times), 3, 3)), -_spins_of(rates, times)

@@ -21,7 +21,7 @@ from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.driven_attitude import DrivenAttitude, driven_attitude
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import PiecewisePolynomial
 from ..shape_space.shape_path import ShapePath
@@ -191,7 +191,7 @@ class _Swing:
             return np.zeros(count)
         given = np.asarray(self.effort(t, state[:count], state[count:]), dtype=np.float64)
         if given.shape != (count,) or not np.isfinite(given).all():
-            raise ShapeError(f"effort: {count} finite numbers are needed, at t = {t:.9g} s it gave {what_came(given)}")
+            raise ShapeError(f"effort: {count} finite numbers are needed, at t = {t:.9g} s it gave {value_text(given)}")
         return given
 
 
@@ -251,7 +251,7 @@ def _quintics(widths: Array, r: Array, v: Array, a: Array, s: Array, w: Array, b
 def _starts(body: Body, free: Mapping[str, Any]) -> Array:
     """Coordinates and rates at the start: (2, k). Raises UnknownNameError, ShapeError."""
     if not isinstance(free, Mapping) or not free:
-        raise ShapeError(f"free: joints with (coordinate, rate) at the start are needed, got {what_came(free)}")
+        raise ShapeError(f"free: joints with (coordinate, rate) at the start are needed, got {value_text(free)}")
     for name in free:
         if name not in body.joint_names:
             raise unknown_name(f"joint of {body.name}", name, body.joint_names)

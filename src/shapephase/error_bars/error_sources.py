@@ -15,7 +15,7 @@ from ..body.body import Body
 from ..body.family import BodyFamily
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.files.labels import NO_UNIT, amounts
 from ..shape_space.path_samples import columns_without_samples, path_samples
@@ -136,7 +136,7 @@ def _of_vector(given: ArrayLike | None, name: str) -> Array | None:
 
 def _deviations(given: Array, name: str) -> Array:
     if np.any(given < 0.0):
-        raise ShapeError(f"{name}: a standard deviation is not negative, got {what_came(given)}")
+        raise ShapeError(f"{name}: a standard deviation is not negative, got {value_text(given)}")
     return given
 
 

@@ -17,7 +17,7 @@ from ..arrays import Array, finite_array
 from ..deformation.deformation import Deformation, prescribed
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
-from ..letters import what_came
+from ..letters import value_text
 from ..rigid_body.euler_top import EulerTop
 
 _MAX_STRETCH = 2.0**30  # of the first guess of a time, up to which a function has to reach its target
@@ -190,7 +190,7 @@ def pulsation(amount: float = 0.5, period: float = 3.0) -> Scale:
     amount = number_argument(amount, "amount")
     frequency = 2.0 * np.pi / positive(period, "period", "s")
     if not 0.0 < abs(amount) < 1.0:
-        raise ShapeError(f"amount: a number between −1 and 1, not 0, is needed, got {what_came(amount)}")
+        raise ShapeError(f"amount: a number between −1 and 1, not 0, is needed, got {value_text(amount)}")
     return Scale(
         factor=lambda t: 1.0 / np.sqrt(1.0 + amount * np.sin(frequency * t)),
         clock=lambda t: t + 2.0 * amount / frequency * np.sin(0.5 * frequency * t) ** 2,
@@ -302,5 +302,5 @@ def positive(value: float, name: str, unit: str) -> float:
     """A user's number, checked to be above 0. Raises ShapeError."""
     number = finite_array(value, name, unit=unit)
     if number.ndim or number <= 0.0:
-        raise ShapeError(f"{name}: a number above 0 [{unit}] is needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: a number above 0 [{unit}] is needed, got {value_text(value)}")
     return float(number)

@@ -24,7 +24,7 @@ from ..body.loading import load_body
 from ..deformation.assemblies import assembly, moving_mass, rigid_part
 from ..deformation.deformation import articulated, prescribed, rigid
 from ..errors import ShapeError, TrajectoryError, unknown_name
-from ..letters import what_came
+from ..letters import value_text
 from ..rigid_body.euler_top import EulerTop
 from ..shape_space.shape_path import ShapePath
 from ._closed_form_motions import (
@@ -234,14 +234,14 @@ def printed_antenna(
     'ABOUT_LARGEST'
     """
     if not isinstance(axis, int | np.integer) or axis not in (1, 3):
-        raise ShapeError(f"axis: 1 or 3 is needed, got {what_came(axis)}")
+        raise ShapeError(f"axis: 1 or 3 is needed, got {value_text(axis)}")
     usual, usual_momentum = (1.45, (0.8, 0.1, 0.6)) if axis == 1 else (2.4, (0.3, 0.4, 0.9))
     start = moments_argument((1.0, 1.5, 2.0) if moments is None else moments)
     end = start.copy()
     end[axis - 1] = positive(usual if grown is None else grown, "grown", "kg m^2")
     if end[axis - 1] <= start[axis - 1]:
         raise ShapeError(
-            f"grown: above the moment at the start, {start[axis - 1]:g} kg m^2, is needed, got {what_came(grown)}"
+            f"grown: above the moment at the start, {start[axis - 1]:g} kg m^2, is needed, got {value_text(grown)}"
         )
     return _extension(
         lambda share: start + (end - start) * share[:, None],
@@ -305,7 +305,7 @@ def dipole_antenna(
     [1.   3.25]
     """
     if not isinstance(axis, int | np.integer) or axis not in (1, 2, 3):
-        raise ShapeError(f"axis: 1, 2 or 3 is needed, got {what_came(axis)}")
+        raise ShapeError(f"axis: 1, 2 or 3 is needed, got {value_text(axis)}")
     bare = moments_argument(hub)
     added = 2.0 * positive(tip_mass, "tip_mass", "kg") * positive(reach, "reach", "m") ** 2 * np.ones(3)
     added[axis - 1] = 0.0

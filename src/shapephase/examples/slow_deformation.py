@@ -17,7 +17,7 @@ from ..arguments import check_object, moments_argument, number_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, unknown_name
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body import separatrix_solid_angle
 from ..rigid_body.euler_top import EulerTop
@@ -180,7 +180,7 @@ def orbit_of_area(moments: ArrayLike, magnitude: float, solid_angle: float) -> E
     nearest, farthest = _END_MARGIN, 0.5 * np.pi - _END_MARGIN
     if not orbit(nearest).solid_angle < solid_angle < orbit(farthest).solid_angle:
         raise ShapeError(
-            f"solid_angle: the orbits about axis 3 have areas from 0 to {limit:.9g} sr, got {what_came(solid_angle)}"
+            f"solid_angle: the orbits about axis 3 have areas from 0 to {limit:.9g} sr, got {value_text(solid_angle)}"
         )
     tilt = root_scalar(lambda x: orbit(x).solid_angle - solid_angle, bracket=(nearest, farthest), xtol=1e-15)
     return orbit(float(tilt.root))
@@ -283,7 +283,7 @@ def first_loop(motion: Motion, axis: int = 3) -> float:
     check_object(motion, "Motion", "motion")
     if motion.batch or not isinstance(axis, int | np.integer) or axis not in (1, 2, 3):
         raise ShapeError(
-            f"one motion and axis 1, 2 or 3 are needed, got a batch {motion.batch} and axis {what_came(axis)}"
+            f"one motion and axis 1, 2 or 3 are needed, got a batch {motion.batch} and axis {value_text(axis)}"
         )
     across = np.array([axis, axis + 1]) % 3
 

@@ -14,7 +14,7 @@ from ..arguments import number_argument, positive_argument
 from ..arrays import Array, finite_array, real_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
-from ..letters import what_came
+from ..letters import value_text
 
 RATES_AT_ENDS = ("zero", "periodic", "free")
 LIMIT_UNITS = {
@@ -94,7 +94,7 @@ class Goal:
         if self.pointing is not None:
             self._keep("pointing", _unit_pairs(self.pointing))
         if self.link is not None and (self.pointing is None or not isinstance(self.link, str)):
-            raise ShapeError(f"link: the name of the one whose axis `pointing` has, got {what_came(self.link)}")
+            raise ShapeError(f"link: the name of the one whose axis `pointing` has, got {value_text(self.link)}")
         if self.symmetry is not None:
             self._keep("symmetry", _symmetry_argument(self.symmetry))
             if self.winds or (self.pointing is not None and np.ndim(self.symmetry) == 1):
@@ -102,7 +102,7 @@ class Goal:
         axis = finite_array(self.twist_axis, "twist_axis", (3,))
         if axis.ndim != 1 or not axis.any():
             raise ShapeError(
-                f"twist_axis: one vector (3,) that is not zero is needed, got {what_came(self.twist_axis)}"
+                f"twist_axis: one vector (3,) that is not zero is needed, got {value_text(self.twist_axis)}"
             )
         self._keep("twist_axis", axis)
 
@@ -165,7 +165,7 @@ class Limits:
     def __post_init__(self) -> None:
         """Check what is given and keep it as read-only arrays."""
         if not isinstance(self.joint_limits, bool | np.bool_):
-            raise ShapeError(f"joint_limits: True or False is needed, got {what_came(self.joint_limits)}")
+            raise ShapeError(f"joint_limits: True or False is needed, got {value_text(self.joint_limits)}")
         for name, (unit, stated) in LIMIT_UNITS.items():
             self._check(name, unit, ("body",) if stated else ())
 
@@ -181,7 +181,7 @@ class Limits:
         limits = finite_array(given, name, unit=unit)
         if limits.ndim > 1 or np.any(limits <= 0.0):
             raise ShapeError(
-                f"{name}: one number above 0, or one for each of the joints, is needed, got {what_came(given)}"
+                f"{name}: one number above 0, or one for each of the joints, is needed, got {value_text(given)}"
             )
         object.__setattr__(self, name, _read_only(limits))
 
@@ -222,7 +222,7 @@ class Waypoint:
             shape = np.array(finite_array(self.shape, "waypoint"))
             if shape.ndim != 1 or not len(shape):
                 raise ShapeError(
-                    f"waypoint: one coordinate for each joint, or names with coordinates, got {what_came(self.shape)}"
+                    f"waypoint: one coordinate for each joint, or names with coordinates, got {value_text(self.shape)}"
                 )
             shape.flags.writeable = False
             object.__setattr__(self, "shape", shape)
@@ -294,16 +294,16 @@ def _unit_pairs(pointing: ArrayLike) -> Array:
     if pairs.ndim not in (2, 3) or pairs.shape[-2:] != (2, 3) or not pairs.size or not np.all(lengths > 0.0):
         raise ShapeError(
             "pointing: an axis of the base and a direction in inertial axes, two vectors (3,) that are not zero, are "
-            f"needed, or several such pairs (k, 2, 3), got {what_came(pointing)}"
+            f"needed, or several such pairs (k, 2, 3), got {value_text(pointing)}"
         )
     return pairs / lengths[..., None]
 
 
 def _check_count(value: Any, name: str, least: int, most: int | None = None) -> None:
     if not isinstance(value, int | np.integer) or value < least:
-        raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: a whole number, {least} or more, is needed, got {value_text(value)}")
     if most is not None and value > most:
-        raise ShapeError(f"{name}: a whole number, up to {most}, is needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: a whole number, up to {most}, is needed, got {value_text(value)}")
 
 
 def _read_only(array: Array) -> Array:
@@ -323,7 +323,7 @@ def _symmetry_argument(value: ArrayLike) -> Array:
     if array.ndim not in (2, 3) or array.shape[-2:] != (3, 3) or not len(array):
         raise ShapeError(
             "symmetry: an axis (3,) that is not zero, or rotations of the body, (3, 3) or (k, 3, 3), are needed, got "
-            f"{what_came(value)}"
+            f"{value_text(value)}"
         )
     return _group(so3.rotation_argument(array, "symmetry").reshape(-1, 3, 3))
 

@@ -18,7 +18,7 @@ from ..integrator.closing import areas_back, far_references, jumps_between
 from ..integrator.curve_integrals import CurveIntegrals, curve_integrals
 from ..integrator.lift import Lift
 from ..integrator.stepped import SteppedRotation
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 
 _MOST_STEPS = 20_000  # along the motion, for memory and time: a frame that needs more is refused
@@ -175,7 +175,7 @@ def momentum_curve(
     """
     if not isinstance(gauge, str) and (not callable(gauge) or isinstance(gauge, type)):
         raise ShapeError(
-            f"gauge: one of {', '.join(GAUGES)}, link:NAME or a function of times is needed, got {what_came(gauge)}"
+            f"gauge: one of {', '.join(GAUGES)}, link:NAME or a function of times is needed, got {value_text(gauge)}"
         )
     lift = motion.lift_with_errors if gauge == "horizontal" else None
     # The integrator's steps are short enough for the base's frame and for the lift, which is stepped alike.

@@ -17,7 +17,7 @@ from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import inverse_inertia
 from ..integrator.closing import areas_back, closed_curves
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
@@ -339,7 +339,7 @@ def arc_phases(motion: Motion, times: ArrayLike, gauge: Gauge = "horizontal") ->
     check_object(motion, "Motion", "motion")
     cuts = times_argument(finite_array(times, "times", (None,), unit="s"), motion.duration)
     if cuts.ndim != 1 or len(cuts) < 2 or np.any(np.diff(cuts) <= 0.0):
-        raise ShapeError(f"times: two or more that increase are needed, (K + 1,), got {what_came(cuts)}")
+        raise ShapeError(f"times: two or more that increase are needed, (K + 1,), got {value_text(cuts)}")
     if len(motion.parts) > 1:
         return by_parts(motion, lambda part: arc_phases(part, times, gauge), shared=("times",))
     curve = momentum_curve(motion, gauge, times=cuts)

@@ -17,7 +17,7 @@ from ..arrays import Array, Integers, Mask, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.interpolant import Interpolant
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 
 _LONGEST = 0.05  # [rad] length of a piece of the curve: its cubic distinguishes two passages through it
@@ -103,7 +103,7 @@ def momentum_returns(motion: Motion, gap: float = 0.1) -> Returns:
     check_object(motion, "Motion", "motion")
     largest = finite_array(gap, "gap", unit="rad")
     if largest.ndim or not 0.0 < largest <= np.pi:
-        raise ShapeError(f"gap: an angle above 0, up to pi [rad] is needed, got {what_came(gap)}")
+        raise ShapeError(f"gap: an angle above 0, up to pi [rad] is needed, got {value_text(gap)}")
     curve = _Curve.of(motion)
     times = _resolved(curve, motion)
     directions, rates = curve.at(times)

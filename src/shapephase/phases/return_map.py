@@ -24,7 +24,7 @@ from ..display import Card, card_html, card_text, numbers, short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
 from ._loop_map import MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis
@@ -236,7 +236,7 @@ def fixed_points(
     magnitude = magnitude_argument(magnitude)
     if not isinstance(most_directions, (int, np.integer)) or most_directions < _FEWEST_DIRECTIONS:
         raise ShapeError(
-            f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {what_came(most_directions)}"
+            f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {value_text(most_directions)}"
         )
     loop = MomentumLoop.of(deformation, _REACHABLE[0] if tolerance is None else tolerance, executor)
     looser = _REACHABLE[1:] if tolerance is None else ()

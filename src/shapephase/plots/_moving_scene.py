@@ -22,7 +22,7 @@ from ..deformation.frames import principal_frames
 from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError, unknown_name
 from ..inertia_tensor import principal_axes, second_moment
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 
 _MAX_FRAMES = 10_000  # five minutes at 30 a second: a larger page is too slow for a browser
@@ -165,7 +165,7 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     if motion.batch:
         raise ShapeError(f"one motion can be shown, this is a batch of {motion.batch}; reconstruct one of them")
     if isinstance(frames, bool) or not isinstance(frames, int | np.integer) or not 2 <= frames <= _MAX_FRAMES:
-        raise ShapeError(f"frames: a whole number from 2 to {_MAX_FRAMES} is needed, got {what_came(frames)}")
+        raise ShapeError(f"frames: a whole number from 2 to {_MAX_FRAMES} is needed, got {value_text(frames)}")
     times = np.linspace(0.0, motion.duration, int(frames))
     description = _ungauged(motion.deformation)
     base = np.broadcast_to(np.eye(4), (len(times), 4, 4)).copy()

@@ -14,7 +14,7 @@ from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.drawing.appearance import visuals
 from ..errors import ShapeError
-from ..letters import what_came
+from ..letters import value_text
 from ..shape_space.curvature_field import curvature_on_plane
 from ._moving_scene import shapes_by_link
 from .page import Page
@@ -69,7 +69,7 @@ def explore(body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None,
         or len(joints) != 2
         or joints[0] == joints[1]
     ):
-        raise ShapeError(f"joints: two different joints of {body.name} are needed, got {what_came(joints)}")
+        raise ShapeError(f"joints: two different joints of {body.name} are needed, got {value_text(joints)}")
     places = body.joint_index(joints[0]), body.joint_index(joints[1])
     for name in joints:
         if body.joint_units[body.joint_index(name)] not in _END:

@@ -12,7 +12,7 @@ from .. import so3
 from ..arguments import number_argument
 from ..arrays import Array, Integers, finite_array
 from ..errors import ShapeError
-from ..letters import what_came
+from ..letters import value_text
 from ..rigid_body.geodesics import (
     SurfaceOfRevolution,
     conjugate_locus,
@@ -144,7 +144,7 @@ def plot_ellipsoid_locus(
     if aspect == 1.0:
         raise ShapeError("aspect: on a sphere the caustics are single points; give another one than 1")
     if not isinstance(orders, Sequence | np.ndarray) or not len(orders):
-        raise ShapeError(f"orders: at least one is needed, such as (1, 2), got {what_came(orders)}")
+        raise ShapeError(f"orders: at least one is needed, such as (1, 2), got {value_text(orders)}")
     curves = []
     for order in orders:
         locus = conjugate_locus(surface, _POINTS, order, latitude)
@@ -199,7 +199,7 @@ def plot_caustic(
     if getattr(ax, "name", "") != "3d":
         raise ShapeError('ax: three-dimensional axes are needed; make them with projection="3d"')
     if isinstance(circles, bool) or not isinstance(circles, int | np.integer) or circles < 2:
-        raise ShapeError(f"circles: a whole number from 2 on, got {what_came(circles)}")
+        raise ShapeError(f"circles: a whole number from 2 on, got {value_text(circles)}")
     if finite_array(view, "view", (2,), unit="deg").ndim != 1:
         raise ShapeError("view: elevation and azimuth [deg] are needed")
     from matplotlib.patches import Patch
@@ -236,7 +236,7 @@ def plot_caustic(
 def _evenly_chosen(count: int, chosen: int) -> Integers:
     """`chosen` of the indices below `count`, evenly spread, the ends left out."""
     if isinstance(chosen, bool) or not isinstance(chosen, int | np.integer) or not 0 <= chosen <= count:
-        raise ShapeError(f"geodesics: a whole number from 0 to {count} is needed, got {what_came(chosen)}")
+        raise ShapeError(f"geodesics: a whole number from 0 to {count} is needed, got {value_text(chosen)}")
     return np.linspace(0, count - 1, chosen + 2)[1:-1].astype(np.int64)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..arguments import check_file_name
 from ..errors import ShapeError
 from ..files import write_whole
-from ..letters import what_came
+from ..letters import value_text
 from .pages.video import FILM_SIZE, check_video, frame_times, write_video
 
 _CELL_HEIGHT = 520  # [px] in a notebook
@@ -118,7 +118,7 @@ def playing_speed(duration: float, speed: float | None) -> float:
         return duration / min(max(duration, _MIN_PLAYING), _MAX_PLAYING)
     if not (isinstance(speed, int | float | np.floating | np.integer) and 0.0 < speed < math.inf):
         raise ShapeError(
-            f"speed: seconds of motion in a second of playing, above 0, are needed, got {what_came(speed)}"
+            f"speed: seconds of motion in a second of playing, above 0, are needed, got {value_text(speed)}"
         )
     return float(speed)
 

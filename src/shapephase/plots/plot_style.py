@@ -20,7 +20,7 @@ from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import MissingExtraError, ShapeError
 from ..files import write_whole
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
@@ -90,7 +90,7 @@ def column_axes(height: float = 2.6, *, projection: str | None = None) -> Axes:
     if projection is not None:
         check_choice(projection, "projection", get_projection_names())
     if not inches > 0.0:
-        raise ShapeError(f"height: a length above 0 [in] is needed, got {what_came(height)}")
+        raise ShapeError(f"height: a length above 0 [in] is needed, got {value_text(height)}")
     return Figure(figsize=(COLUMN, inches), layout="constrained").add_subplot(projection=projection)
 
 

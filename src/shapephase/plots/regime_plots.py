@@ -12,7 +12,7 @@ from ..arrays import Array
 from ..bounds.all_bounds import Bound
 from ..bounds.regimes import CrownRegion
 from ..errors import ShapeError, WrongObjectError
-from ..letters import what_came
+from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, SKY, SMALL, VERMILION, check_flat_axes, one_motion
@@ -112,7 +112,7 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
     """
     check_flat_axes(ax)
     if not isinstance(bounds, Sequence) or not all(isinstance(bound, Bound) for bound in bounds):
-        raise WrongObjectError(f"bounds: those of bounds.bounds(motion) are needed, got {what_came(bounds)}")
+        raise WrongObjectError(f"bounds: those of bounds.bounds(motion) are needed, got {value_text(bounds)}")
     if not bounds:
         raise ShapeError("bounds: one or more are needed to be drawn, got none")
     places = np.arange(len(bounds))[::-1]

@@ -12,7 +12,7 @@ from ..arguments import check_object, whole_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..errors import ShapeError, unknown_name
-from ..letters import what_came
+from ..letters import value_text
 from ..shape_space.body_path import in_joint_order
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
@@ -72,7 +72,7 @@ def plot_shape_path(
     values = route.shape(t)
     span = np.ptp(values, axis=0)
     if joints is not None and (isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray)):
-        raise ShapeError(f"joints: several names or numbers in a list are needed, got {what_came(joints)}")
+        raise ShapeError(f"joints: several names or numbers in a list are needed, got {value_text(joints)}")
     chosen = np.flatnonzero(span > _AT_REST) if joints is None else np.array([_place(j, names) for j in joints], int)
     if not names:
         raise ShapeError("the body has no joints to draw; the figure 'attitude' shows how it turns")
@@ -351,7 +351,7 @@ def _direction(axis: str | ArrayLike | None, field: Array) -> tuple[Array, str]:
     direction = finite_array(axis, "axis", (3,))
     norm = float(np.linalg.norm(direction))
     if direction.ndim != 1 or not norm:
-        raise ShapeError(f"axis: one direction (3,), not zero, is needed, got {what_came(direction)}")
+        raise ShapeError(f"axis: one direction (3,), not zero, is needed, got {value_text(direction)}")
     unit = direction / norm
     return unit, "along ({:.2g}, {:.2g}, {:.2g})".format(*unit).replace("-", "−")
 
@@ -381,7 +381,7 @@ def _named(path: ShapePath, body: Body | None) -> tuple[ShapePath, tuple[str, ..
 
 def _pair(joints: Sequence[str | int], names: Sequence[str]) -> tuple[int, int]:
     if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
-        raise ShapeError(f"joints: two joints are needed, got {what_came(joints)}")
+        raise ShapeError(f"joints: two joints are needed, got {value_text(joints)}")
     i, j = (_place(joint, names) for joint in joints)
     if i == j:
         raise ShapeError(f"joints: two different joints are needed, got {names[i]} twice")

@@ -12,7 +12,7 @@ from ..arguments import breaks_argument, check_choice, check_function
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import ShapeError
-from ..letters import what_came
+from ..letters import value_text
 
 AXES = ("body", "space")
 
@@ -88,7 +88,7 @@ class ExternalTorque:
         given = np.asarray(self.function(state), dtype=np.float64)
         if given.shape != (3,) or not np.isfinite(given).all():
             raise ShapeError(
-                f"torque: three finite numbers [N m] are needed, at t = {state.time:.9g} s it gave {what_came(given)}"
+                f"torque: three finite numbers [N m] are needed, at t = {state.time:.9g} s it gave {value_text(given)}"
             )
         return given if self.axes == "body" else state.attitude.T @ given
 

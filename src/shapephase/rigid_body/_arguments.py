@@ -9,7 +9,7 @@ from .. import so3
 from ..arguments import inertia_argument, number_argument
 from ..arrays import Array, Mask, finite_array
 from ..errors import ShapeError, ShapePhaseError, SingularInertiaError
-from ..letters import what_came
+from ..letters import value_text
 
 _UNIT_LENGTH = 1e-6  # relative: six written digits
 _MOST_TURNS = 1e12  # turns of the body [1]: beyond them twelve of the sixteen digits of the phase are lost
@@ -75,14 +75,14 @@ def above_zero(value: ArrayLike, name: str, unit: str = "") -> float:
     """One number above 0."""
     number = number_argument(value, name, unit)
     if not number > 0.0:
-        raise ShapeError(f"{name}: one number above 0{f' {unit}' if unit else ''} is needed, got {what_came(value)}")
+        raise ShapeError(f"{name}: one number above 0{f' {unit}' if unit else ''} is needed, got {value_text(value)}")
     return number
 
 
 def axis_index(axis: object) -> int:
     """Index of a principal axis: 0, 1 or 2."""
     if not isinstance(axis, int | np.integer) or axis not in (0, 1, 2):
-        raise ShapeError(f"axis: one of 0, 1, 2 is needed, got {what_came(axis)}")
+        raise ShapeError(f"axis: one of 0, 1, 2 is needed, got {value_text(axis)}")
     return int(axis)
 
 

@@ -22,7 +22,7 @@ from ..arrays import Array, common_batch, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
-from ..letters import what_came
+from ..letters import value_text
 from ._arguments import above_zero, unit_vectors
 
 _FLOOR = 3e-14  # relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14
@@ -160,7 +160,7 @@ class HeavyTop:
             start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
         time, requested = above_zero(duration, "duration", "s"), number_argument(tolerance, "tolerance", "rad")
         if not 1e-12 <= requested <= 1e-2:
-            raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {what_came(tolerance)}")
+            raise ShapeError(f"tolerance: one number from 1e-12 to 1e-2 rad is needed, got {value_text(tolerance)}")
         own = np.broadcast_shapes(self.inertia.shape[:-2], self.mgl.shape, self.chi.shape[:-1])
         shape = common_batch(top=own, momentum=body.shape[:-1], attitude=start.shape[:-2])
         start, body = np.broadcast_to(start, (*shape, 3, 3)), np.broadcast_to(body, (*shape, 3))

@@ -33,7 +33,7 @@ from ..arrays import Array, common_shape, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
-from ..letters import what_came
+from ..letters import value_text
 from ._arguments import check_entries
 
 _FAINT = 1e-140  # of the largest component of a momentum: squares of smaller ones underflow
@@ -276,7 +276,7 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
     else:
         order = np.asarray(axes)
         if order.shape != (3,) or sorted(order.tolist()) != [0, 1, 2]:
-            raise ShapeError(f"axes: got {what_came(axes)}; expected an order of 0, 1, 2")
+            raise ShapeError(f"axes: got {value_text(axes)}; expected an order of 0, 1, 2")
     first, second, third = (int(i) for i in order)
     inverse = [1 / Fraction(float(value)) for value in values]
     by_first, by_second = inverse[first] - inverse[third], inverse[second] - inverse[third]

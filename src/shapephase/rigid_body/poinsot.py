@@ -20,7 +20,7 @@ from ..arguments import check_object, number_argument, whole_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
-from ..letters import what_came
+from ..letters import value_text
 from ._arguments import above_zero
 from .euler_top import EulerTop
 from .portrait import inverse_difference
@@ -141,7 +141,7 @@ class Poinsot:
         Raises ShapeError if side is not 1 or -1.
         """
         if not isinstance(side, int | np.integer) or side not in (1, -1):
-            raise ShapeError(f"side: expected 1 or -1, got {what_came(side)}")
+            raise ShapeError(f"side: expected 1 or -1, got {value_text(side)}")
         ellipsoid = self.ellipsoid(t)
         direction = np.linalg.solve(ellipsoid, np.broadcast_to(self.normal, ellipsoid.shape[:-1])[..., None])[..., 0]
         length = np.sqrt(self.distance * self.top.magnitude / np.sum(direction * self.normal, axis=-1, keepdims=True))

@@ -15,7 +15,7 @@ from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
-from ..letters import what_came
+from ..letters import value_text
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     rounding = 1e-12
     if levels.ndim != 1 or np.any((levels < lowest * (1.0 - rounding)) | (levels > highest * (1.0 + rounding))):
         raise ShapeError(
-            f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {what_came(levels)}"
+            f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {value_text(levels)}"
         )
     count = whole_argument(count, "count", 2)
     phase = np.linspace(0.0, 2.0 * np.pi, count)

@@ -19,7 +19,7 @@ from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
-from ..letters import what_came
+from ..letters import value_text
 from ._arguments import one_tensor
 from .euler_top import EulerTop
 
@@ -194,7 +194,7 @@ def spin_in_space(inertia: ArrayLike, momentum: ArrayLike, disturbed: ArrayLike)
     steady = steady_rotation(inertia, momentum)
     vector = vector_argument(disturbed, "disturbed", unit="kg m^2/s")
     if not vector.any():
-        raise ShapeError(f"disturbed: one momentum (3,) other than zero is needed, got {what_came(disturbed)}")
+        raise ShapeError(f"disturbed: one momentum (3,) other than zero is needed, got {value_text(disturbed)}")
     axis = steady.momentum / np.linalg.norm(steady.momentum)
     top, stable = EulerTop(inertia, vector), steady.verdict == "stable"
     return SpinInSpace(

@@ -31,7 +31,7 @@ from ..arguments import moments_argument
 from ..arrays import Array, Integers, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
-from ..letters import what_came
+from ..letters import value_text
 from ..roots import bracketed_root
 from ..sphere import gauss_nodes
 from ._arguments import above_zero
@@ -336,7 +336,7 @@ def _parts(moments: ArrayLike, momentum: float, rotor: float, kick: float, somer
 def _moments(moments: ArrayLike) -> Array:
     values = moments_argument(moments)
     if not values[2] < values[:2].min():
-        raise ShapeError(f"moments: that about z, the long axis, must be the smallest, got {what_came(moments)}")
+        raise ShapeError(f"moments: that about z, the long axis, must be the smallest, got {value_text(moments)}")
     return values
 
 

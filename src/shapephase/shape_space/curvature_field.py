@@ -18,7 +18,7 @@ from ..errors import AccuracyNotReached, OpenPathError, ShapeError, SingularIner
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import Sampler
-from ..letters import what_came
+from ..letters import value_text
 from .body_path import check_closed, route_along
 from .connection import connection_slopes
 from .shape_path import CLOSED, ShapePath
@@ -62,7 +62,7 @@ def is_flat(body: Body | ParticleBody, shapes: ArrayLike | None = None, toleranc
     check_object(body, "Body", "body", or_kind="ParticleBody")
     goal = finite_array(tolerance, "tolerance")
     if goal.ndim or goal <= 0.0:
-        raise ShapeError(f"tolerance: a number above 0 is needed, got {what_came(tolerance)}")
+        raise ShapeError(f"tolerance: a number above 0 is needed, got {value_text(tolerance)}")
     places = _random_shapes(body) if shapes is None else finite_array(shapes, "shapes")
     if not places.size and body.n_shape:
         raise ShapeError(f"shapes: one shape or more is needed, got an array of shape {places.shape}")
@@ -342,7 +342,7 @@ def _rounding_of_slopes(body: Body | ParticleBody, shapes: Array) -> Array:
 
 def _two_joints(body: Body | ParticleBody, joints: Sequence[str | int]) -> tuple[int, int]:
     if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
-        raise ShapeError(f"joints: two joints of {body.name} are needed, got {what_came(joints)}")
+        raise ShapeError(f"joints: two joints of {body.name} are needed, got {value_text(joints)}")
     places = []
     for joint in joints:
         is_place = isinstance(joint, int | np.integer) and not isinstance(joint, bool) and 0 <= joint < body.n_shape

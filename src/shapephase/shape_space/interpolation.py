@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_time_steps, names_argument
 from ..arrays import Array, check_reach, finite_array
 from ..errors import ShapeError, TrajectoryError
-from ..letters import what_came
+from ..letters import value_text
 from .curves import CLOSED, Fourier, PiecewisePolynomial
 
 _PARTS = ("x", "y", "z", "w")  # endings of the four names, behind a dot
@@ -46,7 +46,7 @@ def path_joint_names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[s
         return None
     names = names_argument(joint_names, "joint_names", f"{n_shape} names")
     if len(names) != n_shape or len(set(names)) != len(names):
-        raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {what_came(names)}")
+        raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {value_text(names)}")
     return names
 
 

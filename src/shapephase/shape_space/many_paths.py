@@ -15,7 +15,7 @@ from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError, WrongObjectError
 from ..integrator.many_rotations import rotations_of_each
-from ..letters import what_came
+from ..letters import value_text
 from .body_path import path_sampler, route_along
 from .shape_path import ShapePath
 
@@ -87,7 +87,7 @@ def final_attitudes(
         if array.ndim > single + 1:
             raise ShapeError(f"{name}: one for all paths or one for each is needed, got {array.shape}")
     if isinstance(paths, str | ShapePath) or not isinstance(paths, Iterable):
-        raise WrongObjectError(f"paths: several of ShapePath in a list are needed, got {what_came(paths)}")
+        raise WrongObjectError(f"paths: several of ShapePath in a list are needed, got {value_text(paths)}")
     ends: list[Array] = []
     estimates: list[float] = []
     evaluations: list[int] = []

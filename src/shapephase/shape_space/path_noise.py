@@ -11,7 +11,7 @@ from ..arguments import check_object, times_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..display import short_repr
 from ..errors import ShapeError, WrongObjectError
-from ..letters import what_came
+from ..letters import value_text
 from .path_samples import PathSamples, columns_without_samples, path_samples
 from .shape_path import ShapePath
 
@@ -155,7 +155,7 @@ def _levels(path: ShapePath, joints: ArrayLike | None) -> Array:
     if given.shape not in ((), (path.n_shape,)) or np.any(given < 0.0):
         raise ShapeError(
             f"joints: one standard deviation or {path.n_shape} of them, zero or above, are needed, got "
-            f"{what_came(given)}"
+            f"{value_text(given)}"
         )
     levels = np.array(np.broadcast_to(given, path.n_shape))
     levels[columns_without_samples(path)] = 0.0

@@ -23,7 +23,7 @@ from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, numbers
 from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
-from ..letters import what_came
+from ..letters import value_text
 from ._accelerations import exact_accelerations, resolved_accelerations
 from .curves import (
     CLOSED,
@@ -344,7 +344,7 @@ class ShapePath:
             If the path does not end where it begins, up to whole turns of joints, and signs of quaternions.
         """
         if not isinstance(count, int | float | np.number) or not np.isfinite(count) or count < 1 or count % 1:
-            raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {what_came(count)}")
+            raise TrajectoryError(f"a path is repeated a whole number of times, 1 or more; got {value_text(count)}")
         (start, end), _ = self.curve(np.array([0.0, self.duration]))
         gap = end - start * factors_between(end, start, ball_columns(self.joint_names))
         turns = np.round(gap / _WHOLE_TURN) * _WHOLE_TURN

@@ -12,7 +12,7 @@ from ..arguments import tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..deformation.frames import gauge_link
 from ..errors import StudyError, unknown_name
-from ..letters import what_came
+from ..letters import value_text
 from .distributions import Distribution, Normal, drawn_values
 
 COMPONENTS = ("momentum_x", "momentum_y", "momentum_z")
@@ -61,7 +61,7 @@ def unit_of(name: str) -> str:
 def check_name(name: object, entry: str) -> None:
     """Raise StudyError for a name that no folder of a store can have."""
     if not isinstance(name, str):
-        raise StudyError(f"{entry}: a name is needed, got {what_came(name)}")
+        raise StudyError(f"{entry}: a name is needed, got {value_text(name)}")
     if len(name) > LONGEST_NAME:
         raise StudyError(f"{entry}: a name of {len(name)} characters, {name[:20]!r}...; use {LONGEST_NAME} at most")
 
@@ -69,7 +69,7 @@ def check_name(name: object, entry: str) -> None:
 def check_labels(name: str, given: object) -> None:
     """Raise StudyError for anything but a list of one label or more."""
     if isinstance(given, str) or not isinstance(given, Sequence):
-        raise StudyError(f"over.{name}: a list of names is needed, got {what_came(given)}")
+        raise StudyError(f"over.{name}: a list of names is needed, got {value_text(given)}")
     if not len(given):
         raise StudyError(f"over.{name}: a grid needs one value or more")
 
@@ -96,7 +96,9 @@ def checked_axis(name: str, given: Any, parts: int, parameters: Sequence[str]) -
     try:
         count = len(given)
     except TypeError:
-        raise StudyError(f"over.{name}: a grid of values or a distribution is needed, got {what_came(given)}") from None
+        raise StudyError(
+            f"over.{name}: a grid of values or a distribution is needed, got {value_text(given)}"
+        ) from None
     if not count:
         raise StudyError(f"over.{name}: a grid needs one value or more")
     values = finite_array(given, f"over.{name}")

@@ -25,7 +25,7 @@ import numpy as np
 from ..body.body import Body
 from ..errors import StudyError
 from ..integrator.machine_code import is_used
-from ..letters import what_came
+from ..letters import value_text
 from ..provenance import provenance
 from ..shape_space.shape_path import ShapePath
 
@@ -110,7 +110,7 @@ class _Inputs:
             raise
         except Exception:
             raise StudyError(
-                f"{self._name}: {part} holds {what_came(pickler.last)}, whose content cannot be compared when the "
+                f"{self._name}: {part} holds {value_text(pickler.last)}, whose content cannot be compared when the "
                 'study is resumed; make it from numbers and texts inside the function, or give version="1", a text '
                 'that you change with your functions (version = "1" in a study file)'
             ) from None

@@ -23,7 +23,7 @@ from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError, WrongObjectError, unknown_name
 from ..examples.scenarios import MOTIONS
 from ..files import no_such_file
-from ..letters import shortened, what_came
+from ..letters import shortened, value_text
 from ..shape_space.files.read import read_shape_path
 from ..shape_space.shape_path import ShapePath
 from ._identity import body_digest, file_digest, path_digest
@@ -70,7 +70,7 @@ def check_source(kind: str, source: object) -> None:
     if not isinstance(source, str | os.PathLike) and not made_by:
         other = "a RigidBody" if kind == "body" else "a function that makes a path"
         raise WrongObjectError(
-            f"{kind}: a name, a file or {other} is needed, got {what_came(source)}: a study is sent to other "
+            f"{kind}: a name, a file or {other} is needed, got {value_text(source)}: a study is sent to other "
             f"processes, which make the {kind} themselves"
         )
 

@@ -22,7 +22,7 @@ from ..body.loading import load_body, loading_options
 from ..deformation.frames import gauge_link
 from ..display import short_repr
 from ..errors import ShapePhaseError, StudyError, WrongObjectError
-from ..letters import what_came
+from ..letters import value_text
 from . import _recipes
 from ._axes import (
     COMPONENTS,
@@ -121,7 +121,9 @@ class CaseTable:
     def __post_init__(self) -> None:
         """Check what came."""
         if not isinstance(self.parameters, Mapping) or not all(isinstance(name, str) for name in self.parameters):
-            raise WrongObjectError(f"parameters: numbers by name, a dict, are needed, got {what_came(self.parameters)}")
+            raise WrongObjectError(
+                f"parameters: numbers by name, a dict, are needed, got {value_text(self.parameters)}"
+            )
         for name, value in self.parameters.items():
             number_argument(value, f"parameters.{name}")
         for name, least, most in (("draws", 1, MOST_CASES), ("chunk", 1, MOST_CASES_OF_A_CHUNK), ("seed", 0, None)):
@@ -132,9 +134,9 @@ class CaseTable:
         tolerance_argument(self.tolerance)
         gauge_link(self.gauge)
         if self.time_limit is not None and not number_argument(self.time_limit, "time_limit", "s") > 0.0:
-            raise StudyError(f"time_limit: seconds above 0 are needed, got {what_came(self.time_limit)}")
+            raise StudyError(f"time_limit: seconds above 0 are needed, got {value_text(self.time_limit)}")
         if self.version is not None and not isinstance(self.version, str):
-            raise WrongObjectError(f"version: a text is needed, got {what_came(self.version)}")
+            raise WrongObjectError(f"version: a text is needed, got {value_text(self.version)}")
         if isinstance(self.body, RigidBody) and self.loading:
             raise StudyError(f"{next(iter(self.loading))}: a rigid body is not read from a file")
         if self.cases > MOST_CASES:
@@ -149,7 +151,7 @@ class CaseTable:
     def axes(self) -> tuple[Axis, ...]:
         """What is varied, in its order."""
         if not isinstance(self.over, Mapping):
-            raise StudyError(f"over: names and what they are varied by are needed, got {what_came(self.over)}")
+            raise StudyError(f"over: names and what they are varied by are needed, got {value_text(self.over)}")
         for name in self.over:
             check_name(name, "over")
             if name in LABELS:
@@ -239,7 +241,7 @@ class CaseTable:
     def case(self, index: int) -> Case:
         """Return the numbers of one case. Raises StudyError for an index beyond the last."""
         if not isinstance(index, int | np.integer) or not 0 <= index < self.cases:
-            raise StudyError(f"case {what_came(index)}: there are {self.cases}, from 0 on")
+            raise StudyError(f"case {value_text(index)}: there are {self.cases}, from 0 on")
         return self.some_cases(np.array([index]))[0]
 
     def some_cases(self, indices: Integers, values: Mapping[str, Array] | None = None) -> list[Case]:
@@ -340,7 +342,7 @@ def _check_whole(name: str, value: Any, least: int, most: int | None) -> None:
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or value < least or (most is not None and value > most):
         limit = f"from {least}" + ("" if most is None else f" to {most}")
-        raise StudyError(f"{name}: a whole number {limit} is needed, got {what_came(value)}")
+        raise StudyError(f"{name}: a whole number {limit} is needed, got {value_text(value)}")
 
 
 def _plain(value: Any) -> Any:

@@ -13,7 +13,7 @@ from ..arguments import check_choice, check_function, check_text
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import StudyError, WrongObjectError
-from ..letters import what_came
+from ..letters import value_text
 from ..phases.phase_split import PhaseSplit
 from ..phases.return_map import fixed_points
 from ..reconstruction.reconstruction import Motion
@@ -61,7 +61,7 @@ class Output:
         if not isinstance(self.shape, tuple) or not all(
             isinstance(length, int) and length > 0 for length in self.shape
         ):
-            raise StudyError(f"shape: a tuple of whole numbers above 0 is needed, got {what_came(self.shape)}")
+            raise StudyError(f"shape: a tuple of whole numbers above 0 is needed, got {value_text(self.shape)}")
 
     def of(self, motion: Motion, parts: PhaseSplit | None) -> Array:
         """Return its value for a motion and the split of that. Raises StudyError for another shape."""
@@ -143,7 +143,9 @@ Examples
 def outputs_argument(given: Sequence[str | Output], taken: Sequence[str]) -> tuple[Output, ...]:
     """Return the outputs of a study, whose arrays have names already. Raises UnknownNameError, StudyError."""
     if not isinstance(given, Sequence):
-        raise WrongObjectError(f"outputs: names, or Output of a function, in a list are needed, got {what_came(given)}")
+        raise WrongObjectError(
+            f"outputs: names, or Output of a function, in a list are needed, got {value_text(given)}"
+        )
     outputs: list[Output] = []
     for entry in (given,) if isinstance(given, str) else given:
         if not isinstance(entry, Output):

@@ -16,7 +16,7 @@ import numpy as np
 from ..arguments import check_choice, check_file_name, check_flag, check_object
 from ..arrays import Integers
 from ..errors import RunStopped, StudyError
-from ..letters import what_came
+from ..letters import value_text
 from ..run_progress import ProgressCallback, check_progress
 from ._evaluate import DONE, Evaluator
 from ._identity import processor_text
@@ -121,7 +121,7 @@ class Study(CaseTable):
         check_progress(progress)
         if workers is not None and (client is not None or not isinstance(workers, int) or workers < 0):
             raise StudyError(
-                f"workers: a whole number, 0 or more, is needed, without a client; got {what_came(workers)}"
+                f"workers: a whole number, 0 or more, is needed, without a client; got {value_text(workers)}"
             )
         if workers == 0 and self.time_limit is not None:
             raise StudyError("time_limit: only a process of its own can be stopped; give one worker or more")

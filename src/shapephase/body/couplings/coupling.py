@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ...arguments import check_choice, check_mapping, number_argument
 from ...display import short_repr
 from ...errors import ShapeError
-from ...letters import what_came
+from ...letters import value_text
 from . import functions
 from .functions import JointFunction
 
@@ -178,5 +178,5 @@ def _of(driver: str, function: JointFunction) -> Coupling:
 
 def _name(driver: object) -> str:
     if not isinstance(driver, str):
-        raise ShapeError(f"driver: the name of a joint is needed, got {what_came(driver)}")
+        raise ShapeError(f"driver: the name of a joint is needed, got {value_text(driver)}")
     return driver

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from ...letters import what_came
+from ...letters import value_text
 
 
 def is_casadi_function(value: object) -> bool:
@@ -71,7 +71,7 @@ class CasadiPositions:
         try:
             values = self._derivatives[order].map(len(rows))(rows.T)
         except RuntimeError as error:
-            where = what_came(rows[0] if len(rows) == 1 else rows)
+            where = value_text(rows[0] if len(rows) == 1 else rows)
             fault = str(error).splitlines()[-1]
             raise ShapeError(f"places: CasADi cannot evaluate the function at {where}: {fault}") from None
         return finite_array(np.asarray(values, dtype=np.float64).T, "places")

@@ -14,7 +14,7 @@ from ...arguments import check_picklable, names_argument
 from ...arrays import Array, finite_array, lock_arrays
 from ...display import short_repr
 from ...errors import ShapeError, WrongObjectError, unknown_name
-from ...letters import what_came
+from ...letters import value_text
 from ..shape_arguments import ShapeArguments
 from ._casadi_positions import CasadiPositions, is_casadi_function
 
@@ -221,11 +221,11 @@ def particle_body(
     """
     weights = finite_array(masses, "masses", (None,), unit="kg").copy()
     if weights.ndim != 1 or len(weights) < 2 or np.any(weights <= 0.0):
-        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {what_came(weights)}")
+        raise ShapeError(f"masses: two numbers or more above 0 [kg] are needed, got {value_text(weights)}")
     names = names_argument(parameters, "parameters", "names of the parameters in a list")
     of_each = (units,) * len(names) if isinstance(units, str) else names_argument(units, "units", "a unit for each")
     if len(of_each) != len(names) or not set(of_each) <= {"rad", "m"}:
-        raise ShapeError(f'units: "rad" or "m", of all or of each of {len(names)}, are needed, got {what_came(units)}')
+        raise ShapeError(f'units: "rad" or "m", of all or of each of {len(names)}, are needed, got {value_text(units)}')
     endless = names_argument(continuous, "continuous", "names of parameters in a list")
     for parameter in endless:
         if parameter not in names:
@@ -236,7 +236,7 @@ def particle_body(
         function = _Given(cast("_Places", places), len(weights))
     else:
         raise WrongObjectError(
-            f"places: a function of shapes that gives places and derivatives is needed, got {what_came(places)}"
+            f"places: a function of shapes that gives places and derivatives is needed, got {value_text(places)}"
         )
     limits = np.tile([-np.inf, np.inf], (len(names), 1))
     turning = np.array([parameter in endless for parameter in names], dtype=bool)
@@ -268,7 +268,7 @@ class _Given:
         pair = self.function(rows)
         if not isinstance(pair, tuple | list) or len(pair) != 2:
             raise ShapeError(
-                f"places: a pair, places and their derivatives, must be returned for shapes, got {what_came(pair)}"
+                f"places: a pair, places and their derivatives, must be returned for shapes, got {value_text(pair)}"
             )
         places, slopes = finite_array(pair[0], "places", unit="m"), finite_array(pair[1], "derivatives of places")
         expected = (len(rows), self.particles, 3), (len(rows), rows.shape[1], self.particles, 3)
@@ -287,6 +287,6 @@ class _Given:
         if wrong.max(initial=0.0) > _NOT_DERIVATIVES * size:
             worst = int(np.argmax(wrong))
             raise ShapeError(
-                f"places: the derivatives by parameter {worst} are not those of the places: at {what_came(row[0])} "
+                f"places: the derivatives by parameter {worst} are not those of the places: at {value_text(row[0])} "
                 f"they are off by {wrong[worst]:.3g}"
             )

@@ -12,7 +12,7 @@ from ...arrays import Array
 from ...display import numbers
 from ...errors import ShapeError
 from ...inertia_tensor import inverse_inertia
-from ...letters import what_came
+from ...letters import value_text
 from ...rigid_body.euler_top import EulerTop
 from ...rigid_body.poinsot import Poinsot
 from ..page import Page, frame_count, playing_speed
@@ -68,7 +68,7 @@ def rolling_ellipsoid(
     rate = playing_speed(shown, speed)
     count = frame_count(shown, rate) if frames is None else frames
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
-        raise ShapeError(f"frames: a whole number of 2 or more is needed, got {what_came(frames)}")
+        raise ShapeError(f"frames: a whole number of 2 or more is needed, got {value_text(frames)}")
     times = np.linspace(0.0, shown, int(count))
     return page_from(
         "poinsot.html",
@@ -92,7 +92,7 @@ def _duration(top: EulerTop, duration: float | None) -> float:
         return _TURNS * 2.0 * np.pi / float(np.linalg.norm(top.angular_velocity(0.0)))
     found = number_argument(duration, "duration", "s")
     if not found > 0.0:
-        raise ShapeError(f"duration: a time above 0 is needed, got {what_came(duration)} s")
+        raise ShapeError(f"duration: a time above 0 is needed, got {value_text(duration)} s")
     return found
 
 

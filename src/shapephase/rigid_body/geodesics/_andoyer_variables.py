@@ -31,7 +31,7 @@ from ...arrays import Array, Mask, common_batch, common_shape, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ChartPoleError, ShapeError, WrongObjectError
 from ...inertia_tensor import inverse_inertia
-from ...letters import what_came
+from ...letters import value_text
 from .._arguments import check_entries
 from ..euler_angles import ZXZ, ZYZ, EulerChart
 
@@ -255,7 +255,7 @@ def andoyer_motion(motion: TurningBody, t: ArrayLike) -> AndoyerVariables:
     [1.58113883 1.58113883] 7.508599
     """
     if not (hasattr(motion, "attitude") and hasattr(motion, "body_momentum")):
-        raise WrongObjectError(f"motion: a Motion or an EulerTop is needed, got {what_came(motion)}")
+        raise WrongObjectError(f"motion: a Motion or an EulerTop is needed, got {value_text(motion)}")
     times = finite_array(t, "t", (None,), unit="s")
     if times.ndim != 1 or not times.size or not (np.all(np.diff(times) > 0.0) or np.all(np.diff(times) < 0.0)):
         raise ShapeError(f"t: a list (N,) of times in strict order, at least one, is needed, got shape {times.shape}")

@@ -24,7 +24,7 @@ from ...arguments import check_object, number_argument, whole_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
-from ...letters import what_came
+from ...letters import value_text
 from ...roots import ROUNDING, safe_newton
 from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
@@ -275,7 +275,7 @@ def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
     if not surface.has_smooth_poles:
         raise ShapeError(f"a cut locus is known on smooth spheres of revolution; this one ends at a {surface.end}")
     if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - 1e-12:
-        raise ShapeError(f"latitude: one number between the poles is needed, got {what_came(latitude)}")
+        raise ShapeError(f"latitude: one number between the poles is needed, got {value_text(latitude)}")
     trend = surface.curvature_trend()
     if trend != "neither":
         return {"decreasing": "parallel", "increasing": "meridian", "constant": "point"}[trend]

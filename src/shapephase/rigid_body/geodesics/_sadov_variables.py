@@ -32,7 +32,7 @@ from ...arrays import Array, Mask, common_batch, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
-from ...letters import what_came
+from ...letters import value_text
 from .._arguments import check_entries
 from ._andoyer_variables import AndoyerVariables, andoyer_variables
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
@@ -169,7 +169,7 @@ def andoyer_from_sadov(
     hemisphere = finite_array(side, "side")
     common_batch(angles=turn.shape[:-1], actions=action.shape[:-1], side=hemisphere.shape)
     if np.any(np.abs(hemisphere) != 1.0):
-        raise ShapeError(f"side: 1 or -1 is needed, got {what_came(side)}")
+        raise ShapeError(f"side: 1 or -1 is needed, got {value_text(side)}")
     own, precession, node = np.moveaxis(turn, -1, 0)
     enclosed, total, vertical = np.moveaxis(action, -1, 0)
     if np.any((total <= 0.0) | (enclosed < 0.0) | (enclosed > total)):

@@ -25,7 +25,7 @@ from ... import so3
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
-from ...letters import what_came
+from ...letters import value_text
 from ...roots import bracketed_root, safe_newton
 
 
@@ -269,7 +269,7 @@ def axisymmetric_metric(equatorial: float, axial: float) -> AxisymmetricMetric:
     try:
         first, third = float(equatorial), float(axial)
     except (TypeError, ValueError):
-        came = f"{what_came(equatorial)} and {what_came(axial)}"
+        came = f"{value_text(equatorial)} and {value_text(axial)}"
         raise ShapeError(f"moments: two numbers are needed, got {came}") from None
     if not (0.0 < first < np.inf and third > 0.0):
         raise ShapeError(

@@ -37,7 +37,7 @@ from ...arguments import check_function, made_by, number_argument
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
-from ...letters import what_came
+from ...letters import value_text
 from ...roots import ROUNDING, safe_newton
 from .._arguments import above_zero, check_entries
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
@@ -329,10 +329,10 @@ def surface_of_stretch(
     equator = above_zero(equator, "equator")
     depth = number_argument(depth, "depth")
     if not isinstance(end, str) or end not in ("pole", "parallel", "boundary"):
-        raise ShapeError(f"end: expected one of pole, parallel, boundary, got {what_came(end)}")
+        raise ShapeError(f"end: expected one of pole, parallel, boundary, got {value_text(end)}")
     if not (0.0 < depth <= 1.0) or (end == "pole") != (depth == 1.0):
         raise ShapeError(
-            f"depth: 1 - m(reach)/m(0) must be in (0, 1), and 1 for a pole; got {what_came(depth)} for a {end}"
+            f"depth: 1 - m(reach)/m(0) must be in (0, 1), and 1 for a pole; got {value_text(depth)} for a {end}"
         )
     square = depth * np.linspace(0.0, 0.999, 33)
     value, _, _ = stretch(square, depth - square)

@@ -18,7 +18,7 @@ from ...arguments import check_object
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import LieAlgebraError, ShapeError
-from ...letters import what_came
+from ...letters import value_text
 
 Matrices = NDArray[Any]  # real or complex square matrices (..., n, n)
 
@@ -201,7 +201,7 @@ def so(n: int) -> LieAlgebra:
     (6, 6, 6)
     """
     if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 2:
-        raise LieAlgebraError(f"n: a whole number from 2 up is needed, got {what_came(n)}")
+        raise LieAlgebraError(f"n: a whole number from 2 up is needed, got {value_text(n)}")
     pairs = [(1, 2), (2, 0), (0, 1)] if n == 3 else list(combinations(range(n), 2))
     return lie_algebra_from_matrices(np.stack([_unit(n, j, i) - _unit(n, i, j) for i, j in pairs]), f"so({n})")
 

@@ -14,7 +14,7 @@ from ... import so3
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
-from ...letters import what_came
+from ...letters import value_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ def magnetic_equilibria(magnitude: float, field: ArrayLike) -> tuple[MagneticEqu
     if not np.all(strength > 0.0):
         raise ShapeError("field: without a field every moment is an equilibrium; a field other than 0 is needed")
     if not np.all(radius > 0.0):
-        raise ShapeError(f"magnitude: the length of the moment must be above 0, got {what_came(magnitude)}")
+        raise ShapeError(f"magnitude: the length of the moment must be above 0, got {value_text(magnitude)}")
     spectrum = strength[..., None] * np.array([0.0, 1j, -1j])
     along, against = (
         MagneticEquilibrium(moment=m, energy=magnetic_hamiltonian(m, axis), spectrum=spectrum)

@@ -13,7 +13,7 @@ from ...arguments import check_flag
 from ...arrays import Array, Integers
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
-from ...letters import what_came
+from ...letters import value_text
 from ..interpolation import ball_columns
 from ._ball_columns import continued_balls, continued_hinges, with_quaternions
 from ._gaps import Gaps
@@ -70,7 +70,7 @@ class JointChoices:
         check_flag(self.rest_missing, "rest_missing")
         check_flag(self.ignore_extra, "ignore_extra")
         if self.rest is not None and not isinstance(self.rest, Mapping):
-            raise ShapeError(f"rest: a mapping, joint -> value, is needed, got {what_came(self.rest)}")
+            raise ShapeError(f"rest: a mapping, joint -> value, is needed, got {value_text(self.rest)}")
 
 
 class Matched(NamedTuple):

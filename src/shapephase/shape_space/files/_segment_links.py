@@ -19,7 +19,7 @@ from ... import so3
 from ...arrays import Array
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError
-from ...letters import what_came
+from ...letters import value_text
 from .recording import Recording, SegmentPoses, warn
 
 OWN_AXES = "links"  # calibration: segments have the axes of the body's links
@@ -62,9 +62,9 @@ class SegmentChoices:
         """Raise ShapeError for values of the wrong kind."""
         off, at = self.length_tolerance, self.calibration
         if off is not None and (isinstance(off, bool) or not isinstance(off, int | float) or not 0.0 < off < 1.0):
-            raise ShapeError(f"length_tolerance: a share between 0 and 1 is needed, as 0.1, got {what_came(off)}")
+            raise ShapeError(f"length_tolerance: a share between 0 and 1 is needed, as 0.1, got {value_text(off)}")
         if at is not None and (isinstance(at, bool) or not isinstance(at, int | float | str)):
-            raise ShapeError(f"calibration: a time or {OWN_AXES!r} is needed, got {what_came(at)}")
+            raise ShapeError(f"calibration: a time or {OWN_AXES!r} is needed, got {value_text(at)}")
 
     @property
     def given(self) -> bool:

@@ -13,7 +13,7 @@ from ...arrays import Array, Integers
 from ...body.link_tree import Joint
 from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
-from ...letters import what_came
+from ...letters import value_text
 from ._gaps import Gaps
 from ._pose_columns import CANONICAL, MRP, VECTOR
 from ._unit_doubts import angles_in_rad, check_range, lengths_in_m
@@ -107,7 +107,7 @@ def base_choices(order: str | None, axes: Any) -> BaseChoices:
     orders = ["".join(letters) for letters in permutations("xyz")]
     if order is not None and (not isinstance(order, str) or order not in orders):
         raise TrajectoryError(
-            f"base_order: the three axes in their order, as 'zxy', are needed, got {what_came(order)}"
+            f"base_order: the three axes in their order, as 'zxy', are needed, got {value_text(order)}"
         )
     if axes is None or (isinstance(axes, str) and axes == ESTIMATE):
         return BaseChoices(order=order, axes=axes, given=axes)
@@ -133,7 +133,7 @@ def named_axes(text: str) -> Array:
     if len(words) != 3 or np.linalg.det(matrix) != 1.0:
         raise TrajectoryError(
             f"base_axes: where the x, y and z axis of the base point to is needed, three right-handed words such as "
-            f"'x,-z,y', or {ESTIMATE!r}; got {what_came(text)}"
+            f"'x,-z,y', or {ESTIMATE!r}; got {value_text(text)}"
         )
     return matrix
 

@@ -15,7 +15,7 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
-from ...letters import what_came
+from ...letters import value_text
 from ..fall_units import check_gravity, check_parabola, is_long, slipped_fall
 from ..free_fall import GRAVITY, UP_AXES, FreeFall, centre_noise, fall_number, free_fall, lasts
 from ._joint_columns import Matched
@@ -93,7 +93,7 @@ def flight_choices(flight: str | Sequence[float] | None, up: str | None, gravity
     expected: float | None = GRAVITY
     if isinstance(gravity, str):
         if gravity != ANY_GRAVITY:
-            raise ShapeError(f"gravity: a number of m/s^2, or {ANY_GRAVITY!r}, is needed, got {what_came(gravity)}")
+            raise ShapeError(f"gravity: a number of m/s^2, or {ANY_GRAVITY!r}, is needed, got {value_text(gravity)}")
         expected = None
     elif gravity is not None:
         expected = positive_argument(gravity, "gravity", "an acceleration in m/s^2")
@@ -105,7 +105,7 @@ def flight_choices(flight: str | Sequence[float] | None, up: str | None, gravity
     if isinstance(flight, str) or not isinstance(flight, Sequence | np.ndarray) or len(flight) != 2:
         raise ShapeError(
             f"flight: {AUTO!r}, '{AUTO}:2' (the second), {ALL!r}, {RECORDED!r} or two times are needed, got "
-            f"{what_came(flight)}"
+            f"{value_text(flight)}"
         )
     first, last = flight
     return FlightChoices(trim_argument((first, last), "flight"), up, expected)

@@ -15,7 +15,7 @@ from ...arguments import check_file_name, check_text, positive_argument
 from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ...files import no_such_file
-from ...letters import what_came
+from ...letters import value_text
 from .formats.bvh import read_bvh
 from .formats.c3d import INVERSE_KINEMATICS, read_c3d
 from .formats.deepmimic import read_deepmimic
@@ -93,7 +93,7 @@ def read_input(
     Raises InputFileNotFoundError; UnknownNameError for an unknown ending or part; TrajectoryError for faults.
     """
     if topic is not None and not isinstance(topic, str):
-        raise ShapeError(f"topic: a name is needed, got {what_came(topic)}")
+        raise ShapeError(f"topic: a name is needed, got {value_text(topic)}")
     if timestep is not None:
         timestep = positive_argument(timestep, "timestep")
     if isinstance(source, Input):
@@ -136,7 +136,7 @@ def read_input(
     _check_exists(where)
     if topic is not None and suffix not in (*TABLES, *_WITH_PARTS):
         raise TrajectoryError(
-            f"{where}: topic={what_came(topic)} is for bags, workbooks and .mat files; this one has no parts"
+            f"{where}: topic={value_text(topic)} is for bags, workbooks and .mat files; this one has no parts"
         )
     data = file_bytes(where)
     name, sha256 = str(source), hashlib.sha256(data).hexdigest()
@@ -168,7 +168,7 @@ def _check_exists(where: Path) -> None:
 
 def _no_topic(topic: str | None, source: str) -> None:
     if topic is not None:
-        raise TrajectoryError(f"topic={what_came(topic)} is for bags, workbooks and .mat files, and this is {source}")
+        raise TrajectoryError(f"topic={value_text(topic)} is for bags, workbooks and .mat files, and this is {source}")
 
 
 def read_table(file: str | os.PathLike[str], *, topic: str | None = None) -> pd.DataFrame:

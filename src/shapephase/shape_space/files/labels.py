@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import TrajectoryError
-from ...letters import what_came
+from ...letters import value_text
 
 _DEGREE = np.pi / 180.0
 ANGLES = {"rad": 1.0, "deg": _DEGREE, "mrad": 1e-3}  # unit -> size [rad]
@@ -137,7 +137,7 @@ def time_unit_argument(unit: str | None) -> str | None:
         return None
     known = unit_of(unit) if isinstance(unit, str) else None
     if known not in IN_A_SECOND:
-        raise TrajectoryError(f"time_unit: one of {', '.join(IN_A_SECOND)} is needed, got {what_came(unit)}")
+        raise TrajectoryError(f"time_unit: one of {', '.join(IN_A_SECOND)} is needed, got {value_text(unit)}")
     return known
 
 
@@ -167,7 +167,7 @@ def seconds(value: object, what: str) -> float:
     if match is not None and unit in IN_A_SECOND:
         return float(match["number"]) / IN_A_SECOND[unit]
     if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
-        raise TrajectoryError(f"{what}: seconds, as 0.1, '0.1s' or '100ms', are needed, got {what_came(value)}")
+        raise TrajectoryError(f"{what}: seconds, as 0.1, '0.1s' or '100ms', are needed, got {value_text(value)}")
     return float(value)
 
 
@@ -182,7 +182,7 @@ def amounts(value: object, what: str) -> dict[str, float]:
     for part in value.split(",") if isinstance(value, str) else [value]:
         number, stated = _number_and_unit(part, what)
         if number < 0.0:
-            raise TrajectoryError(f"{what}: zero or more is needed, got {what_came(value)}")
+            raise TrajectoryError(f"{what}: zero or more is needed, got {value_text(value)}")
         for kind in ["rad", "m"] if stated is None else ["rad" if stated in ANGLES else "m"]:
             if kind in given:
                 raise TrajectoryError(f"{what}: {value!r:.40} says two amounts of one kind")
@@ -199,13 +199,15 @@ def _number_and_unit(value: object, what: str) -> tuple[float, str | None]:
         if match is None or (match["unit"] and stated not in ANGLES | LENGTHS):
             units = ", ".join(ANGLES | LENGTHS)
             raise TrajectoryError(
-                f"{what}: a number is needed, with one of {units} behind it or none; got {what_came(value)}"
+                f"{what}: a number is needed, with one of {units} behind it or none; got {value_text(value)}"
             )
         value = match["number"]
     try:
         number = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        raise TrajectoryError(f"{what}: a number or a text such as '30deg' is needed, got {what_came(value)}") from None
+        raise TrajectoryError(
+            f"{what}: a number or a text such as '30deg' is needed, got {value_text(value)}"
+        ) from None
     if not np.isfinite(number):
-        raise TrajectoryError(f"{what}: a finite number is needed, got {what_came(value)}")
+        raise TrajectoryError(f"{what}: a finite number is needed, got {value_text(value)}")
     return number, stated

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...arguments import check_file_name
 from ...errors import ShapeError, TrajectoryError
-from ...letters import what_came
+from ...letters import value_text
 from .labels import label
 from .recording import check_text, file_bytes
 
@@ -68,7 +68,7 @@ def names_argument(names: Any) -> Mapping[str, str | None] | None:
     if isinstance(names, list | tuple):
         return {str(number): name for number, name in enumerate(names, start=1)}
     if names is not None and not isinstance(names, Mapping):
-        raise ShapeError(f"names: a mapping, name in the file -> joint, is needed, got {what_came(names)}")
+        raise ShapeError(f"names: a mapping, name in the file -> joint, is needed, got {value_text(names)}")
     return names
 
 
@@ -86,7 +86,7 @@ def names_by_label(names: Mapping[str, str | None], labels: Iterable[str]) -> di
     for column, name in names.items():
         if not isinstance(column, str) or not (name is None or isinstance(name, str)):
             raise ShapeError(
-                f"names: texts are needed (None leaves a column out), got {what_came(column)}: {name!r:.40}"
+                f"names: texts are needed (None leaves a column out), got {value_text(column)}: {name!r:.40}"
             )
         candidates = [column] if column in known else plain.get(column, [])
         if not candidates:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ...arguments import check_choice, positive_argument
 from ...body.joint_orders import WORDS
 from ...errors import TrajectoryError, WrongObjectError, unknown_name
-from ...letters import what_came
+from ...letters import value_text
 from ._gaps import fill_argument
 from ._joint_columns import JointChoices
 from ._segment_links import SegmentChoices
@@ -139,7 +139,7 @@ class Reading:
             )
         if close is None and given("close_by") is not None:
             raise TrajectoryError(
-                f"close_by={what_came(given('close_by'))}: how large a gap is to be closed? Give close, as 0.05 or "
+                f"close_by={value_text(given('close_by'))}: how large a gap is to be closed? Give close, as 0.05 or "
                 "'3deg'"
             )
         names = names_argument(given("names"))

@@ -15,7 +15,7 @@ from ...arrays import FARTHEST, Array, Mask, finite_array, lock_arrays
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError
-from ...letters import what_came
+from ...letters import value_text
 from ..curves import CLOSED, PiecewisePolynomial
 from ..interpolation import ball_columns, neighbours_signs
 from ..linear_smoother import ORDER, PILOT_ORDER, LinearSmoother, LowPass, likeliest, width_of
@@ -155,7 +155,7 @@ def smoothed_path(
     levels = finite_array(noise, "noise")
     if levels.shape not in ((), (plain.n_shape,)) or np.any(levels < 0.0):
         raise ShapeError(
-            f"noise: a number or {plain.n_shape} of them, zero or above, are needed, got {what_came(noise)}"
+            f"noise: a number or {plain.n_shape} of them, zero or above, are needed, got {value_text(noise)}"
         )
     samples = Recorded(at, recorded, np.broadcast_to(levels, plain.n_shape), plain.joint_names)
     return prepared_path(samples, periodic=samples.meets if periodic is None else periodic, penalty=penalty)

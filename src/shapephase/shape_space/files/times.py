@@ -11,7 +11,7 @@ import numpy as np
 from ...arguments import positive_argument
 from ...arrays import Array, Integers, finite_array
 from ...errors import ShapeError, TrajectoryError
-from ...letters import what_came
+from ...letters import value_text
 from .labels import IN_A_SECOND, in_square_brackets, label, time_unit_argument
 from .recording import Recording, Table, listed, times_from_zero
 
@@ -103,11 +103,11 @@ def trim_argument(trim: tuple[float, float] | None, name: str = "trim") -> tuple
         return None
     if np.shape(trim) != (2,):
         raise ShapeError(
-            f"{name}: two times are needed, as {name}=(0.5, 2.0) (--{name} 0.5 2.0), got {what_came(trim)}"
+            f"{name}: two times are needed, as {name}=(0.5, 2.0) (--{name} 0.5 2.0), got {value_text(trim)}"
         )
     first, last = finite_array(trim, name, (2,)).tolist()
     if not first < last:
-        raise ShapeError(f"{name}: two times, the first before the last, are needed, got {what_came(trim)}")
+        raise ShapeError(f"{name}: two times, the first before the last, are needed, got {value_text(trim)}")
     return first, last
 
 

@@ -13,7 +13,7 @@ from ....arrays import Array, finite_array
 from ....body.body import Body
 from ....errors import ShapeError, TrajectoryError
 from ....files import npy_array, npz_arrays
-from ....letters import what_came
+from ....letters import value_text
 from ..labels import SI
 from ..nameless_joints import FREE_JOINT, nameless_joints, placed_joints
 from ..recording import Rates, Simulated, Table, warn
@@ -48,7 +48,7 @@ def arrays_in_memory(source: Any) -> dict[str, Any]:
     """Arrays by name, of a mapping or of `(times, array, names)`. Raises ShapeError."""
     if isinstance(source, tuple):
         if len(source) != 3:
-            raise ShapeError(f"file: (times, array, names) are three, got {len(source)}: {what_came(source)}")
+            raise ShapeError(f"file: (times, array, names) are three, got {len(source)}: {value_text(source)}")
         source = dict(zip(("time", "shapes", "joint_names"), source, strict=True))
     return {str(name): value if isinstance(value, Mapping) else np.asarray(value) for name, value in source.items()}
 
