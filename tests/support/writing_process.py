@@ -48,6 +48,7 @@ COMMANDS = {
     "audit.svg": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),
     "audit.pdf": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),
     "audit.png": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),
+    "audit.html": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--html"),
     "conjugate.svg": ("conjugate", "1", "2", ("3", "4"), "--out"),
     "conjugate.pdf": ("conjugate", "1", "2", ("3", "4"), "--out"),
     "conjugate.png": ("conjugate", "1", "2", ("3", "4"), "--out"),
