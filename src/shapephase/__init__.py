@@ -4,8 +4,9 @@ The folders are the rooms of the theory, from the bottom up: `body` (a model and
 `rigid_body` (rotations, in general and in closed form), `shape_space` (paths, connection, holonomy), `deformation`
 (inertia and internal momentum in time), `reconstruction` (the attitude), `dynamics` (what drives it), `phases`,
 `bounds` and `optimal_control`, `segments` (the part of every limb), `plots` and `examples`, `study` (many cases),
-`auditing` (is a simulated or recorded trajectory right?). `dir()` lists the rooms and the names that most scripts use; every public name of a room is an
-attribute of that room. Names are loaded when they are first used.
+`auditing` (is a simulated or recorded trajectory right?). `dir()` lists the rooms and the
+names that most scripts use; every public name of a room is an attribute of that room. Names are loaded when they are
+first used.
 """
 
 from lazy_loader import attach_stub
