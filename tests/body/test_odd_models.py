@@ -187,10 +187,10 @@ REFUSED = {
     "a joint in a link": (urdf(TRUNK.replace("</link>", HIP + "</link>"), LEG), "<joint> stands in <link>", "move it"),
     "a mass in a link": (urdf(TRUNK.replace("</link>", '<mass value="1"/></link>')), "<mass> stands", "move it"),
     "a link in a joint": (urdf(TRUNK, LEG, HIP.replace("</joint>", LOOSE + "</joint>")), "<link> stands", "move it"),
-    "a screw of Drake's": (
+    "a screw without its thread": (
         urdf(TRUNK, LEG, f'<drake:joint name="hip" type="screw">{FRAME}</drake:joint>'),
-        "joint 'hip': type 'screw' is not supported",
-        "use revolute",
+        "joint 'hip': <drake:joint> has no <drake:screw_thread_pitch>",
+        "add it",
     ),
 }
 

@@ -88,19 +88,20 @@ def inertia_and_momentum(
     children = [place[joint.child] for joint in tree.joints]
     states = with_followers(tree.couplings, shape, rate)
     angles, rates = np.array([[values.get(joint.name, 0.0) for joint in tree.joints] for values in states])
-    sliding = np.array([joint.kind == "prismatic" for joint in tree.joints], dtype=bool)
+    turning = np.array([joint.kind != "prismatic" for joint in tree.joints], dtype=bool)
+    leads = np.array([joint.lead if joint.kind == "screw" else joint.kind == "prismatic" for joint in tree.joints])
     stacked = [np.array([getattr(j, what) for j in tree.joints]) for what in ("axis", "place", "after", "turn")]
     axes, places, afters = (array.reshape(-1, 3) for array in stacked[:3])
     axes = axes / np.sqrt((axes**2).sum(axis=-1, keepdims=True))
     turns = stacked[3].reshape(-1, 3, 3)
-    own = _about(axes, np.where(sliding, 0.0, angles))
+    own = _about(axes, turning * angles)
     # How the child turns or slides, in the joint's axes.
     motions = axes * rates[:, None]
     for number, joint in enumerate(tree.joints):
         if joint.kind == "ball":
             own[number], motions[number] = _ball_motion(*_four_numbers(joint.name, shape, rate))
     moved = turns @ own
-    slides = places + (turns @ (axes * np.where(sliding, angles, 0.0)[:, None])[..., None])[..., 0]
+    slides = places + (turns @ (axes * (leads * angles)[:, None])[..., None])[..., 0]
     slides += (moved @ afters[..., None])[..., 0]
     pose_turn, pose_place = np.zeros((len(names), 3, 3)), np.zeros((len(names), 3))
     pose_turn[0] = np.eye(3)
@@ -111,10 +112,10 @@ def inertia_and_momentum(
     directions = (pose_turn[parents] @ (turns @ motions[..., None]))[..., 0]
     omega, velocity = np.zeros((len(names), 3)), np.zeros((len(names), 3))
     for number, (parent, child) in enumerate(zip(parents, children, strict=True)):
-        omega[child] = omega[parent] + (0.0 if sliding[number] else directions[number])
+        omega[child] = omega[parent] + turning[number] * directions[number]
     hinges = pose_place[children] - (pose_turn[children] @ afters[..., None])[..., 0]
     steps = np.cross(omega[parents], hinges - pose_place[parents])
-    steps += np.cross(omega[children], pose_place[children] - hinges) + np.where(sliding[:, None], directions, 0.0)
+    steps += np.cross(omega[children], pose_place[children] - hinges) + leads[:, None] * directions
     for number, (parent, child) in enumerate(zip(parents, children, strict=True)):
         velocity[child] = velocity[parent] + steps[number]
     links = tree.links.values()

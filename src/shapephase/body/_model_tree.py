@@ -116,6 +116,8 @@ def _built(tree: LinkTree, root: str) -> pin.Model:
             most = np.reshape(joint.most, (2, 1))
             sliding = joint.kind == "prismatic"
             moving = (pin.JointModelPrismaticUnaligned if sliding else pin.JointModelRevoluteUnaligned)(axis)
+            if joint.kind == "screw":
+                moving = pin.JointModelHelicalUnaligned(axis, joint.lead)
             if joint.kind == "continuous":
                 # Pinocchio's joint without end about any axis cannot be given one: its x turned to the axis.
                 turned = pin.SE3(so3.between(np.array([1.0, 0.0, 0.0]), axis), np.zeros(3))

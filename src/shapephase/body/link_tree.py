@@ -50,12 +50,13 @@ class Link:
 class Joint:
     """One joint: the child's axes are the parent's, moved by (place, turn), then by the joint, then by `after`.
 
-    kind : "revolute", "continuous", "prismatic", "ball" or "fixed"; on the way to a base also "floating" or "planar"
+    kind : "revolute", "continuous", "prismatic", "screw", "ball" or "fixed"; towards a base also "floating" or "planar"
     place, turn : (3,) [m], (3, 3) the joint's axes in those of the parent
     axis : (3,) in the joint's axes, of any length; of a ball joint it means nothing
     after : (3,) the origin of the child in the joint's axes [m]
     limits : lower and upper [rad or m]
     most : the largest effort and rate that a file states [N m or N], [rad/s or m/s]; zero: none
+    lead : of a screw, along the axis [m/rad]
     """
 
     name: str
@@ -69,6 +70,7 @@ class Joint:
     after: Array = field(default_factory=lambda: np.zeros(3))
     limits: tuple[float, float] = (-np.inf, np.inf)
     most: tuple[float, float] = (0.0, 0.0)
+    lead: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from .xml_text import Node, quoted
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _AXIS_JOINTS = ("revolute", "continuous", "prismatic")
 _BALL = "spherical"
+_SCREW, _THREAD = "screw", "drake:screw_thread_pitch"  # of Drake: metres along the axis a turn, in attribute `value`
 WHOLE_TURN = 2.0 * math.pi * (1.0 + 1e-3)  # [rad] as rounded in a file; 10 degrees are beyond it
 _WORLD = "world"  # an implicit link of Drake and Gazebo
 _EXPRESSION = re.compile(r"\$[{(]")
@@ -35,7 +36,18 @@ _DRAKE_BALL = "ball"
 _UNIVERSAL = "universal"  # of Drake: about x, then about the y that was turned (`UniversalJoint`)
 _ROBOT_PARTS = ("link", "joint", _DRAKE_JOINT)
 _LINK_PARTS = ("inertial", "visual", "collision")
-_JOINT_PARTS = ("parent", "child", "origin", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller")
+_JOINT_PARTS = (
+    "parent",
+    "child",
+    "origin",
+    "axis",
+    "limit",
+    "mimic",
+    "dynamics",
+    "calibration",
+    "safety_controller",
+    _THREAD,
+)
 # Elements that move a body: in the wrong place they would be ignored, and the body be another.
 _MOVING = (*_ROBOT_PARTS, "parent", "child", "axis", "limit", "mimic", "inertial", "mass", "inertia")
 # Elements of other programs, without influence on how a free body turns.
@@ -97,9 +109,9 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
         raise _mimic_fault(reading.mimics[key][0], "mimic joints follow each other in a circle")
     base = free_base(first, links, ordered, couplings, free)
     kept = {base.link: links[base.link]} | {joint.child: links[joint.child] for joint in base.joints}
-    # The parser of Pinocchio knows no ball joints, and makes links of mere frames.
+    # The parser of Pinocchio knows no ball joints and screws, and makes links of mere frames.
     text = None
-    if not frames and all(joint.kind != "ball" for joint in base.joints):
+    if not frames and all(joint.kind not in ("ball", _SCREW) for joint in base.joints):
         written = [("link", link) for link in kept] + [("joint", joint.name) for joint in base.joints]
         text = f"<robot name={quoteattr(name)}>{''.join(reading.text[key] for key in written)}</robot>"
     notes = (*grouped(reading.notes), *base.notes)
@@ -211,9 +223,9 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     _check_parts(node, _JOINT_PARTS, reading)
     kind = node.get("type") or ""
     kind = _BALL if kind == _DRAKE_BALL else kind
-    if kind not in (*_AXIS_JOINTS, _BALL, "fixed", ANYWHERE, IN_A_PLANE):
+    if kind not in (*_AXIS_JOINTS, _BALL, _SCREW, "fixed", ANYWHERE, IN_A_PLANE):
         raise node.fault(
-            f"type {quoted(kind)!r} is not supported; use {', '.join(_AXIS_JOINTS)}, {_BALL} "
+            f"type {quoted(kind)!r} is not supported; use {', '.join(_AXIS_JOINTS)}, {_BALL}, {_SCREW} "
             "or fixed, several in a row for a joint of several axes",
         )
     ends = {end: node.needed_child(end) for end in ("parent", "child")}
@@ -223,7 +235,7 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     place, turn, parts = _origin(node, reading)
     parts += f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>"
     axis, limits = [1.0, 0.0, 0.0], (-math.inf, math.inf)
-    if kind in (*_AXIS_JOINTS, IN_A_PLANE):
+    if kind in (*_AXIS_JOINTS, _SCREW, IN_A_PLANE):
         written = node.child("axis")
         if written is not None:
             written.check_attributes("xyz")
@@ -231,6 +243,9 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
             if math.hypot(*axis) < 1e-9:
                 raise written.fault(f"the axis {axis} points nowhere; give it a length")
         parts += f'<axis xyz="{_text(axis)}"/>'
+    lead = 0.0
+    if kind == _SCREW:
+        lead = node.needed_child(_THREAD).number("value") / (2.0 * math.pi)
     fastest = effort = 0.0
     if kind != "fixed" and (limit := node.child("limit")) is not None:
         fastest = abs(limit.number("velocity", default="0", most=math.inf))
@@ -250,7 +265,9 @@ def _joint(name: str, node: Node, reading: _Reading) -> Joint:
     if kind == _BALL and node.child("limit") is not None:
         reading.notes.append((where, "joint", repr(name), "<limit> of a ball joint is ignored"))
     kind = "ball" if kind == _BALL else kind
-    return Joint(name, where, kind, parent, child, place, turn, np.array(axis), _NO_OFFSET, limits, (effort, fastest))
+    return Joint(
+        name, where, kind, parent, child, place, turn, np.array(axis), _NO_OFFSET, limits, (effort, fastest), lead
+    )
 
 
 def _effort(limit: Node) -> float:
