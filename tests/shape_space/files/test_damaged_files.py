@@ -107,6 +107,7 @@ CASES = {
     "an HDF5 file cut off": ("m.h5", cut(0.5), "no HDF5 file"),
     "an HDF5 file without its signature": ("m.h5", lambda data: b"x" + data[1:], "no HDF5 file"),
     "turns in HDF5, whose order nothing keeps": ("m.h5", turns_in_hdf5, "keeps no order"),
+    "a log of JSON lines cut off": ("m.jsonl", lambda _: b'{"time": 0.0, "hip": 0.1}\n{"time": 0.1, "hi', "jsonl:2"),
     "a Parquet file cut off": ("m.parquet", cut(0.8), "Parquet"),
     "a workbook cut off": ("m.xlsx", cut(0.8), "workbook"),
     "a C3D file cut off": ("m.c3d", cut(0.6), "damaged"),

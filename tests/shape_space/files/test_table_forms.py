@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import gzip
 import io
+import json
 import warnings
 
 import numpy as np
@@ -53,6 +54,9 @@ START = 1_700_000_000
 ROWS = np.column_stack([T, JOINTS])
 NAMES = ["time", "arm", "leg"]
 FRAME = pd.DataFrame(ROWS, columns=NAMES)
+RECORDS = FRAME.to_dict(orient="records")
+LINES = "\n".join(map(json.dumps, RECORDS))
+NESTED_LINES = "\n".join(json.dumps({"time": row.pop("time"), "joints": row}) for row in map(dict, RECORDS)) + "\n\n"
 DEG = np.degrees(JOINTS)
 NS = START * 10**9 + 20_000_000 * np.arange(COUNT)
 STAMPS = pd.to_datetime(NS, unit="ns")
@@ -271,6 +275,8 @@ TABLES = {
     "Parquet": ("m.parquet", FRAME.to_parquet, {}, EXACT),
     "Parquet, the time as index": ("m.parquet", FRAME.set_index("time").to_parquet, {}, EXACT),
     "Feather": ("m.feather", FRAME.to_feather, {}, EXACT),
+    "JSON lines": ("m.jsonl", lambda file: file.write_text(LINES), {}, EXACT),
+    "JSON lines, objects within": ("m.ndjson", lambda file: file.write_text(NESTED_LINES), {}, EXACT),
     "a frame": (None, lambda: FRAME, {}, EXACT),
     "a frame, times as index": (None, lambda: pd.DataFrame(JOINTS, columns=NAMES[1:], index=T), {}, EXACT),
     "a frame of two levels": (

@@ -25,7 +25,7 @@ from .formats.named_arrays import read_hdf5, read_matlab
 from .formats.opensim import has_header, read_opensim
 from .formats.ros_motion_files import read_bag, read_ros_yaml
 from .formats.segment_poses import read_mvnx
-from .formats.spreadsheets import read_excel, read_feather, read_parquet
+from .formats.spreadsheets import read_excel, read_feather, read_json_lines, read_parquet
 from .formats.text_tables import read_text
 from .recording import Table, digest, file_bytes
 
@@ -33,11 +33,13 @@ if TYPE_CHECKING:
     import pandas as pd
 
 STANDARD_INPUT = "-"  # file name: a text table or an OpenSim motion
+JSON_LINES = (".jsonl", ".ndjson")
 TABLES: dict[str, Callable[[Path, bytes, str | None], Any]] = {  # ending -> reader of name, bytes and topic
     **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".log", ".tum"), lambda w, d, part: read_text(w, d, section=part)),
     **dict.fromkeys((".xlsx", ".xlsm"), read_excel),
     ".parquet": lambda where, data, _: read_parquet(where, data),
     ".feather": lambda where, data, _: read_feather(where, data),
+    **dict.fromkeys(JSON_LINES, lambda where, data, _: read_json_lines(where, data)),
 }
 _TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
     ".mot": read_opensim,
@@ -156,7 +158,7 @@ def _table(where: Path, data: bytes, topic: str | None) -> Table:
     """A table of any kind, a motion of OpenSim that a spreadsheet has saved, or JSON: DeepMimic's files end in .txt."""
     if has_header(data):
         return read_opensim(where, data)
-    if data.lstrip().startswith(b"{"):
+    if data.lstrip().startswith(b"{") and where.suffix.lower() not in JSON_LINES:
         return read_deepmimic(where, data)
     return file_table(TABLES[where.suffix.lower()](where, data, topic), str(where))
 

@@ -1,4 +1,4 @@
-"""Tables of columns in files of spreadsheets and databases: Excel, Parquet and Feather."""
+"""Tables of columns in files of spreadsheets and databases: Excel, Parquet, Feather and lines of JSON."""
 
 from __future__ import annotations
 
@@ -87,6 +87,36 @@ def read_parquet(where: Path, data: bytes) -> pd.DataFrame:
 def read_feather(where: Path, data: bytes) -> pd.DataFrame:
     """Frame of a Feather file; see `read_parquet`."""
     return _arrow(where, data, "Feather")
+
+
+def read_json_lines(where: Path, data: bytes) -> pd.DataFrame:
+    """Frame of a log with one JSON object a line, such as `{"time": 0.01, "hip": 0.3}`.
+
+    Names within inner objects stand for themselves where no two are alike, else as `outer.inner`.
+
+    Raises TrajectoryError for faults, with the line.
+    """
+    import json
+
+    import pandas as pd
+
+    rows, lines = [], []
+    for number, line in enumerate(data.splitlines(), start=1):
+        if line.strip():
+            try:
+                rows.append(json.loads(line))
+            except ValueError as error:
+                raise TrajectoryError(f"{where}:{number}: not a JSON object: {error}") from None
+            if not isinstance(rows[-1], dict):
+                raise TrajectoryError(f'{where}:{number}: a JSON object is needed, such as {{"time": 0.0}}')
+            lines.append(number)
+    if not rows:
+        raise TrajectoryError(f"{where}: empty; a JSON object a line is needed")
+    frame = pd.json_normalize(rows).set_axis(lines)
+    inner = [name.rpartition(".")[2] for name in frame.columns]
+    frame.columns = inner if len(set(inner)) == len(inner) else frame.columns
+    frame.attrs = {"format": "JSON lines"}
+    return frame
 
 
 def _arrow(where: Path, data: bytes, kind: str) -> pd.DataFrame:
