@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import inertia_argument, number_argument
-from ..arrays import Array, Mask, finite_array
+from ..arrays import Array, Mask, common_shape, finite_array
 from ..errors import ShapeError, ShapePhaseError, SingularInertiaError
 from ..letters import value_text
 
@@ -23,6 +23,13 @@ def check_entries(
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         value = values[where] if np.ndim(values[where]) else f"{values[where]:.17g}"
         raise error(f"{name}: entry {list(where)} is {value}; {requirement}")
+
+
+def together(**values: ArrayLike) -> tuple[Array, ...]:
+    """Finite numbers (...) each, broadcast to one shape."""
+    arrays = {name: finite_array(value, name) for name, value in values.items()}
+    shape = common_shape(**arrays)
+    return tuple(np.broadcast_to(array, shape) for array in arrays.values())
 
 
 def ascending_times(times: ArrayLike) -> Array:

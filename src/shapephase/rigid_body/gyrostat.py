@@ -205,11 +205,6 @@ def _shortest(directions: Array, axis: Array) -> Array:
     return so3.normalised(np.concatenate([np.cross(directions, axis), scalar[..., None]], axis=-1))
 
 
-_ROUNDING = 4.0 * float(
-    np.finfo(float).eps
-)  # relative difference of inverse moments, or part of the rotor along an axis
-
-
 @dataclass(frozen=True, eq=False)
 class GyrostatEquilibrium:
     """Steady rotation of a gyrostat about its momentum. Made by `gyrostat_equilibria`."""

@@ -356,7 +356,14 @@ def stability_chart(
     moments = np.ones((len(ratios), 1, 3))
     moments[..., 0, 2] = ratios
     spectrum = spectrally_stable(moments, 1.0, spins)
-    largest = _largest_tilt(HeavyTop(moments[..., None] * np.eye(3), 1.0), spins, lean, time)
+    attitude = np.broadcast_to(so3.exp(np.array([lean, 0.0, 0.0])), (*spectrum.shape, 3, 3))
+    momentum = np.broadcast_to(spins[:, None] * np.eye(3)[2], (*spectrum.shape, 3))
+    largest = np.full(spectrum.shape, lean)
+    top = HeavyTop(moments[..., None] * np.eye(3), 1.0)
+    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, time, 1e-9):
+        # The parts of the quaternion are sine and cosine of half the angle between body axis 3 and the vertical.
+        across, along = np.hypot(quat[..., 0], quat[..., 1]), np.hypot(quat[..., 2], quat[..., 3])
+        largest = np.maximum(largest, 2.0 * np.arctan2(across, along))
     return StabilityChart(
         axial_ratios=ratios,
         momenta=spins,
@@ -365,18 +372,6 @@ def stability_chart(
         simulation=largest <= _GROWTH * lean,
         largest_tilt=largest,
     )
-
-
-def _largest_tilt(top: HeavyTop, spins: Array, tilt: float, duration: float) -> Array:
-    shape = np.broadcast_shapes(top.inertia.shape[:-2], spins.shape)
-    attitude = np.broadcast_to(so3.exp(np.array([tilt, 0.0, 0.0])), (*shape, 3, 3))
-    momentum = np.broadcast_to(spins[:, None] * np.eye(3)[2], (*shape, 3))
-    largest = np.full(shape, tilt)
-    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, duration, 1e-9):
-        # The parts of the quaternion are sine and cosine of half the angle between body axis 3 and the vertical.
-        across, along = np.hypot(quat[..., 0], quat[..., 1]), np.hypot(quat[..., 2], quat[..., 3])
-        largest = np.maximum(largest, 2.0 * np.arctan2(across, along))
-    return largest
 
 
 def _upright(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> tuple[Array, ...]:

@@ -24,7 +24,7 @@ from ..arguments import check_object, number_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, UnphysicalInertiaError
-from ._arguments import axis_index
+from ._arguments import axis_index, check_entries
 
 _EPS = float(np.finfo(float).eps)
 
@@ -67,7 +67,9 @@ class PseudoRigidBody:
 
     def moments(self, stretches: ArrayLike = (1.0, 1.0, 1.0)) -> Array:
         """Principal moments of inertia of the body stretched by q: (..., 3) -> (..., 3) [kg m^2]."""
-        parts = self.second_moments * _stretches(stretches) ** 2
+        q = finite_array(stretches, "stretches", (3,))
+        check_entries(q <= 0.0, q, "stretches", "they must be above 0")
+        parts = self.second_moments * q**2
         return parts.sum(axis=-1, keepdims=True) - parts
 
     def stored_energy(self, deformation: ArrayLike) -> Array:
@@ -172,13 +174,6 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
         eigenvalues=eigenvalues,
         verdict=verdict,
     )
-
-
-def _stretches(value: ArrayLike) -> Array:
-    stretches = finite_array(value, "stretches", (3,))
-    if np.any(stretches <= 0.0):
-        raise ShapeError("stretches: they must be above 0")
-    return stretches
 
 
 def _stretched(body: PseudoRigidBody, axis: int, momentum: float) -> Array:

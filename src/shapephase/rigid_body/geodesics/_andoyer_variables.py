@@ -27,12 +27,12 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_object, inertia_argument
-from ...arrays import Array, Mask, common_batch, common_shape, finite_array
+from ...arrays import Array, Mask, common_batch, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ChartPoleError, ShapeError, WrongObjectError
 from ...inertia_tensor import inverse_inertia
 from ...letters import value_text
-from .._arguments import check_entries
+from .._arguments import check_entries, together
 from ..euler_angles import ZXZ, ZYZ, EulerChart
 
 _NEAREST = 1e-8  # sqrt(G^2 - L^2)/G; nearer, L rounds to G, and the momentum's component across the axis is lost
@@ -85,10 +85,8 @@ class AndoyerVariables:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        values = {name: finite_array(value, name) for name, value in vars(self).items()}
-        shape = common_shape(**values)
-        for name, value in values.items():
-            object.__setattr__(self, name, np.broadcast_to(value, shape))
+        for name, value in zip(list(vars(self)), together(**vars(self)), strict=True):
+            object.__setattr__(self, name, value)
         check_entries(self.total <= 0.0, self.total, "total", "G must be above 0")
         for name, value in (("vertical", self.vertical), ("axial", self.axial)):
             check_entries(np.abs(value) > self.total, value, name, "K and L must be between -G and G")
