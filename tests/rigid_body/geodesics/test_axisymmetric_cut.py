@@ -268,7 +268,7 @@ def test_refusals():
     for name in ("conjugate_time", "cut_time", "cut_time_on_su2"):
         with pytest.raises(ShapeError, match="forbidden"):
             getattr(flat, name)([0.0, 0.0, 1.0])
-        with pytest.raises(ShapeError, match="nothing moves"):
+        with pytest.raises(ShapeError, match="moves"):
             getattr(usual, name)([0.0, 0.0, 0.0])
     with pytest.raises(ShapeError):
         usual.distance(2.0 * np.eye(3))

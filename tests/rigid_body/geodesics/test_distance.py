@@ -205,16 +205,16 @@ def test_the_nearest_of_a_set_is_the_nearest_of_all_q6():
     assert number == 1
     assert found.length == pytest.approx(0.6 * np.sqrt(2.0), abs=1e-11)
     for wrong in (np.eye(3), np.zeros((0, 3, 3))):
-        with pytest.raises(ShapeError, match="one or more rotations"):
+        with pytest.raises(ShapeError, match="attitudes"):
             nearest_attitude(metric, wrong)
 
 
 def test_refusals(monkeypatch):
     metric = left_invariant_metric([3.0, 2.0, 1.0])
-    with pytest.raises(ShapeError, match="one rotation"):
+    with pytest.raises(ShapeError, match="attitude"):
         shortest_geodesic(metric, np.broadcast_to(np.eye(3), (2, 3, 3)))
     with pytest.raises(ShapeError):
         shortest_geodesic(metric, np.diag([1.0, 1.0, -1.0]))
     monkeypatch.setattr(distance, "_STEPS", 0)
-    with pytest.raises(AccuracyNotReached, match="at most"):
+    with pytest.raises(AccuracyNotReached, match="most"):
         shortest_geodesic(metric, so3.exp(np.array([1.0, 0.5, 0.2])))

@@ -436,7 +436,7 @@ def test_geodetic_latitudes_by_quadrature_and_back_p1(aspect):
 
 
 def test_latitudes_beyond_a_pole_are_refused():
-    with pytest.raises(ShapeError, match="between -pi/2 and pi/2"):
+    with pytest.raises(ShapeError, match="geodetic"):
         latitude_of_geodetic(0.9, 45.0)
-    with pytest.raises(ShapeError, match="poles are at"):
+    with pytest.raises(ShapeError, match="latitude"):
         geodetic_latitude(0.9, 2.0)

@@ -220,9 +220,9 @@ def test_gradients_may_be_callables_and_batches_k1(rng):
         rtol=0,
     )
     np.testing.assert_array_equal(poisson_tensor(pi), rotations.hat(pi))
-    with pytest.raises(ShapeError, match="first gradient"):
+    with pytest.raises(ShapeError, match="first"):
         lie_poisson_bracket([1.0, 2.0], axis, pi)
-    with pytest.raises(ShapeError, match="second gradient"):
+    with pytest.raises(ShapeError, match="second"):
         lie_poisson_bracket(axis, lambda p: np.full_like(p, np.nan), pi)
 
 
@@ -397,14 +397,14 @@ def test_all_forms_take_the_momentum_first_k2():
 
 
 def test_what_is_not_tangent_or_no_sphere_is_refused_k2():
-    with pytest.raises(ShapeError, match="not tangent"):
+    with pytest.raises(ShapeError, match="tangent"):
         coadjoint_orbit_form([0.0, 0.0, 2.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0])
-    with pytest.raises(ShapeError, match="radius 0"):
+    with pytest.raises(ShapeError, match="radius"):
         sphere_area_form(np.zeros(3), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
 
 
 def test_wrong_inertia_is_refused():
-    with pytest.raises(ShapeError, match="not symmetric"):
+    with pytest.raises(ShapeError, match="symmetric"):
         euler_equations(np.triu(np.ones((3, 3))), [1.0, 0.0, 0.0])
     with pytest.raises(SingularInertiaError):
         euler_equations(np.diag([1.0, 1.0, 0.0]), [1.0, 0.0, 0.0])
@@ -566,24 +566,24 @@ def test_angular_velocities_in_body_and_space_g4(rng):
 
 
 def test_wrong_particles_and_rates_are_refused():
-    with pytest.raises(ShapeError, match="above 0 kg"):
+    with pytest.raises(ShapeError, match="masses"):
         mass_inertia([1.0, -1.0], np.eye(3)[:2])
     with pytest.raises(ShapeError, match="one"):
         mass_inertia([1.0, 1.0], np.eye(3))
-    with pytest.raises(ShapeError, match="not the rate of a rotation"):
+    with pytest.raises(ShapeError, match="attitude_rate"):
         body_angular_velocity(np.eye(3), np.eye(3))
     with pytest.raises(ShapeError, match="reflection"):
         body_angular_velocity(-np.eye(3), np.zeros((3, 3)))
 
 
 def test_motions_no_method_can_follow_are_refused(monkeypatch):
-    with pytest.raises(AccuracyNotReached, match="no finite rate"):
+    with pytest.raises(AccuracyNotReached, match="finite"):
         double_bracket_motion(1e-200 * np.eye(3), [1e200, 1.0, 1.0], 1.0, [0.0, 1.0])
     monkeypatch.setattr("shapephase.rigid_body._flow._STEPS", 50)
-    with pytest.raises(AccuracyNotReached, match="more than 50 steps"):
+    with pytest.raises(AccuracyNotReached, match="50"):
         double_bracket_motion(INERTIA, [1.0, 2.0, 3.0], 1e12, [0.0, 1.0])
     # What stops being finite on the way is refused as well.
-    with pytest.raises(AccuracyNotReached, match="cannot be followed"):
+    with pytest.raises(AccuracyNotReached, match="followed"):
         lie_poisson_motion(lambda p: np.where(p > 1.5, np.nan, [0.0, 0.0, 1.0]), [0.0, -1.6, 0.0], [0.0, 5.0])
 
 
@@ -692,9 +692,9 @@ def test_spinor_over_a_momentum_g6(rng):
         np.testing.assert_allclose(cayley_klein_momentum(cayley_klein_spinor(pi, phase)), pi, atol=rounding, rtol=0)
     turned = np.exp(0.7j) * cayley_klein_spinor(pi)
     np.testing.assert_allclose(cayley_klein_spinor(pi, 0.7), turned, atol=rounding, rtol=0)
-    with pytest.raises(ShapeError, match="equal lengths"):
+    with pytest.raises(ShapeError, match="lengths"):
         cayley_klein_attitude([1.0, 0.0], [2.0, 0.0])
-    with pytest.raises(ShapeError, match="equal lengths"):
+    with pytest.raises(ShapeError, match="lengths"):
         cayley_klein_attitude([0.0, 0.0], [0.0, 0.0])
     with pytest.raises(ShapeError):
         cayley_klein_momentum([1.0, 2.0, 3.0])
@@ -745,9 +745,9 @@ def test_equilibria_are_two_stable_centres_k3(rng):
         along = magnetic_precession(near, field, np.linspace(0.0, 50.0, 101))
         distance = np.linalg.norm(along - equilibrium.moment, axis=-1)
         np.testing.assert_allclose(distance, distance[0], rtol=1e-12)
-    with pytest.raises(ShapeError, match="without a field"):
+    with pytest.raises(ShapeError, match="field"):
         magnetic_equilibria(1.0, np.zeros(3))
-    with pytest.raises(ShapeError, match="above 0"):
+    with pytest.raises(ShapeError, match="above"):
         magnetic_equilibria(0.0, field)
 
 
