@@ -19,9 +19,7 @@ from ...arrays import Array, Mask
 Triple = tuple[Array, Array, Array]
 Stretch = Callable[[Array, Array], Triple]  # Y and depth - Y, (N,) each -> D(Y), D'(Y), D''(Y), (N,) each
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(
-    16
-)  # right to rounding on panels as long as their distance to a pole
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)  # rounding, on panels as long as their distance to a pole
 
 
 class Arcs(NamedTuple):

@@ -90,12 +90,9 @@ class Extremal:
         `surface_of_revolution`.
         """
         t = finite_array(times, "times")
-        return self.jacobi_field_at(self.phase(t), t)
-
-    def jacobi_field_at(self, phase: Array, times: Array) -> Array:
-        """`jacobi_field` at known phases of the times."""
-        p, q, room, first, _ = self._spread_start(times)
-        bend = self._arcs(phase, times).bend - self.surface.trusted_arcs(p, q, room, first).bend
+        phase = self.phase(t)
+        p, q, room, first, _ = self._spread_start(t)
+        bend = self._arcs(phase, t).bend - self.surface.trusted_arcs(p, q, room, first).bend
         there, here = self._stretch(q, room, phase), self._stretch(q, room, first)
         return (
             np.cos(first) * there * np.sin(phase)
@@ -148,7 +145,6 @@ def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     >>> print(f"{latitude:.9f}")  # on a sphere as far north as it went
     0.300000000
     """
-    check_object(surface, "SurfaceOfRevolution", "surface")
     return Extremal(surface=surface, start=start_of(surface, direction, latitude))
 
 

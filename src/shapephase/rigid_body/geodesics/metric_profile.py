@@ -27,9 +27,7 @@ from .surface_of_revolution import NEAREST, SurfaceOfRevolution, surface_of_stre
 Profile = Callable[[Array], tuple[Array, Array]]
 Meridian = Callable[[Array], Array]  # x (N,) -> F_1 > 0 (N,)
 
-_DEGREE = (
-    24  # of the polynomial on a panel: high enough for few panels, low enough for derivatives to keep their digits
-)
+_DEGREE = 24  # of a panel's polynomial: for few panels, and derivatives that keep their digits
 _EPS = float(np.finfo(float).eps)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _ROUNDING = 1e-12  # of the largest value: differences of F_1, F_2 and slopes that are rounding

@@ -387,12 +387,8 @@ def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float,
     >>> print(pi[-1].round(4) + 0.0, np.linalg.norm(pi, axis=-1).round(6))
     [0.     0.     0.7874] [0.787401 0.787401]
     """
-    pi, instants, strength = (
-        finite_array(momentum, "momentum", (3,), unit="kg m^2/s"),
-        ascending_times(times),
-        finite_array(alpha, "alpha")[..., None],
-    )
-    inverse = inverse_inertia_argument(inertia)
+    pi, instants = finite_array(momentum, "momentum", (3,), unit="kg m^2/s"), ascending_times(times)
+    strength, inverse = finite_array(alpha, "alpha")[..., None], inverse_inertia_argument(inertia)
     start = np.array(np.broadcast_to(pi, np.broadcast_shapes(pi.shape, inverse.shape[:-1], (*strength.shape[:-1], 3))))
     return flow(lambda p: _rate(p, (inverse @ p[..., None])[..., 0], strength), start, instants)
 
