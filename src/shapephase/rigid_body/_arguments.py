@@ -1,4 +1,4 @@
-"""Checks of arguments that several modules of this folder share. They raise `ShapeError` unless noted otherwise."""
+"""Checks of arguments and thresholds that several modules share. Checks raise `ShapeError` unless noted otherwise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from ..arrays import Array, Mask, common_shape, finite_array
 from ..errors import ShapeError, ShapePhaseError, SingularInertiaError
 from ..letters import value_text
 
-_UNIT_LENGTH = 1e-6  # relative: six written digits
+SIX_DIGITS = 1e-6  # relative: unit vectors and rates of rotations are often written with six digits
+TWELVE_DIGITS = 1e-12  # relative: numbers that agree so far are equal, and ends of a range are met
+FEW_ULPS = 16.0 * float(np.finfo(float).eps)  # rounding of eigenvalues and short sums, relative to the largest term
+HALVINGS = 60  # of an interval of some radians, which leave rounding
 _MOST_TURNS = 1e12  # turns of the body [1]: beyond them twelve of the sixteen digits of the phase are lost
 
 
@@ -97,6 +100,6 @@ def unit_vectors(value: ArrayLike, name: str) -> Array:
     """Vectors of length 1 to six digits, normalised: (..., 3)."""
     vectors = finite_array(value, name, (3,))
     length = np.linalg.norm(vectors, axis=-1)
-    if np.any(np.abs(length - 1.0) > _UNIT_LENGTH):
+    if np.any(np.abs(length - 1.0) > SIX_DIGITS):
         raise ShapeError(f"{name}: a unit vector must have length 1, got {np.ravel(length)[0]:.6g}")
     return so3.normalised(vectors)

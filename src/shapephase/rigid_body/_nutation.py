@@ -119,7 +119,7 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     low, high = min(low, 0.0), min(max(high, 0.0), 1.0 - height)
     third = max(third, 1.0 - height)
     width = high - low
-    rate = float(np.sqrt(0.25 * beta * (third - low)))
+    rate = float(np.sqrt(beta * (third - low) / 4.0))
     if width == 0.0 or third == low:
         return _without_nutation(height, third, rate, turns)
     complement = (third - high) / (third - low)

@@ -20,10 +20,9 @@ from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
 from ..letters import value_text
-from ._arguments import one_tensor
+from ._arguments import FEW_ULPS, TWELVE_DIGITS, one_tensor
 from .euler_top import EulerTop
 
-_ALIGNED = 1e-12  # |I n - I_e n|/trace(I) that rounding leaves for a computed principal axis n
 _LARGEST = 1e100  # [kg m^2/s] and its inverse: the momentum's square and inverse square must be finite
 
 
@@ -107,7 +106,7 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     image = tensor @ axis
     moment = float(axis @ image)
     tilt = float(np.linalg.norm(image - moment * axis))
-    if tilt > _ALIGNED * np.trace(tensor):
+    if tilt > TWELVE_DIGITS * np.trace(tensor):
         raise ShapeError(
             f"momentum: {vector} is not along a principal axis, so the rotation is not steady (I n leaves n by "
             f"{tilt:.3g} kg m^2); take the axes from `steady_rotations`"
@@ -272,4 +271,4 @@ def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
 def _tie(tensor: Array, axis: Array) -> float:
     """Largest difference of equal moments [kg m^2]: 0 for a diagonal tensor, else 16 roundings of the trace."""
     exact = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0 and np.count_nonzero(axis) == 1
-    return 0.0 if exact else 16.0 * float(np.finfo(float).eps * np.trace(tensor))
+    return 0.0 if exact else FEW_ULPS * float(np.trace(tensor))

@@ -35,7 +35,7 @@ from ..errors import ShapeError, TrajectoryError
 from ..letters import value_text
 from ..roots import bracketed_root
 from ..sphere import gauss_nodes
-from ._arguments import above_zero
+from ._arguments import TWELVE_DIGITS, above_zero
 from .euler_top import EulerTop
 from .gyrostat import Gyrostat
 
@@ -148,7 +148,7 @@ class RotorDive:
 
     def _checked(self, t: ArrayLike) -> Array:
         times = finite_array(t, "t", unit="s")
-        if np.any((times < 0.0) | (times > self.duration * (1.0 + 1e-12))):
+        if np.any((times < 0.0) | (times > self.duration * (1.0 + TWELVE_DIGITS))):
             raise ShapeError(f"t: {times.min():.6g} to {times.max():.6g} s; the dive is on [0, {self.duration:.6g}] s")
         return np.minimum(times, self.duration)
 
@@ -165,7 +165,7 @@ class RotorDive:
         """Values of each stage at its times; `alone` is for the somersaults without twist, first and last."""
         times = self._checked(t)
         values, stages = np.empty((*times.shape, *shape)), self._stage(times)
-        for stage in range(5):
+        for stage in range(len(self.turns)):
             here = stages == stage
             since = times[here] - self.times[stage]
             values[here] = alone(stage, since) if stage in (0, 4) else of_body(self._bodies[stage - 1], since)
@@ -305,7 +305,8 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
         return top.long_axis_precession_per_period / (2.0 * np.pi) - ratio
 
     # Off the separatrix and the long axis, where the rotation number is not defined.
-    low, high = float(least) + 1e-9, 0.5 * np.pi - 1e-9
+    margin = 1e-9
+    low, high = float(least) + margin, 0.5 * np.pi - margin
     if excess(low) < 0.0 or excess(high) > 0.0:
         raise TrajectoryError(
             f"somersaults_per_twist: from {excess(high) + ratio:.6g} to {excess(low) + ratio:.6g} are possible for "

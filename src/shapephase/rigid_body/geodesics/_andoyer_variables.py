@@ -33,9 +33,8 @@ from ...errors import AccuracyNotReached, ChartPoleError, ShapeError, WrongObjec
 from ...inertia_tensor import inverse_inertia
 from ...letters import value_text
 from .._arguments import check_entries, together
-from ..euler_angles import ZXZ, ZYZ, EulerChart
+from ..euler_angles import NEAREST, ZXZ, ZYZ, EulerChart
 
-_NEAREST = 1e-8  # sqrt(G^2 - L^2)/G; nearer, L rounds to G, and the momentum's component across the axis is lost
 _MOST_SAMPLES = 200_000  # 14 MB of attitudes; or eight times the number of times given, if that is more
 
 
@@ -94,7 +93,7 @@ class AndoyerVariables:
     @property
     def is_regular(self) -> Mask:
         """True where they are regular: the momentum has more than 1e-8 of G across both third axes."""
-        return (self._across > _NEAREST * self.total) & (self._level > _NEAREST * self.total)
+        return (self._across > NEAREST * self.total) & (self._level > NEAREST * self.total)
 
     @property
     def body_momentum(self) -> Array:
@@ -150,10 +149,10 @@ class AndoyerVariables:
         column, third = so3.apply(inverse, ahead), inverse[..., 2, 2]
         own, mixed = np.sum(column * ahead, axis=-1), column[..., 2]
         requirement = (
-            f"the momentum is along the body's third axis to {_NEAREST:g}, where l has no rate unless that axis is "
+            f"the momentum is along the body's third axis to {NEAREST:g}, where l has no rate unless that axis is "
             "principal; turn the body axes, so that another axis is the third"
         )
-        undefined = (across <= _NEAREST * self.total) & np.any(inverse[..., 2, :2] != 0.0, axis=-1)
+        undefined = (across <= NEAREST * self.total) & np.any(inverse[..., 2, :2] != 0.0, axis=-1)
         check_entries(undefined, np.broadcast_to(along, undefined.shape), "axial", requirement, ChartPoleError)
         part = np.where(mixed == 0.0, 0.0, along * mixed / np.where(across > 0.0, across, 1.0))
         twist = across**2 * np.sum(column * aside, axis=-1) + across * along * np.sum(aside * inverse[..., 2], axis=-1)

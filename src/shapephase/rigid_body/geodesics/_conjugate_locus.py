@@ -26,6 +26,7 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ...letters import value_text
 from ...roots import ROUNDING, safe_newton
+from .._arguments import TWELVE_DIGITS
 from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
 from .surface_of_revolution import SurfaceOfRevolution
@@ -267,7 +268,7 @@ def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
     check_object(surface, "SurfaceOfRevolution", "surface")
     if not surface.has_smooth_poles:
         raise ShapeError(f"a cut locus is known on smooth spheres of revolution; this one ends at a {surface.end}")
-    if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - 1e-12:
+    if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - TWELVE_DIGITS:
         raise ShapeError(f"latitude: one number between the poles is needed, got {value_text(latitude)}")
     trend = surface.curvature_trend()
     if trend != "neither":

@@ -13,6 +13,7 @@ from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, safe_newton
+from .._flow import TOLERANCE
 from ._arc_quadrature import Arcs
 from .surface_of_revolution import SurfaceOfRevolution
 
@@ -202,8 +203,7 @@ def variational_jacobi_field(
 
     state = [float(start.phase), 0.0, 1.0]
     span = (0.0, max(float(t[-1]), np.finfo(float).tiny))
-    # Just above the least tolerance that SciPy accepts: the integration is there to check the closed form.
-    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=3e-14, atol=1e-15)
+    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=TOLERANCE, atol=1e-15)
     if not solution.success:
         raise AccuracyNotReached(f"Jacobi's equation could not be integrated: {solution.message}")
     return solution.y[1]

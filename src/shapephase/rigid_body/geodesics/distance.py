@@ -191,7 +191,7 @@ def _shortest_arrival(metric: LeftInvariantMetric, target: Array, count: int, le
 def _starts(count: int) -> Array:
     """Momenta in units of the largest along each axis: all directions, up to sqrt(2), where a loop closes."""
     directions = sphere.fibonacci_directions(count)
-    return np.concatenate([fraction * directions for fraction in (0.35, 0.7, 1.05, 1.4)])
+    return np.concatenate([fraction * directions for fraction in np.sqrt(2.0) / 4.0 * np.array([1, 2, 3, 4])])
 
 
 def _reach(metric: LeftInvariantMetric, length: float) -> Array:
@@ -245,7 +245,7 @@ def _arrivals(
         momenta[taken], errors[taken], sizes[taken] = trial[better], error[better], apart[better]
         derivative[taken] = exponential_derivative(inverse_moments, momenta[taken], times[taken])
         changed = np.where(better, 0.1 * damping[rows], 10.0 * damping[rows])
-        damping[rows] = np.clip(changed, 1e-16, 1e6)
+        damping[rows] = np.maximum(changed, np.finfo(float).eps)
         rows = rows[(sizes[rows] > missed * weights.max()) & (damping[rows] < 1e5)]
         if not rows.size:
             break

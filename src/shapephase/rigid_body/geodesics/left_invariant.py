@@ -27,11 +27,9 @@ from ...arrays import Array, common_batch, finite_array, real_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments, principal_axes
-from .._arguments import check_entries
+from .._arguments import TWELVE_DIGITS, check_entries
 from ._conjugate_search import conjugate_times
 from ._momentum_flow import attitude_flow, exponential_derivative
-
-_LEAST_SPEED = 1e-12  # of the largest speed of such a momentum: below, rounding decides whether it moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +153,7 @@ class LeftInvariantMetric:
     def _moving(self, momentum: Array) -> Array:
         """The speeds; raises unless all are above 0."""
         speed = self.speed(momentum)
-        still = ~(speed > _LEAST_SPEED * np.sqrt(self.inverse_moments[0]) * np.linalg.norm(momentum, axis=-1))
+        still = ~(speed > TWELVE_DIGITS * np.sqrt(self.inverse_moments[0]) * np.linalg.norm(momentum, axis=-1))
         forbidden = f", nor along the forbidden direction {self.axes[:, 2]}" if self.is_sub_riemannian else ""
         check_entries(still, momentum, "momentum", "nothing moves with it; it must not be zero" + forbidden)
         return speed

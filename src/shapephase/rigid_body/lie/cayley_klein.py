@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...arguments import inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from .._arguments import ascending_times
+from .._arguments import SIX_DIGITS, ascending_times
 from .._flow import flow
 from .lie_algebra import complex_or_real, su2
 from .lie_poisson import angular_velocity, kinetic_energy
@@ -149,7 +149,7 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
     """
     first, last = _spinor(start, "start"), _spinor(z, "z")
     length, other = np.linalg.norm(first, axis=-1), np.linalg.norm(last, axis=-1)
-    if not np.all((length > 0.0) & (np.abs(length - other) <= 1e-6 * length)):
+    if not np.all((length > 0.0) & (np.abs(length - other) <= SIX_DIGITS * length)):
         raise ShapeError("z: not on the sphere |z| = |start| of a motion; equal lengths above 0 are needed")
     a, b = (_frame(x / n[..., None]) for x, n in ((first, length), (last, other)))
     unitary = a @ np.swapaxes(b.conj(), -1, -2)
@@ -162,7 +162,7 @@ def _frame(unit: Spinor) -> Spinor:
 
 
 def _momentum_map(spinor: Spinor) -> Array:
-    return -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
+    return -np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real / 4.0
 
 
 def _turned(omega: Array, spinor: Spinor) -> Spinor:
