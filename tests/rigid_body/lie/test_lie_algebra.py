@@ -452,16 +452,15 @@ def test_pfaffian_squares_to_the_determinant_and_is_constant_g7(rng):
 
 
 def test_wrong_n_dimensional_bodies_are_refused():
-    with pytest.raises(ShapeError, match="even"):
-        pfaffian(np.zeros((3, 3)))
-    with pytest.raises(ShapeError, match="antisymmetric"):
-        momentum_traces(np.eye(3))
-    with pytest.raises(ShapeError, match="symmetric"):
-        n_dimensional_inertia(np.triu(np.ones((3, 3))))
-    with pytest.raises(SingularInertiaError, match="inertia"):
-        n_dimensional_inertia(np.diag([1.0, 0.0, 0.0]))
-    with pytest.raises(ShapeError, match="whole"):
-        manakov_integrals(np.eye(3), np.zeros((3, 3)), 0)
+    for error, word, call in (
+        (ShapeError, "even", lambda: pfaffian(np.zeros((3, 3)))),
+        (ShapeError, "antisymmetric", lambda: momentum_traces(np.eye(3))),
+        (ShapeError, "symmetric", lambda: n_dimensional_inertia(np.triu(np.ones((3, 3))))),
+        (SingularInertiaError, "inertia", lambda: n_dimensional_inertia(np.diag([1.0, 0.0, 0.0]))),
+        (ShapeError, "whole", lambda: manakov_integrals(np.eye(3), np.zeros((3, 3)), 0)),
+    ):
+        with pytest.raises(error, match=word):
+            call()
     with pytest.raises(ShapeError):
         n_dimensional_rate(np.eye(3), np.zeros((4, 4)))
 
