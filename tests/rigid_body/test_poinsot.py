@@ -196,21 +196,6 @@ def test_length_over_many_periods_i4(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_herpolhode_in_polar_form_i5(name):
-    times, attitudes, rates = integrated(name)
-    poinsot = Poinsot(top_of(name))
-    first, second = poinsot.plane_axes
-    basis = np.stack([first, second, poinsot.normal])
-    assert basis @ basis.T == pytest.approx(np.eye(3), abs=1e-14)
-    assert np.linalg.det(basis) == pytest.approx(1.0)
-    along = carried(attitudes, rates) @ basis.T
-    radius, angle = np.hypot(along[:, 0], along[:, 1]), np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
-    assert angle[0] == pytest.approx(0.0, abs=1e-11)
-    assert poinsot.herpolhode_radius(times) == pytest.approx(radius, abs=3e-11)
-    assert radius * (poinsot.herpolhode_angle(times) - angle) == pytest.approx(np.zeros(len(times)), abs=3e-11)
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_polar_form_is_that_of_the_attitude_over_hundreds_of_periods_i5(name):
     poinsot = Poinsot(top_of(name))
     times = np.linspace(-300.0, 300.0, 999) * min(poinsot.top.period, 1.0)

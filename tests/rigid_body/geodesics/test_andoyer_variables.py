@@ -81,17 +81,6 @@ def test_the_last_relation_is_for_phi_3_and_with_atan2_b_e4():
     assert 25 < np.sum(wrong > 3.0) < 75
 
 
-def test_is_plus_the_size_times_the_cosine_b_e3_h3():
-    """With the momentum along the inertial third axis L = G cos(phi_2), where the paper prints a minus sign."""
-    rng = np.random.default_rng(4)
-    attitude = random_attitudes(rng, 50)
-    momentum = 1.7 * attitude[:, 2, :]
-    v = andoyer_variables(attitude, momentum)
-    cosine = np.cos(ZYZ.angles(attitude)[:, 1])
-    assert np.abs(v.axial - 1.7 * cosine).max() < 1e-14
-    assert np.all(np.abs(v.axial + 1.7 * cosine) > 1e-3)
-
-
 def test_definition_as_a_product_of_turns_r1():
     rng = np.random.default_rng(5)
     attitude, momentum = random_attitudes(rng, 300), rng.normal(size=(300, 3))

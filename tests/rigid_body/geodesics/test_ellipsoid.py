@@ -57,28 +57,6 @@ def integrals(aspect, p):
     return 4 * mp.quad(speed, places), 2 * mp.quad(turn, places)
 
 
-def conjugate_by_mpmath(aspect, p, order):
-    """The phase of the conjugate point: root of d theta/dp at fixed psi, theta = n R + or - the rest, all by mpmath."""
-    p, aspect = mp.mpf(p), mp.mpf(aspect)
-
-    def longitude(psi, momentum):
-        q = 1 - momentum**2
-        top = mp.asin(mp.sin(psi) / mp.sqrt(q))
-
-        def turn(chi):
-            sine2 = q * mp.sin(chi) ** 2
-            return momentum * mp.sqrt(sine2 + aspect**2 * (1 - sine2)) / (1 - sine2)
-
-        return order * 2 * mp.quad(turn, [0, mp.pi / 4, mp.pi / 2]) + (-1) ** order * mp.quad(turn, [0, top])
-
-    def slope(psi):
-        return mp.diff(lambda momentum: longitude(psi, momentum), p, h=mp.mpf(10) ** -10)
-
-    guess = float(conjugate_points_of_momentum(ellipsoid(float(aspect)), float(p), order).height)
-    psi = mp.findroot(slope, (mp.asin(guess) - mp.mpf("1e-4"), mp.asin(guess) + mp.mpf("1e-4")), tol=1e-22)
-    return psi, longitude(psi, p)
-
-
 def test_coefficients_and_the_polar_form_p1():
     for aspect in ASPECTS:
         surface = ellipsoid(aspect)
@@ -324,16 +302,6 @@ def test_conjugate_times_against_geographiclib_o12(flattening, start):
             assert latitude_of(surface, aspect, there["lat2"]) == pytest.approx(float(point.latitude), abs=1e-10)
             if azimuth not in (0.0, 180.0):
                 assert np.deg2rad(there["lon2"]) == pytest.approx(float(point.longitude), abs=1e-10)
-
-
-@pytest.mark.parametrize(("aspect", "p", "order"), full_but([(0.6, 0.3, 2), (1.5, 0.6, 1)], (1.5, 0.6, 1)))
-def test_conjugate_points_against_mpmath_o12(aspect, p, order):
-    """The envelope of d theta/dp = 0 at fixed latitude, by quadratures and differences at 25 digits, to 1e-12."""
-    with mp.workdps(25):
-        psi, longitude = conjugate_by_mpmath(aspect, p, order)
-    point = conjugate_points_of_momentum(ellipsoid(aspect), p, order)
-    assert float(np.arcsin(point.height)) == pytest.approx(float(psi), abs=1e-12)
-    assert float(point.longitude) == pytest.approx(float(longitude), abs=1e-12)
 
 
 def test_the_period_integrand_has_the_square_of_the_sine_b_e6():

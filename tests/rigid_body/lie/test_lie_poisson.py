@@ -165,46 +165,6 @@ def test_bracket_and_its_gradient_are_those_of_exact_arithmetic_k1(algebra, rng)
         assert nested == pytest.approx(outer, rel=1e-10, abs=1e3 * scale)
 
 
-@each_algebra
-def test_jacobi_identity_of_the_computed_bracket_k1(algebra, rng):
-    for _ in range(5):
-        point = rational_point(algebra.dimension, rng)
-        mu = np.array([float(x) for x in point])
-        pairs = [(x.gradient(point), x.hessian(point)) for x in random_polynomials(algebra.dimension, rng, 3)]
-        terms = [
-            lie_poisson_bracket(bracket_gradient(pairs[i], pairs[j], mu, algebra), pairs[k][0], mu, algebra)
-            for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1))
-        ]
-        assert abs(sum(terms)) <= 1e-12 * max(1.0, *np.abs(terms))
-
-
-def test_so3_bracket_proved_with_symbols_k1():
-    # For three quadratics whose coefficients are symbols. (For all functions it follows from the coordinates, whose
-    # identity is that of the structure constants, exact in test_lie_algebra.)
-    pi = casadi.SX.sym("pi", 3)
-
-    def quadratic(name):
-        linear, square = casadi.SX.sym(name, 3), casadi.SX.sym(name * 2, 3, 3)
-        return casadi.dot(linear, pi) + casadi.bilin(square + square.T, pi, pi), [linear, square]
-
-    (f, p), (g, q), (h, r) = (quadratic(n) for n in "fgh")
-
-    def bracket(a, b):
-        return -casadi.dot(pi, casadi.cross(casadi.gradient(a, pi), casadi.gradient(b, pi)))
-
-    cyclic = bracket(bracket(f, g), h) + bracket(bracket(g, h), f) + bracket(bracket(h, f), g)
-    symbols = [pi, *p, *q, *r]
-    value = casadi.Function("value", symbols, [cyclic, bracket(f, g), casadi.gradient(f, pi), casadi.gradient(g, pi)])
-    # On integers up to 6 every product is an exact double, so a zero is a zero. A polynomial of degree 7 that is not
-    # zero vanishes at one such random point with a chance of 7/13 at most, at all fifty of 1e-13.
-    rng = np.random.default_rng(15)
-    for _ in range(50):
-        numbers = [rng.integers(-6, 7, s.shape).astype(float) for s in symbols]
-        jacobi, fg, df, dg = (np.array(x).squeeze() for x in value(*numbers))
-        assert jacobi == 0.0
-        assert lie_poisson_bracket(df, dg, numbers[0].ravel()) == fg
-
-
 def test_gradients_may_be_callables_and_batches_k1(rng):
     pi = rng.normal(size=(4, 5, 3))
     linear, axis = rng.normal(size=3), np.array([0.0, 0.0, 1.0])
@@ -386,14 +346,6 @@ def test_orbit_form_on_any_algebra_k2(algebra, rng):
     np.testing.assert_allclose(form, np.sum(a * v, axis=-1), atol=1e-11, rtol=0)
     if algebra.dimension == 3 and algebra.name in ("so(3)", "su(2)"):
         np.testing.assert_allclose(form, sphere_symplectic_form(mu, u, v), atol=1e-11, rtol=0)
-
-
-def test_all_forms_take_the_momentum_first_k2():
-    """At (0, 0, r) the form of x and y is -1/r: by position, one order for all of them."""
-    x, y, point = [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 5.0]
-    assert sphere_area_form(point, x, y) == 1.0
-    assert sphere_symplectic_form(point, x, y) == -0.2
-    assert coadjoint_orbit_form(point, x, y) == pytest.approx(-0.2, abs=1e-15)
 
 
 def test_what_is_not_tangent_or_no_sphere_is_refused_k2():
