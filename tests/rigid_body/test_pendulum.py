@@ -699,16 +699,16 @@ def test_symmetries_and_types_of_trajectories_n12():
     for mirrored in ((-y, p_y), (y, -p_y), (y + np.pi, p_y)):
         assert np.abs(pendulum.hamiltonian(1.0, *mirrored) - h).max() < 1e-15
     counted = {"oscillating": 0, "rotating": 0}
-    for momentum in rng.normal(size=(14, 3)):
+    for momentum in rng.normal(size=(8, 3)):
         size, start, p = pendulum.coordinates(momentum)
-        path = solve_ivp(lambda _, v, s=size: pendulum.rates(s, *v), (0.0, 30.0), [start, p], **TOLERANCES).y
+        path = solve_ivp(lambda _, v, s=size: pendulum.rates(s, *v), (0.0, 20.0), [start, p], **TOLERANCES).y
         kind = "rotating" if np.ptp(path[0]) > np.pi else "oscillating"
         counted[kind] += 1
         assert pendulum.trajectory_type(momentum) == kind
         if kind == "oscillating":
             centre = np.round((path[0].mean() - 0.5 * np.pi) / np.pi) * np.pi + 0.5 * np.pi
             assert np.abs(path[0] - centre).max() < 0.5 * np.pi
-    assert min(counted.values()) > 3
+    assert min(counted.values()) > 1
     assert andoyer_pendulum([6.0, 3.0, 2.0]).trajectory_type([1.0, 0.3, -1.0]) == "separatrix"
     assert pendulum.trajectory_type([0.0, -1.0, 0.0]) == pendulum.trajectory_type([2.0, 0.0, 0.0]) == "equilibrium"
 
@@ -746,7 +746,7 @@ def test_andoyer_equations_are_eulers_for_moments_in_any_order(order):
     assert np.abs((ahead[2] - behind[2]) / (2.0 * h) - p_rate).max() < 1e-11
 
 
-@pytest.mark.parametrize("count", full_but([4, 12], 4))
+@pytest.mark.parametrize("count", full_but([2, 12], 2))
 @pytest.mark.parametrize("order", full_but(ORDERS, [2, 0, 1]), ids=str)
 def test_closed_solution_for_y_n12(order, count):
     moments = np.array([3.0, 2.0, 1.0])[order]

@@ -179,7 +179,7 @@ def test_length_of_a_polhode_with_nearly_a_corner_i4():
         omega = top.angular_velocity(u / top.rate)
         return np.linalg.norm(np.cross(omega * top.inertia.diagonal(), omega) / top.inertia.diagonal()) / top.rate
 
-    pieces = np.linspace(0.0, top.rate * top.period, 200)
+    pieces = np.linspace(0.0, top.rate * top.period, 80)
     truth = sum(quad(speed, a, b, epsabs=1e-10, epsrel=1e-11, limit=200)[0] for a, b in itertools.pairwise(pieces))
     assert Poinsot(top).length_per_period == pytest.approx(truth, rel=1e-10)
     assert Poinsot(top).herpolhode_length(0.0, top.period) == pytest.approx(truth, rel=1e-10)
@@ -298,7 +298,7 @@ def test_a_rational_ratio_closes_the_curve_i5(turns, lobes):
     def excess(third):
         return poinsot_of(third).angle_per_period / (4.0 * np.pi) - turns / lobes
 
-    grid = np.linspace(0.05, 8.0, 400)
+    grid = np.linspace(0.05, 8.0, 120)
     values = np.array([excess(third) for third in grid])
     at = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (np.abs(np.diff(values)) < 0.05))[0]
     poinsot = poinsot_of(brentq(excess, grid[at], grid[at + 1], xtol=1e-15, rtol=1e-15))

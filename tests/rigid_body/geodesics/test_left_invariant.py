@@ -260,8 +260,8 @@ def test_the_differential_at_special_momenta_q6():
     ]
     metric = left_invariant_metric(TRIAXIAL)
     for start in np.array(special):
-        at = variational(TRIAXIAL, start, 12.0)
-        for t in (1e-3, 0.0199, 0.0201, 3.0, 12.0):
+        at = variational(TRIAXIAL, start, 8.0)
+        for t in (1e-3, 0.0199, 0.0201, 3.0, 8.0):
             expected = at(t)[2]
             np.testing.assert_allclose(
                 metric.differential(start, t), expected, rtol=0, atol=1e-11 * max(t, np.abs(expected).max())
@@ -305,7 +305,7 @@ def test_small_turns_keep_their_digits_q6():
 def test_conjugate_times_are_zeros_of_the_variational_determinant_q6(name):
     rng = np.random.default_rng(8)
     metric = left_invariant_metric(METRICS[name])
-    for _ in range(2):
+    for _ in range(1):
         start = metric.unit_speed(rng.normal(size=3))
         times = [float(metric.conjugate_time(start, order)) for order in (1, 2, 3)]
         at = variational(METRICS[name], start, times[1] * 1.02)
@@ -366,7 +366,7 @@ def test_double_conjugate_points_count_twice_q6():
 def test_conjugate_times_scale_and_are_symmetric_q6():
     rng = np.random.default_rng(10)
     metric = left_invariant_metric(TRIAXIAL)
-    start = rng.normal(size=(40, 3))
+    start = rng.normal(size=(20, 3))
     time = metric.conjugate_time(start)
     np.testing.assert_allclose(metric.conjugate_time(2.5 * start), time / 2.5, rtol=1e-12)
     for signs in ([-1, -1, 1], [1, -1, -1], [-1, 1, -1]):
@@ -385,7 +385,7 @@ def test_the_conjugate_locus_is_a_critical_value_of_the_exponential_map_q6():
     rng = np.random.default_rng(11)
     for name in ("triaxial", "sub-Riemannian", "flat"):
         metric = left_invariant_metric(METRICS[name])
-        start = metric.unit_speed(rng.normal(size=(30, 3)))
+        start = metric.unit_speed(rng.normal(size=(12, 3)))
         time = metric.conjugate_time(start)
         values = np.linalg.svd(metric.differential(start, time), compute_uv=False)
         assert (values[:, 2] / values[:, 0]).max() < 1e-12

@@ -460,7 +460,7 @@ def test_general_points_and_orders_against_the_raw_equations_o12(case):
         angle = fraction * widest
         time = float(conjugate_points(surface, angle, order, start).time)
         p = np.sqrt(m) * np.cos(angle)
-        normal = hamiltonian_flow(case.metric, p, start, np.linspace(time / 40, time - 1e-6, 500), np.sin(angle))
+        normal = hamiltonian_flow(case.metric, p, start, np.linspace(time / 40, time - 1e-6, 200), np.sin(angle))
         # The sign of the field normal to the extremal: that of d phi/p, as d theta = -p_phi d phi/p.
         assert np.count_nonzero(np.diff(np.sign(normal[3]))) == order - 1
 
@@ -535,7 +535,7 @@ def test_r_rate_is_half_the_period_rate_over_p_in_high_precision_o14():
     """Lemma 2.8 by mpmath's derivatives of quadratures of the torus, to 1e-10 and far below."""
     surface = CASES["torus"].surface()
     with mp.workdps(40):
-        for p in (1.1, 2.0, 2.8):
+        for p in (1.1, 2.8):
 
             def along(momentum, power):
                 top = mp.acos(momentum - 2)
