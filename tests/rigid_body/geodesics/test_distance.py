@@ -12,7 +12,6 @@ from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError
 from shapephase.rigid_body.geodesics import (
     axisymmetric_metric,
-    distance,
     left_invariant_metric,
     nearest_attitude,
     shortest_geodesic,
@@ -215,6 +214,6 @@ def test_refusals(monkeypatch):
         shortest_geodesic(metric, np.broadcast_to(np.eye(3), (2, 3, 3)))
     with pytest.raises(ShapeError):
         shortest_geodesic(metric, np.diag([1.0, 1.0, -1.0]))
-    monkeypatch.setattr(distance, "_STEPS", 0)
+    monkeypatch.setattr("shapephase.rigid_body.geodesics.distance._STEPS", 0)
     with pytest.raises(AccuracyNotReached, match="most"):
         shortest_geodesic(metric, so3.exp(np.array([1.0, 0.5, 0.2])))

@@ -14,7 +14,6 @@ from scipy.optimize import brentq
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
 from shapephase.rigid_body import EulerTop
-from shapephase.rigid_body.geodesics import _conjugate_search as conjugate_search
 from shapephase.rigid_body.geodesics import andoyer_variables, left_invariant_metric, serret_andoyer_metric
 from support.independent import cross
 from support.long_runs import full_but
@@ -504,7 +503,7 @@ def test_momenta_refused():
 
 
 def test_no_conjugate_time_is_an_error(monkeypatch):
-    monkeypatch.setattr(conjugate_search, "_STEPS_EACH", 2)
+    monkeypatch.setattr("shapephase.rigid_body.geodesics._conjugate_search._STEPS_EACH", 2)
     with pytest.raises(AccuracyNotReached, match="conjugate"):
         left_invariant_metric(TRIAXIAL).conjugate_time([1.0, 0.0, 0.0])
 
