@@ -22,7 +22,7 @@ from shapephase.rigid_body.lie import (
     nambu_pair,
     structure_constants,
 )
-from support.independent import cross
+from support.independent import rigid_motion
 from support.long_runs import full_but
 
 ASCENDING = np.array([1.0, 2.0, 3.0])
@@ -39,8 +39,7 @@ def euler(moments, momentum):
 
 
 def integrated(moments, momentum, times):
-    solution = solve_ivp(lambda _, y: cross(y, y / moments), (0.0, times[-1]), momentum, t_eval=times, **TOLERANCES)
-    return solution.y.T
+    return rigid_motion(np.diag(moments), momentum, times)[0]
 
 
 def random_matrix(rng, determinant):

@@ -8,13 +8,13 @@ from functools import lru_cache
 import mpmath
 import numpy as np
 import pytest
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from shapephase.errors import ShapeError
 from shapephase.rigid_body import Closure, EulerTop, Poinsot, cones
-from support.independent import cross
+from support.independent import rigid_motion
 from support.long_runs import full_but
 
 TILT = Rotation.from_rotvec([0.4, -1.1, 0.7]).as_matrix()
@@ -59,28 +59,14 @@ def top_of(name):
     return EulerTop.principal(*PRINCIPAL[name], attitude)
 
 
-def span(top):
-    return min(2.2 * top.period, 60.0)
-
-
 @lru_cache
 def integrated(name):
-    """Times, attitudes and body rates of the raw equations: Euler's, and the quaternion's, by DOP853."""
+    """Times, attitudes and body rates of the raw equations."""
     top = top_of(name)
-    inverse = np.linalg.inv(top.inertia)
+    times = np.linspace(0.0, min(2.2 * top.period, 60.0), 241)
     body = top.initial_attitude.T @ top.momentum
-
-    def slope(_, state):
-        q, momentum = state[:4], state[4:]
-        rate = inverse @ momentum
-        vector = 0.5 * (q[3] * rate + cross(q[:3], rate))
-        return np.concatenate([vector, [-0.5 * q[:3] @ rate], cross(momentum, rate)])
-
-    times = np.linspace(0.0, span(top), 241)
-    start = np.concatenate([Rotation.from_matrix(top.initial_attitude).as_quat(), body])
-    solved = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", t_eval=times, rtol=1e-13, atol=1e-15)
-    attitudes = Rotation.from_quat(solved.y[:4].T).as_matrix()
-    return times, attitudes, solved.y[4:].T @ inverse
+    momenta, attitudes = rigid_motion(top.inertia, body, times, top.initial_attitude)
+    return times, attitudes, momenta @ np.linalg.inv(top.inertia)
 
 
 def carried(matrix, vector):
@@ -243,29 +229,6 @@ def test_the_inner_circle_keeps_its_digits_next_to_the_separatrix_i5(offset):
                 radii.append(mpmath.sqrt(u / i[a] ** 2 + v / i[b] ** 2 - energy**2 / square))
         radii = sorted(float(r) for r in radii)
     assert (inner, outer) == pytest.approx(tuple(radii), rel=1e-13, abs=0.0)
-
-
-@pytest.mark.parametrize("name", full_but(PERIODIC, *PERIODIC[::2]))
-def test_angle_per_period_is_the_integral_of_the_rate_i5(name):
-    """Of the angle's rate mu.(w x w')/(|mu| r²), w' = I^-1 (Pi x Omega), by quadrature."""
-    top, poinsot = top_of(name), Poinsot(top_of(name))
-    inverse = np.linalg.inv(top.inertia)
-
-    def rate(t):
-        momentum = top.body_momentum(t)
-        omega = inverse @ momentum
-        change = inverse @ np.cross(momentum, omega)
-        size = np.linalg.norm(momentum)
-        return momentum @ np.cross(omega, change) * size / np.sum(np.cross(momentum, omega) ** 2)
-
-    pieces = np.linspace(0.0, top.period, 33)
-    angle = sum(quad(rate, a, b, epsabs=1e-12, epsrel=1e-11)[0] for a, b in itertools.pairwise(pieces))
-    assert poinsot.angle_per_period == pytest.approx(angle, abs=1e-8)
-    for t in (-0.7, 0.0, 2.9):
-        advance = poinsot.herpolhode_angle(t + top.period) - poinsot.herpolhode_angle(t)
-        assert advance == pytest.approx(poinsot.angle_per_period, abs=1e-12)
-        half = poinsot.herpolhode_angle(t + 0.5 * top.period) - poinsot.herpolhode_angle(t)
-        assert half == pytest.approx(0.5 * poinsot.angle_per_period, abs=1e-12)
 
 
 def test_reference_value_i5():

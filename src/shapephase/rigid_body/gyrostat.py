@@ -41,7 +41,6 @@ class Gyrostat:
     `rotor` is its moment times that speed along its axle. One that turns freely, whose momentum about the axle p is
     constant: `inertia` is without the wheel's moment J about its axle, I - J a a^T, and `rotor` is p a.
 
-    Source: Volterra 1899; Wittenburg 1977.
     Raises AccuracyNotReached within some 3e-5 rad of a steady rotation, where the oval is so small that its digits are
     lost (below 1e-2 rad the error of the start grows as the inverse square of that angle), or for a body so nearly
     symmetric that it is nearly a circle; `reconstruct` with `prescribed` has no such limit.

@@ -65,7 +65,7 @@ from shapephase.rigid_body.lie import (
     su2,
     symmetric_bracket,
 )
-from support.independent import cross
+from support.independent import cross, rigid_motion
 
 ALGEBRAS = [so3(), so(4), sl2r(), se2(), se3(), su2(), heisenberg()]
 each_algebra = pytest.mark.parametrize("algebra", ALGEBRAS, ids=lambda a: a.name)
@@ -230,15 +230,8 @@ def test_bracket_is_the_rate_of_functions_along_a_motion_g1(algebra, rng):
 
 def test_motion_is_that_of_the_raw_equations_g1():
     times, start = np.linspace(0.0, 20.0, 41), np.array([0.3, 1.2, -0.8])
-    raw = solve_ivp(
-        lambda _, p: cross(p, np.linalg.solve(INERTIA, p)), (0, 20), start, "DOP853", times, rtol=1e-13, atol=1e-14
-    )
-    np.testing.assert_allclose(
-        lie_poisson_motion(lambda p: angular_velocity(INERTIA, p), start, times),
-        raw.y.T,
-        atol=1e-11,
-        rtol=0,
-    )
+    motion = lie_poisson_motion(lambda p: angular_velocity(INERTIA, p), start, times)
+    np.testing.assert_allclose(motion, rigid_motion(INERTIA, start, times)[0], atol=1e-11, rtol=0)
 
 
 def test_casimirs_of_so3_are_functions_of_the_length_g2(rng):
@@ -495,17 +488,8 @@ def test_spatial_momentum_is_turned_and_constant_g3(particles, rng):
     np.testing.assert_allclose(spatial_momentum(masses, positions, attitude, rate), expected, atol=1e-12, rtol=0)
     # Along a motion of the raw second-order equations of the particles' attitude.
     inertia = mass_inertia(masses, positions)
-
-    def slope(_, y):
-        spin = y[:3]
-        turned = y[3:].reshape(3, 3) @ rotations.hat(spin)
-        return np.concatenate([np.linalg.solve(inertia, cross(inertia @ spin, spin)), turned.ravel()])
-
-    times = np.linspace(0.0, 5.0, 11)
-    run = solve_ivp(slope, (0, 5), [*omega[0], *np.eye(3).ravel()], "DOP853", times, rtol=1e-13, atol=1e-14)
-    rotation = run.y[3:].T.reshape(-1, 3, 3)
-    rotation = rotations.orthonormalised(rotation)
-    along = spatial_momentum(masses, positions, rotation, rotation @ rotations.hat(run.y[:3].T))
+    pi, rotation = rigid_motion(inertia, inertia @ omega[0], np.linspace(0.0, 5.0, 11))
+    along = spatial_momentum(masses, positions, rotation, rotation @ rotations.hat(pi @ np.linalg.inv(inertia)))
     np.testing.assert_allclose(along, np.broadcast_to(along[0], along.shape), atol=1e-10, rtol=0)
 
 
@@ -622,15 +606,9 @@ def test_flow_on_c2_covers_the_rigid_body_with_its_attitude_g6(rng):
     z, times = spinors(rng), np.linspace(0.0, 12.0, 25)
     path = cayley_klein_motion(INERTIA, z, times)
     start = cayley_klein_momentum(z)
-
-    def slope(_, y):
-        omega = np.linalg.solve(INERTIA, y[:3])
-        return np.concatenate([cross(y[:3], omega), (y[3:].reshape(3, 3) @ rotations.hat(omega)).ravel()])
-
-    run = solve_ivp(slope, (0, 12), [*start, *np.eye(3).ravel()], "DOP853", times, rtol=1e-13, atol=1e-14)
-    np.testing.assert_allclose(cayley_klein_momentum(path), run.y[:3].T, atol=1e-11, rtol=0)
-    attitude = cayley_klein_attitude(z, path)
-    np.testing.assert_allclose(attitude, run.y[3:].T.reshape(-1, 3, 3), atol=1e-11, rtol=0)
+    momentum, attitude = rigid_motion(INERTIA, start, times)
+    np.testing.assert_allclose(cayley_klein_momentum(path), momentum, atol=1e-11, rtol=0)
+    np.testing.assert_allclose(cayley_klein_attitude(z, path), attitude, atol=1e-11, rtol=0)
     np.testing.assert_allclose(np.linalg.norm(path, axis=-1), np.linalg.norm(z), rtol=1e-12)
     batch = cayley_klein_motion(INERTIA, np.stack([z, 1j * z]), times)
     np.testing.assert_allclose(batch[1], 1j * path, atol=1e-12, rtol=0)

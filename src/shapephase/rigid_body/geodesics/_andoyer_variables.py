@@ -209,8 +209,6 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
 def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart = ZYZ) -> AndoyerVariables:
     """Andoyer's variables of Euler angles (phi, theta, psi) and their momenta: (..., 3), (..., 3) -> (...) each.
 
-    Source: as `AndoyerVariables.euler_angles`.
-
     Raises ChartPoleError within 1e-8 of a pole of the chart, ShapeError if a momentum is zero.
 
     Examples

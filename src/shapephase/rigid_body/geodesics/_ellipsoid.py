@@ -81,8 +81,6 @@ def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolut
 def metric_coefficients(aspect: float, colatitude: ArrayLike) -> tuple[Array, Array]:
     """F_1 = cos^2 + epsilon^2 sin^2 and F_2 = sin^2 of the parametric colatitude, unit equator: (...) -> (...), (...).
 
-    Source: Bonnard et al., section 2.
-
     Examples
     --------
     >>> tuple(float(value) for value in sp.rigid_body.geodesics.metric_coefficients(0.5, np.pi / 2.0))

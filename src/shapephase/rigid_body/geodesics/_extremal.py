@@ -70,10 +70,7 @@ class Extremal:
         return safe_newton(step, start.ravel(), -limit, limit, ROUNDING).reshape(p.shape) + turns * np.pi
 
     def state(self, times: ArrayLike) -> tuple[Array, Array, Array]:
-        """Latitude phi, longitude theta (continuous) [rad] and p_phi = d phi/dt at times t.
-
-        Source: Bonnard et al., section 2.1.
-        """
+        """Latitude phi, longitude theta (continuous) [rad] and p_phi = d phi/dt at times t."""
         t = finite_array(times, "times")
         p, q, _, first, side = self._spread_start(t)
         chi = self.phase(t)
@@ -114,10 +111,7 @@ class Extremal:
         return field * p / distance, -field * slope / distance
 
     def poincare_field(self, times: ArrayLike) -> tuple[Array, Array]:
-        """J_2 = t dq/dt, of phi and theta: the end's derivative by the magnitude of the initial momentum, at times t.
-
-        Source: Bonnard et al., section 2.2.
-        """
+        """J_2 = t dq/dt, of phi and theta: the end's derivative by the magnitude of the initial momentum, at times t."""
         t = finite_array(times, "times")
         latitude, _, slope = self.state(t)
         return t * slope, t * _spread(self.start.momentum, t) / self.surface.metric(latitude)

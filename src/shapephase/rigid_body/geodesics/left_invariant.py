@@ -56,10 +56,7 @@ class LeftInvariantMetric:
         return bool(self.inverse_moments[2] == 0.0)
 
     def angular_velocity(self, momentum: ArrayLike) -> Array:
-        """u = a Pi, which maximises the pseudo-Hamiltonian: (..., 3) -> (..., 3), body axes [rad/s].
-
-        Source: Bonnard et al., section 3.1, u_i = H_i/I_i.
-        """
+        """u = a Pi, which maximises the pseudo-Hamiltonian: (..., 3) -> (..., 3), body axes [rad/s]."""
         return (self._principal(momentum) * self.inverse_moments) @ self.axes.T
 
     def pseudo_hamiltonian(self, momentum: ArrayLike, angular_velocity: ArrayLike) -> Array:
@@ -167,7 +164,6 @@ class LeftInvariantMetric:
 def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
     """The metric u.I u of an inertia, or of principal moments one of which may be infinite.
 
-    Source: Bonnard et al., sections 3.1 and 3.2.
     Raises ShapeError for another shape, moments not positive, or more than one infinite.
 
     Parameters

@@ -87,7 +87,6 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
 
     (A3), on the curvature, is `SurfaceOfRevolution.is_greatest_curvature_on_equator`.
 
-    Source: Bonnard et al., section 2.1.
     Raises ShapeError if the reach is not positive, or the functions give no finite numbers of the right shape, or F_2
     <= 0 inside.
 

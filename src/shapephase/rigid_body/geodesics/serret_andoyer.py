@@ -199,7 +199,6 @@ class SerretAndoyerMetric:
     def geodesics(self, p_theta: ArrayLike) -> GeodesicFamily:
         """The geodesics of unit speed from the equator with these p_theta, |p_theta| <= sqrt(I_3): (...).
 
-        Source: Bonnard et al., sections 4.2 and 4.3.
         Raises ShapeError if a p_theta is beyond `largest_momentum`.
         """
         return GeodesicFamily(constants=constants_of(self.moments, p_theta))

@@ -84,8 +84,6 @@ class GeodesicFamily:
         "oscillating" about the equator (the momentum circles the axis of the largest moment, I_3) and its limit, the
         "equator" itself; "rotating" (the momentum circles the axis of the smallest, I_1); "separatrix"; "extended":
         |p_theta| below sqrt(I_1), where there is a geodesic but no rigid body.
-
-        Source: Bonnard et al., section 4.2.
         """
         names = np.array([member.name.lower() for member in GeodesicClass])[self.constants.kind]
         return str(names) if names.ndim == 0 else names
@@ -152,7 +150,6 @@ class GeodesicFamily:
         """The largest phi of oscillating geodesics, phi_+: (...) [sqrt(kg) m]; K/alpha on the separatrix.
 
         Raises ShapeError for rotating geodesics, which have none.
-        Source: Bonnard et al., section 4.2.
         """
         requirement = "a largest phi needs an oscillating geodesic, |p_theta| >= sqrt(I_2)"
         check_entries(self.constants.kind < GeodesicClass.SEPARATRIX, self.p_theta, "p_theta", requirement)

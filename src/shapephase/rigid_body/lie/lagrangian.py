@@ -183,8 +183,6 @@ def mass_inner_product(masses: ArrayLike, positions: ArrayLike, a: ArrayLike, b:
 def mass_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
     """The inertia tensor about the material origin, I a . b = <<a, b>>: (P,), (P, 3) -> (3, 3) [kg m^2].
 
-    Source: Marsden and Ratiu, section 15.3.
-
     Examples
     --------
     >>> sp.rigid_body.lie.mass_inertia([1.0, 1.0], [[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]).tolist()
