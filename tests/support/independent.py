@@ -171,6 +171,11 @@ def apart(first: Array, second: Array) -> float:
     return float(np.max(2.0 * np.arcsin(np.minimum(norm, 1.0))))
 
 
+def assert_within(found: ArrayLike, expected: ArrayLike, tolerance: float | Array) -> None:
+    """Every entry is right to an absolute tolerance."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)  # type: ignore[arg-type]
+
+
 def wrapped(angle: ArrayLike) -> Array:
     """An angle modulo 2 pi, nearest to zero."""
     return np.angle(np.exp(1j * np.asarray(angle, dtype=float)))

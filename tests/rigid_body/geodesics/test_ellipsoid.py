@@ -26,6 +26,7 @@ from shapephase.rigid_body.geodesics import (
     metric_coefficients,
     surface_of_metric,
 )
+from support.independent import assert_within
 from support.long_runs import full_but
 
 ASPECTS = [0.02, 0.5, 0.6, 0.99, 1.0, 1.5, 20.0]
@@ -76,8 +77,8 @@ def test_coefficients_and_the_polar_form_p1():
                 assert float(value) == pytest.approx(float(exact), rel=1e-13, abs=4.0 * np.finfo(float).eps * length[3])
         inner = colatitude[1:5]
         latitude = length[3] - length[1:5]
-        np.testing.assert_allclose(surface.latitude(np.cos(inner)), latitude, rtol=0, atol=2e-13 * max(1.0, aspect))
-        np.testing.assert_allclose(surface.metric(latitude), second[1:5], rtol=0, atol=1e-12)
+        assert_within(surface.latitude(np.cos(inner)), latitude, 2e-13 * max(1.0, aspect))
+        assert_within(surface.metric(latitude), second[1:5], 1e-12)
 
 
 def test_the_surface_of_the_coefficients_alone_is_the_same_p1():
@@ -89,8 +90,8 @@ def test_the_surface_of_the_coefficients_alone_is_the_same_p1():
         np.testing.assert_allclose(found.first_return(p), closed.first_return(p), rtol=1e-13)
         np.testing.assert_allclose(found.first_return_rate(p), closed.first_return_rate(p), rtol=1e-10)
         one, other = (conjugate_locus(s, 50, 2, 0.1) for s in (closed, found))
-        np.testing.assert_allclose(other.points.latitude, one.points.latitude, rtol=0, atol=1e-11)
-        np.testing.assert_allclose(other.points.longitude, one.points.longitude, rtol=0, atol=1e-11)
+        assert_within(other.points.latitude, one.points.latitude, 1e-11)
+        assert_within(other.points.longitude, one.points.longitude, 1e-11)
         np.testing.assert_allclose(other.points.time, one.points.time, rtol=1e-11)
 
 
@@ -385,7 +386,7 @@ def test_geodetic_latitudes_of_the_earth_against_geographiclib_p1():
     model, degrees = Geodesic(radius, flattening), np.array([-90.0, -33.3, 0.0, 1e-7, 20.0, 45.0, 89.999, 90.0])
     lengths = [model.Inverse(0.0, 0.0, x, 0.0)["s12"] * np.sign(x) for x in degrees]
     found = latitude_of_geodetic(1.0 - flattening, np.radians(degrees), radius)
-    np.testing.assert_allclose(found, lengths, rtol=0, atol=2e-8)
+    assert_within(found, lengths, 2e-8)
 
 
 @pytest.mark.parametrize("aspect", [0.5, 1.0, 1.3])
@@ -399,7 +400,7 @@ def test_geodetic_latitudes_by_quadrature_and_back_p1(aspect):
         curvature = aspect**2 * (np.cos(inside) ** 2 + (aspect * np.sin(inside)) ** 2) ** -1.5
         assert length == pytest.approx(0.5 * angle * (weights @ curvature), abs=1e-14)
     assert found[-1] == pytest.approx(ellipsoid(aspect).reach, abs=1e-14)
-    np.testing.assert_allclose(np.degrees(geodetic_latitude(aspect, found)), degrees, rtol=0, atol=1e-13)
+    assert_within(np.degrees(geodetic_latitude(aspect, found)), degrees, 1e-13)
     assert geodetic_latitude(aspect, 0.0) == latitude_of_geodetic(aspect, 0.0) == 0.0
 
 

@@ -15,7 +15,7 @@ from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
 from shapephase.rigid_body import EulerTop
 from shapephase.rigid_body.geodesics import andoyer_variables, left_invariant_metric, serret_andoyer_metric
-from support.independent import cross
+from support.independent import assert_within, cross
 from support.long_runs import full_but
 
 METRICS = {
@@ -73,12 +73,12 @@ def test_the_controls_maximise_the_pseudo_hamiltonian_q1(name):
     u = metric.angular_velocity(pi)
     np.testing.assert_allclose(u, pi / moments, rtol=1e-15)
     best = metric.pseudo_hamiltonian(pi, u)
-    np.testing.assert_allclose(best, metric.hamiltonian(pi), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(best, 0.5 * np.sum(pi**2 / moments, axis=-1), rtol=0, atol=1e-14)
+    assert_within(best, metric.hamiltonian(pi), 1e-14)
+    assert_within(best, 0.5 * np.sum(pi**2 / moments, axis=-1), 1e-14)
     step = rng.normal(size=(50, 3)) * np.isfinite(moments)
     weights = np.where(np.isfinite(moments), moments, 0.0)
     lost = 0.5 * np.sum(weights * step**2, axis=-1)
-    np.testing.assert_allclose(metric.pseudo_hamiltonian(pi, u + step), best - lost, rtol=0, atol=1e-13)
+    assert_within(metric.pseudo_hamiltonian(pi, u + step), best - lost, 1e-13)
 
 
 @pytest.mark.parametrize("name", full_but(METRICS, "unsorted", "rod", "strong", "sub-Riemannian"))
@@ -89,8 +89,8 @@ def test_geodesics_solve_the_extremal_equations_q1_q2(name):
         start = metric.unit_speed(rng.normal(size=3))
         at = variational(METRICS[name], start, 5.0)
         t = np.array([0.3, 2.0, 5.0])
-        np.testing.assert_allclose(metric.attitude(start, t), [at(s)[0] for s in t], rtol=0, atol=1e-11)
-        np.testing.assert_allclose(metric.body_momentum(start, t), [at(s)[1] for s in t], rtol=0, atol=1e-11)
+        assert_within(metric.attitude(start, t), [at(s)[0] for s in t], 1e-11)
+        assert_within(metric.body_momentum(start, t), [at(s)[1] for s in t], 1e-11)
 
 
 def test_eulers_equation_componentwise_q2():
@@ -103,7 +103,7 @@ def test_eulers_equation_componentwise_q2():
         h[:, 0] * h[:, 2] * (1 / i1 - 1 / i3),
         h[:, 0] * h[:, 1] * (1 / i2 - 1 / i1),
     ]
-    np.testing.assert_allclose(metric.momentum_rate(h), np.transpose(printed), rtol=0, atol=1e-15)
+    assert_within(metric.momentum_rate(h), np.transpose(printed), 1e-15)
 
 
 def test_times_are_quadratures_of_the_two_integrals_q3():
@@ -132,11 +132,11 @@ def test_momentum_in_inertial_axes_and_the_hamiltonian_are_conserved_q4(name):
     t = rng.uniform(-20.0, 20.0, 20)
     at = metric.body_momentum(start, t)
     np.testing.assert_allclose(so3.apply(metric.attitude(start, t), at), start, atol=1e-12)
-    np.testing.assert_allclose(metric.hamiltonian(at), 0.5, rtol=0, atol=1e-11)
+    assert_within(metric.hamiltonian(at), 0.5, 1e-11)
     # The lift of A_i R is one component of R Pi.
     attitude, pi = metric.attitude(start[0], 1.3), metric.body_momentum(start[0], 1.3)
     lifts = [so3.vee(attitude.T @ generator @ attitude) @ pi for generator in (A1, A2, A3)]
-    np.testing.assert_allclose(lifts, start[0], rtol=0, atol=1e-12)
+    assert_within(lifts, start[0], 1e-12)
 
 
 def test_geodesics_are_the_motions_of_the_euler_top():
@@ -147,11 +147,11 @@ def test_geodesics_are_the_motions_of_the_euler_top():
         metric, start = left_invariant_metric(inertia), rng.normal(size=3)
         top = EulerTop(inertia, start)
         t = rng.uniform(-3.0, 10.0, 5)
-        np.testing.assert_allclose(metric.attitude(start, t), top.attitude(t), rtol=0, atol=1e-11)
-        np.testing.assert_allclose(metric.body_momentum(start, t), top.body_momentum(t), rtol=0, atol=1e-11)
+        assert_within(metric.attitude(start, t), top.attitude(t), 1e-11)
+        assert_within(metric.body_momentum(start, t), top.body_momentum(t), 1e-11)
     # An eigenvalue routine is right for a tensor within some units of rounding of the given one.
     rounding = 16.0 * np.finfo(float).eps * np.trace(inertia)
-    np.testing.assert_allclose(metric.axes @ np.diag(metric.moments) @ metric.axes.T, inertia, rtol=0, atol=rounding)
+    assert_within(metric.axes @ np.diag(metric.moments) @ metric.axes.T, inertia, rounding)
 
 
 @pytest.mark.parametrize("moments", list(itertools.permutations((0.2, 0.47, 0.8))), ids=str)
@@ -160,7 +160,7 @@ def test_next_to_the_unstable_axis_with_one_component_zero_q2(moments):
     metric = left_invariant_metric(moments)
     for momentum in itertools.permutations((1.0, 1e-9, 0.0)):
         top = EulerTop.principal(moments, momentum)
-        np.testing.assert_allclose(metric.attitude(momentum, 5.0), top.attitude(5.0), rtol=0, atol=1e-12)
+        assert_within(metric.attitude(momentum, 5.0), top.attitude(5.0), 1e-12)
 
 
 def test_moments_and_axes_ascend_and_are_those_given():
@@ -175,7 +175,7 @@ def test_one_parameter_is_left_in_the_sub_riemannian_case_q5():
     # k^2 = I_2/I_3: multiplying both moments by a number only multiplies the momenta.
     start, t = np.array([0.7, -0.4, 1.1]), 1.7
     once, thrice = left_invariant_metric([np.inf, 2.0, 1.0]), left_invariant_metric([np.inf, 6.0, 3.0])
-    np.testing.assert_allclose(thrice.attitude(3.0 * start, t), once.attitude(start, t), rtol=0, atol=1e-14)
+    assert_within(thrice.attitude(3.0 * start, t), once.attitude(start, t), 1e-14)
     assert once.is_sub_riemannian
     assert not left_invariant_metric(TRIAXIAL).is_sub_riemannian
 
@@ -204,9 +204,9 @@ def test_the_riemannian_case_converges_as_the_inverse_of_the_moment_q5():
 
     slope = solve_ivp(rate, (0.0, 3.0), np.append(start, np.zeros(6)), "DOP853", rtol=1e-12, atol=1e-13).y[3:6, -1]
     measured = so3.log(at.T @ near[2].attitude(start, 3.0)) / inverse_moments[2]
-    np.testing.assert_allclose(measured, slope, rtol=0, atol=2e-3 * np.linalg.norm(slope))
+    assert_within(measured, slope, 2e-3 * np.linalg.norm(slope))
     tiny = left_invariant_metric([1e10, 2.0, 1.0])
-    np.testing.assert_allclose(so3.log(at.T @ tiny.attitude(start, 3.0)) * 1e10, slope, rtol=0, atol=1e-4)
+    assert_within(so3.log(at.T @ tiny.attitude(start, 3.0)) * 1e10, slope, 1e-4)
 
 
 @pytest.mark.parametrize("name", full_but(METRICS, "triaxial", "flat", "round", "sub-Riemannian about 2"))
@@ -218,9 +218,7 @@ def test_the_differential_solves_the_variational_equation_q6(name):
         at = variational(METRICS[name], start, 6.0)
         for t in (0.004, 0.3, 2.5, 6.0):
             expected = at(t)[2]
-            np.testing.assert_allclose(
-                metric.differential(start, t), expected, rtol=0, atol=2e-11 * max(t, np.abs(expected).max())
-            )
+            assert_within(metric.differential(start, t), expected, 2e-11 * max(t, np.abs(expected).max()))
 
 
 def test_the_differential_at_special_momenta_q6():
@@ -239,10 +237,8 @@ def test_the_differential_at_special_momenta_q6():
         at = variational(TRIAXIAL, start, 8.0)
         for t in (1e-3, 0.0199, 0.0201, 3.0, 8.0):
             expected = at(t)[2]
-            np.testing.assert_allclose(
-                metric.differential(start, t), expected, rtol=0, atol=1e-11 * max(t, np.abs(expected).max())
-            )
-    np.testing.assert_allclose(metric.differential(np.zeros(3), 2.0), np.diag(2.0 / TRIAXIAL), rtol=0, atol=1e-15)
+            assert_within(metric.differential(start, t), expected, 1e-11 * max(t, np.abs(expected).max()))
+    assert_within(metric.differential(np.zeros(3), 2.0), np.diag(2.0 / TRIAXIAL), 1e-15)
     np.testing.assert_array_equal(metric.differential(np.ones(3), 0.0), np.zeros((3, 3)))
 
 
@@ -272,7 +268,7 @@ def test_small_turns_keep_their_digits_q6():
 
     for t in (1e-6, 1e-3, 0.0199, 0.0201, 0.05):
         expected = np.array([series(column, t) for column in range(3)]).T
-        np.testing.assert_allclose(metric.differential(direction, t), expected, rtol=0, atol=1e-13 * t)
+        assert_within(metric.differential(direction, t), expected, 1e-13 * t)
 
 
 @pytest.mark.parametrize(
@@ -294,7 +290,7 @@ def test_conjugate_times_are_zeros_of_the_variational_determinant_q6(name):
         change = np.flatnonzero(values[1:] * values[:-1] < 0.0)
         found = [brentq(determinant, grid[k], grid[k + 1], xtol=1e-14) for k in change]
         assert len(found) == 2
-        np.testing.assert_allclose(found, times[:2], rtol=0, atol=1e-10)
+        assert_within(found, times[:2], 1e-10)
         assert times[2] > times[1]
 
 
@@ -354,7 +350,7 @@ def test_conjugate_times_scale_and_are_symmetric_q6():
     turned = left_invariant_metric(turn @ np.diag(TRIAXIAL) @ turn.T)
     np.testing.assert_allclose(turned.conjugate_time(start @ turn.T), time, rtol=1e-11)
     locus = metric.conjugate_locus(start)
-    np.testing.assert_allclose(turned.conjugate_locus(start @ turn.T), turn @ locus @ turn.T, rtol=0, atol=1e-10)
+    assert_within(turned.conjugate_locus(start @ turn.T), turn @ locus @ turn.T, 1e-10)
 
 
 def test_the_conjugate_locus_is_a_critical_value_of_the_exponential_map_q6():
@@ -380,7 +376,7 @@ def test_gauss_lemma_holds_q6(name):
     metric = left_invariant_metric(METRICS[name])
     start, t = rng.normal(size=(20, 3)), rng.uniform(0.1, 6.0, 20)
     projected = np.einsum("ni,nij->nj", metric.body_momentum(start, t), metric.differential(start, t))
-    np.testing.assert_allclose(projected, t[:, None] * metric.angular_velocity(start), rtol=0, atol=1e-10)
+    assert_within(projected, t[:, None] * metric.angular_velocity(start), 1e-10)
 
 
 def test_serret_andoyer_conjugate_points_are_not_those_on_so3_q7():
@@ -429,8 +425,8 @@ def test_batches_and_shapes():
     assert metric.conjugate_time(start).shape == (4, 1)
     assert np.shape(metric.conjugate_time(start[0, 0])) == ()
     assert metric.conjugate_locus(start).shape == (4, 1, 3, 3)
-    np.testing.assert_allclose(attitude[2, 3], metric.attitude(start[2, 0], t[3]), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(differential[2, 3], metric.differential(start[2, 0], t[3]), rtol=0, atol=1e-13)
+    assert_within(attitude[2, 3], metric.attitude(start[2, 0], t[3]), 1e-14)
+    assert_within(differential[2, 3], metric.differential(start[2, 0], t[3]), 1e-13)
     np.testing.assert_allclose(
         metric.conjugate_time(start)[3, 0], metric.conjugate_time(start[3, 0]), rtol=1e-13, atol=0
     )

@@ -27,6 +27,7 @@ from shapephase.rigid_body.geodesics import (
     surface_of_stretch,
     variational_jacobi_field,
 )
+from support.independent import assert_within
 from support.long_runs import full_but
 
 ANDOYER = (1.0 / 3.0, 1.0 / 2.0, 1.0)
@@ -130,9 +131,9 @@ def test_extremals_solve_hamiltons_equations_o1(case):
         times = np.linspace(0.3, 1.7 * float(surface.period(p)), 13)
         raw = hamiltonian_flow(case.metric, p, 0.0, times, unit_slope(case.metric, p, 0.0))
         latitude, longitude, slope = extremal(surface, surface.direction_of(p)).state(times)
-        np.testing.assert_allclose(latitude, raw[0], rtol=0, atol=2e-11)
-        np.testing.assert_allclose(longitude, raw[1], rtol=0, atol=2e-11)
-        np.testing.assert_allclose(slope, raw[2], rtol=0, atol=2e-11)
+        assert_within(latitude, raw[0], 2e-11)
+        assert_within(longitude, raw[1], 2e-11)
+        assert_within(slope, raw[2], 2e-11)
 
 
 def test_extremals_from_any_latitude_in_any_direction_o1(case):
@@ -146,10 +147,10 @@ def test_extremals_from_any_latitude_in_any_direction_o1(case):
         raw = hamiltonian_flow(case.metric, p, start, times, np.sin(angle))
         path = extremal(surface, angle, start)
         latitude, longitude, slope = path.state(times)
-        np.testing.assert_allclose(np.stack([latitude, longitude, slope]), raw[:3], rtol=0, atol=5e-12)
+        assert_within(np.stack([latitude, longitude, slope]), raw[:3], 5e-12)
         d_phi, d_theta = path.direction_derivative(times)
         scale = -np.sqrt(m) * np.sin(angle)
-        np.testing.assert_allclose(np.stack([d_phi, d_theta]) / scale, raw[3:5], rtol=0, atol=3e-10)
+        assert_within(np.stack([d_phi, d_theta]) / scale, raw[3:5], 3e-10)
 
 
 def test_clairaut_parallels_and_meridians_o2(case):
@@ -236,12 +237,12 @@ def test_jacobi_fields_by_two_routes_and_the_raw_equations_o5(case):
         times = np.linspace(0.2, 1.1 * float(surface.period(p)), 8)
         field = extremal(surface, angle).jacobi_field(times)
         size = np.abs(field).max()
-        np.testing.assert_allclose(variational_jacobi_field(surface, angle, times), field, rtol=0, atol=1e-10 * size)
+        assert_within(variational_jacobi_field(surface, angle, times), field, 1e-10 * size)
         raw = hamiltonian_flow(case.metric, p, 0.0, times, unit_slope(case.metric, p, 0.0))
         d_phi, d_theta = extremal(surface, angle).direction_derivative(times)
         scale = -float(surface.greatest_momentum) * np.sin(angle)
-        np.testing.assert_allclose(d_phi / scale, raw[3], rtol=0, atol=1e-10 * np.abs(raw[3]).max())
-        np.testing.assert_allclose(d_theta / scale, raw[4], rtol=0, atol=1e-10 * np.abs(raw[4]).max())
+        assert_within(d_phi / scale, raw[3], 1e-10 * np.abs(raw[3]).max())
+        assert_within(d_theta / scale, raw[4], 1e-10 * np.abs(raw[4]).max())
 
 
 def test_poincare_field_and_homogeneity_o5(case):
@@ -366,7 +367,7 @@ def curvature_of(metric, phi):
 def test_gauss_curvature_of_surfaces_o10(case):
     surface = case.surface()
     phi = case.reach * np.array([0.0, 1e-3, 0.1, -0.4, 0.7, 0.9])
-    np.testing.assert_allclose(surface.curvature(phi), curvature_of(case.metric, phi), rtol=0, atol=2e-11)
+    assert_within(surface.curvature(phi), curvature_of(case.metric, phi), 2e-11)
 
 
 def test_first_conjugate_point_of_the_equator_is_a_cusp_o11(case):
@@ -598,7 +599,7 @@ def test_eight_cusps_where_the_curvature_is_not_monotone_and_the_rate_of_the_tim
             times = {k: conjugate_points(surface, angles + k * h, order, latitude).time for k in (-2, -1, 1, 2)}
             slope = (times[-2] - 8 * times[-1] + 8 * times[1] - times[2]) / (12 * h)
             rate = conjugate_locus(surface, angles, order, latitude).time_rate
-            np.testing.assert_allclose(rate, slope, rtol=0, atol=1e-9)
+            assert_within(rate, slope, 1e-9)
 
 
 def test_cut_locus_is_an_arc_of_the_opposite_parallel_or_meridian_o16():
@@ -636,18 +637,18 @@ def test_where_only_the_first_return_falls_the_cut_locus_is_an_arc_of_the_parall
     assert (surface.curvature_trend(), surface.tameness()) == ("neither", "decreasing")
     p = np.array([0.3, 1.0, 2.0, 2.2])
     root = np.sqrt(1.0 + 0.8 * p**2)
-    np.testing.assert_allclose(surface.period(p), 2.0 * np.pi / root, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(surface.first_return(p), np.pi * (1.0 - 0.8 * p / root), rtol=0, atol=1e-13)
-    np.testing.assert_allclose(cut_locus(surface).longitudes, (0.2 * np.pi, 1.8 * np.pi), rtol=0, atol=1e-13)
+    assert_within(surface.period(p), 2.0 * np.pi / root, 1e-13)
+    assert_within(surface.first_return(p), np.pi * (1.0 - 0.8 * p / root), 1e-13)
+    assert_within(cut_locus(surface).longitudes, (0.2 * np.pi, 1.8 * np.pi), 1e-13)
     latitude, angle = 0.3, 0.6
     largest = np.sqrt(orbital_transfer_metric(latitude)[0])
     end = np.pi * (1.0 - 0.8 * largest / np.sqrt(1.0 + 0.8 * largest**2))
     arc = cut_locus(surface, latitude)
     assert (arc.kind, arc.latitudes) == ("parallel", (-latitude, -latitude))
-    np.testing.assert_allclose(arc.longitudes, (end, 2.0 * np.pi - end), rtol=0, atol=1e-12)
+    assert_within(arc.longitudes, (end, 2.0 * np.pi - end), 1e-12)
     time = float(cut_time(surface, angle, latitude))
     there, mirrored = (np.array(extremal(surface, sign * angle, latitude).state(time)[:2]) for sign in (1.0, -1.0))
-    np.testing.assert_allclose(there, mirrored, rtol=0, atol=1e-11)
+    assert_within(there, mirrored, 1e-11)
     # None of the points that are nearer is the end.
     near = extremal(surface, np.linspace(-np.pi, np.pi, 1441), latitude).state(0.98 * time)
     across = 2.0 * np.sqrt(surface.metric(there[0])) * np.sin(0.5 * (near[1] - there[1]))
