@@ -455,17 +455,6 @@ def test_bonnards_precession_and_angles_j9():
     assert np.abs(first / precession_rate(momentum, velocity) - 1.0).max() < 1e-12
 
 
-def test_momentum_and_energy_of_proposition_6_j9():
-    rng = np.random.default_rng(24)
-    moments = np.array([3.0, 2.0, 1.2])
-    for angles, p in zip(random_angles(rng, 40), rng.normal(size=(40, 3)), strict=True):
-        (_, phi2, phi3), (p1, p2, p3) = angles, p
-        lever = (p1 - p3 * np.cos(phi2)) / np.sin(phi2)
-        h = np.array([p2 * np.sin(phi3) - np.cos(phi3) * lever, p2 * np.cos(phi3) + np.sin(phi3) * lever, p3])
-        assert np.abs(ZYZ.body_momentum(angles, p) - h).max() < 1e-14 / np.sin(phi2)
-        assert abs(ZYZ.hamiltonian(np.diag(moments), angles, p) / (0.5 * np.sum(h * h / moments)) - 1.0) < 1e-13
-
-
 def test_the_printed_sign_of_h3_is_wrong_b_e3():
     rng = np.random.default_rng(25)
     for momentum in rng.normal(size=(30, 3)):

@@ -86,20 +86,6 @@ def test_the_book_runs_backwards_m_e11():
         assert np.abs(pair.rate(values) - np.array(euler_rate, dtype=float)).max() < 4.0 * EPS * largest
 
 
-def test_the_printed_rates_of_theta_and_p_run_backwards_m_e11():
-    rng = np.random.default_rng(1)
-    pendulum = rigid_body_pendulum(ASCENDING)
-    assert pendulum.axes == (0, 1, 2)
-    k1, k2 = (1.0 / np.sqrt(1.0 / ASCENDING[i] - 1.0 / 3.0) for i in (0, 1))
-    for pi in rng.normal(size=(20, 3)):
-        r, theta, p = pendulum.coordinates(pi)
-        rate = euler(ASCENDING, pi)
-        theta_rate = (rate[1] / k2 * np.cos(theta) - rate[0] / k1 * np.sin(theta)) / r
-        assert abs(theta_rate - p / (k1 * k2)) < 1e-14
-        assert abs(theta_rate + p / (k1 * k2)) > 1e-3
-        assert np.abs(np.array(pendulum.rates(r, theta, p)) - [theta_rate, rate[2]]).max() < 1e-14
-
-
 @pytest.mark.parametrize("determinant", [1.0, -1.0])
 def test_every_matrix_of_determinant_one_gives_eulers_equations_n1(determinant):
     rng = np.random.default_rng(2)
@@ -643,21 +629,6 @@ def test_maxwell_bloch_has_the_same_family_of_gradients_n11():
             assert np.abs(np.array(rate(point)).ravel() - maxwell_bloch_rate(point)).max() < 1e-12
             values = ca.Function("v", [x], [circle, parabola])(point)
             assert np.abs(np.array([float(v) for v in values]) - maxwell_bloch_invariants(point)).max() < 1e-15
-
-
-def test_each_momentum_component_obeys_a_duffing_equation_n11():
-    """The rigid body's own: Pi_3'' is a cubic of Pi_3 with coefficients from K and N."""
-    i1, i2, i3 = ASCENDING
-    pi = ca.SX.sym("pi", 3)
-    flow = ca.cross(pi, pi / ASCENDING)
-    second = ca.Function("s", [pi], [ca.gradient(flow[2], pi).T @ flow])
-    pair = nambu_pair(np.diag(ASCENDING), cylinder_matrix(ASCENDING))
-    for point in np.random.default_rng(14).normal(size=(20, 3)):
-        k, n = pair.values(point)
-        square = (2 * n - point[2] ** 2) / pair.hamiltonian[1, 1]
-        first_square = (2 * k - pair.casimir[1, 1] * square) / pair.casimir[0, 0]
-        cubic = (1 / i2 - 1 / i1) * point[2] * ((1 / i3 - 1 / i2) * square + (1 / i1 - 1 / i3) * first_square)
-        assert abs(cubic - float(second(point))) < 1e-13
 
 
 def test_andoyer_equations_are_eulers_n12():

@@ -120,19 +120,6 @@ def test_period_in_closed_form_p2():
                 assert float(value) == pytest.approx(float(exact), rel=1e-14)
 
 
-@pytest.mark.parametrize("count", full_but([10, 25], 10))
-def test_values_against_mpmath_p2(count):
-    """T, R and R' to 1e-12 at random ellipsoids and momenta."""
-    rng = np.random.default_rng(2013)
-    with mp.workdps(30):
-        for _ in range(count):
-            aspect, p = float(np.exp(rng.uniform(-2.0, 1.5))), float(rng.uniform(0.02, 0.999))
-            surface = ellipsoid(aspect)
-            period, turn = integrals(aspect, p)
-            assert float(surface.period(p)) == pytest.approx(float(period), rel=1e-12)
-            assert float(surface.first_return(p)) == pytest.approx(float(turn), rel=1e-12)
-
-
 @pytest.mark.parametrize("count", full_but([2, 4], 2))
 def test_rates_against_mpmath_p2(count):
     """R' and R'' of the closed form, and R' = T'/(2p), by derivatives at 40 digits: to 1e-12."""

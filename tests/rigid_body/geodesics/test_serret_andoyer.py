@@ -302,20 +302,6 @@ def test_closed_forms_against_integration_r7_r8_r9(name, p):
     assert np.abs(family.theta(-times) + family.theta(times)).max() < 1e-14
 
 
-def test_closed_forms_of_other_bodies_r7_r8_r9():
-    rng = np.random.default_rng(3)
-    for moments in random_moments(rng, 3):
-        metric = serret_andoyer_metric(moments)
-        i1, i2, i3 = np.sqrt(moments)
-        for p in (rng.uniform(i2, i1), rng.uniform(i3, i2), rng.uniform(0.0, i3)):
-            family = metric.geodesics(p)
-            times, (phi, _, theta, field, _, _) = integrated(p, 3.0 * i1, moments)
-            scale = 1e-11 * np.maximum(1.0, 1.0 / np.sqrt(family.complement))
-            assert np.abs(family.phi(times) - phi).max() < scale * i1
-            assert np.abs(family.theta(times) - theta).max() < scale
-            assert np.abs((family.jacobi_field(times) - field) / (i1 + np.abs(field))).max() < scale
-
-
 def test_theta_on_the_separatrix_r8():
     """sin-Gordon-like: sin am = tanh; time and theta by their integrals in p = sqrt(I_2) exactly."""
     path = METRIC.separatrix()
@@ -425,13 +411,13 @@ def test_gauss_curvature_of_the_polar_form_r10():
         assert np.abs(curvature - total * (z - low) * (z - high) / z**2).max() < 10.0 * scale
 
 
-def test_lemma_4_2_over_200_bodies_r10():
+def test_lemma_4_2_over_100_bodies_r10():
     """The largest curvature, (B - A)(C - A)/A, is on the equator, as the lemma says.
 
     The least, of which it says nothing, is at z = 2 B only if 2 I_2 >= I_1 + I_3.
     """
     inner = 0
-    for moments in random_moments(np.random.default_rng(5), 200):
+    for moments in random_moments(np.random.default_rng(5), 100):
         metric = serret_andoyer_metric(moments)
         a, b, c = 1.0 / moments
         curvature = metric.gauss_curvature(np.linspace(0.0, metric.crest, 301))
@@ -454,7 +440,7 @@ def test_lemma_4_2_over_200_bodies_r10():
             assert metric.gauss_curvature(metric.phi_of_y(y)) == pytest.approx(least, abs=rounding)
             assert least < curvature[-1]
             inner += 1
-    assert 20 < inner < 180
+    assert 10 < inner < 90
 
 
 def test_the_reference_table_r11_r12():
@@ -696,20 +682,6 @@ def test_actions_by_quadrature_and_frequencies_by_their_derivatives_r15(start):
     # Euler's theorem on homogeneous functions.
     assert total * s.precession_rate + s.action * s.own_rate == pytest.approx(2.0 * energy, rel=1e-13)
     assert sadov_frequencies(MOMENTS, start) == pytest.approx((float(s.own_rate), float(s.precession_rate)), rel=1e-14)
-
-
-@pytest.mark.parametrize("start", STATES)
-def test_angles_advance_evenly_r15(start):
-    top = EulerTop.principal(MOMENTS, start, so3.exp(np.array([0.3, 0.2, 0.5])))
-    times = np.linspace(0.0, 60.0, 121)
-    s = sadov_variables(MOMENTS, andoyer_variables(top.attitude(times), top.body_momentum(times)))
-    assert np.abs(so3.wrap(s.own - s.own[0] - s.own_rate * times)).max() < 1e-12
-    assert np.abs(so3.wrap(s.precession - s.precession[0] - s.precession_rate * times)).max() < 1e-12
-    assert np.ptp(s.action) < 1e-14
-    assert np.ptp(s.node) < 1e-14
-    assert s.own_rate[0] == pytest.approx(top.polhode_frequency, rel=1e-13)
-    turn = s.precession_rate[0] * top.period
-    assert turn == pytest.approx(top.long_axis_precession_per_period, rel=1e-13)
 
 
 @pytest.mark.parametrize("start", STATES)
