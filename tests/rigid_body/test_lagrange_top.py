@@ -299,9 +299,7 @@ def test_a_fine_chart_m8():
     assert np.array_equal(chart.energy_casimir, chart.spectrum)
 
 
-@pytest.mark.parametrize(
-    ("eps", "duration"), full_but([(1e-3, 20.0), (0.05, 50.0), (0.05, 150.0)], (1e-3, 20.0), (0.05, 50.0))
-)
+@pytest.mark.parametrize(("eps", "duration"), full_but([(1e-3, 20.0), (0.05, 20.0), (0.05, 150.0)], (0.05, 20.0)))
 def test_a_nearly_symmetric_fast_top_is_linearly_stable_and_stays_near_for_long_m9(eps, duration):
     moments = np.array([1.0, 1.0 + eps, 0.6])
     top = HeavyTop(np.diag(moments), 1.0)
@@ -348,8 +346,8 @@ def test_the_asymmetric_threshold_is_where_simulation_finds_it_m9():
     assert threshold > 2.05
     top = HeavyTop(np.diag(moments), 1.0)
     motion = top.motion(
-        np.array([[0.95], [1.05]]) * threshold * UP, so3.normalised([1e-4, 1e-4, 1.0]), duration=60.0, tolerance=1e-3
+        np.array([[0.95], [1.05]]) * threshold * UP, so3.normalised([1e-4, 1e-4, 1.0]), duration=45.0, tolerance=1e-3
     )
-    tilt = np.arccos(np.minimum(motion.gamma(np.linspace(0.0, 60.0, 1500))[..., 2], 1.0)).max(axis=-1)
+    tilt = np.arccos(np.minimum(motion.gamma(np.linspace(0.0, 45.0, 1500))[..., 2], 1.0)).max(axis=-1)
     assert tilt[0] > 0.05
     assert tilt[1] < 2e-3

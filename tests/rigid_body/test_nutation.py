@@ -65,9 +65,8 @@ def test_precession_beside_the_nutation_by_quadrature_m3():
             height = motion.gamma(t)[2]
             return (vertical - axial * height) / (top.transverse * (1.0 - height) * (1.0 + height))
 
-        for end in (0.7, 4.0):
-            expected = quad(rate, 0.0, end, epsabs=1e-11, epsrel=1e-11, limit=200)[0]
-            assert found.precession(end) == pytest.approx(expected, abs=1e-8)
+        expected = quad(rate, 0.0, 4.0, epsabs=1e-11, epsrel=1e-11, limit=200)[0]
+        assert found.precession(4.0) == pytest.approx(expected, abs=1e-8)
         gained = found.precession([-1.0, found.period - 1.0])
         assert gained[1] - gained[0] == pytest.approx(found.precession_per_period, abs=1e-12)
 

@@ -122,7 +122,7 @@ def test_polhodes_at_the_ends_are_points_and_at_the_middle_the_separatrices_g8()
     ends = polhodes(moments, [0.125, 0.5], 9)
     assert ends[0, 0] == pytest.approx(np.tile([0.0, 0.0, 1.0], (9, 1)), abs=1e-15)
     assert ends[1, 1] == pytest.approx(np.tile([0.0, -1.0, 0.0], (9, 1)), abs=1e-15)
-    both = polhodes(moments, 0.25, 361)[0].reshape(-1, 3)
+    both = polhodes(moments, 0.25, 61)[0].reshape(-1, 3)
     separatrices = heteroclinics(moments, 3601).reshape(-1, 3)
     for point in both:
         assert np.linalg.norm(separatrices - point, axis=-1).min() < 1e-3

@@ -232,7 +232,7 @@ def test_metrics_that_break_an_assumption_are_refused_o4():
 @pytest.mark.parametrize("case", full_but(CASES, "boundary"), indirect=True)
 def test_jacobi_fields_by_two_routes_and_the_raw_equations_o5(case):
     surface = case.surface()
-    for p in case.momenta:
+    for p in case.momenta[1:]:
         angle = float(surface.direction_of(p))
         times = np.linspace(0.2, 1.1 * float(surface.period(p)), 8)
         field = extremal(surface, angle).jacobi_field(times)
