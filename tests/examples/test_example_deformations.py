@@ -40,7 +40,7 @@ from shapephase.examples.slow_deformation import (
 )
 from shapephase.inertia_tensor import triangle_defect
 from shapephase.phases.phases import arc_phases
-from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body import EulerTop
 from support.long_runs import full_but
 
 # What is computed is the same with and without machine code, which is quicker.

@@ -15,7 +15,7 @@ from shapephase.examples import kane_scher
 from support import osim_models
 from support.ball_bodies import BALLS
 from support.independent import apart, body_of, random_loop, random_rotation
-from support.opensim_replay import replayed
+from support.opensim_oracle import replayed
 
 FALL = {"start": [0.5, -0.2, 3.0], "velocity": [1.0, 0.3, 2.0], "gravity": [0.0, -9.81, 0.0]}
 TIMES = np.linspace(0.0, 2.0, 23)

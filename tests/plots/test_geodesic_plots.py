@@ -16,11 +16,15 @@ from shapephase.cli.rigid_body.conjugate import conjugate_command
 from shapephase.errors import InputFileNotFoundError, ShapeError, UnknownNameError
 from shapephase.plots.geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from shapephase.plots.plot_style import column_axes
-from shapephase.rigid_body.geodesics._conjugate_locus import conjugate_locus
-from shapephase.rigid_body.geodesics._ellipsoid import astroid, ellipsoid, meridian_length
-from shapephase.rigid_body.geodesics.axisymmetric_cut import axisymmetric_metric
-from shapephase.rigid_body.geodesics.left_invariant import left_invariant_metric
-from shapephase.rigid_body.geodesics.serret_andoyer import serret_andoyer_metric
+from shapephase.rigid_body.geodesics import (
+    astroid,
+    axisymmetric_metric,
+    conjugate_locus,
+    ellipsoid,
+    left_invariant_metric,
+    meridian_length,
+    serret_andoyer_metric,
+)
 
 MOMENTS = (3.0, 2.0, 1.0)
 # p, T, R, phi and theta of the first conjugate point of MOMENTS: theory.md, section 6.

@@ -22,7 +22,7 @@ from shapephase.plots._joint_styles import other_side
 from shapephase.plots._sphere_area import enclosed_cells, outlines
 from shapephase.plots.motion_plots import _pieces
 from shapephase.plots.plot_style import axes_image
-from shapephase.rigid_body.euler_top import EulerTop
+from shapephase.rigid_body import EulerTop
 from support.long_runs import full_but
 
 BLACK, BLUE, VERMILION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"

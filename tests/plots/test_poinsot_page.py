@@ -10,7 +10,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError
 from shapephase.plots import rolling_ellipsoid
-from shapephase.rigid_body.poinsot import Poinsot
+from shapephase.rigid_body import Poinsot
 from support.browser import opened, seen
 from support.pages import page_data
 

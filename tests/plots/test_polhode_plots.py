@@ -16,9 +16,7 @@ from shapephase.plots.polhode_plots import (
     plot_herpolhode,
     plot_polhodes,
 )
-from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.lagrange_top import LagrangeTop, upright_potential
-from shapephase.rigid_body.poinsot import Poinsot
+from shapephase.rigid_body import EulerTop, LagrangeTop, Poinsot, upright_potential
 
 MOMENTS = (2.0, 1.0, 4.0)
 ROUND_LARGEST, ROUND_SMALLEST, OWN = "#0072B2", "#D55E00", "#009E73"

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 from shapephase.errors import ShapeError
 from shapephase.plots.plot_style import column_axes
 from shapephase.plots.rolling_plots import plot_cones, plot_rolling_ellipsoid
-from shapephase.rigid_body.euler_top import EulerTop
-from shapephase.rigid_body.poinsot import Poinsot
+from shapephase.rigid_body import EulerTop, Poinsot
 
 BLUE, VERMILION, GREEN, BLACK, DARK = "#0072B2", "#D55E00", "#009E73", "#000000", "#555555"
 TOPS = {

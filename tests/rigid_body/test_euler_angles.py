@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from shapephase import so3
 from shapephase.errors import ChartPoleError, ShapeError, ShapePhaseError, SingularInertiaError, UnphysicalInertiaError
 from shapephase.rigid_body import ZXZ, ZYZ, canonical_bracket, precession_rate
-from support.independent import cross
+from support.independent import assert_within, rigid_motion
 
 CHARTS = pytest.mark.parametrize("chart", [ZXZ, ZYZ], ids=["zxz", "zyz"])
 THIRD = np.array([0.0, 0.0, 1.0])
@@ -107,19 +107,6 @@ def printed_spatial_velocity(angles, rates):
     )
 
 
-def printed_body_momentum(angles, momenta):
-    """Pi of Marsden and Ratiu (15.7.4)."""
-    (_, theta, psi), (p_phi, p_theta, p_psi) = angles, momenta
-    lever = p_phi - p_psi * np.cos(theta)
-    return np.array(
-        [
-            (lever * np.sin(psi) + p_theta * np.sin(theta) * np.cos(psi)) / np.sin(theta),
-            (lever * np.cos(psi) - p_theta * np.sin(theta) * np.sin(psi)) / np.sin(theta),
-            p_psi,
-        ]
-    )
-
-
 @CHARTS
 def test_attitude_is_the_product_of_three_turns_j1(chart):
     rng = np.random.default_rng(1)
@@ -184,14 +171,6 @@ def test_angular_velocities_are_the_derivative_of_the_attitude_j2(chart):
     assert np.abs(turned - spatial).max() < 5e-15
 
 
-def test_printed_velocities_j2():
-    rng = np.random.default_rng(5)
-    for angles, rates in zip(random_angles(rng, 20), rng.normal(size=(20, 3)), strict=True):
-        assert np.abs(ZXZ.body_angular_velocity(angles, rates) - printed_body_velocity(angles, rates)).max() < 3e-15
-        spatial = ZXZ.spatial_angular_velocity(angles, rates)
-        assert np.abs(spatial - printed_spatial_velocity(angles, rates)).max() < 3e-15
-
-
 @CHARTS
 def test_conjugate_momenta_are_derivatives_of_the_energy_j3(chart):
     rng = np.random.default_rng(6)
@@ -202,20 +181,6 @@ def test_conjugate_momenta_are_derivatives_of_the_energy_j3(chart):
     truth = rows(ca.Function("p", [q, dq], [ca.gradient(energy, dq)]), angles, rates)
     momentum = chart.body_angular_velocity(angles, rates) @ inertia
     assert np.abs(chart.conjugate_momenta(angles, momentum) - truth).max() < 1e-13
-
-
-def test_printed_momenta_j3():
-    rng = np.random.default_rng(7)
-    i1, i2, i3 = moments = np.array([3.0, 2.0, 1.2])
-    for angles, (dphi, dtheta, dpsi) in zip(random_angles(rng, 20), rng.normal(size=(20, 3)), strict=True):
-        _, theta, psi = angles
-        ct, st, cp, sp = np.cos(theta), np.sin(theta), np.cos(psi), np.sin(psi)
-        first, second = dphi * st * sp + dtheta * cp, dphi * st * cp - dtheta * sp
-        p_phi = i1 * first * st * sp + i2 * second * st * cp + i3 * (dphi * ct + dpsi) * ct
-        p_theta = i1 * first * cp - i2 * second * sp
-        truth = [p_phi, p_theta, i3 * (dphi * ct + dpsi)]
-        velocity = ZXZ.body_angular_velocity(angles, [dphi, dtheta, dpsi])
-        assert np.abs(ZXZ.conjugate_momenta(angles, moments * velocity) - truth).max() < 2e-14
 
 
 @CHARTS
@@ -243,13 +208,6 @@ def test_body_momentum_is_the_inverse_j4(chart):
     assert np.abs((back - p) * np.sin(angles[:, 1:2])).max() < 3e-15
 
 
-def test_printed_body_momentum_j4():
-    rng = np.random.default_rng(10)
-    for angles, p in zip(random_angles(rng, 30), rng.normal(size=(30, 3)), strict=True):
-        error = np.abs(ZXZ.body_momentum(angles, p) - printed_body_momentum(angles, p)).max()
-        assert error < 1e-14 / np.sin(angles[1])
-
-
 @CHARTS
 def test_kinetic_energy_three_ways_j5(chart):
     rng = np.random.default_rng(11)
@@ -261,18 +219,6 @@ def test_kinetic_energy_three_ways_j5(chart):
     assert np.abs(chart.kinetic_energy(inertia, angles, rates) / direct - 1.0).max() < 1e-13
     assert np.abs(chart.hamiltonian(inertia, angles, p) / direct - 1.0).max() < 1e-11
     assert np.abs(0.5 * np.sum(p * rates, axis=-1) / direct - 1.0).max() < 1e-12
-
-
-def test_printed_energy_j5():
-    rng = np.random.default_rng(12)
-    moments = np.array([3.0, 2.0, 1.2])
-    for angles, p in zip(random_angles(rng, 30), rng.normal(size=(30, 3)), strict=True):
-        (_, theta, psi), (p_phi, p_theta, p_psi) = angles, p
-        st, lever = np.sin(theta), p_phi - p_psi * np.cos(theta)
-        first = (lever * np.sin(psi) + p_theta * st * np.cos(psi)) ** 2 / (moments[0] * st**2)
-        second = (lever * np.cos(psi) - p_theta * st * np.sin(psi)) ** 2 / (moments[1] * st**2)
-        truth = 0.5 * (first + second + p_psi**2 / moments[2])
-        assert abs(ZXZ.hamiltonian(np.diag(moments), angles, p) / truth - 1.0) < 1e-13
 
 
 @CHARTS
@@ -318,17 +264,11 @@ def test_motion_in_the_chart_is_the_motion_of_attitude_and_momentum_j6(chart):
     def in_chart(_, state):
         return np.concatenate(chart.hamilton_equations(inertia, state[:3], state[3:]))
 
-    def euler(_, state):
-        attitude, pi = state[:9].reshape(3, 3), state[9:]
-        velocity = np.linalg.solve(inertia, pi)
-        return np.concatenate([(attitude @ so3.hat(velocity)).ravel(), cross(pi, velocity)])
-
-    options = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
-    first = solve_ivp(in_chart, (0.0, 4.0), np.concatenate([start, p]), **options).y[:, -1]
-    second = solve_ivp(euler, (0.0, 4.0), np.concatenate([chart.attitude(start).ravel(), momentum]), **options).y[:, -1]
-    assert np.abs(chart.attitude(first[:3]).ravel() - second[:9]).max() < 1e-11
-    assert np.abs(chart.body_momentum(first[:3], first[3:]) - second[9:]).max() < 1e-11
-    assert first[3] == p[0]
+    end = solve_ivp(in_chart, (0.0, 4.0), np.concatenate([start, p]), "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+    momenta, attitudes = rigid_motion(inertia, momentum, np.array([4.0]), chart.attitude(start))
+    assert np.abs(chart.attitude(end[:3]) - attitudes[0]).max() < 1e-11
+    assert np.abs(chart.body_momentum(end[:3], end[3:]) - momenta[0]).max() < 1e-11
+    assert end[3] == p[0]
 
 
 @CHARTS
@@ -430,7 +370,7 @@ def test_poles_are_refused_j8(chart, theta):
         lambda: chart.hamiltonian(np.eye(3), angles, vector),
         lambda: chart.hamilton_equations(np.eye(3), angles, vector),
     ):
-        with pytest.raises(ChartPoleError, match=r"theta: entry \[1\] .* pole of the Z[XY]Z chart"):
+        with pytest.raises(ChartPoleError, match="theta"):
             refused()
     assert abs(np.linalg.det(chart.body_rate_matrix(angles[1]))) < 1e-8
     assert np.isfinite(chart.kinetic_energy(np.eye(3), angles, vector)).all()
@@ -515,17 +455,6 @@ def test_bonnards_precession_and_angles_j9():
     assert np.abs(first / precession_rate(momentum, velocity) - 1.0).max() < 1e-12
 
 
-def test_momentum_and_energy_of_proposition_6_j9():
-    rng = np.random.default_rng(24)
-    moments = np.array([3.0, 2.0, 1.2])
-    for angles, p in zip(random_angles(rng, 40), rng.normal(size=(40, 3)), strict=True):
-        (_, phi2, phi3), (p1, p2, p3) = angles, p
-        lever = (p1 - p3 * np.cos(phi2)) / np.sin(phi2)
-        h = np.array([p2 * np.sin(phi3) - np.cos(phi3) * lever, p2 * np.cos(phi3) + np.sin(phi3) * lever, p3])
-        assert np.abs(ZYZ.body_momentum(angles, p) - h).max() < 1e-14 / np.sin(phi2)
-        assert abs(ZYZ.hamiltonian(np.diag(moments), angles, p) / (0.5 * np.sum(h * h / moments)) - 1.0) < 1e-13
-
-
 def test_the_printed_sign_of_h3_is_wrong_b_e3():
     rng = np.random.default_rng(25)
     for momentum in rng.normal(size=(30, 3)):
@@ -537,25 +466,6 @@ def test_the_printed_sign_of_h3_is_wrong_b_e3():
         assert np.abs(attitude @ corrected - size * THIRD).max() < 3e-15 * size
         assert np.abs(attitude @ printed - size * THIRD).max() > 0.1 * abs(momentum[2])
         assert np.abs(corrected - momentum).max() < 3e-15 * size
-
-
-def test_the_last_andoyer_relation_is_that_of_phi_3_b_e4():
-    """Printed for phi_2 and with arctan; it is right for phi_3 and with arctan2. l is the angle of H from axis 2."""
-    rng = np.random.default_rng(26)
-    printed_fails = arctan_fails = 0
-    for angles, p in zip(random_angles(rng, 60), rng.normal(size=(60, 3)), strict=True):
-        h = ZYZ.body_momentum(angles, p)
-        (_, phi2, phi3), (k, p2, l3) = angles, p
-        size, azimuth = np.linalg.norm(h), np.arctan2(h[0], h[1])
-        radius = np.sqrt(size**2 - l3**2)
-        assert np.abs(h - [radius * np.sin(azimuth), radius * np.cos(azimuth), l3]).max() < 1e-13 * size / np.sin(phi2)
-        numerator, denominator = k - l3 * np.cos(phi2), p2 * np.sin(phi2)
-        right = azimuth + np.arctan2(numerator, denominator)
-        assert abs(so3.wrap(right - phi3)) < 1e-13 / np.sin(phi2)
-        printed_fails += abs(so3.wrap(right - phi2)) > 1e-3
-        arctan_fails += abs(so3.wrap(azimuth + np.arctan(numerator / denominator) - phi3)) > 1e-3
-    assert printed_fails == 60
-    assert 15 < arctan_fails < 45
 
 
 def momentum_map_derivative(chart, angles, momenta):
@@ -674,7 +584,7 @@ def test_bad_input_is_refused(chart):
                 call(bad)
         with pytest.raises(ShapeError, match="momenta"):
             chart.body_momentum(angles, bad)
-    with pytest.raises(ShapeError, match=r"angles \(2,\), rates \(3,\)"):
+    with pytest.raises(ShapeError, match="rates"):
         chart.body_angular_velocity(np.ones((2, 3)), np.ones((3, 3)))
     with pytest.raises(ShapeError, match="inertia"):
         chart.hamiltonian(np.stack([np.eye(3)] * 2), np.ones((3, 3)), np.ones(3))
@@ -686,18 +596,18 @@ def test_bad_input_is_refused(chart):
         chart.angles(-np.eye(3))
     with pytest.raises(ShapeError, match="attitudes"):
         chart.continuous_angles(np.eye(3))
-    with pytest.raises(ShapeError, match="zero momentum"):
+    with pytest.raises(ShapeError, match="zero"):
         chart.angles_about_momentum(np.zeros(3))
 
 
 def test_bad_brackets_and_precessions_are_refused():
-    with pytest.raises(ShapeError, match="2n entries each"):
+    with pytest.raises(ShapeError, match="2n"):
         canonical_bracket(np.ones(3), np.ones(3))
-    with pytest.raises(ShapeError, match="2n entries each"):
+    with pytest.raises(ShapeError, match="2n"):
         canonical_bracket(np.ones(4), np.ones(6))
     with pytest.raises(ShapeError, match="broadcast"):
         canonical_bracket(np.ones((2, 4)), np.ones((3, 4)))
-    with pytest.raises(ChartPoleError, match=r"entry \[1\]"):
+    with pytest.raises(ChartPoleError, match="entry"):
         precession_rate([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]], np.ones(3))
     with pytest.raises(ChartPoleError):
         precession_rate(np.zeros(3), np.ones(3))
@@ -709,4 +619,4 @@ def test_bad_brackets_and_precessions_are_refused():
 @pytest.mark.parametrize("chart", [ZXZ, ZYZ])
 def test_one_sample_alone_is_continuous(chart):
     turned = so3.exp(np.array([[[0.3, -0.4, 0.9]], [[-1.0, 0.2, 0.1]]]))
-    np.testing.assert_allclose(chart.continuous_angles(turned), chart.angles(turned), rtol=0, atol=1e-15)
+    assert_within(chart.continuous_angles(turned), chart.angles(turned), 1e-15)

@@ -6,6 +6,8 @@ characteristic times either way. Momentum errors are relative to |Pi|, attitude 
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -29,8 +31,9 @@ def rows_of(name):
     return np.flatnonzero(REFERENCE["kind"] == NAMES.index(name))
 
 
-def top_of(row, attitude=None):
-    return EulerTop.principal(REFERENCE["moments"][row], REFERENCE["momentum"][row], attitude)
+@cache
+def top_of(row):
+    return EulerTop.principal(REFERENCE["moments"][row], REFERENCE["momentum"][row])
 
 
 def exact_attitude(row):
@@ -84,8 +87,8 @@ def test_the_reference_keeps_energy_magnitude_and_spatial_momentum():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_reference_solves_the_equations(name):
-    """By a general integrator, over short times, on three bodies of each kind."""
-    for row in rows_of(name)[[1, len(rows_of(name)) // 2, -1]]:
+    """By a general integrator, over short times, on two bodies of each kind."""
+    for row in rows_of(name)[[1, -1]]:
         moments, start, times = (
             REFERENCE["moments"][row],
             REFERENCE["momentum"][row] / SIZE[row],
@@ -129,7 +132,7 @@ def test_complement_and_axis_against_60_digits():
 def test_a_given_attitude_comes_before_the_motion():
     rows = np.arange(0, len(SIZE), 17)
     for row, given in zip(rows, random_rotations(len(rows), 1)):
-        top = top_of(row, given)
+        top = EulerTop.principal(REFERENCE["moments"][row], REFERENCE["momentum"][row], given)
         off = so3.angle(so3.transpose(given @ exact_attitude(row)) @ top.attitude(REFERENCE["times"][row]))
         assert off.max() < 1e-12
         assert top.momentum == pytest.approx(given @ REFERENCE["momentum"][row], abs=8.0 * EPS * SIZE[row])

@@ -9,6 +9,7 @@ import shapephase as sp
 from shapephase.errors import ShapeError
 from shapephase.rigid_body import bifurcation_rotors, dual_spin_turn, gyrostat_equilibria
 from support import gyrostat_reference
+from support.independent import assert_within
 
 EPS = np.finfo(float).eps
 PER_CONDITION = 1e-14
@@ -44,12 +45,11 @@ def test_a_hundred_attitudes_are_those_of_50_digits(reference, rows):
 def test_the_committed_values_are_those_of_the_script(reference):
     inputs = gyrostat_reference.cases()
     for name, values in zip(("inertia", "rotor", "momentum"), inputs, strict=True):
-        np.testing.assert_allclose(values, reference[name], rtol=0, atol=1e-7)
-    rough = gyrostat_reference.plain_attitudes(
-        reference["inertia"], reference["rotor"], reference["momentum"], float(reference["duration"]), steps=300
-    )
-    off = np.abs(rough - reference["attitude"]).max(axis=(1, 2))
-    assert np.all(off < 1e-7 * reference["condition"])
+        assert_within(values, reference[name], 1e-7)
+    some = (reference[name][::4] for name in ("inertia", "rotor", "momentum"))
+    rough = gyrostat_reference.plain_attitudes(*some, float(reference["duration"]), steps=300)
+    off = np.abs(rough - reference["attitude"][::4]).max(axis=(1, 2))
+    assert np.all(off < 1e-7 * reference["condition"][::4])
 
 
 def test_half_periods_are_counted_where_the_sine_is_exactly_zero():
@@ -77,7 +77,7 @@ def test_it_is_what_reconstruct_integrates(reference, case):
         motion = sp.reconstruct(rotating(inertia, rotor, 6.0), momentum, start, tolerance=1e-11)
         goal = 2e-11 + PER_CONDITION * reference["condition"][row]
         for ask in ("attitude", "body_momentum", "angular_velocity"):
-            np.testing.assert_allclose(getattr(top, ask)(times), getattr(motion, ask)(times), rtol=0, atol=goal)
+            assert_within(getattr(top, ask)(times), getattr(motion, ask)(times), goal)
 
 
 @pytest.mark.parametrize(
@@ -96,15 +96,15 @@ def test_symmetric_bodies_and_rotors_along_axes(moments, rotor, regime):
     top, times = sp.Gyrostat(inertia, rotor, momentum), np.linspace(-6.0, 6.0, 7)
     assert regime is None or top.regime == regime
     motion = sp.reconstruct(rotating(inertia, rotor, 6.0), momentum, tolerance=1e-12)
-    np.testing.assert_allclose(top.attitude(times[3:]), motion.attitude(times[3:]), rtol=0, atol=2e-12)
+    assert_within(top.attitude(times[3:]), motion.attitude(times[3:]), 2e-12)
     turned = np.swapaxes(top.attitude(times), 1, 2) @ momentum
-    np.testing.assert_allclose(top.body_momentum(times), turned, rtol=0, atol=100 * EPS)
+    assert_within(top.body_momentum(times), turned, 100 * EPS)
 
 
 def test_without_a_rotor_it_is_the_euler_top():
     inertia, momentum, times = np.diag([3.0, 2.0, 1.0]), [0.6, 0.3, 1.5], np.linspace(-20.0, 20.0, 9)
     top, known = sp.Gyrostat(inertia, np.zeros(3), momentum), sp.EulerTop(inertia, momentum)
-    np.testing.assert_allclose(top.attitude(times), known.attitude(times), rtol=0, atol=500 * EPS)
+    assert_within(top.attitude(times), known.attitude(times), 500 * EPS)
     assert top.period == pytest.approx(known.period, rel=100 * EPS)
     assert np.exp(1j * top.phase) == pytest.approx(np.exp(1j * known.montgomery_phase), abs=500 * EPS)
 
@@ -115,7 +115,7 @@ def test_its_phase_is_the_turn_about_the_momentum_in_a_period(reference):
         top = sp.Gyrostat(inertia, rotor, momentum)
         about = sp.so3.exp(top.phase * momentum / np.linalg.norm(momentum))
         late = top.attitude(top.period + 0.7)
-        np.testing.assert_allclose(late, about @ top.attitude(0.7), rtol=0, atol=1e-11)
+        assert_within(late, about @ top.attitude(0.7), 1e-11)
         # Dynamic phase less the solid angle, as `split` finds it.
         found = sp.split(sp.reconstruct(rotating(inertia, rotor, top.period), momentum), "base")
         assert np.exp(1j * top.phase) == pytest.approx(np.exp(1j * found.montgomery_angle), abs=1e-8)
@@ -131,7 +131,7 @@ def test_steady_rotations_are_all_found_with_their_stability(rotor):
     kinds = [one.stability for one in found]
     for one in found:
         omega = np.linalg.solve(inertia, one.direction - rotor)
-        np.testing.assert_allclose(omega, one.rate * one.direction, rtol=0, atol=100 * EPS)
+        assert_within(omega, one.rate * one.direction, 100 * EPS)
         assert sp.Gyrostat(inertia, rotor, one.direction).period > 1e3 or one.stability != "saddle"
     assert kinds.count("saddle") == len(found) - kinds.count("saddle") - 2
     lat, lon = np.meshgrid(np.linspace(0.0, np.pi, 181)[1:-1], np.linspace(0.0, 2.0 * np.pi, 361)[:-1], indexing="ij")
@@ -183,10 +183,10 @@ def test_a_dual_spin_turn_is_what_a_slow_rotor_makes():
     inertia, axis, duration = np.diag([1.0, 1.5, 2.2]), np.array([0.6, 0.3, 0.5]), 400.0
     unit = axis / np.linalg.norm(axis)
     turn = dual_spin_turn(inertia, axis, 1.0, 401)
-    np.testing.assert_allclose(turn.direction[[0, -1]], [[0.0, 0.0, 1.0], unit], rtol=0, atol=10 * EPS)
+    assert_within(turn.direction[[0, -1]], [[0.0, 0.0, 1.0], unit], 10 * EPS)
     middle = len(turn.rotor) // 3
     steady = gyrostat_equilibria(inertia, turn.rotor[middle] * unit, 1.0)[0]
-    np.testing.assert_allclose(steady.direction, turn.direction[middle], rtol=0, atol=100 * EPS)
+    assert_within(steady.direction, turn.direction[middle], 100 * EPS)
 
     def rotor(t):
         return np.sin(0.5 * np.pi * t / duration)[:, None] ** 2 * unit
@@ -216,7 +216,7 @@ def test_a_rigid_diver_with_a_rotor_goes_stage_by_stage():
     legs = begin
     for rotor, length in stages:
         legs = sp.reconstruct(rotating(inertia, rotor, length), momentum, legs, tolerance=1e-11).final_attitude
-    np.testing.assert_allclose(attitude, legs, rtol=0, atol=2e-9)
+    assert_within(attitude, legs, 2e-9)
 
 
 def test_wrong_arguments_are_refused():

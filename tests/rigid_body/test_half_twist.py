@@ -17,7 +17,7 @@ from shapephase.rigid_body import (
     steady_rotations,
     twist_defect,
 )
-from support.independent import cross
+from support.independent import assert_within, cross
 
 
 def with_attitude(moments):
@@ -125,13 +125,13 @@ def test_half_twist_is_batched_and_refuses_bad_input():
     assert table.time.shape == table.growth_rate.shape == (4, 5)
     assert table.time[2, 3] == half_twist(moments[2, 0], momenta[3]).time
     assert half_twist_from_tilt(moments, 1.0, [0.1] * 5, 0.2).time.shape == (4, 5)
-    with pytest.raises(SingularInertiaError, match="above 0"):
+    with pytest.raises(SingularInertiaError, match="above"):
         half_twist([1.0, 0.0, 2.0], [1.0, 1.0, 1.0])
     with pytest.raises(ShapeError, match="broadcast"):
         half_twist(np.ones((2, 3)), np.ones((3, 3)))
     with pytest.raises(ShapeError, match="broadcast"):
         half_twist_from_tilt([1.0, 2.0, 3.0], [1.0, 2.0], [0.1, 0.1, 0.1], 0.0)
-    with pytest.raises(ShapeError, match="two are equal"):
+    with pytest.raises(ShapeError, match="equal"):
         twist_defect([1.0, 2.0, 2.0])
     with pytest.raises(SingularInertiaError):
         twist_defect([1.0, -2.0, 2.0])
@@ -223,11 +223,11 @@ def test_twist_of_a_racket_next_to_the_separatrix_and_refusals():
     on_it = np.pi - 2.0 * float(twist_defect([1.0, 2.0, 2.1]))
     assert racket_twist([1.0, 2.0, 2.1], [0.0, 3.0, 0.0]) == pytest.approx(on_it, abs=1e-14)
     both = racket_twist([1.0, 2.0, 2.1], [[1e-5, 1.0, 0.0], [0.0, 1.0, 1e-5]])
-    np.testing.assert_allclose(both, on_it, rtol=0, atol=1e-8)
+    assert_within(both, on_it, 1e-8)
     assert both[1] < on_it < both[0]
-    with pytest.raises(ShapeError, match="two are equal"):
+    with pytest.raises(ShapeError, match="equal"):
         racket_twist([1.0, 1.0, 2.0], [0.0, 1.0, 0.0])
-    with pytest.raises(ShapeError, match="needs a momentum"):
+    with pytest.raises(ShapeError, match="momentum"):
         racket_twist([1.0, 2.0, 3.0], [0.0, 0.0, 0.0])
 
 

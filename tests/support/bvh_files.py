@@ -17,7 +17,6 @@ _LIMBS = {
     "Left": (1.0, "LeftToeBase", "LeftFingerBase"),
     "Right": (-1.0, "RightToeBase", "RightFingerBase"),
 }
-AXES = dict(zip("XYZ", np.eye(3), strict=True))
 
 
 def bones() -> list[tuple[str, str | None, tuple[float, float, float], tuple[float, float, float] | None]]:

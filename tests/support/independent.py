@@ -171,6 +171,11 @@ def apart(first: Array, second: Array) -> float:
     return float(np.max(2.0 * np.arcsin(np.minimum(norm, 1.0))))
 
 
+def assert_within(found: ArrayLike, expected: ArrayLike, tolerance: float | Array) -> None:
+    """Every entry is right to an absolute tolerance."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)  # type: ignore[arg-type]
+
+
 def wrapped(angle: ArrayLike) -> Array:
     """An angle modulo 2 pi, nearest to zero."""
     return np.angle(np.exp(1j * np.asarray(angle, dtype=float)))
@@ -592,6 +597,25 @@ def simulated_motion(
     assert run.success, run.message
     values = run.sol(wanted_times).T
     return SimulatedMotion(Rotation.from_quat(values[:, 3:7]).as_matrix(), values[:, :3], values[:, 10:13])
+
+
+# ---- A rigid body ----------------------------------------------------------------------------------------------------
+
+
+def rigid_motion(
+    inertia: ArrayLike, body_momentum: ArrayLike, times: Array, attitude: ArrayLike | None = None
+) -> tuple[Array, Array]:
+    """Pi (N, 3) and R (N, 3, 3) at ascending times from 0 on, by DOP853 on Euler's equations and a quaternion."""
+    inverse = np.linalg.inv(inertia)
+
+    def slope(_: float, y: Array) -> Array:
+        omega = inverse @ y[:3]
+        return np.concatenate([cross(y[:3], omega), quaternion_rate(y[3:], omega)])
+
+    quat = _NO_TURN if attitude is None else Rotation.from_matrix(attitude).as_quat()
+    start = np.concatenate([body_momentum, quat])
+    run = solve_ivp(slope, (0.0, times[-1]), start, "DOP853", t_eval=times, rtol=3e-14, atol=1e-15)
+    return run.y[:3].T, Rotation.from_quat(run.y[3:].T).as_matrix()
 
 
 # ---- Closed forms ---------------------------------------------------------------------------------------------------

@@ -16,10 +16,9 @@ _RADIUS = 0.04
 
 @dataclass(frozen=True)
 class Landing:
-    """A flight, and the first and last state at which nothing touches [s]."""
+    """A flight, and the last state at which nothing touches [s]."""
 
     motion: Flown
-    first_free: float
     last_free: float
 
 
@@ -41,7 +40,7 @@ def landing(name: str, *, seed: int, lands: float, duration: float, **more) -> L
     motion = flown(name, seed=seed, duration=duration, model=_over_a_floor(name, floor), watch=look, **more)
     times, contacts = np.array(touched).T
     free = times[: int(np.argmax(contacts > 0))] if contacts.any() else times
-    return Landing(motion, float(free[0]), float(free[-1]))
+    return Landing(motion, float(free[-1]))
 
 
 def _over_a_floor(name: str, height: float) -> mujoco.MjModel:

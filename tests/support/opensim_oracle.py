@@ -15,6 +15,7 @@ import sys
 import tempfile
 from math import cos, sin
 from pathlib import Path
+from typing import Any
 
 _ACCURACY = 1e-11
 """Of OpenSim's integrator."""
@@ -47,7 +48,12 @@ def flown(
     return _answered(question | {"turns": turns})
 
 
-def _answered(question: dict) -> list[dict]:
+def replayed(model: Path, motion: Path, bodies: list[str]) -> dict:
+    """Times (N,) of a file of motion, and for each body its poses in the ground (N, 4, 4), as nested lists."""
+    return _answered({"model": str(model), "motion": str(motion), "bodies": bodies})
+
+
+def _answered(question: dict) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         answer = Path(folder) / "answer.json"
         command = [sys.executable, __file__, str(answer)]
@@ -63,7 +69,8 @@ def main() -> None:
     opensim.Logger.setLevelString("Off")
     question = json.loads(sys.stdin.read())
     model = opensim.Model(question["model"])
-    found = _at_shapes(opensim, model, question) if "shapes" in question else _flown(opensim, model, question)
+    answering = _at_shapes if "shapes" in question else _replayed if "motion" in question else _flown
+    found = answering(opensim, model, question)
     Path(sys.argv[1]).write_text(json.dumps(found))
     # What OpenSim takes down at the end may crash, and nothing of it is needed.
     os._exit(0)
@@ -172,6 +179,25 @@ def _kept(opensim, model, state, known, question) -> list[dict]:
     for time, angles in zip(run.t, run.y.T, strict=True):
         put(time, angles)
         found.append({"attitude": _turn(root, state), "momentum": momentum.tolist()})
+    return found
+
+
+def _replayed(opensim, model, question) -> dict:
+    rows, state = opensim.Storage(question["motion"]), model.initSystem()
+    assert not rows.isInDegrees()
+    labels, coordinates = rows.getColumnLabels(), model.getCoordinateSet()
+    found = {"times": [], "poses": {name: [] for name in question["bodies"]}}
+    for k in range(rows.getSize()):
+        row = rows.getStateVector(k)
+        found["times"].append(row.getTime())
+        for column in range(1, labels.getSize()):
+            coordinates.get(labels.get(column)).setValue(state, row.getData().get(column - 1), False)
+        model.realizePosition(state)
+        for name, poses in found["poses"].items():
+            body = model.getBodySet().get(name)
+            places = _three(body.getTransformInGround(state).p())
+            rows_of_pose = [[*turned, place] for turned, place in zip(_turn(body, state), places)]
+            poses.append([*rows_of_pose, [0.0, 0.0, 0.0, 1.0]])
     return found
 
 

@@ -41,19 +41,21 @@ class WarmEngines:
             engine.stop()
 
 
-class WarmEngine(AskedProcess):
-    """The same for one format, MJCF if none is named."""
+class WarmStart(AskedProcess):
+    """In place of `run_alone`: what is to run in a process of its own runs in one that is forked from one that waits.
 
-    def __init__(self, name: str = MJCF) -> None:
+    With what readers of bodies and of motions import, whose processes are told apart by their words alone.
+    """
+
+    def __init__(self, name: str = ANYTHING) -> None:
         super().__init__(__file__, name, silent=True)
 
     def __call__(
         self, source: str, words: tuple[str, ...], data: bytes, seconds: float
     ) -> subprocess.CompletedProcess[bytes]:
-        assert "read_in_this_process" in source
-        assert not data
         with tempfile.TemporaryDirectory() as folder:
-            self.send({"words": words, "folder": folder})
+            (Path(folder) / "stdin").write_bytes(data)
+            self.send({"source": source, "words": words, "folder": folder})
             try:
                 code = self.answer(seconds)["code"]
             except (ProcessEnded, TimeoutError) as end:
@@ -66,29 +68,11 @@ class WarmEngine(AskedProcess):
         return subprocess.CompletedProcess(list(words), code, printed, said)
 
 
-class WarmStart(AskedProcess):
-    """In place of `run_alone`: what is to run in a process of its own runs in one that is forked from one that waits.
+class WarmEngine(WarmStart):
+    """The same for one format, MJCF if none is named."""
 
-    With what readers of bodies and of motions import, whose processes are told apart by their words alone.
-    """
-
-    def __init__(self) -> None:
-        super().__init__(__file__, ANYTHING, silent=True)
-
-    def __call__(
-        self, source: str, words: tuple[str, ...], data: bytes, seconds: float
-    ) -> subprocess.CompletedProcess[bytes]:
-        with tempfile.TemporaryDirectory() as folder:
-            (Path(folder) / "stdin").write_bytes(data)
-            self.send({"source": source, "words": words, "folder": folder})
-            try:
-                code = self.answer(seconds)["code"]
-            except TimeoutError:
-                self.stop()
-                self.start()
-                raise subprocess.TimeoutExpired(words[0], seconds) from None
-            printed, said = ((Path(folder) / name).read_bytes() for name in ("stdout", "stderr"))
-        return subprocess.CompletedProcess(list(words), code, printed, said)
+    def __init__(self, name: str = MJCF) -> None:
+        super().__init__(name)
 
 
 def work_at_anything() -> None:

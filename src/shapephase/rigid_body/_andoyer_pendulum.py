@@ -24,11 +24,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arguments import moments_argument
-from ..arrays import Array, common_shape, finite_array
+from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
-from ._arguments import check_entries
+from ._arguments import check_entries, together
 from .pendulum import RigidBodyPendulum, rigid_body_pendulum
 
 _REGIME_NAMES = {"libration": "oscillating", "rotation": "rotating"}  # the paper's names, where they differ
@@ -161,8 +161,6 @@ def andoyer_pendulum(moments: ArrayLike) -> AndoyerPendulum:
 
 
 def _variables(magnitude: ArrayLike, y: ArrayLike, p_y: ArrayLike) -> tuple[Array, Array, Array]:
-    magnitude, y, p_y = (finite_array(v, name) for v, name in ((magnitude, "magnitude"), (y, "y"), (p_y, "p_y")))
-    common_shape(magnitude=magnitude, y=y, p_y=p_y)
-    magnitude, y, p_y = np.broadcast_arrays(magnitude, y, p_y)
+    magnitude, y, p_y = together(magnitude=magnitude, y=y, p_y=p_y)
     check_entries(np.abs(p_y) > magnitude, p_y, "p_y", "that is beyond the momentum's magnitude")
     return magnitude, y, p_y

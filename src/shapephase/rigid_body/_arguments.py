@@ -1,4 +1,4 @@
-"""Checks of arguments that several modules of this folder share. They raise `ShapeError` unless noted otherwise."""
+"""Checks of arguments and thresholds that several modules share. Checks raise `ShapeError` unless noted otherwise."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import inertia_argument, number_argument
-from ..arrays import Array, Mask, finite_array
+from ..arrays import Array, Mask, common_shape, finite_array
 from ..errors import ShapeError, ShapePhaseError, SingularInertiaError
 from ..letters import value_text
 
-_UNIT_LENGTH = 1e-6  # relative: six written digits
+SIX_DIGITS = 1e-6  # relative: unit vectors and rates of rotations are often written with six digits
+TWELVE_DIGITS = 1e-12  # relative: numbers that agree so far are equal, and ends of a range are met
+FEW_ULPS = 16.0 * float(np.finfo(float).eps)  # rounding of eigenvalues and short sums, relative to the largest term
+HALVINGS = 60  # of an interval of some radians, which leave rounding
 _MOST_TURNS = 1e12  # turns of the body [1]: beyond them twelve of the sixteen digits of the phase are lost
 
 
@@ -23,6 +26,13 @@ def check_entries(
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         value = values[where] if np.ndim(values[where]) else f"{values[where]:.17g}"
         raise error(f"{name}: entry {list(where)} is {value}; {requirement}")
+
+
+def together(**values: ArrayLike) -> tuple[Array, ...]:
+    """Finite numbers (...) each, broadcast to one shape."""
+    arrays = {name: finite_array(value, name) for name, value in values.items()}
+    shape = common_shape(**arrays)
+    return tuple(np.broadcast_to(array, shape) for array in arrays.values())
 
 
 def ascending_times(times: ArrayLike) -> Array:
@@ -90,6 +100,6 @@ def unit_vectors(value: ArrayLike, name: str) -> Array:
     """Vectors of length 1 to six digits, normalised: (..., 3)."""
     vectors = finite_array(value, name, (3,))
     length = np.linalg.norm(vectors, axis=-1)
-    if np.any(np.abs(length - 1.0) > _UNIT_LENGTH):
+    if np.any(np.abs(length - 1.0) > SIX_DIGITS):
         raise ShapeError(f"{name}: a unit vector must have length 1, got {np.ravel(length)[0]:.6g}")
     return so3.normalised(vectors)

@@ -12,7 +12,7 @@ from ..arguments import check_function
 from ..arrays import Array
 from ..errors import AccuracyNotReached
 
-_TOLERANCE = 3e-14  # relative tolerance of a step; SciPy warns below 2.2e-14 (100 eps) and raises the value
+TOLERANCE = 3e-14  # relative tolerance of a step; SciPy warns below 2.2e-14 (100 eps) and raises the value
 _STEPS = 20_000  # most steps from one time to the next; a motion that needs more is too stiff for an explicit method
 
 
@@ -46,7 +46,7 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
     if not start.size:
         return np.zeros((*shape[:-1], len(times), shape[-1]))
     magnitude = np.abs(start).max(axis=-1, keepdims=True) if scale is None else scale
-    absolute: Any = _TOLERANCE * np.maximum(np.broadcast_to(magnitude, shape).ravel(), np.finfo(float).tiny)
+    absolute: Any = TOLERANCE * np.maximum(np.broadcast_to(magnitude, shape).ravel(), np.finfo(float).tiny)
     state, next_step = start.ravel(), None
 
     def slope(_: float, flat: Array) -> Array:
@@ -57,7 +57,7 @@ def flow(rate: Callable[[Array], Array], start: Array, times: Array, scale: Arra
             if not np.isfinite(slope(left, state)).all():
                 raise AccuracyNotReached(f"the motion has no finite rate at t = {left:.9g}; its values are too large")
             first = None if next_step is None else min(next_step, right - left)
-            solver = DOP853(slope, left, state, right, rtol=_TOLERANCE, atol=absolute, first_step=first)
+            solver = DOP853(slope, left, state, right, rtol=TOLERANCE, atol=absolute, first_step=first)
             steps = 0
             while solver.status == "running" and steps < _STEPS:
                 solver.step()

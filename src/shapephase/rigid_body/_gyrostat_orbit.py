@@ -26,6 +26,7 @@ from scipy.special import elliprf, elliprj
 from .. import elliptic
 from ..arrays import Array, lock_arrays
 from ..errors import AccuracyNotReached
+from ._arguments import FEW_ULPS, HALVINGS
 
 _EPS = float(np.finfo(float).eps)
 _TOLERANCE = 1e-9  # of the imaginary part of a root tried as real, and of the distance of the curve from its start
@@ -146,14 +147,14 @@ class Swing:
         first, second = self.orbit.roots
         scaled = np.where(weight > 0.0, weight, 1.0)
         third = elliprj(top + 0j, top - first * scaled, top - second * scaled, top - pole * scaled)
-        return np.where(weight > 0.0, 2.0 / (3.0 * np.sqrt(self.orbit.leading)) * scaled**1.5 * third, 0.0)
+        return np.where(weight > 0.0, 2.0 / (3.0 * np.sqrt(self.orbit.leading)) * scaled * np.sqrt(scaled) * third, 0.0)
 
     def _to_near(self, top: Array, weight: Array, pole: complex) -> Array:
         """The integral of dt/(q - pole) from q = top/weight to P1, where q is zero: with 1/q for q."""
         first, second = self.orbit.roots
         scaled = np.where(top > 0.0, top, 1.0)
         args = weight + 0j, weight - scaled / first, weight - scaled / second
-        third = scaled**1.5 / (3.0 * pole) * elliprj(*args, weight - scaled / pole)
+        third = scaled * np.sqrt(scaled) / (3.0 * pole) * elliprj(*args, weight - scaled / pole)
         factor = -2.0 / (pole * np.abs(first) * np.sqrt(self.orbit.leading))
         return np.where(top > 0.0, factor * (np.sqrt(scaled) * elliprf(*args) + third), 0.0)
 
@@ -175,7 +176,7 @@ def gyrostat_orbit(rates: Array, shift: Array, start: Array, speed: float) -> Gy
         distance = _distance_from(start, orbit) if orbit is not None else np.inf
         if distance <= nearest:
             nearest, best = distance, orbit
-        if distance < 16.0 * _EPS:
+        if distance < FEW_ULPS:
             break
     if best is None:
         raise AccuracyNotReached("the curve of the momentum was not found: it is too near to a point or to a circle")
@@ -266,7 +267,7 @@ def _on_circle(conic: Array) -> Array:
     change = np.sign(form(left)) * np.sign(form(right)) < 0.0
     left, right = left[change], right[change]
     sign = np.sign(form(left))
-    for _ in range(60):  # halvings, which leave rounding
+    for _ in range(HALVINGS):
         middle = 0.5 * (left + right)
         same = np.sign(form(middle)) == sign
         left, right = np.where(same, middle, left), np.where(same, right, middle)

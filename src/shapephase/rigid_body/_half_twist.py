@@ -43,6 +43,9 @@ class HalfTwist:
     __repr__ = short_repr
 
 
+_FARTHEST = 300.0  # of the logarithm of a tangent: the square of exp(300) is a number
+
+
 def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     """Time between the flips of a free rigid body, from its principal moments and its body momentum.
 
@@ -67,8 +70,7 @@ def half_twist(moments: ArrayLike, momentum: ArrayLike) -> HalfTwist:
     inertia, vector = _ordered(moments, momentum)
     rows = [_flip(i, x) for i, x in zip(inertia.reshape(-1, 3), vector.reshape(-1, 3))]
     table = np.array(rows, dtype=float).reshape(*inertia.shape[:-1], 5)
-    time, asymptote, complement, rate, growth_rate = (table[..., k][()] for k in range(5))
-    return HalfTwist(time=time, asymptote=asymptote, complement=complement, rate=rate, growth_rate=growth_rate)
+    return HalfTwist(*(column[()] for column in np.moveaxis(table, -1, 0)))
 
 
 def half_twist_from_tilt(moments: ArrayLike, magnitude: ArrayLike, tilt: ArrayLike, azimuth: ArrayLike) -> HalfTwist:
@@ -177,15 +179,16 @@ def racket_twist(moments: ArrayLike, momentum: ArrayLike) -> Array:
 
 def _racket_twist(a: float, b: float, c: float) -> float:
     """Twist of one racket [rad]."""
-    # The end of a swing, or a quarter turn, at tan(psi) = exp(-low); the square of exp(300) is a number.
-    low = 0.5 * math.log(-c / (b + c)) if c < 0.0 and b + c > 0.0 else -300.0
+    # The end of a swing, or a quarter turn, at tan(psi) = exp(-low).
+    low = 0.5 * math.log(-c / (b + c)) if c < 0.0 and b + c > 0.0 else -_FARTHEST
     if b + c <= 0.0:
         return 0.0
     quarter = _azimuth(math.exp(2.0 * low) if c < 0.0 else 0.0, a, b, c) if c else math.inf
     swings, rest = divmod(math.pi, 2.0 * quarter) if c else (0.0, math.pi)
     back = rest > quarter
     part = 2.0 * quarter - rest if back else rest
-    angle = math.atan2(1.0, math.exp(bracketed_root(lambda x: _azimuth(math.exp(2.0 * x), a, b, c) - part, low, 300.0)))
+    logarithm = bracketed_root(lambda x: _azimuth(math.exp(2.0 * x), a, b, c) - part, low, _FARTHEST)
+    angle = math.atan2(1.0, math.exp(logarithm))
     if c > 0.0:
         return 2.0 * (math.pi * swings + (math.pi - angle if back else angle))
     return 2.0 * (angle if swings % 2.0 == 0.0 else -angle)

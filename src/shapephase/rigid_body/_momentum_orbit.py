@@ -30,7 +30,7 @@ from ..inertia_tensor import ascending_moments
 from ._arguments import axis_index
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MomentumOrbit:
     """Motion of Pi in the principal axes of a free rigid body. Made by `momentum_orbit`."""
 
@@ -42,29 +42,29 @@ class MomentumOrbit:
     """|Pi| [kg m^2/s]."""
     regime: str
     """ "rest", "spherical", "steady", "axisymmetric", "circling" or "separatrix"."""
-    circled: int
-    other: int
+    circled: int = -1
+    other: int = -1
     """`circled` and `other`: the indices k and a, 0 and 2 or 2 and 0; both -1 where Pi stands still and circles
     nothing."""
     direction: Array
     """(3,) ê, the unit vector along the axis circled, on Pi's side; Pi's own where it circles nothing."""
     amplitudes: Array
     """(3,) signed, of Pi/|Pi|."""
-    rate: float
+    rate: float = 0.0
     """Rate of u [rad/s]; 0 where Pi circles nothing."""
     complement: float
     """m1."""
-    phase: float
+    phase: float = 0.0
     """u0."""
-    characteristic: float
+    characteristic: float = 0.0
     """n <= 0 of the integral of the third kind in the azimuth and the attitude, by the moments only."""
     spin: float
     """L/I_2, the steady part of the turn about Pi [rad/s]."""
-    excess: float
+    excess: float = 0.0
     """2 E/L − L/I_2, by which the turn about Pi differs from it [rad/s]; 0 on the separatrix."""
-    precession: float
+    precession: float = 0.0
     """(L/I_a − L/I_k)/rate."""
-    sense: float
+    sense: float = 0.0
     """+1 where k = 3, where Pi goes round ê counterclockwise, −1 where k = 1; 0 where it stands still."""
     condition: float
     """Factor that magnifies a small change of inertia or momentum, see `EulerTop.condition`."""
@@ -274,18 +274,10 @@ def _stationary_orbit(moments: Array, start: Array, magnitude: float) -> Momentu
         start=start,
         magnitude=magnitude,
         regime="rest" if not magnitude else "spherical" if moments[0] == moments[2] else "steady",
-        circled=-1,
-        other=-1,
         direction=direction,
         amplitudes=direction,
-        rate=0.0,
         complement=0.0 if unstable else 1.0,
-        phase=0.0,
-        characteristic=0.0,
         spin=float(np.sum(direction**2 / moments)) * magnitude,
-        excess=0.0,
-        precession=0.0,
-        sense=0.0,
         condition=np.inf if unstable else float(moments[2] / moments[0]),
     )
 

@@ -25,7 +25,7 @@ from ._arguments import unit_vectors
 from .lagrange_top import LagrangeTop
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Nutation:
     """Rise and fall of a Lagrange top's axis. Made by `nutation`."""
 
@@ -36,11 +36,11 @@ class Nutation:
     """The root of the cubic above this range, >= 1."""
     rate: float
     """Argument of the elliptic functions per second [rad/s]."""
-    complement: float
+    complement: float = 1.0
     """m1 = 1 - k^2."""
-    period: float
+    period: float = np.inf
     """2K/rate; infinite where the axis only approaches the vertical [s]."""
-    _phase: float = field(repr=False)
+    _phase: float = field(default=0.0, repr=False)
     _turns: tuple[float, float] = field(repr=False)
     _rooms: tuple[float, float] = field(repr=False)
 
@@ -104,25 +104,22 @@ def nutation(top: LagrangeTop, momentum: ArrayLike, gamma: ArrayLike) -> Nutatio
     if top.mgl <= 0.0:
         raise ShapeError(f"mgl: the nutation needs Mgl > 0, got {top.mgl:.6g} J; turn e3 towards the centre of mass")
     body = vector_argument(momentum, "momentum", unit="kg m^2/s")
-    return _nutation(top, body, unit_vectors(vector_argument(gamma, "gamma"), "gamma"))
-
-
-def _nutation(top: LagrangeTop, momentum: Array, gamma: Array) -> Nutation:
-    """The closed form, from the cubic in w = u - u(0): there the terms of its coefficients do not cancel."""
-    i1, height = top.transverse, float(gamma[2])
-    turns = _turns(top, momentum, gamma)
-    beta, spin = 2.0 * top.mgl / i1, float(momentum[2]) / i1
-    speed = float(momentum[0] ** 2 + momentum[1] ** 2) / i1**2
-    turn = float(momentum[0] * gamma[0] + momentum[1] * gamma[1]) / i1
-    across = float(gamma[0] ** 2 + gamma[1] ** 2)
-    climb = float(gamma[0] * momentum[1] - gamma[1] * momentum[0]) / i1
+    up = unit_vectors(vector_argument(gamma, "gamma"), "gamma")
+    # The cubic in w = u - u(0): there the terms of its coefficients do not cancel.
+    i1, height = top.transverse, float(up[2])
+    turns = _turns(top, body, up)
+    beta, spin = 2.0 * top.mgl / i1, float(body[2]) / i1
+    speed = float(body[0] ** 2 + body[1] ** 2) / i1**2
+    turn = float(body[0] * up[0] + body[1] * up[1]) / i1
+    across = float(up[0] ** 2 + up[1] ** 2)
+    climb = float(up[0] * body[1] - up[1] * body[0]) / i1
     second, first = 2.0 * beta * height - speed - spin**2, 2.0 * spin * turn - beta * across - 2.0 * height * speed
     cubic = np.array([beta, second, first, climb**2])
     low, high, third = _three_real_roots(cubic)
     low, high = min(low, 0.0), min(max(high, 0.0), 1.0 - height)
     third = max(third, 1.0 - height)
     width = high - low
-    rate = float(np.sqrt(0.25 * beta * (third - low)))
+    rate = float(np.sqrt(beta * (third - low) / 4.0))
     if width == 0.0 or third == low:
         return _without_nutation(height, third, rate, turns)
     complement = (third - high) / (third - low)
@@ -174,9 +171,6 @@ def _without_nutation(height: float, third: float, rate: float, turns: tuple[flo
         highest=height,
         third_root=height + third,
         rate=rate,
-        complement=1.0,
-        period=np.inf,
-        _phase=0.0,
         _turns=turns,
         _rooms=(1.0 - height, 1.0 + height),
     )

@@ -27,7 +27,7 @@ from ..errors import ChartPoleError, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ._arguments import check_entries
 
-_NEAREST = 1e-8  # sine of theta up to which angles are not coordinates: dividing by it costs half of the sixteen digits
+NEAREST = 1e-8  # sine of theta up to which angles are not coordinates: dividing by it costs half of the sixteen digits
 _AT_POLE = 1e-15  # sine of half the angle to a pole, up to which an attitude is at it: that of rounding
 
 
@@ -104,7 +104,7 @@ class EulerChart:
 
         Source: Marsden and Ratiu, end of section 15.6; theory.md J8.
         """
-        return np.abs(np.sin(finite_array(angles, "angles", (3,), unit="rad")[..., 1])) > _NEAREST
+        return np.abs(np.sin(finite_array(angles, "angles", (3,), unit="rad")[..., 1])) > NEAREST
 
     def body_rate_matrix(self, angles: ArrayLike) -> Array:
         """B with Omega = B (phi', theta', psi') in body axes: (..., 3) -> (..., 3, 3), |det B| = |sin theta|.
@@ -266,10 +266,10 @@ class EulerChart:
     def _refuse_poles(self, angles: Array) -> None:
         theta = angles[..., 1]
         requirement = (
-            f"a pole of the {self.name.upper()} chart to {_NEAREST:g}, where the angles are not coordinates; turn the "
+            f"a pole of the {self.name.upper()} chart to {NEAREST:g}, where the angles are not coordinates; turn the "
             "inertial or the body axes by a constant rotation, or use attitudes and body momenta"
         )
-        check_entries(np.abs(np.sin(theta)) <= _NEAREST, theta, "theta", requirement, ChartPoleError)
+        check_entries(np.abs(np.sin(theta)) <= NEAREST, theta, "theta", requirement, ChartPoleError)
 
 
 ZXZ = EulerChart("zxz", (1.0, 0.0))  # R = R_z(phi) R_x(theta) R_z(psi): Marsden and Ratiu, section 15.6
@@ -295,7 +295,7 @@ def precession_rate(body_momentum: ArrayLike, angular_velocity: ArrayLike) -> Ar
     requirement = (
         "along it, the azimuth of the body's third axis is undefined; turn the body axes to have another third"
     )
-    check_entries(across <= _NEAREST * magnitude, momentum, "body_momentum", requirement, ChartPoleError)
+    check_entries(across <= NEAREST * magnitude, momentum, "body_momentum", requirement, ChartPoleError)
     unit = momentum[..., :2] / across[..., None]
     return magnitude * _dot(unit, velocity[..., :2]) / across
 

@@ -41,7 +41,6 @@ class Gyrostat:
     `rotor` is its moment times that speed along its axle. One that turns freely, whose momentum about the axle p is
     constant: `inertia` is without the wheel's moment J about its axle, I - J a a^T, and `rotor` is p a.
 
-    Source: Volterra 1899; Wittenburg 1977.
     Raises AccuracyNotReached within some 3e-5 rad of a steady rotation, where the oval is so small that its digits are
     lost (below 1e-2 rad the error of the start grows as the inverse square of that angle), or for a body so nearly
     symmetric that it is nearly a circle; `reconstruct` with `prescribed` has no such limit.
@@ -203,11 +202,6 @@ def _shortest(directions: Array, axis: Array) -> Array:
     """Quaternions of the shortest turns that take unit vectors to an axis: (..., 3), (3,) -> (..., 4)."""
     scalar = 1.0 + directions @ axis
     return so3.normalised(np.concatenate([np.cross(directions, axis), scalar[..., None]], axis=-1))
-
-
-_ROUNDING = 4.0 * float(
-    np.finfo(float).eps
-)  # relative difference of inverse moments, or part of the rotor along an axis
 
 
 @dataclass(frozen=True, eq=False)

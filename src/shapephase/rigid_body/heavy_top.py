@@ -24,8 +24,8 @@ from ..errors import AccuracyNotReached, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..letters import value_text
 from ._arguments import above_zero, unit_vectors
+from ._flow import TOLERANCE
 
-_FLOOR = 3e-14  # relative tolerance of a step, below which rounding dominates; SciPy takes none below 2.2e-14
 _RATIO = 32.0  # of the local tolerances of the two runs of a motion, whose difference shows the error
 _STEPS = 200_000  # most steps of one run, some minutes of computing
 
@@ -98,12 +98,8 @@ class HeavyTop:
         """
         pi, up = _point(momentum, gamma)
         omega, weight = self.energy_gradient(pi, up)
-        matrix = np.zeros((*omega.shape[:-1], 6, 6))
-        matrix[..., :3, :3] = so3.hat(pi) @ self.inverse - so3.hat(omega)
-        matrix[..., :3, 3:] = -so3.hat(weight)
-        matrix[..., 3:, :3] = so3.hat(up) @ self.inverse
-        matrix[..., 3:, 3:] = -so3.hat(omega)
-        return matrix
+        spin = so3.hat(omega)
+        return np.block([[so3.hat(pi) @ self.inverse - spin, -so3.hat(weight)], [so3.hat(up) @ self.inverse, -spin]])
 
     def legendre(self, momentum: ArrayLike, gamma: ArrayLike) -> Pair:
         """(Omega, v) = gradient of H + |Gamma|^2/2, an element of se(3): (..., 3), (..., 3) -> two of (..., 3).
@@ -164,7 +160,7 @@ class HeavyTop:
         own = np.broadcast_shapes(self.inertia.shape[:-2], self.mgl.shape, self.chi.shape[:-1])
         shape = common_batch(top=own, momentum=body.shape[:-1], attitude=start.shape[:-2])
         start, body = np.broadcast_to(start, (*shape, 3, 3)), np.broadcast_to(body, (*shape, 3))
-        least = _RATIO * _FLOOR
+        least = _RATIO * TOLERANCE
         local = max(0.01 * requested, least)  # errors of steps add up
         while True:
             coarse = _integrated(self, start, body, time, local)
@@ -291,7 +287,7 @@ def heavy_top_steps(
     strength = top.mgl / scale
 
     def rates(_: float, y: Array) -> Array:
-        state, out = y.reshape(*scale.shape, 6), np.empty((*scale.shape, 6))
+        state, out = y.reshape(start.shape), np.empty(start.shape)
         quat, spatial = _unpacked(state, scale, vertical)
         rotation = so3.matrix_from_quat(quat)
         omega = so3.apply(top.inverse, so3.apply(so3.transpose(rotation), spatial))
@@ -301,17 +297,17 @@ def heavy_top_steps(
         out[..., 3] = -0.5 * np.sum(vector * omega, axis=-1)
         arm = so3.apply(rotation, top.chi)
         out[..., 4] = -strength * arm[..., 1]
-        out[..., 5] = strength * arm[..., 0]
+        out[..., -1] = strength * arm[..., 0]
         return out.ravel()
 
     solver = DOP853(
-        rates, 0.0, start.ravel(), duration, rtol=_FLOOR, atol=local_tolerance / np.sqrt(max(scale.size, 1))
+        rates, 0.0, start.ravel(), duration, rtol=TOLERANCE, atol=local_tolerance / np.sqrt(max(scale.size, 1))
     )
     for _ in range(_STEPS):
         message = solver.step()
         if solver.status == "failed":
             raise AccuracyNotReached(f"heavy top: {message} at t = {solver.t:.9g} s; loosen the tolerance")
-        yield solver.t, *_unpacked(solver.y.reshape(*scale.shape, 6), scale, vertical), solver.dense_output()
+        yield solver.t, *_unpacked(solver.y.reshape(start.shape), scale, vertical), solver.dense_output()
         if solver.status == "finished":
             return
     raise AccuracyNotReached(

@@ -18,7 +18,7 @@ from ..arguments import check_object, number_argument
 from ..arrays import Array, Mask, common_batch, finite_array
 from ..display import short_repr
 from ..errors import ShapeError, SingularInertiaError
-from ._arguments import positive_moments
+from ._arguments import FEW_ULPS, positive_moments
 from .heavy_top import HeavyTop, heavy_top_steps
 
 _GROWTH = 50.0  # of the tilt, up to which a simulated spin counts as stable: stable spins next to the threshold nutate
@@ -140,7 +140,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
     b = -2.0 * phi_prime + 2.0 * i3 * phi_dot**2 + abs(mgl) + p * p / i1
     second = second_variation(top, p, phi_dot, b=b)
     excess = p * p - 4.0 * mgl * i1
-    at_threshold = abs(excess) <= 8.0 * np.finfo(float).eps * p * p  # `critical_momentum`, but for rounding
+    at_threshold = abs(excess) <= FEW_ULPS * p * p  # `critical_momentum`, but for rounding
     stable = bool(np.all(spectrally_stable([i1, i1, i3], mgl, p)))
     return SleepingTop(
         momentum=p,
@@ -151,7 +151,7 @@ def sleeping_top(top: LagrangeTop, momentum: float) -> SleepingTop:
             [0.0, 0.0, p / i3 + phi_dot + axial_slope, 0.0, 0.0, mgl + phi_dot * p + 2.0 * phi_prime]
         ),
         second_variation=second,
-        minors=np.array([np.linalg.det(second[:n, :n]) for n in range(1, 7)]),
+        minors=np.array([np.linalg.det(second[:n, :n]) for n in range(1, len(second) + 1)]),
         quadratic=e_quadratic(top, p),
         eigenvalues=sleeping_spectrum([i1, i1, i3], mgl, p),
         energy_casimir=excess > 0.0 and not at_threshold,
@@ -219,8 +219,8 @@ def second_variation(
     vertical = -(top.mgl + phi_dot * p)
     matrix = np.diag([1.0 / top.transverse, 1.0 / top.transverse, 1.0 / top.axial + a + c, vertical, vertical, 0.0])
     matrix[0, 3] = matrix[3, 0] = matrix[1, 4] = matrix[4, 1] = phi_dot
-    matrix[2, 5] = matrix[5, 2] = phi_dot + p * c + d
-    matrix[5, 5] = vertical + b + p * p * c + 2.0 * p * d
+    matrix[2, -1] = matrix[-1, 2] = phi_dot + p * c + d
+    matrix[-1, -1] = vertical + b + p * p * c + 2.0 * p * d
     return matrix
 
 
@@ -356,7 +356,14 @@ def stability_chart(
     moments = np.ones((len(ratios), 1, 3))
     moments[..., 0, 2] = ratios
     spectrum = spectrally_stable(moments, 1.0, spins)
-    largest = _largest_tilt(HeavyTop(moments[..., None] * np.eye(3), 1.0), spins, lean, time)
+    attitude = np.broadcast_to(so3.exp(np.array([lean, 0.0, 0.0])), (*spectrum.shape, 3, 3))
+    momentum = np.broadcast_to(spins[:, None] * np.eye(3)[2], (*spectrum.shape, 3))
+    largest = np.full(spectrum.shape, lean)
+    top = HeavyTop(moments[..., None] * np.eye(3), 1.0)
+    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, time, 1e-9):
+        # The parts of the quaternion are sine and cosine of half the angle between body axis 3 and the vertical.
+        across, along = np.hypot(quat[..., 0], quat[..., 1]), np.hypot(quat[..., 2], quat[..., 3])
+        largest = np.maximum(largest, 2.0 * np.arctan2(across, along))
     return StabilityChart(
         axial_ratios=ratios,
         momenta=spins,
@@ -365,18 +372,6 @@ def stability_chart(
         simulation=largest <= _GROWTH * lean,
         largest_tilt=largest,
     )
-
-
-def _largest_tilt(top: HeavyTop, spins: Array, tilt: float, duration: float) -> Array:
-    shape = np.broadcast_shapes(top.inertia.shape[:-2], spins.shape)
-    attitude = np.broadcast_to(so3.exp(np.array([tilt, 0.0, 0.0])), (*shape, 3, 3))
-    momentum = np.broadcast_to(spins[:, None] * np.eye(3)[2], (*shape, 3))
-    largest = np.full(shape, tilt)
-    for _, quat, _, _ in heavy_top_steps(top, attitude, momentum, duration, 1e-9):
-        # The parts of the quaternion are sine and cosine of half the angle between body axis 3 and the vertical.
-        across, along = np.hypot(quat[..., 0], quat[..., 1]), np.hypot(quat[..., 2], quat[..., 3])
-        largest = np.maximum(largest, 2.0 * np.arctan2(across, along))
-    return largest
 
 
 def _upright(moments: ArrayLike, mgl: ArrayLike, momentum: ArrayLike) -> tuple[Array, ...]:

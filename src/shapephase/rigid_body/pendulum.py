@@ -29,12 +29,12 @@ from scipy.special import elliprf
 
 from .. import elliptic
 from ..arguments import moments_argument, vector_argument
-from ..arrays import Array, common_shape, finite_array
+from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from ..letters import value_text
-from ._arguments import check_entries
+from ._arguments import check_entries, together
 
 _FAINT = 1e-140  # of the largest component of a momentum: squares of smaller ones underflow
 
@@ -91,7 +91,7 @@ class RigidBodyPendulum:
 
     def body_momentum(self, r: ArrayLike, theta: ArrayLike, p: ArrayLike) -> Array:
         """Pi of r, theta and p, the inverse of `coordinates`: (...) each -> (..., 3) [kg m^2/s]."""
-        r, theta, p = _scalars(r=r, theta=theta, p=p)
+        r, theta, p = together(r=r, theta=theta, p=p)
         pi = np.empty((*p.shape, 3))
         pi[..., self.axes[0]] = self.k1 * r * np.cos(theta)
         pi[..., self.axes[1]] = self.k2 * r * np.sin(theta)
@@ -103,7 +103,7 @@ class RigidBodyPendulum:
 
         Source: Marsden and Ratiu (15.11.13).
         """
-        r, theta, p = _scalars(r=r, theta=theta, p=p)
+        r, theta, p = together(r=r, theta=theta, p=p)
         return 0.5 * (p * p + (self.k2 * r * np.sin(theta)) ** 2 * self.inverse_square_k3)
 
     def rates(self, r: ArrayLike, theta: ArrayLike, p: ArrayLike) -> tuple[Array, Array]:
@@ -111,7 +111,7 @@ class RigidBodyPendulum:
 
         Source: Marsden and Ratiu (15.11.16), (15.11.17) with time reversed; theory.md M-E11.
         """
-        r, theta, p = _scalars(r=r, theta=theta, p=p)
+        r, theta, p = together(r=r, theta=theta, p=p)
         slope = (self.k2 * r) ** 2 * self.inverse_square_k3 * np.sin(theta) * np.cos(theta)
         return self.angle_momentum_bracket * p, -self.angle_momentum_bracket * slope
 
@@ -120,7 +120,7 @@ class RigidBodyPendulum:
 
         Source: Marsden and Ratiu (15.11.18), the same forwards and backwards in time.
         """
-        r, theta = _scalars(r=r, theta=theta)
+        r, theta = together(r=r, theta=theta)
         return -0.5 * self.stiffness * r * r * np.sin(2.0 * theta)
 
     @property
@@ -351,9 +351,3 @@ def _motion(pendulum: RigidBodyPendulum, pi: Array, r: float) -> PendulumMotion:
 
 def _root(value: Fraction) -> float:
     return float(np.sqrt(float(value)))
-
-
-def _scalars(**values: ArrayLike) -> tuple[Array, ...]:
-    arrays = {name: finite_array(value, name) for name, value in values.items()}
-    shape = common_shape(**arrays)
-    return tuple(np.broadcast_to(array, shape) for array in arrays.values())

@@ -21,12 +21,11 @@ from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import ShapeError
 from ..letters import value_text
-from ._arguments import above_zero
+from ._arguments import TWELVE_DIGITS, above_zero
 from .euler_top import EulerTop
 from .portrait import inverse_difference
 
 _TAIL = 60.0  # argument u of the separatrix: the arc beyond it is shorter than exp(-60) = 1e-26 of the whole
-_EQUAL = 1e-12  # relative difference of moments that count as equal: inertias are seldom known to more digits
 
 
 @dataclass(frozen=True)
@@ -339,7 +338,7 @@ def cones(top: EulerTop) -> Cones:
     """
     check_object(top, "EulerTop", "top")
     moments, magnitude = top.moments, top.magnitude
-    close = np.diff(moments) <= _EQUAL * moments[1:]
+    close = np.diff(moments) <= TWELVE_DIGITS * moments[1:]
     if close.sum() != 1 or not magnitude > 0.0:
         raise ShapeError(
             f"cones: exactly two equal moments and a momentum are needed, got moments {moments} kg m^2 and momentum "

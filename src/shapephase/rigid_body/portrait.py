@@ -16,6 +16,7 @@ from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import ascending_moments
 from ..letters import value_text
+from ._arguments import TWELVE_DIGITS
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,8 @@ def polhodes(moments: ArrayLike, energies: ArrayLike, count: int = 361) -> Array
     lowest, highest = 0.5 / ascending[2], 0.5 / ascending[0]
     if lowest == highest:
         raise ShapeError(f"moments: all are {lowest} kg m^2, and every point of the sphere is at rest; no curves")
-    rounding = 1e-12
-    if levels.ndim != 1 or np.any((levels < lowest * (1.0 - rounding)) | (levels > highest * (1.0 + rounding))):
+    outside = (levels < lowest * (1.0 - TWELVE_DIGITS)) | (levels > highest * (1.0 + TWELVE_DIGITS))
+    if levels.ndim != 1 or np.any(outside):
         raise ShapeError(
             f"energies: expected (N,) in [{lowest}, {highest}] 1/(kg m^2) for |Pi| = 1, got {value_text(levels)}"
         )

@@ -24,7 +24,7 @@ from ..arguments import check_object, number_argument
 from ..arrays import Array, finite_array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, UnphysicalInertiaError
-from ._arguments import axis_index
+from ._arguments import axis_index, check_entries
 
 _EPS = float(np.finfo(float).eps)
 
@@ -67,7 +67,9 @@ class PseudoRigidBody:
 
     def moments(self, stretches: ArrayLike = (1.0, 1.0, 1.0)) -> Array:
         """Principal moments of inertia of the body stretched by q: (..., 3) -> (..., 3) [kg m^2]."""
-        parts = self.second_moments * _stretches(stretches) ** 2
+        q = finite_array(stretches, "stretches", (3,))
+        check_entries(q <= 0.0, q, "stretches", "they must be above 0")
+        parts = self.second_moments * q**2
         return parts.sum(axis=-1, keepdims=True) - parts
 
     def stored_energy(self, deformation: ArrayLike) -> Array:
@@ -92,9 +94,10 @@ class PseudoRigidBody:
     def _stiffness(self, stretches: Array) -> Array:
         """The second derivative of V at diag(q), rows of Q one after the other: (9, 9) [J]."""
         log, inverse = float(np.log(stretches.prod())), 1.0 / stretches
-        turned = np.einsum("i,j,ik,jl->ijlk", inverse, inverse, np.eye(3), np.eye(3)).reshape(9, 9)
         volume = np.diag(inverse).ravel()
-        return self.shear * (np.eye(9) + turned) + self.bulk * (np.outer(volume, volume) - log * turned)
+        same = np.eye(len(volume))
+        turned = np.einsum("i,j,ik,jl->ijlk", inverse, inverse, np.eye(3), np.eye(3)).reshape(same.shape)
+        return self.shear * (same + turned) + self.bulk * (np.outer(volume, volume) - log * turned)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,13 +177,6 @@ def pseudo_rigid_spin(body: PseudoRigidBody, axis: int, momentum: float) -> Pseu
     )
 
 
-def _stretches(value: ArrayLike) -> Array:
-    stretches = finite_array(value, "stretches", (3,))
-    if np.any(stretches <= 0.0):
-        raise ShapeError("stretches: they must be above 0")
-    return stretches
-
-
 def _stretched(body: PseudoRigidBody, axis: int, momentum: float) -> Array:
     """Stretches of a steady spin, solved for by their logarithms, so that they stay positive."""
     across = np.where(np.arange(3) == axis, 0.0, body.second_moments)
@@ -202,7 +198,7 @@ def _curvatures(body: PseudoRigidBody, axis: int, momentum: float, stretches: Ar
     q, second, unit = np.diag(stretches), np.diag(body.second_moments), np.eye(3)[axis]
     inverse = np.diag(1.0 / body.moments(stretches))
     omega = momentum * inverse @ unit
-    directions = np.eye(9).reshape(9, 3, 3)
+    directions = np.eye(q.size).reshape(-1, 3, 3)
     products = directions @ second @ q.T
     slopes = 2.0 * np.trace(products, axis1=1, axis2=2)[:, None, None] * np.eye(3) - products - so3.transpose(products)
     # d^2 (mu.I^-1 mu/2) = omega.dI I^-1 dI omega - omega.d^2I omega/2, I quadratic in Q.
@@ -219,5 +215,5 @@ def _spectrum(body: PseudoRigidBody, axis: int, rate: float, stretches: Array) -
     """Eigenvalues of d'' = -2 hat(Omega) d' - hat(Omega)^2 d - V''[d] E^-1 in the frame that turns."""
     turn = np.kron(so3.hat(rate * np.eye(3)[axis]), np.eye(3))
     forces = body._stiffness(stretches) / np.tile(body.second_moments, 3)[:, None]
-    matrix = np.block([[np.zeros((9, 9)), np.eye(9)], [-turn @ turn - forces, -2.0 * turn]])
+    matrix = np.block([[np.zeros_like(turn), np.eye(len(turn))], [-turn @ turn - forces, -2.0 * turn]])
     return np.linalg.eigvals(matrix)

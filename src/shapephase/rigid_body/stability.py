@@ -20,10 +20,9 @@ from ..display import short_repr
 from ..errors import ShapeError
 from ..inertia_tensor import principal_axes
 from ..letters import value_text
-from ._arguments import one_tensor
+from ._arguments import FEW_ULPS, TWELVE_DIGITS, one_tensor
 from .euler_top import EulerTop
 
-_ALIGNED = 1e-12  # |I n - I_e n|/trace(I) that rounding leaves for a computed principal axis n
 _LARGEST = 1e100  # [kg m^2/s] and its inverse: the momentum's square and inverse square must be finite
 
 
@@ -107,15 +106,43 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
     image = tensor @ axis
     moment = float(axis @ image)
     tilt = float(np.linalg.norm(image - moment * axis))
-    if tilt > _ALIGNED * np.trace(tensor):
+    if tilt > TWELVE_DIGITS * np.trace(tensor):
         raise ShapeError(
             f"momentum: {vector} is not along a principal axis, so the rotation is not steady (I n leaves n by "
             f"{tilt:.3g} kg m^2); take the axes from `steady_rotations`"
         )
     others, tangent = _across(tensor, axis)
-    gaps = (moment - others) / (moment * others)
+    gaps = (moment - others) / (moment * others)  # 1/I_i - 1/I_e along the columns of `tangent`
     gaps[np.abs(moment - others) <= _tie(tensor, axis)] = 0.0
-    return _classified(vector, magnitude, axis, moment, others, gaps, tangent)
+    low, high = float(gaps.min()), float(gaps.max())
+    if low > 0.0:
+        definiteness, verdict = "positive definite", "stable"
+    elif high < 0.0:
+        definiteness, verdict = "negative definite", "stable"
+    elif low < 0.0 < high:
+        definiteness, verdict = "indefinite", "unstable"
+    else:
+        definiteness = "semidefinite"
+        verdict = "stable" if low == high else "stable modulo the circle of equilibria"
+    slope, along = -1.0 / moment, (-2.0 if low < 0.0 and high <= 0.0 else 2.0) / moment
+    root = magnitude * np.sqrt(complex(-gaps[0] * gaps[1]))
+    inverse = tangent @ np.diag(1.0 / others) @ tangent.T + np.outer(axis, axis) / moment
+    return SteadyRotation(
+        momentum=vector.copy(),
+        moment=moment,
+        slope=slope,
+        curvature=along / magnitude**2,
+        first_variation=inverse @ vector + slope * vector,
+        second_variation=tangent @ np.diag(gaps) @ tangent.T + along * np.outer(axis, axis),
+        definiteness=definiteness,
+        # Pi_e x (D^2 H + Phi') dPi, since X_H = Pi x grad H and X_Phi = 0; no difference of equal terms is left.
+        linearisation=magnitude * so3.hat(axis) @ tangent @ np.diag(gaps) @ tangent.T,
+        tangent=tangent,
+        eigenvalues=np.array([root, -root]),
+        sphere_hessian=np.diag(gaps),
+        index=int(np.count_nonzero(gaps < 0.0)),
+        verdict=verdict,
+    )
 
 
 def steady_rotations(
@@ -244,40 +271,4 @@ def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
 def _tie(tensor: Array, axis: Array) -> float:
     """Largest difference of equal moments [kg m^2]: 0 for a diagonal tensor, else 16 roundings of the trace."""
     exact = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0 and np.count_nonzero(axis) == 1
-    return 0.0 if exact else 16.0 * float(np.finfo(float).eps * np.trace(tensor))
-
-
-def _classified(
-    momentum: Array, magnitude: float, axis: Array, moment: float, others: Array, gaps: Array, tangent: Array
-) -> SteadyRotation:
-    """The steady rotation of these moments; `gaps` are 1/I_i - 1/I_e along the columns of `tangent`."""
-    low, high = float(gaps.min()), float(gaps.max())
-    if low > 0.0:
-        definiteness, verdict = "positive definite", "stable"
-    elif high < 0.0:
-        definiteness, verdict = "negative definite", "stable"
-    elif low < 0.0 < high:
-        definiteness, verdict = "indefinite", "unstable"
-    else:
-        definiteness = "semidefinite"
-        verdict = "stable" if low == high else "stable modulo the circle of equilibria"
-    sign = -1.0 if low < 0.0 and high <= 0.0 else 1.0
-    slope, along = -1.0 / moment, sign * 2.0 / moment
-    root = magnitude * np.sqrt(complex(-gaps[0] * gaps[1]))
-    inverse = tangent @ np.diag(1.0 / others) @ tangent.T + np.outer(axis, axis) / moment
-    return SteadyRotation(
-        momentum=momentum.copy(),
-        moment=moment,
-        slope=slope,
-        curvature=along / magnitude**2,
-        first_variation=inverse @ momentum + slope * momentum,
-        second_variation=tangent @ np.diag(gaps) @ tangent.T + along * np.outer(axis, axis),
-        definiteness=definiteness,
-        # Pi_e x (D^2 H + Phi') dPi, since X_H = Pi x grad H and X_Phi = 0; no difference of equal terms is left.
-        linearisation=magnitude * so3.hat(axis) @ tangent @ np.diag(gaps) @ tangent.T,
-        tangent=tangent,
-        eigenvalues=np.array([root, -root]),
-        sphere_hessian=np.diag(gaps),
-        index=int(np.count_nonzero(gaps < 0.0)),
-        verdict=verdict,
-    )
+    return 0.0 if exact else FEW_ULPS * float(np.trace(tensor))

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,7 +35,7 @@ from ..errors import ShapeError, TrajectoryError
 from ..letters import value_text
 from ..roots import bracketed_root
 from ..sphere import gauss_nodes
-from ._arguments import above_zero
+from ._arguments import TWELVE_DIGITS, above_zero
 from .euler_top import EulerTop
 from .gyrostat import Gyrostat
 
@@ -61,7 +62,7 @@ class RotorDive:
     """(5,) angles of the long axis about the momentum in each stage [rad], of sum 2 pi m."""
     tilt: float
     """The angle of the momentum from the plane of x and y halfway [rad]."""
-    _bodies: tuple[Gyrostat, EulerTop, Gyrostat] = field(repr=False)
+    _lengths: tuple[float, float] = field(repr=False)
 
     __repr__ = short_repr
 
@@ -69,6 +70,16 @@ class RotorDive:
     def duration(self) -> float:
         """Duration of the whole dive [s]."""
         return float(self.times[-1])
+
+    @cached_property
+    def _bodies(self) -> tuple[Gyrostat, EulerTop, Gyrostat]:
+        """Those of the three stages between the somersaults alone."""
+        on, lasting = self._lengths
+        inertia, spatial = np.diag(self.moments), self.momentum * _ACROSS
+        tilting = Gyrostat(inertia, self.rotor * _FORWARD, spatial, so3.exp(self.turns[0] * _ACROSS))
+        twisting = EulerTop.principal(self.moments, tilting.body_momentum(on), tilting.attitude(on))
+        back = self.rotor if self.twists % 1.0 else -self.rotor
+        return tilting, twisting, Gyrostat(inertia, back * _FORWARD, spatial, twisting.attitude(lasting))
 
     @property
     def landing(self) -> Array:
@@ -137,7 +148,7 @@ class RotorDive:
 
     def _checked(self, t: ArrayLike) -> Array:
         times = finite_array(t, "t", unit="s")
-        if np.any((times < 0.0) | (times > self.duration * (1.0 + 1e-12))):
+        if np.any((times < 0.0) | (times > self.duration * (1.0 + TWELVE_DIGITS))):
             raise ShapeError(f"t: {times.min():.6g} to {times.max():.6g} s; the dive is on [0, {self.duration:.6g}] s")
         return np.minimum(times, self.duration)
 
@@ -154,7 +165,7 @@ class RotorDive:
         """Values of each stage at its times; `alone` is for the somersaults without twist, first and last."""
         times = self._checked(t)
         values, stages = np.empty((*times.shape, *shape)), self._stage(times)
-        for stage in range(5):
+        for stage in range(len(self.turns)):
             here = stages == stage
             since = times[here] - self.times[stage]
             values[here] = alone(stage, since) if stage in (0, 4) else of_body(self._bodies[stage - 1], since)
@@ -188,26 +199,38 @@ def rotor_dive(
     >>> print((dive.turns / (2.0 * np.pi)).round(4), f"{dive.turns.sum() / np.pi:.9f} pi")
     [0.4787 0.0765 0.3897 0.0765 0.4787] 3.000000000 pi
     """
-    parts = _parts(moments, momentum, rotor, kick, somersaults, twists)
-    values, size, spin, on, count, around = parts.arguments
-    inertia, spatial = np.diag(values), size * _ACROSS
-    begun = so3.exp(0.5 * parts.left * _ACROSS)
-    twisting = EulerTop.principal(values, parts.tilting.body_momentum(on), begun @ parts.tilting.attitude(on))
-    back = spin if around % 1.0 else -spin
+    values = _moments(moments)
+    size, on = above_zero(momentum, "momentum", "kg m^2/s"), above_zero(kick, "kick", "s")
+    count, around = above_zero(somersaults, "somersaults"), above_zero(twists, "twists")
+    spin = finite_array(rotor, "rotor", unit="kg m^2/s")
+    if (2.0 * around) % 1.0 or spin.shape or not spin:
+        raise ShapeError("twists: a multiple of a half is needed; rotor: one momentum other than 0")
+    tilting = Gyrostat(np.diag(values), float(spin) * _FORWARD, size * _ACROSS)
+    tilted = tilting.body_momentum(on)
+    twisting = EulerTop.principal(values, tilted, tilting.attitude(on))
+    if twisting.orbit.circled != 0 or not np.isfinite(twisting.period) or tilted[2] * spin <= 0.0:
+        raise TrajectoryError(f"after {on:.6g} s of the rotor the momentum does not circle the long axis: no twist")
+    lasting = around * twisting.period - 2.0 * _since_the_plane(twisting)
+    if lasting <= 0.0:
+        raise TrajectoryError(f"the rotor, on for {on:.6g} s, twists by more than {0.5 * around:g} turns each time")
+    changing, twisted = float(_turned(tilting, on)), float(_turned(twisting, lasting))
+    left = 2.0 * np.pi * count - 2.0 * changing - twisted
+    if left < 0.0:
+        raise TrajectoryError(
+            f"{around:g} twists and the shape changes for them are {count - 0.5 * left / np.pi:.6g} somersaults, more "
+            f"than {count:g}; a quicker or stronger rotor tilts more"
+        )
+    alone = 0.5 * left * float(values[1]) / size
     return RotorDive(
         moments=values,
         momentum=size,
-        rotor=spin,
+        rotor=float(spin),
         somersaults=count,
         twists=around,
-        times=np.cumsum([0.0, parts.alone, on, parts.lasting, on, parts.alone]),
-        turns=np.array([0.5 * parts.left, parts.changing, parts.twisted, parts.changing, 0.5 * parts.left]),
-        tilt=float(np.arcsin(np.clip(twisting.body_momentum(0.5 * parts.lasting)[2] / size, -1.0, 1.0))),
-        _bodies=(
-            Gyrostat(inertia, spin * _FORWARD, spatial, begun),
-            twisting,
-            Gyrostat(inertia, back * _FORWARD, spatial, twisting.attitude(parts.lasting)),
-        ),
+        times=np.cumsum([0.0, alone, on, lasting, on, alone]),
+        turns=np.array([0.5 * left, changing, twisted, changing, 0.5 * left]),
+        tilt=float(np.arcsin(np.clip(twisting.body_momentum(0.5 * lasting)[2] / size, -1.0, 1.0))),
+        _lengths=(on, lasting),
     )
 
 
@@ -233,7 +256,7 @@ def rotor_dive_lasting(
     momenta = 2.0 * np.pi * above_zero(somersaults, "somersaults") * float(values[1]) / span * _MOMENTA
 
     def excess(momentum: float) -> float:
-        return _parts(values, momentum, rotor, kick, somersaults, twists).duration - span
+        return rotor_dive(values, momentum, rotor, kick, somersaults=somersaults, twists=twists).duration - span
 
     last, reason = None, "none of them is a dive"
     for momentum in momenta:
@@ -282,55 +305,14 @@ def tilt_of_ratio(moments: ArrayLike, somersaults_per_twist: float) -> float:
         return top.long_axis_precession_per_period / (2.0 * np.pi) - ratio
 
     # Off the separatrix and the long axis, where the rotation number is not defined.
-    low, high = float(least) + 1e-9, 0.5 * np.pi - 1e-9
+    margin = 1e-9
+    low, high = float(least) + margin, 0.5 * np.pi - margin
     if excess(low) < 0.0 or excess(high) > 0.0:
         raise TrajectoryError(
             f"somersaults_per_twist: from {excess(high) + ratio:.6g} to {excess(low) + ratio:.6g} are possible for "
             f"this body, got {ratio:.6g}"
         )
     return bracketed_root(excess, low, high)
-
-
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """Durations [s] and turns [rad] of the stages, before their bodies are made."""
-
-    arguments: tuple[Array, float, float, float, float, float]
-    tilting: Gyrostat
-    lasting: float
-    changing: float
-    twisted: float
-    left: float
-    alone: float  # duration of the first and of the last stage [s]
-    duration: float  # of the whole dive [s]
-
-
-def _parts(moments: ArrayLike, momentum: float, rotor: float, kick: float, somersaults: float, twists: float) -> _Parts:
-    """The stages of a dive; see `rotor_dive`."""
-    values = _moments(moments)
-    size, on = above_zero(momentum, "momentum", "kg m^2/s"), above_zero(kick, "kick", "s")
-    count, around = above_zero(somersaults, "somersaults"), above_zero(twists, "twists")
-    spin = finite_array(rotor, "rotor", unit="kg m^2/s")
-    if (2.0 * around) % 1.0 or spin.shape or not spin:
-        raise ShapeError("twists: a multiple of a half is needed; rotor: one momentum other than 0")
-    tilting = Gyrostat(np.diag(values), float(spin) * _FORWARD, size * _ACROSS)
-    tilted = tilting.body_momentum(on)
-    twisting = EulerTop.principal(values, tilted, tilting.attitude(on))
-    if twisting.orbit.circled != 0 or not np.isfinite(twisting.period) or tilted[2] * spin <= 0.0:
-        raise TrajectoryError(f"after {on:.6g} s of the rotor the momentum does not circle the long axis: no twist")
-    lasting = around * twisting.period - 2.0 * _since_the_plane(twisting)
-    if lasting <= 0.0:
-        raise TrajectoryError(f"the rotor, on for {on:.6g} s, twists by more than {0.5 * around:g} turns each time")
-    changing, twisted = float(_turned(tilting, on)), float(_turned(twisting, lasting))
-    left = 2.0 * np.pi * count - 2.0 * changing - twisted
-    if left < 0.0:
-        raise TrajectoryError(
-            f"{around:g} twists and the shape changes for them are {count - 0.5 * left / np.pi:.6g} somersaults, more "
-            f"than {count:g}; a quicker or stronger rotor tilts more"
-        )
-    alone = 0.5 * left * float(values[1]) / size
-    arguments = values, size, float(spin), on, count, around
-    return _Parts(arguments, tilting, lasting, changing, twisted, left, alone, 2.0 * (alone + on) + lasting)
 
 
 def _moments(moments: ArrayLike) -> Array:

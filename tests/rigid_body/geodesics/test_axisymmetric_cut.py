@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from shapephase import so3
 from shapephase.errors import ShapeError
 from shapephase.rigid_body.geodesics import axisymmetric_metric, left_invariant_metric
+from support.independent import assert_within
 
 # (I_1, I_3): flat with I_3 below and beyond 2 I_1, round, rods, sub-Riemannian.
 PAIRS = [(1.0, 1.5), (1.0, 3.0), (1.0, 30.0), (2.0, 2.0), (2.0, 0.7), (1.0, 0.2), (1.0, np.inf), (2.5, np.inf)]
@@ -58,10 +59,10 @@ def test_distances_on_su2_are_the_least_of_all_ways_q6(pair):
     closed = axisymmetric_metric(*pair)
     quats = Rotation.random(6, random_state=5).as_quat() * np.array([[1.0], [-1.0]] * 3)
     expected = [all_ways(pair, quat, on_su2=True) for quat in quats]
-    np.testing.assert_allclose(closed.distance_on_su2(quats), expected, rtol=0, atol=1e-10)
+    assert_within(closed.distance_on_su2(quats), expected, 1e-10)
     rotations = Rotation.from_quat(quats).as_matrix()
     nearer = np.minimum(closed.distance_on_su2(quats), closed.distance_on_su2(-quats))
-    np.testing.assert_allclose(closed.distance(rotations), nearer, rtol=0, atol=1e-11)
+    assert_within(closed.distance(rotations), nearer, 1e-11)
     assert closed.distance_on_su2([0.0, 0.0, 0.0, 1.0]) == 0.0
 
 
@@ -96,7 +97,7 @@ def test_the_printed_equation_of_the_conjugate_times_q6(pair):
     tau = axisymmetric_metric(*pair).conjugate_time(start) * np.linalg.norm(start, axis=-1) / (2.0 * pair[0])
     slope = tau * eta * (1.0 - axial**2) / (1.0 + eta * axial**2)
     product = np.sin(tau) * (np.sin(tau) + slope * np.cos(tau))
-    np.testing.assert_allclose(product, 0.0, rtol=0, atol=1e-14)
+    assert_within(product, 0.0, 1e-14)
     if eta > 0.0:
         assert np.all((tau > 0.5 * np.pi) & (tau < np.pi))
     else:
@@ -114,7 +115,7 @@ def test_the_printed_equation_of_the_conjugate_times_q6(pair):
 
 @pytest.mark.parametrize("pair", SOME, ids=IDS)
 def test_cut_times_against_all_geodesics_q6(pair):
-    metric, start = unit_momenta(pair, 4, 6)
+    metric, start = unit_momenta(pair, 4, 3)
     cut = axisymmetric_metric(*pair).cut_time(start)
     assert np.all(cut <= metric.conjugate_time(start) * (1.0 + 1e-12))
     for part, shortest in ((0.4, True), (0.999, True), (1.001, False), (1.3, False)):
@@ -128,7 +129,7 @@ def test_cut_times_against_all_geodesics_q6(pair):
 
 @pytest.mark.parametrize("pair", SOME, ids=IDS)
 def test_cut_times_on_su2_against_all_geodesics_q6(pair):
-    _, start = unit_momenta(pair, 5, 6)
+    _, start = unit_momenta(pair, 5, 3)
     closed = axisymmetric_metric(*pair)
     cut = closed.cut_time_on_su2(start)
     assert np.all(cut >= closed.cut_time(start))
@@ -155,7 +156,7 @@ def test_q0_vanishes_at_the_cut_or_tau_is_pi_q6():
         half = tau < np.pi * (1.0 - 1e-12)
         if half.any():
             angle = so3.angle(metric.attitude(start[half], cut[half]))
-            np.testing.assert_allclose(angle, np.pi, rtol=0, atol=1e-7)
+            assert_within(angle, np.pi, 1e-7)
         # No zero comes earlier.
         for part in np.linspace(0.05, 0.999, 40):
             t = part * tau
@@ -165,13 +166,13 @@ def test_q0_vanishes_at_the_cut_or_tau_is_pi_q6():
 @pytest.mark.parametrize("pair", SOME, ids=IDS)
 def test_distances_against_all_geodesics_q6(pair):
     closed = axisymmetric_metric(*pair)
-    attitudes = Rotation.random(12, random_state=7).as_matrix()
+    attitudes = Rotation.random(6, random_state=7).as_matrix()
     distance = closed.distance(attitudes)
     expected = [all_ways(pair, so3.quat_from_matrix(attitude)) for attitude in attitudes]
-    np.testing.assert_allclose(distance, expected, rtol=0, atol=1e-11)
+    assert_within(distance, expected, 1e-11)
     momentum = closed.shortest_momentum(attitudes)
     metric = left_invariant_metric([pair[0], pair[0], pair[1]])
-    np.testing.assert_allclose(metric.attitude(momentum), attitudes, rtol=0, atol=1e-12)
+    assert_within(metric.attitude(momentum), attitudes, 1e-12)
     np.testing.assert_allclose(metric.speed(momentum), distance, rtol=1e-14)
     assert distance.max() <= closed.diameter
 
@@ -220,7 +221,7 @@ def test_distance_to_turns_about_the_axis_q6(pair):
     np.testing.assert_allclose(closed.distance_to_turn(alpha + 2.0 * np.pi), closed.distance_to_turn(alpha), rtol=1e-13)
     # Either way it is a geodesic's length.
     metric = left_invariant_metric([pair[0], pair[0], pair[1]])
-    np.testing.assert_allclose(metric.attitude(closed.shortest_momentum(turns)), turns, rtol=0, atol=1e-12)
+    assert_within(metric.attitude(closed.shortest_momentum(turns)), turns, 1e-12)
 
 
 def test_sub_riemannian_distance_to_turns_about_the_axis_is_a_limit_q5():
@@ -268,7 +269,7 @@ def test_refusals():
     for name in ("conjugate_time", "cut_time", "cut_time_on_su2"):
         with pytest.raises(ShapeError, match="forbidden"):
             getattr(flat, name)([0.0, 0.0, 1.0])
-        with pytest.raises(ShapeError, match="nothing moves"):
+        with pytest.raises(ShapeError, match="moves"):
             getattr(usual, name)([0.0, 0.0, 0.0])
     with pytest.raises(ShapeError):
         usual.distance(2.0 * np.eye(3))

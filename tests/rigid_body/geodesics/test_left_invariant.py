@@ -14,9 +14,8 @@ from scipy.optimize import brentq
 from shapephase import so3
 from shapephase.errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnphysicalInertiaError
 from shapephase.rigid_body import EulerTop
-from shapephase.rigid_body.geodesics import _conjugate_search as conjugate_search
-from shapephase.rigid_body.geodesics import left_invariant_metric
-from support.independent import cross
+from shapephase.rigid_body.geodesics import andoyer_variables, left_invariant_metric, serret_andoyer_metric
+from support.independent import assert_within, cross
 from support.long_runs import full_but
 
 METRICS = {
@@ -74,12 +73,12 @@ def test_the_controls_maximise_the_pseudo_hamiltonian_q1(name):
     u = metric.angular_velocity(pi)
     np.testing.assert_allclose(u, pi / moments, rtol=1e-15)
     best = metric.pseudo_hamiltonian(pi, u)
-    np.testing.assert_allclose(best, metric.hamiltonian(pi), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(best, 0.5 * np.sum(pi**2 / moments, axis=-1), rtol=0, atol=1e-14)
+    assert_within(best, metric.hamiltonian(pi), 1e-14)
+    assert_within(best, 0.5 * np.sum(pi**2 / moments, axis=-1), 1e-14)
     step = rng.normal(size=(50, 3)) * np.isfinite(moments)
     weights = np.where(np.isfinite(moments), moments, 0.0)
     lost = 0.5 * np.sum(weights * step**2, axis=-1)
-    np.testing.assert_allclose(metric.pseudo_hamiltonian(pi, u + step), best - lost, rtol=0, atol=1e-13)
+    assert_within(metric.pseudo_hamiltonian(pi, u + step), best - lost, 1e-13)
 
 
 @pytest.mark.parametrize("name", full_but(METRICS, "unsorted", "rod", "strong", "sub-Riemannian"))
@@ -90,8 +89,8 @@ def test_geodesics_solve_the_extremal_equations_q1_q2(name):
         start = metric.unit_speed(rng.normal(size=3))
         at = variational(METRICS[name], start, 5.0)
         t = np.array([0.3, 2.0, 5.0])
-        np.testing.assert_allclose(metric.attitude(start, t), [at(s)[0] for s in t], rtol=0, atol=1e-11)
-        np.testing.assert_allclose(metric.body_momentum(start, t), [at(s)[1] for s in t], rtol=0, atol=1e-11)
+        assert_within(metric.attitude(start, t), [at(s)[0] for s in t], 1e-11)
+        assert_within(metric.body_momentum(start, t), [at(s)[1] for s in t], 1e-11)
 
 
 def test_eulers_equation_componentwise_q2():
@@ -104,18 +103,7 @@ def test_eulers_equation_componentwise_q2():
         h[:, 0] * h[:, 2] * (1 / i1 - 1 / i3),
         h[:, 0] * h[:, 1] * (1 / i2 - 1 / i1),
     ]
-    np.testing.assert_allclose(metric.momentum_rate(h), np.transpose(printed), rtol=0, atol=1e-15)
-
-
-def test_the_commutators_are_printed_with_the_wrong_sign_b_e2():
-    for a, b, c in ((A1, A2, A3), (A2, A3, A1), (A3, A1, A2)):
-        np.testing.assert_array_equal(a @ b - b @ a, c)
-        assert np.abs((a @ b - b @ a) + c).max() == 2.0
-    # The paper's matrices are those of the cross product; its Euler equations come from {H_i, H_j} = -H([A_i, A_j]).
-    np.testing.assert_array_equal(A1, [[0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    metric, h = left_invariant_metric(TRIAXIAL), np.array([0.4, -0.7, 1.1])
-    lift = np.array([[-(so3.vee(x @ y - y @ x) @ h) for y in (A1, A2, A3)] for x in (A1, A2, A3)])
-    np.testing.assert_allclose(metric.momentum_rate(h), lift @ (h / TRIAXIAL), rtol=0, atol=1e-15)
+    assert_within(metric.momentum_rate(h), np.transpose(printed), 1e-15)
 
 
 def test_times_are_quadratures_of_the_two_integrals_q3():
@@ -144,11 +132,11 @@ def test_momentum_in_inertial_axes_and_the_hamiltonian_are_conserved_q4(name):
     t = rng.uniform(-20.0, 20.0, 20)
     at = metric.body_momentum(start, t)
     np.testing.assert_allclose(so3.apply(metric.attitude(start, t), at), start, atol=1e-12)
-    np.testing.assert_allclose(metric.hamiltonian(at), 0.5, rtol=0, atol=1e-11)
+    assert_within(metric.hamiltonian(at), 0.5, 1e-11)
     # The lift of A_i R is one component of R Pi.
     attitude, pi = metric.attitude(start[0], 1.3), metric.body_momentum(start[0], 1.3)
     lifts = [so3.vee(attitude.T @ generator @ attitude) @ pi for generator in (A1, A2, A3)]
-    np.testing.assert_allclose(lifts, start[0], rtol=0, atol=1e-12)
+    assert_within(lifts, start[0], 1e-12)
 
 
 def test_geodesics_are_the_motions_of_the_euler_top():
@@ -159,11 +147,11 @@ def test_geodesics_are_the_motions_of_the_euler_top():
         metric, start = left_invariant_metric(inertia), rng.normal(size=3)
         top = EulerTop(inertia, start)
         t = rng.uniform(-3.0, 10.0, 5)
-        np.testing.assert_allclose(metric.attitude(start, t), top.attitude(t), rtol=0, atol=1e-11)
-        np.testing.assert_allclose(metric.body_momentum(start, t), top.body_momentum(t), rtol=0, atol=1e-11)
+        assert_within(metric.attitude(start, t), top.attitude(t), 1e-11)
+        assert_within(metric.body_momentum(start, t), top.body_momentum(t), 1e-11)
     # An eigenvalue routine is right for a tensor within some units of rounding of the given one.
     rounding = 16.0 * np.finfo(float).eps * np.trace(inertia)
-    np.testing.assert_allclose(metric.axes @ np.diag(metric.moments) @ metric.axes.T, inertia, rtol=0, atol=rounding)
+    assert_within(metric.axes @ np.diag(metric.moments) @ metric.axes.T, inertia, rounding)
 
 
 @pytest.mark.parametrize("moments", list(itertools.permutations((0.2, 0.47, 0.8))), ids=str)
@@ -172,7 +160,7 @@ def test_next_to_the_unstable_axis_with_one_component_zero_q2(moments):
     metric = left_invariant_metric(moments)
     for momentum in itertools.permutations((1.0, 1e-9, 0.0)):
         top = EulerTop.principal(moments, momentum)
-        np.testing.assert_allclose(metric.attitude(momentum, 5.0), top.attitude(5.0), rtol=0, atol=1e-12)
+        assert_within(metric.attitude(momentum, 5.0), top.attitude(5.0), 1e-12)
 
 
 def test_moments_and_axes_ascend_and_are_those_given():
@@ -183,23 +171,11 @@ def test_moments_and_axes_ascend_and_are_those_given():
         assert np.linalg.det(metric.axes) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_the_sub_riemannian_closed_form_is_a_top_turned_back_about_its_momentum_q5():
-    # With a + c in place of a the attitude turns by c t more about Pi, in inertial axes.
-    rng = np.random.default_rng(6)
-    moments = np.array(METRICS["sub-Riemannian"])
-    metric = left_invariant_metric(moments)
-    for shift in (0.4, 1.0, 7.0):
-        start, t = rng.normal(size=3), rng.uniform(0.0, 8.0, 20)
-        top = EulerTop.principal(1.0 / (inverse(moments) + shift), start)
-        back = so3.exp(-shift * t[:, None] * start)
-        np.testing.assert_allclose(metric.attitude(start, t), back @ top.attitude(t), rtol=0, atol=1e-12)
-
-
 def test_one_parameter_is_left_in_the_sub_riemannian_case_q5():
     # k^2 = I_2/I_3: multiplying both moments by a number only multiplies the momenta.
     start, t = np.array([0.7, -0.4, 1.1]), 1.7
     once, thrice = left_invariant_metric([np.inf, 2.0, 1.0]), left_invariant_metric([np.inf, 6.0, 3.0])
-    np.testing.assert_allclose(thrice.attitude(3.0 * start, t), once.attitude(start, t), rtol=0, atol=1e-14)
+    assert_within(thrice.attitude(3.0 * start, t), once.attitude(start, t), 1e-14)
     assert once.is_sub_riemannian
     assert not left_invariant_metric(TRIAXIAL).is_sub_riemannian
 
@@ -228,9 +204,9 @@ def test_the_riemannian_case_converges_as_the_inverse_of_the_moment_q5():
 
     slope = solve_ivp(rate, (0.0, 3.0), np.append(start, np.zeros(6)), "DOP853", rtol=1e-12, atol=1e-13).y[3:6, -1]
     measured = so3.log(at.T @ near[2].attitude(start, 3.0)) / inverse_moments[2]
-    np.testing.assert_allclose(measured, slope, rtol=0, atol=2e-3 * np.linalg.norm(slope))
+    assert_within(measured, slope, 2e-3 * np.linalg.norm(slope))
     tiny = left_invariant_metric([1e10, 2.0, 1.0])
-    np.testing.assert_allclose(so3.log(at.T @ tiny.attitude(start, 3.0)) * 1e10, slope, rtol=0, atol=1e-4)
+    assert_within(so3.log(at.T @ tiny.attitude(start, 3.0)) * 1e10, slope, 1e-4)
 
 
 @pytest.mark.parametrize("name", full_but(METRICS, "triaxial", "flat", "round", "sub-Riemannian about 2"))
@@ -242,9 +218,7 @@ def test_the_differential_solves_the_variational_equation_q6(name):
         at = variational(METRICS[name], start, 6.0)
         for t in (0.004, 0.3, 2.5, 6.0):
             expected = at(t)[2]
-            np.testing.assert_allclose(
-                metric.differential(start, t), expected, rtol=0, atol=2e-11 * max(t, np.abs(expected).max())
-            )
+            assert_within(metric.differential(start, t), expected, 2e-11 * max(t, np.abs(expected).max()))
 
 
 def test_the_differential_at_special_momenta_q6():
@@ -260,13 +234,11 @@ def test_the_differential_at_special_momenta_q6():
     ]
     metric = left_invariant_metric(TRIAXIAL)
     for start in np.array(special):
-        at = variational(TRIAXIAL, start, 12.0)
-        for t in (1e-3, 0.0199, 0.0201, 3.0, 12.0):
+        at = variational(TRIAXIAL, start, 8.0)
+        for t in (1e-3, 0.0199, 0.0201, 3.0, 8.0):
             expected = at(t)[2]
-            np.testing.assert_allclose(
-                metric.differential(start, t), expected, rtol=0, atol=1e-11 * max(t, np.abs(expected).max())
-            )
-    np.testing.assert_allclose(metric.differential(np.zeros(3), 2.0), np.diag(2.0 / TRIAXIAL), rtol=0, atol=1e-15)
+            assert_within(metric.differential(start, t), expected, 1e-11 * max(t, np.abs(expected).max()))
+    assert_within(metric.differential(np.zeros(3), 2.0), np.diag(2.0 / TRIAXIAL), 1e-15)
     np.testing.assert_array_equal(metric.differential(np.ones(3), 0.0), np.zeros((3, 3)))
 
 
@@ -296,7 +268,7 @@ def test_small_turns_keep_their_digits_q6():
 
     for t in (1e-6, 1e-3, 0.0199, 0.0201, 0.05):
         expected = np.array([series(column, t) for column in range(3)]).T
-        np.testing.assert_allclose(metric.differential(direction, t), expected, rtol=0, atol=1e-13 * t)
+        assert_within(metric.differential(direction, t), expected, 1e-13 * t)
 
 
 @pytest.mark.parametrize(
@@ -305,7 +277,7 @@ def test_small_turns_keep_their_digits_q6():
 def test_conjugate_times_are_zeros_of_the_variational_determinant_q6(name):
     rng = np.random.default_rng(8)
     metric = left_invariant_metric(METRICS[name])
-    for _ in range(2):
+    for _ in range(1):
         start = metric.unit_speed(rng.normal(size=3))
         times = [float(metric.conjugate_time(start, order)) for order in (1, 2, 3)]
         at = variational(METRICS[name], start, times[1] * 1.02)
@@ -318,15 +290,19 @@ def test_conjugate_times_are_zeros_of_the_variational_determinant_q6(name):
         change = np.flatnonzero(values[1:] * values[:-1] < 0.0)
         found = [brentq(determinant, grid[k], grid[k + 1], xtol=1e-14) for k in change]
         assert len(found) == 2
-        np.testing.assert_allclose(found, times[:2], rtol=0, atol=1e-10)
+        assert_within(found, times[:2], 1e-10)
         assert times[2] > times[1]
 
 
-def test_conjugate_times_of_steady_rotations_q6():
-    # About axis k the linear flow is a turn by a_k t of the exponential of a constant matrix.
-    a = inverse(TRIAXIAL)
-    metric = left_invariant_metric(TRIAXIAL)
-    for k in range(3):
+UNEQUAL = [([1.0, 1e3, 20.0], [1]), ([np.inf, 1.0, 1e-2], [1]), ([1e4, 1.0, 1e-2], [1])]
+
+
+@pytest.mark.parametrize(("moments", "axes"), [(TRIAXIAL, [0, 1, 2]), *UNEQUAL], ids=str)
+def test_conjugate_times_of_steady_rotations_q6(moments, axes):
+    """About axis k the linear flow is a turn by a_k t of the exponential of a constant matrix."""
+    a = inverse(moments)
+    metric = left_invariant_metric(moments)
+    for k in axes:
         i, j = (k + 1) % 3, (k + 2) % 3
         linear = np.array([[0.0, a[k] - a[j]], [a[i] - a[k], 0.0]])
 
@@ -334,10 +310,10 @@ def test_conjugate_times_of_steady_rotations_q6():
             turn = expm(t * a[k] * np.array([[0.0, -1.0], [1.0, 0.0]]))
             return 2.0 - np.trace(turn @ expm(t * linear))
 
-        for order in (1, 2, 3):
+        for order in (1, 2, 3)[: len(axes)]:
             time = float(metric.conjugate_time(np.eye(3)[k], order))
             assert abs(determinant(time)) < 1e-12 * np.linalg.norm(expm(time * linear)) ** 2
-        if k:
+        if k and len(axes) > 1:
             first = float(metric.conjugate_time(np.eye(3)[k]))
             grid = np.linspace(0.1, 0.999 * first, 200)
             assert min(determinant(t) for t in grid) > 0.0
@@ -362,7 +338,7 @@ def test_double_conjugate_points_count_twice_q6():
 def test_conjugate_times_scale_and_are_symmetric_q6():
     rng = np.random.default_rng(10)
     metric = left_invariant_metric(TRIAXIAL)
-    start = rng.normal(size=(40, 3))
+    start = rng.normal(size=(8, 3))
     time = metric.conjugate_time(start)
     np.testing.assert_allclose(metric.conjugate_time(2.5 * start), time / 2.5, rtol=1e-12)
     for signs in ([-1, -1, 1], [1, -1, -1], [-1, 1, -1]):
@@ -374,14 +350,14 @@ def test_conjugate_times_scale_and_are_symmetric_q6():
     turned = left_invariant_metric(turn @ np.diag(TRIAXIAL) @ turn.T)
     np.testing.assert_allclose(turned.conjugate_time(start @ turn.T), time, rtol=1e-11)
     locus = metric.conjugate_locus(start)
-    np.testing.assert_allclose(turned.conjugate_locus(start @ turn.T), turn @ locus @ turn.T, rtol=0, atol=1e-10)
+    assert_within(turned.conjugate_locus(start @ turn.T), turn @ locus @ turn.T, 1e-10)
 
 
 def test_the_conjugate_locus_is_a_critical_value_of_the_exponential_map_q6():
     rng = np.random.default_rng(11)
     for name in ("triaxial", "sub-Riemannian", "flat"):
         metric = left_invariant_metric(METRICS[name])
-        start = metric.unit_speed(rng.normal(size=(30, 3)))
+        start = metric.unit_speed(rng.normal(size=(5, 3)))
         time = metric.conjugate_time(start)
         values = np.linalg.svd(metric.differential(start, time), compute_uv=False)
         assert (values[:, 2] / values[:, 0]).max() < 1e-12
@@ -400,96 +376,44 @@ def test_gauss_lemma_holds_q6(name):
     metric = left_invariant_metric(METRICS[name])
     start, t = rng.normal(size=(20, 3)), rng.uniform(0.1, 6.0, 20)
     projected = np.einsum("ni,nij->nj", metric.body_momentum(start, t), metric.differential(start, t))
-    np.testing.assert_allclose(projected, t[:, None] * metric.angular_velocity(start), rtol=0, atol=1e-10)
+    assert_within(projected, t[:, None] * metric.angular_velocity(start), 1e-10)
 
 
 def test_serret_andoyer_conjugate_points_are_not_those_on_so3_q7():
-    # theory.md section 6: p, phi_1c, theta_1c of the Serret-Andoyer metric of I = (3, 2, 1), from the equator.
-    table = [
-        (1.70, -0.094594, 3.565678),
-        (1.60, -0.644765, 5.025759),
-        (1.50, -1.152362, 7.022735),
-        (1.43, -1.676710, 11.331023),
-        (1.42, -1.829686, 13.924233),
-    ]
-    a, b, c = inverse(TRIAXIAL)
+    surface = serret_andoyer_metric(TRIAXIAL)
     metric = left_invariant_metric(TRIAXIAL)
-    for p, phi_conjugate, theta_conjugate in table:
-        momentum = np.array([0.0, 0.0, np.sqrt((1.0 - a * p * p) / (c - a))])
+    a, _, c = inverse(TRIAXIAL)
+    for p in (1.70, 1.42):
+        momentum = np.array([0.0, 0.0, -np.sqrt((1.0 - a * p * p) / (c - a))])
         momentum[0] = np.sqrt(p * p - momentum[2] ** 2)
-        assert abs(metric.hamiltonian(momentum) - 0.5) < 1e-15
-
-        def rate(_, y, p=p):
-            angle, p_y = y[1], y[2]
-            half = a * np.sin(angle) ** 2 + b * np.cos(angle) ** 2
-            return [
-                p * half,
-                p_y * (c - half),
-                (b - a) * (p * p - p_y * p_y) * np.sin(angle) * np.cos(angle),
-                p_y * np.sqrt(c - half),
-            ]
-
-        def reached(_, y, phi=phi_conjugate):
-            return y[3] - phi
-
-        reached.direction, reached.terminal = -1.0, True
-        start = [0.0, 0.5 * np.pi, momentum[2], 0.0]
-        path = solve_ivp(rate, (0.0, 40.0), start, "DOP853", events=reached, rtol=1e-12, atol=1e-12)
-        time, end = path.t_events[0][0], path.y_events[0][0]
-        # The table's point lies on this extremal: the reduced motion is the same one.
-        assert abs(end[0] - theta_conjugate) < 5e-5
+        family = surface.geodesics(p)
+        time = float(family.conjugate_points().time)
+        # The reduced motion is the same one.
         here = metric.body_momentum(momentum, time)
-        np.testing.assert_allclose(np.arctan2(here[0], here[1]), end[1], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(here[2], end[2], rtol=0, atol=1e-9)
+        assert [np.arctan2(here[0], here[1]), here[2]] == pytest.approx([family.y(time), family.p_y(time)], abs=1e-11)
         # But the end of the geodesic on SO(3) is not conjugate there, and is elsewhere.
-        conjugates = np.array([metric.conjugate_time(momentum, order) for order in (1, 2, 3, 4)])
+        conjugates = np.array([metric.conjugate_time(momentum, order) for order in (1, 2, 3)])
         assert np.abs(conjugates / time - 1.0).min() > 0.01
         values = np.linalg.svd(metric.differential(momentum, time), compute_uv=False)
         assert values[2] / values[0] > 1e-3
 
 
 def test_the_fibre_is_lagrangian_in_andoyer_variables_q8():
-    # sum dG^dg + dK^dk + dL^dl vanishes on the momenta at one attitude, but not on all of the phase space.
-    mpmath.mp.dps = 40
-    angles = [mpmath.mpf("0.4"), mpmath.mpf("1.1"), mpmath.mpf("-0.7")]
-
-    def rotation(axis, angle):
-        cosine, sine, i, j = mpmath.cos(angle), mpmath.sin(angle), (axis + 1) % 3, (axis + 2) % 3
-        matrix = mpmath.eye(3)
-        matrix[i, i] = matrix[j, j] = cosine
-        matrix[i, j], matrix[j, i] = -sine, sine
-        return matrix
-
-    def andoyer(h1, h2, h3, phi_1=angles[0]):
-        attitude = rotation(2, phi_1) * rotation(1, angles[1]) * rotation(2, angles[2])
-        body = mpmath.matrix([h1, h2, h3])
-        spatial = attitude * body
-        size = mpmath.norm(body)
-        # Nodes of the plane at right angles to the momentum with both third planes.
-        node = mpmath.matrix([-spatial[1], spatial[0], 0])
-        across = mpmath.matrix([-spatial[0] * spatial[2], -spatial[1] * spatial[2], spatial[0] ** 2 + spatial[1] ** 2])
-        inner = attitude * mpmath.matrix([body[1], -body[0], 0])
-        g = mpmath.atan2((across.T * inner)[0] / size, (node.T * inner)[0])
-        return [g, mpmath.atan2(node[1], node[0]), mpmath.atan2(body[0], body[1]), size, spatial[2], body[2]]
-
-    point = [mpmath.mpf("0.8"), mpmath.mpf("-0.5"), mpmath.mpf("1.3")]
-
-    def column(order, k):
-        return mpmath.diff(lambda *x: andoyer(*x)[k], (*point, angles[0]), order)
-
-    orders = [(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
-    slopes = [[column(order, k) for k in range(6)] for order in orders]
-
-    def form(x, y):
-        return sum(x[k + 3] * y[k] - y[k + 3] * x[k] for k in range(3))
-
-    for i in range(3):
-        for j in range(i):
-            assert abs(form(slopes[i], slopes[j])) < 1e-15
-    # Along the angle phi_1 the form is the differential of its momentum p_phi1 = K: not zero.
-    for i in range(3):
-        assert abs(abs(form(slopes[i], slopes[3])) - abs(slopes[i][4])) < 1e-15
-        assert abs(slopes[i][4]) > 0.1
+    """The sum dG^dg + dK^dk + dL^dl vanishes on the momenta at one attitude, but not on all of the phase space."""
+    offsets, weights = np.array([1, 2, 3, -1, -2, -3]), np.array([45, -9, 1, -45, 9, -1]) / 60.0
+    h, momentum = 1e-2, np.array([0.8, -0.5, 1.3])
+    turns = so3.exp(np.array([0.0, 0.0, h]) * offsets[:, None])
+    attitude = so3.exp(np.array([0.3, -1.0, 0.6]))
+    states = [andoyer_variables(attitude, momentum + h * offsets[:, None] * unit) for unit in np.eye(3)]
+    states.append(andoyer_variables(turns @ attitude, momentum))
+    names = ("g", "k", "l", "total", "vertical", "axial")
+    slopes = np.array([[weights @ getattr(state, name) / h for name in names] for state in states])
+    form = slopes[:, 3:] @ slopes[:, :3].T
+    form = form - form.T
+    assert np.abs(form[:3, :3]).max() < 1e-9
+    # Along a turn about the third axis the form is the differential of K: not zero.
+    assert np.abs(form[:3, 3]) == pytest.approx(np.abs(slopes[:3, 4]), abs=1e-9)
+    assert np.abs(slopes[:3, 4]).max() > 0.1
 
 
 def test_batches_and_shapes():
@@ -501,8 +425,8 @@ def test_batches_and_shapes():
     assert metric.conjugate_time(start).shape == (4, 1)
     assert np.shape(metric.conjugate_time(start[0, 0])) == ()
     assert metric.conjugate_locus(start).shape == (4, 1, 3, 3)
-    np.testing.assert_allclose(attitude[2, 3], metric.attitude(start[2, 0], t[3]), rtol=0, atol=1e-14)
-    np.testing.assert_allclose(differential[2, 3], metric.differential(start[2, 0], t[3]), rtol=0, atol=1e-13)
+    assert_within(attitude[2, 3], metric.attitude(start[2, 0], t[3]), 1e-14)
+    assert_within(differential[2, 3], metric.differential(start[2, 0], t[3]), 1e-13)
     np.testing.assert_allclose(
         metric.conjugate_time(start)[3, 0], metric.conjugate_time(start[3, 0]), rtol=1e-13, atol=0
     )
@@ -532,13 +456,13 @@ def test_metrics_refused(inertia, error):
 
 def test_momenta_refused():
     metric, flat = left_invariant_metric(TRIAXIAL), left_invariant_metric([1.0, np.inf, 2.0])
-    with pytest.raises(ShapeError, match="nothing moves"):
+    with pytest.raises(ShapeError, match="moves"):
         metric.conjugate_time(np.zeros(3))
-    with pytest.raises(ShapeError, match="forbidden direction"):
+    with pytest.raises(ShapeError, match="forbidden"):
         flat.unit_speed([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
     with pytest.raises(ShapeError, match="forbids"):
         flat.pseudo_hamiltonian([1.0, 1.0, 1.0], [0.0, 0.1, 0.0])
-    with pytest.raises(ShapeError, match="do not broadcast"):
+    with pytest.raises(ShapeError, match="broadcast"):
         metric.attitude(np.ones((4, 3)), np.ones(3))
     for order in (0, -1, 1.5, True):
         with pytest.raises(ShapeError, match="order"):
@@ -547,26 +471,13 @@ def test_momenta_refused():
         metric.attitude([1.0, np.nan, 0.0])
     with pytest.raises(ShapeError):
         metric.differential([1.0, 0.0, 0.0], np.inf)
-    with pytest.raises(ShapeError, match="too far"):
+    with pytest.raises(ShapeError, match="far"):
         metric.differential([1.0, 0.3, 0.2], 1e9)
 
 
-def test_very_unequal_moments_q6():
-    # Steady about the axis of the second moment, where the flow is a constant matrix.
-    for moments in ([1.0, 1e3, 20.0], [np.inf, 1.0, 1e-2], [1e4, 1.0, 1e-2]):
-        metric = left_invariant_metric(moments)
-        a = inverse(moments)
-        start = np.array([0.0, 1.0, 0.0])
-        time = float(metric.conjugate_time(start))
-        linear = np.array([[0.0, a[1] - a[0]], [a[2] - a[1], 0.0]])
-        turn = expm(time * a[1] * np.array([[0.0, -1.0], [1.0, 0.0]]))
-        flow = expm(time * linear)
-        assert abs(2.0 - np.trace(turn @ flow)) < 1e-11 * np.linalg.norm(flow) ** 2
-
-
 def test_no_conjugate_time_is_an_error(monkeypatch):
-    monkeypatch.setattr(conjugate_search, "_STEPS_EACH", 2)
-    with pytest.raises(AccuracyNotReached, match="conjugate point 1"):
+    monkeypatch.setattr("shapephase.rigid_body.geodesics._conjugate_search._STEPS_EACH", 2)
+    with pytest.raises(AccuracyNotReached, match="conjugate"):
         left_invariant_metric(TRIAXIAL).conjugate_time([1.0, 0.0, 0.0])
 
 
@@ -587,7 +498,7 @@ def test_geodesics_are_minima_of_the_length_up_to_the_conjugate_time_q6(part, sa
     def length(x, y):
         total, meeting = 0.0, middle @ so3.exp(x * plane[0] + y * plane[1])
         for attitude, pi in ((meeting, 0.5 * time * start), (meeting.T @ target, 0.5 * time * here)):
-            for _ in range(6):
+            for _ in range(4):
                 pi = pi + np.linalg.solve(metric.differential(pi), so3.log(metric.attitude(pi).T @ attitude))
             total += float(metric.speed(pi))
         return total

@@ -15,6 +15,7 @@ from shapephase.rigid_body.geodesics import (
     sadov_variables,
     serret_andoyer_metric,
 )
+from support.independent import assert_within
 
 ORDERS = ([3.0, 2.0, 1.0], [1.0, 2.0, 3.0], [2.0, 3.0, 1.0], [1.0, 3.0, 2.0])
 
@@ -77,14 +78,14 @@ def test_of_two_equal_moments_the_error_says_which_variables_to_take_r15(moments
     equal, own = moments[order[0]], moments[symmetry]
     size, along = np.linalg.norm(momentum), momentum[symmetry]
     for angle, rate in ((found.l, along * (1.0 / own - 1.0 / equal)), (found.g, size / equal)):
-        np.testing.assert_allclose(so3.wrap(angle - angle[0] - rate * times), 0.0, rtol=0, atol=1e-13)
+        assert_within(so3.wrap(angle - angle[0] - rate * times), 0.0, 1e-13)
     state = andoyer_variables(np.eye(3), momentum)
     for call in (
         lambda: sadov_variables(moments, state),
         lambda: sadov_frequencies(moments, momentum),
         lambda: andoyer_from_sadov(moments, [0.0, 0.0, 0.0], [0.5, 1.0, 0.2]),
     ):
-        with pytest.raises(ShapeError, match="are angles and actions already"):
+        with pytest.raises(ShapeError, match="andoyer_variables"):
             call()
 
 

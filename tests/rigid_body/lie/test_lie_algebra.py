@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from itertools import product
 
 import numpy as np
@@ -48,7 +47,7 @@ from shapephase.rigid_body.lie import (
     space_velocity,
     su2,
 )
-from support.independent import cross
+from support.independent import assert_within, rigid_motion
 
 ALGEBRAS = [so3(), so(2), so(4), so(5), sl2r(), se2(), se3(), su2(), heisenberg()]
 each_algebra = pytest.mark.parametrize("algebra", ALGEBRAS, ids=lambda a: a.name)
@@ -72,38 +71,31 @@ def commutator(a, b):
 def test_bracket_is_the_commutator_of_matrices(algebra, rng):
     a, b = rng.normal(size=(2, 4, algebra.dimension))
     expected = commutator(algebra.matrix(a), algebra.matrix(b))
-    np.testing.assert_allclose(algebra.matrix(algebra.bracket(a, b)), expected, atol=1e-14, rtol=0)
-    np.testing.assert_allclose(algebra.coordinates(expected), algebra.bracket(a, b), atol=1e-13, rtol=0)
-    np.testing.assert_allclose(algebra.ad(a) @ b[..., None], algebra.bracket(a, b)[..., None], atol=1e-14, rtol=0)
+    assert_within(algebra.matrix(algebra.bracket(a, b)), expected, 1e-14)
+    assert_within(algebra.coordinates(expected), algebra.bracket(a, b), 1e-13)
+    assert_within(algebra.ad(a) @ b[..., None], algebra.bracket(a, b)[..., None], 1e-14)
 
 
 @each_algebra
-def test_laws_of_the_algebra_are_exact_in_rational_numbers(algebra):
-    c = [[[Fraction(x) for x in row] for row in plane] for plane in algebra.structure.tolist()]
-    d = algebra.dimension
-    for i, j, k in product(range(d), repeat=3):
-        assert c[i][j][k] == -c[j][i][k]
-    for i, j, k, m in product(range(d), repeat=4):
-        terms = (c[i][j][s] * c[s][k][m] + c[j][k][s] * c[s][i][m] + c[k][i][s] * c[s][j][m] for s in range(d))
-        assert sum(terms) == 0
+def test_laws_of_the_algebra_are_exact_in_whole_numbers(algebra):
+    c = algebra.structure.astype(int)
+    assert np.array_equal(c, algebra.structure)
+    assert np.array_equal(c, -c.transpose(1, 0, 2))
+    double = np.einsum("ijs,skm->ijkm", c, c)
+    assert not (double + double.transpose(1, 2, 0, 3) + double.transpose(2, 0, 1, 3)).any()
 
 
 @each_algebra
 def test_coad_is_the_dual_of_ad(algebra, rng):
     a, b, mu = rng.normal(size=(3, 5, algebra.dimension))
-    np.testing.assert_allclose(
-        np.sum(algebra.coad(a, mu) * b, axis=-1),
-        np.sum(mu * algebra.bracket(a, b), axis=-1),
-        atol=1e-13,
-        rtol=0,
-    )
+    assert_within(np.sum(algebra.coad(a, mu) * b, axis=-1), np.sum(mu * algebra.bracket(a, b), axis=-1), 1e-13)
 
 
 def test_so3_is_the_cross_product_and_coad_gives_pi_cross_omega(rng):
     a, b = rng.normal(size=(2, 6, 3))
     for algebra in (so3(), so(3), su2()):
-        np.testing.assert_allclose(algebra.bracket(a, b), np.cross(a, b), atol=1e-15, rtol=0)
-        np.testing.assert_allclose(algebra.coad(a, b), np.cross(b, a), atol=1e-15, rtol=0)
+        assert_within(algebra.bracket(a, b), np.cross(a, b), 1e-15)
+        assert_within(algebra.coad(a, b), np.cross(b, a), 1e-15)
     np.testing.assert_array_equal(so3().matrix(a), rotations.hat(a))
 
 
@@ -136,13 +128,13 @@ def test_se3_dual_carries_the_heavy_top_bracket_m2(rng):
     known = -np.sum(pi * np.cross(f_pi, g_pi), -1)
     known -= np.sum(gamma * (np.cross(f_pi, g_gamma) - np.cross(g_pi, f_gamma)), -1)
     mu, df, dg = (np.concatenate(x, axis=-1) for x in ((pi, gamma), (f_pi, f_gamma), (g_pi, g_gamma)))
-    np.testing.assert_allclose(lie_poisson_bracket(df, dg, mu, se3()), known, atol=1e-13, rtol=0)
+    assert_within(lie_poisson_bracket(df, dg, mu, se3()), known, 1e-13)
     moments, weight, chi = np.array([1.0, 2.0, 2.7]), 1.3, np.array([0.0, 0.6, 0.8])
     gradient = np.concatenate([pi / moments, np.broadcast_to(weight * chi, pi.shape)], axis=-1)
     top = np.concatenate(
         [np.cross(pi, pi / moments) + weight * np.cross(gamma, chi), np.cross(gamma, pi / moments)], axis=-1
     )
-    np.testing.assert_allclose(hamiltonian_vector_field(gradient, mu, se3()), top, atol=1e-13, rtol=0)
+    assert_within(hamiltonian_vector_field(gradient, mu, se3()), top, 1e-13)
 
 
 def test_commutators_have_the_opposite_sign_to_the_printed_ones_b_e2():
@@ -154,11 +146,9 @@ def test_commutators_have_the_opposite_sign_to_the_printed_ones_b_e2():
     # With them Euler's equations come out right only because the bracket's sign is chosen wrong as well.
     pi, moments = np.array([0.3, -1.1, 0.7]), np.array([1.0, 2.0, 3.0])
     euler = [(1 / moments[k] - 1 / moments[j]) * pi[j] * pi[k] for j, k in ((1, 2), (2, 0), (0, 1))]
-    np.testing.assert_allclose(euler_poincare_rate(so3(), np.diag(moments), pi), euler, atol=1e-15, rtol=0)
+    assert_within(euler_poincare_rate(so3(), np.diag(moments), pi), euler, 1e-15)
     flipped = LieAlgebra(-so3().structure)
-    np.testing.assert_allclose(
-        euler_poincare_rate(flipped, np.diag(moments), pi), np.negative(euler), atol=1e-15, rtol=0
-    )
+    assert_within(euler_poincare_rate(flipped, np.diag(moments), pi), np.negative(euler), 1e-15)
 
 
 def test_any_basis_of_matrices_gives_its_algebra(rng):
@@ -166,8 +156,8 @@ def test_any_basis_of_matrices_gives_its_algebra(rng):
     for algebra in (so3(), sl2r(), su2()):
         other = lie_algebra_from_matrices(np.einsum("ij,jab->iab", mixing, algebra.matrix_basis))
         # A change of basis is a congruence of the Killing form.
-        np.testing.assert_allclose(other.killing_form, mixing @ algebra.killing_form @ mixing.T, atol=1e-11, rtol=0)
-    with pytest.raises(LieAlgebraError, match="not linearly independent"):
+        assert_within(other.killing_form, mixing @ algebra.killing_form @ mixing.T, 1e-11)
+    with pytest.raises(LieAlgebraError, match="independent"):
         lie_algebra_from_matrices([np.eye(2), 2.0 * np.eye(2)])
     with pytest.raises(LieAlgebraError, match="closed"):
         lie_algebra_from_matrices([[[0, 1], [0, 0]], [[0, 0], [1, 0]]])
@@ -182,7 +172,7 @@ def test_numbers_that_are_no_lie_algebra_are_refused():
     bent[0, 1, 0], bent[1, 2, 0], bent[2, 0, 1] = 1.0, 1.0, 1.0
     with pytest.raises(LieAlgebraError, match="Jacobi"):
         LieAlgebra(bent - bent.swapaxes(0, 1))
-    with pytest.raises(LieAlgebraError, match="another basis"):
+    with pytest.raises(LieAlgebraError, match="basis"):
         LieAlgebra(so3().structure, -so3().matrix_basis)
     with pytest.raises(ShapeError, match="square"):
         LieAlgebra(so3().structure, np.ones((3, 2, 3)))
@@ -190,7 +180,7 @@ def test_numbers_that_are_no_lie_algebra_are_refused():
         with pytest.raises(ShapeError):
             LieAlgebra(wrong)
     for n in (1, 2.5, True, "3"):
-        with pytest.raises(LieAlgebraError, match="whole number"):
+        with pytest.raises(LieAlgebraError, match="whole"):
             so(n)
     masked = np.ma.masked_array(so3().matrix_basis, mask=np.zeros((3, 3, 3)) == 0)
     with pytest.raises(ShapeError, match="masked"):
@@ -203,11 +193,11 @@ def test_numbers_that_are_no_lie_algebra_are_refused():
 
 def test_what_is_not_of_the_algebra_is_refused():
     algebra = so3()
-    with pytest.raises(LieAlgebraError, match="not an element"):
+    with pytest.raises(LieAlgebraError, match="element"):
         algebra.coordinates(np.eye(3))
-    with pytest.raises(LieAlgebraError, match="only structure constants"):
+    with pytest.raises(LieAlgebraError, match="structure"):
         LieAlgebra(algebra.structure).matrix([1.0, 0.0, 0.0])
-    with pytest.raises(ShapeError, match="n = 3"):
+    with pytest.raises(ShapeError, match="matrix"):
         algebra.coordinates(np.eye(4))
     with pytest.raises(ShapeError):
         algebra.bracket([1.0, 2.0], [1.0, 2.0, 3.0])
@@ -221,55 +211,48 @@ def test_what_is_not_of_the_algebra_is_refused():
 @each_algebra
 def test_body_and_space_trivialisations_g5(algebra, rng):
     g = group_exponential(algebra, 0.7 * rng.normal(size=(4, algebra.dimension)))
-    np.testing.assert_allclose(g[0], expm(algebra.matrix(algebra.coordinates(logm(g[0])))), atol=1e-10, rtol=0)
+    assert_within(g[0], expm(algebra.matrix(algebra.coordinates(logm(g[0])))), 1e-10)
     a = rng.normal(size=(4, algebra.dimension))
     moved = g @ algebra.matrix(a)
-    np.testing.assert_allclose(body_velocity(algebra, g, moved), a, atol=1e-12, rtol=0)
+    assert_within(body_velocity(algebra, g, moved), a, 1e-12)
     # (15.4.6): V^S = Ad_g V^B.
     in_space = space_velocity(algebra, g, moved)
-    np.testing.assert_allclose((adjoint_action(algebra, g) @ a[..., None])[..., 0], in_space, atol=1e-12, rtol=0)
-    np.testing.assert_allclose(algebra.matrix(in_space) @ g, moved, atol=1e-12, rtol=0)
+    assert_within((adjoint_action(algebra, g) @ a[..., None])[..., 0], in_space, 1e-12)
+    assert_within(algebra.matrix(in_space) @ g, moved, 1e-12)
     # (15.4.5): alpha^S = Ad*_{g^-1} alpha^B, and both pair with velocities as alpha does with V.
     alpha = rng.normal(size=g.shape) + (1j * rng.normal(size=g.shape) if np.iscomplexobj(g) else 0.0)
     body, space = body_momentum(algebra, g, alpha), space_momentum(algebra, g, alpha)
-    np.testing.assert_allclose((coadjoint_action(algebra, g) @ body[..., None])[..., 0], space, atol=1e-11, rtol=0)
+    assert_within((coadjoint_action(algebra, g) @ body[..., None])[..., 0], space, 1e-11)
     value = np.sum(alpha.conj() * moved, axis=(-1, -2)).real
-    np.testing.assert_allclose(np.sum(body * a, axis=-1), value, atol=1e-12, rtol=0)
-    np.testing.assert_allclose(np.sum(space * in_space, axis=-1), value, atol=1e-11, rtol=0)
+    assert_within(np.sum(body * a, axis=-1), value, 1e-12)
+    assert_within(np.sum(space * in_space, axis=-1), value, 1e-11)
 
 
 @each_algebra
 def test_adjoint_action_is_a_homomorphism_with_ad_as_its_rate(algebra, rng):
     a, b, x = 0.5 * rng.normal(size=(3, algebra.dimension))
     g, h = group_exponential(algebra, a), group_exponential(algebra, b)
-    np.testing.assert_allclose(
-        adjoint_action(algebra, g @ h),
-        adjoint_action(algebra, g) @ adjoint_action(algebra, h),
-        atol=1e-12,
-        rtol=0,
-    )
-    np.testing.assert_allclose(adjoint_action(algebra, g), expm(algebra.ad(a)), atol=1e-12, rtol=0)
+    assert_within(adjoint_action(algebra, g @ h), adjoint_action(algebra, g) @ adjoint_action(algebra, h), 1e-12)
+    assert_within(adjoint_action(algebra, g), expm(algebra.ad(a)), 1e-12)
     turned = adjoint_action(algebra, g)
-    np.testing.assert_allclose(
-        algebra.bracket(turned @ b, turned @ x), turned @ algebra.bracket(b, x), atol=1e-12, rtol=0
-    )
-    np.testing.assert_allclose(coadjoint_action(algebra, g), np.linalg.inv(turned).T, atol=1e-12, rtol=0)
+    assert_within(algebra.bracket(turned @ b, turned @ x), turned @ algebra.bracket(b, x), 1e-12)
+    assert_within(coadjoint_action(algebra, g), np.linalg.inv(turned).T, 1e-12)
 
 
 def test_spatial_momentum_of_so3_is_the_turned_one_g5(rng):
     rotation = rotations.exp(rng.normal(size=3))
     # Sums of products of two entries of a rotation, known to a unit or two of rounding each.
     rounding = 8.0 * np.finfo(float).eps
-    np.testing.assert_allclose(adjoint_action(so3(), rotation), rotation, atol=rounding, rtol=0)
-    np.testing.assert_allclose(coadjoint_action(so3(), rotation), rotation, atol=rounding, rtol=0)
+    assert_within(adjoint_action(so3(), rotation), rotation, rounding)
+    assert_within(coadjoint_action(so3(), rotation), rotation, rounding)
 
 
 def test_what_is_not_of_the_group_is_refused():
     with pytest.raises(LieAlgebraError, match="singular"):
         adjoint_action(so3(), np.zeros((3, 3)))
-    with pytest.raises(LieAlgebraError, match="not an element"):
+    with pytest.raises(LieAlgebraError, match="element"):
         adjoint_action(so3(), np.diag([1.0, 2.0, 3.0]))
-    with pytest.raises(LieAlgebraError, match="not an element"):
+    with pytest.raises(LieAlgebraError, match="element"):
         body_velocity(so3(), np.eye(3), np.eye(3))
     with pytest.raises(ShapeError, match="complex"):
         adjoint_action(so3(), 1j * np.eye(3))
@@ -280,29 +263,17 @@ def test_what_is_not_of_the_group_is_refused():
 # The Euler-Poincare equations
 
 
-def raw_euler(moments, pi, times):
-    """Euler's equations by components, and R' = R hat(Omega), by SciPy: (N, 3), (N, 3, 3)."""
-
-    def rate(_, y):
-        omega = y[:3] / moments
-        return np.concatenate([cross(y[:3], omega), (y[3:].reshape(3, 3) @ rotations.hat(omega)).ravel()])
-
-    start = np.concatenate([pi, np.eye(3).ravel()])
-    run = solve_ivp(rate, (times[0], times[-1]), start, "DOP853", times, rtol=1e-13, atol=1e-15)
-    return run.y[:3].T, run.y[3:].T.reshape(-1, 3, 3)
-
-
 def test_euler_poincare_on_so3_is_the_free_rigid_body_g7():
     moments, pi, times = np.array([3.0, 2.0, 1.0]), np.array([0.4, 1.5, -0.7]), np.linspace(0.0, 10.0, 21)
-    momentum, attitude = raw_euler(moments, pi, times)
+    momentum, attitude = rigid_motion(np.diag(moments), pi, times)
     motion = euler_poincare_motion(so3(), np.diag(moments), pi, times)
-    np.testing.assert_allclose(motion.momentum, momentum, atol=1e-11, rtol=0)
-    np.testing.assert_allclose(motion.attitude, attitude, atol=1e-11, rtol=0)
-    np.testing.assert_allclose(motion.adjoint, motion.attitude, atol=1e-13, rtol=0)
+    assert_within(motion.momentum, momentum, 1e-11)
+    assert_within(motion.attitude, attitude, 1e-11)
+    assert_within(motion.adjoint, motion.attitude, 1e-13)
     # The same motion on the double cover.
     covered = euler_poincare_motion(su2(), np.diag(moments), pi, times)
-    np.testing.assert_allclose(covered.momentum, momentum, atol=1e-11, rtol=0)
-    np.testing.assert_allclose(adjoint_action(su2(), covered.attitude), attitude, atol=1e-11, rtol=0)
+    assert_within(covered.momentum, momentum, 1e-11)
+    assert_within(adjoint_action(su2(), covered.attitude), attitude, 1e-11)
 
 
 def test_a_batch_and_a_later_start_give_the_same_motions_g7(rng):
@@ -312,24 +283,19 @@ def test_a_batch_and_a_later_start_give_the_same_motions_g7(rng):
     assert motion.attitude.shape == (2, 2, 4, 3, 3)
     for i, j in np.ndindex(2, 2):
         alone = euler_poincare_motion(so3(), inertia, momenta[i, j], np.linspace(0.0, 3.0, 4))
-        np.testing.assert_allclose(motion.momentum[i, j], alone.momentum, atol=1e-13, rtol=0)
-        np.testing.assert_allclose(motion.attitude[i, j], alone.attitude, atol=1e-13, rtol=0)
+        assert_within(motion.momentum[i, j], alone.momentum, 1e-13)
+        assert_within(motion.attitude[i, j], alone.attitude, 1e-13)
 
 
 @each_algebra
 def test_energy_and_space_momentum_are_constant_and_attitude_follows_g7(algebra, rng):
     motion = euler_poincare_motion(algebra, inertia_of(algebra, rng), rng.normal(size=algebra.dimension), [0, 0.7, 2.0])
     np.testing.assert_allclose(motion.energy, motion.energy[0], rtol=3e-13)
-    np.testing.assert_allclose(
-        motion.space_momentum,
-        np.broadcast_to(motion.momentum[0], (3, algebra.dimension)),
-        atol=1e-12,
-        rtol=0,
-    )
-    np.testing.assert_allclose(adjoint_action(algebra, motion.attitude), motion.adjoint, atol=1e-12, rtol=0)
+    assert_within(motion.space_momentum, np.broadcast_to(motion.momentum[0], (3, algebra.dimension)), 1e-12)
+    assert_within(adjoint_action(algebra, motion.attitude), motion.adjoint, 1e-12)
     # The same constants through the group's matrices.
     by_matrices = np.einsum("nij,nj->ni", coadjoint_action(algebra, motion.attitude), motion.momentum)
-    np.testing.assert_allclose(by_matrices, np.broadcast_to(motion.momentum[0], by_matrices.shape), atol=1e-12, rtol=0)
+    assert_within(by_matrices, np.broadcast_to(motion.momentum[0], by_matrices.shape), 1e-12)
 
 
 def test_on_se3_the_centre_of_mass_moves_straight_and_the_rest_turns_as_on_so3_g7(rng):
@@ -340,12 +306,10 @@ def test_on_se3_the_centre_of_mass_moves_straight_and_the_rest_turns_as_on_so3_g
     motion = euler_poincare_motion(se3(), operator, operator @ twist, times)
     rotation, origin = motion.attitude[:, :3, :3], motion.attitude[:, :3, 3]
     start = twist[3:] + np.cross(twist[:3], body.centre)
-    np.testing.assert_allclose(
-        origin + rotation @ body.centre, body.centre + times[:, None] * start, atol=1e-11, rtol=0
-    )
+    assert_within(origin + rotation @ body.centre, body.centre + times[:, None] * start, 1e-11)
     alone = euler_poincare_motion(so3(), body.inertia, body.inertia @ twist[:3], times)
-    np.testing.assert_allclose(rotation, alone.attitude, atol=1e-11, rtol=0)
-    np.testing.assert_allclose(body.momentum(motion.momentum), alone.momentum, atol=1e-11, rtol=0)
+    assert_within(rotation, alone.attitude, 1e-11)
+    assert_within(body.momentum(motion.momentum), alone.momentum, 1e-11)
 
 
 def test_structure_constants_alone_are_enough_g7(rng):
@@ -354,8 +318,8 @@ def test_structure_constants_alone_are_enough_g7(rng):
     motion = euler_poincare_motion(abstract, inertia, mu, [0.0, 1.0, 2.0])
     assert motion.attitude is None
     with_matrices = euler_poincare_motion(known, inertia, mu, [0.0, 1.0, 2.0])
-    np.testing.assert_allclose(motion.adjoint, with_matrices.adjoint, atol=1e-12, rtol=0)
-    np.testing.assert_allclose(np.linalg.det(with_matrices.attitude), 1.0, atol=1e-12, rtol=0)
+    assert_within(motion.adjoint, with_matrices.adjoint, 1e-12)
+    assert_within(np.linalg.det(with_matrices.attitude), 1.0, 1e-12)
 
 
 def test_motions_that_run_away_and_wrong_operators_are_refused():
@@ -365,7 +329,7 @@ def test_motions_that_run_away_and_wrong_operators_are_refused():
     algebra = LieAlgebra(affine)
     indefinite = np.array([[0.0, 1.0], [1.0, 0.0]])
     assert euler_poincare_motion(algebra, indefinite, [0.0, 1.0], [0.0, 0.9]).momentum[-1, 1] == pytest.approx(10.0)
-    with pytest.raises(AccuracyNotReached, match="cannot be followed"):
+    with pytest.raises(AccuracyNotReached, match="followed"):
         euler_poincare_motion(algebra, indefinite, [0.0, 1.0], [0.0, 2.0])
     for wrong, match in ((np.diag([1.0, 0.0, 1.0]), "singular"), (np.triu(np.ones((3, 3))), "symmetric")):
         with pytest.raises(LieAlgebraError, match=match):
@@ -384,7 +348,7 @@ def test_three_dimensional_case_is_the_usual_inertia_g7(rng):
     inertia = inertia_of(so3(), rng)
     j = second_moment(inertia)
     j += (1.0 - np.linalg.eigvalsh(j)[0]) * np.eye(3)
-    np.testing.assert_allclose(n_dimensional_inertia(j), np.trace(j) * np.eye(3) - j, atol=1e-13, rtol=0)
+    assert_within(n_dimensional_inertia(j), np.trace(j) * np.eye(3) - j, 1e-13)
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 6])
@@ -393,11 +357,11 @@ def test_n_dimensional_rigid_body_keeps_all_its_integrals_g7(n, rng):
     j, algebra = root @ root.T + 0.5 * np.eye(n), so(n)
     m = algebra.matrix(rng.normal(size=algebra.dimension))
     omega = n_dimensional_angular_velocity(j, m)
-    np.testing.assert_allclose(omega @ j + j @ omega, m, atol=1e-13, rtol=0)
-    np.testing.assert_allclose(n_dimensional_momentum(j, omega), m, atol=1e-13, rtol=0)
-    np.testing.assert_allclose(n_dimensional_rate(j, m), commutator(m, omega), atol=1e-13, rtol=0)
+    assert_within(omega @ j + j @ omega, m, 1e-13)
+    assert_within(n_dimensional_momentum(j, omega), m, 1e-13)
+    assert_within(n_dimensional_rate(j, m), commutator(m, omega), 1e-13)
     by_algebra = euler_poincare_rate(algebra, n_dimensional_inertia(j), algebra.coordinates(m))
-    np.testing.assert_allclose(algebra.matrix(by_algebra), commutator(m, omega), atol=1e-12, rtol=0)
+    assert_within(algebra.matrix(by_algebra), commutator(m, omega), 1e-12)
     times = [0.0, 1.0, 3.0]
     motion = euler_poincare_motion(algebra, n_dimensional_inertia(j), algebra.coordinates(m), times)
     raw = solve_ivp(
@@ -410,12 +374,12 @@ def test_n_dimensional_rigid_body_keeps_all_its_integrals_g7(n, rng):
         atol=1e-14,
     )
     matrices = algebra.matrix(motion.momentum)
-    np.testing.assert_allclose(matrices, raw.y.T.reshape(-1, n, n), atol=1e-10, rtol=0)
+    assert_within(matrices, raw.y.T.reshape(-1, n, n), 1e-10)
     for constants in (momentum_traces(matrices), *(manakov_integrals(j, matrices, k) for k in range(1, n + 1))):
         np.testing.assert_allclose(constants, np.broadcast_to(constants[0], constants.shape), rtol=1e-11, atol=1e-10)
     # The space momentum R M R^T, through the attitude.
     in_space = motion.attitude @ matrices @ np.swapaxes(motion.attitude, -1, -2)
-    np.testing.assert_allclose(in_space, np.broadcast_to(m, in_space.shape), atol=1e-11, rtol=0)
+    assert_within(in_space, np.broadcast_to(m, in_space.shape), 1e-11)
 
 
 def test_manakov_coefficients_are_the_traces_g7(rng):
@@ -452,16 +416,15 @@ def test_pfaffian_squares_to_the_determinant_and_is_constant_g7(rng):
 
 
 def test_wrong_n_dimensional_bodies_are_refused():
-    with pytest.raises(ShapeError, match="even dimension"):
-        pfaffian(np.zeros((3, 3)))
-    with pytest.raises(ShapeError, match="not antisymmetric"):
-        momentum_traces(np.eye(3))
-    with pytest.raises(ShapeError, match="not symmetric"):
-        n_dimensional_inertia(np.triu(np.ones((3, 3))))
-    with pytest.raises(SingularInertiaError, match="no inertia"):
-        n_dimensional_inertia(np.diag([1.0, 0.0, 0.0]))
-    with pytest.raises(ShapeError, match="whole number"):
-        manakov_integrals(np.eye(3), np.zeros((3, 3)), 0)
+    for error, word, call in (
+        (ShapeError, "even", lambda: pfaffian(np.zeros((3, 3)))),
+        (ShapeError, "antisymmetric", lambda: momentum_traces(np.eye(3))),
+        (ShapeError, "symmetric", lambda: n_dimensional_inertia(np.triu(np.ones((3, 3))))),
+        (SingularInertiaError, "inertia", lambda: n_dimensional_inertia(np.diag([1.0, 0.0, 0.0]))),
+        (ShapeError, "whole", lambda: manakov_integrals(np.eye(3), np.zeros((3, 3)), 0)),
+    ):
+        with pytest.raises(error, match=word):
+            call()
     with pytest.raises(ShapeError):
         n_dimensional_rate(np.eye(3), np.zeros((4, 4)))
 
@@ -483,10 +446,10 @@ def test_spatial_velocity_stays_in_the_invariable_hyperplane_i6(algebra, rng):
     g = motion.attitude
     in_space = algebra.coordinates(g @ algebra.matrix(motion.velocity) @ np.linalg.inv(g))
     offsets = (in_space - motion.velocity[0]) @ motion.momentum[0]
-    np.testing.assert_allclose(offsets, 0.0, atol=1e-11, rtol=0)
+    assert_within(offsets, 0.0, 1e-11)
     contact = rolling_contact(motion)
-    np.testing.assert_allclose(contact.point, in_space, atol=1e-11, rtol=0)
-    np.testing.assert_allclose(contact.hyperplane_offset, offsets, atol=1e-11, rtol=0)
+    assert_within(contact.point, in_space, 1e-11)
+    assert_within(contact.hyperplane_offset, offsets, 1e-11)
     assert np.abs(in_space - in_space[0]).max() > 0.01
 
 
@@ -494,8 +457,8 @@ def test_spatial_velocity_stays_in_the_invariable_hyperplane_i6(algebra, rng):
 def test_moved_energy_quadric_is_tangent_to_the_hyperplane_there_i6(algebra, rng):
     motion = rolling(algebra, rng)
     contact = rolling_contact(motion)
-    np.testing.assert_allclose(contact.quadric_offset, 0.0, atol=1e-11, rtol=0)
-    np.testing.assert_allclose(contact.tangency_defect, 0.0, atol=1e-11, rtol=0)
+    assert_within(contact.quadric_offset, 0.0, 1e-11)
+    assert_within(contact.tangency_defect, 0.0, 1e-11)
     # By hand: along every direction v of the plane the energy starts without a linear term.
     normal = contact.hyperplane.normal
     v = rng.normal(size=(6, algebra.dimension))
@@ -507,7 +470,7 @@ def test_moved_energy_quadric_is_tangent_to_the_hyperplane_there_i6(algebra, rng
             return 0.5 * np.einsum("...i,ij,...j->...", x @ back.T, motion.inertia, x @ back.T)
 
         linear = energy(contact.point[i] + v) - energy(contact.point[i] - v)
-        np.testing.assert_allclose(linear, 0.0, atol=1e-10, rtol=0)
+        assert_within(linear, 0.0, 1e-10)
         assert energy(contact.point[i]) == pytest.approx(motion.energy[0], rel=1e-11)
 
 
@@ -515,24 +478,19 @@ def test_moved_energy_quadric_is_tangent_to_the_hyperplane_there_i6(algebra, rng
 def test_the_energy_quadric_rolls_without_slipping_i6(algebra, rng):
     motion = rolling(algebra, rng)
     contact = rolling_contact(motion)
-    np.testing.assert_allclose(contact.contact_velocity, 0.0, atol=1e-12, rtol=0)
+    assert_within(contact.contact_velocity, 0.0, 1e-12)
     # By hand: the rate of Ad_g(t) eta, eta the body's point that touches at a node, by Chebyshev's differentiation.
     slope = chebyshev_slope(motion.times)
     for i in (6, 20, 33):
         carried = motion.adjoint @ motion.velocity[i]
-        np.testing.assert_allclose(slope[i] @ carried, 0.0, atol=1e-9, rtol=0)
+        assert_within(slope[i] @ carried, 0.0, 1e-9)
         other = motion.velocity[i] + np.eye(algebra.dimension)[0]
         moving = slope[i] @ (motion.adjoint @ other)
-        np.testing.assert_allclose(
-            moving,
-            contact_velocity(algebra, motion.adjoint[i], motion.velocity[i], other),
-            atol=1e-9,
-            rtol=0,
-        )
+        assert_within(moving, contact_velocity(algebra, motion.adjoint[i], motion.velocity[i], other), 1e-9)
         assert np.abs(moving).max() > 1e-3
     # The contact runs along quadric and plane alike: the two rates are one vector, seen from the body and from space.
-    np.testing.assert_allclose(slope @ motion.velocity, contact.body_rate, atol=1e-9, rtol=0)
-    np.testing.assert_allclose(slope @ contact.point, contact.space_rate, atol=1e-9, rtol=0)
+    assert_within(slope @ motion.velocity, contact.body_rate, 1e-9)
+    assert_within(slope @ contact.point, contact.space_rate, 1e-9)
 
 
 def chebyshev_slope(times):
@@ -556,7 +514,7 @@ def test_rolling_in_so3_is_poinsots_theorem_i6(rng):
     )
     rotation = motion.attitude[9]
     conormal = contact_conormal(motion.inertia, rotation, contact.point[9])
-    np.testing.assert_allclose(conormal, rotation @ motion.inertia @ rotation.T @ contact.point[9], atol=1e-12, rtol=0)
+    assert_within(conormal, rotation @ motion.inertia @ rotation.T @ contact.point[9], 1e-12)
 
 
 def test_rolling_holds_for_an_indefinite_operator_and_a_batch_i6(rng):
@@ -571,6 +529,6 @@ def test_rolling_holds_for_an_indefinite_operator_and_a_batch_i6(rng):
         contact.tangency_defect,
         contact.contact_velocity,
     ):
-        np.testing.assert_allclose(defect, 0.0, atol=1e-12, rtol=0)
-    with pytest.raises(LieAlgebraError, match="at rest"):
+        assert_within(defect, 0.0, 1e-12)
+    with pytest.raises(LieAlgebraError, match="rest"):
         invariable_hyperplane(algebra, inertia, np.zeros((2, 3)))

@@ -27,15 +27,14 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_object, inertia_argument
-from ...arrays import Array, Mask, common_batch, common_shape, finite_array
+from ...arrays import Array, Mask, common_batch, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ChartPoleError, ShapeError, WrongObjectError
 from ...inertia_tensor import inverse_inertia
 from ...letters import value_text
-from .._arguments import check_entries
-from ..euler_angles import ZXZ, ZYZ, EulerChart
+from .._arguments import check_entries, together
+from ..euler_angles import NEAREST, ZXZ, ZYZ, EulerChart
 
-_NEAREST = 1e-8  # sqrt(G^2 - L^2)/G; nearer, L rounds to G, and the momentum's component across the axis is lost
 _MOST_SAMPLES = 200_000  # 14 MB of attitudes; or eight times the number of times given, if that is more
 
 
@@ -85,10 +84,8 @@ class AndoyerVariables:
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
-        values = {name: finite_array(value, name) for name, value in vars(self).items()}
-        shape = common_shape(**values)
-        for name, value in values.items():
-            object.__setattr__(self, name, np.broadcast_to(value, shape))
+        for name, value in zip(list(vars(self)), together(**vars(self)), strict=True):
+            object.__setattr__(self, name, value)
         check_entries(self.total <= 0.0, self.total, "total", "G must be above 0")
         for name, value in (("vertical", self.vertical), ("axial", self.axial)):
             check_entries(np.abs(value) > self.total, value, name, "K and L must be between -G and G")
@@ -96,7 +93,7 @@ class AndoyerVariables:
     @property
     def is_regular(self) -> Mask:
         """True where they are regular: the momentum has more than 1e-8 of G across both third axes."""
-        return (self._across > _NEAREST * self.total) & (self._level > _NEAREST * self.total)
+        return (self._across > NEAREST * self.total) & (self._level > NEAREST * self.total)
 
     @property
     def body_momentum(self) -> Array:
@@ -152,10 +149,10 @@ class AndoyerVariables:
         column, third = so3.apply(inverse, ahead), inverse[..., 2, 2]
         own, mixed = np.sum(column * ahead, axis=-1), column[..., 2]
         requirement = (
-            f"the momentum is along the body's third axis to {_NEAREST:g}, where l has no rate unless that axis is "
+            f"the momentum is along the body's third axis to {NEAREST:g}, where l has no rate unless that axis is "
             "principal; turn the body axes, so that another axis is the third"
         )
-        undefined = (across <= _NEAREST * self.total) & np.any(inverse[..., 2, :2] != 0.0, axis=-1)
+        undefined = (across <= NEAREST * self.total) & np.any(inverse[..., 2, :2] != 0.0, axis=-1)
         check_entries(undefined, np.broadcast_to(along, undefined.shape), "axial", requirement, ChartPoleError)
         part = np.where(mixed == 0.0, 0.0, along * mixed / np.where(across > 0.0, across, 1.0))
         twist = across**2 * np.sum(column * aside, axis=-1) + across * along * np.sum(aside * inverse[..., 2], axis=-1)
@@ -211,8 +208,6 @@ def andoyer_variables(attitude: ArrayLike, body_momentum: ArrayLike) -> AndoyerV
 
 def andoyer_from_euler(angles: ArrayLike, momenta: ArrayLike, chart: EulerChart = ZYZ) -> AndoyerVariables:
     """Andoyer's variables of Euler angles (phi, theta, psi) and their momenta: (..., 3), (..., 3) -> (...) each.
-
-    Source: as `AndoyerVariables.euler_angles`.
 
     Raises ChartPoleError within 1e-8 of a pole of the chart, ShapeError if a momentum is zero.
 

@@ -19,9 +19,7 @@ from ...arrays import Array, Mask
 Triple = tuple[Array, Array, Array]
 Stretch = Callable[[Array, Array], Triple]  # Y and depth - Y, (N,) each -> D(Y), D'(Y), D''(Y), (N,) each
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(
-    16
-)  # right to rounding on panels as long as their distance to a pole
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)  # rounding, on panels as long as their distance to a pole
 
 
 class Arcs(NamedTuple):
@@ -55,7 +53,7 @@ def quadrature(
         rows = _integrands(stretch, depth, pole, q[active, None], room[active, None], sine2, cosine2)
         total[:, active] += (rows @ _WEIGHTS) * half
 
-    quarter = 0.25 * np.pi
+    quarter = np.pi / 4.0
     equator_levels = 2 * (splits - 1)
     edges = _divided(quarter * 0.5 ** np.arange(equator_levels, -1, -1.0), splits)
     for low, high in pairwise(edges.tolist()):
@@ -96,7 +94,7 @@ def folded_cosine(angle: Array) -> Array:
 
 def settled_splits(stretch: Stretch, depth: float, end: str) -> int | None:
     """The least number of parts of each panel at which the integrals have converged; None if there is none."""
-    q = depth * np.array([0.02, 0.2, 0.5, 0.8, 0.95, 0.999])
+    q = depth * 0.5 * (1.0 + _NODES[::3])
     # Rounding of integrals of D, and of its derivatives, which may come from a table of D.
     rounding = np.array([2e-13, 2e-13, 2e-12, 1e-8])
     before = np.full((4, q.size), np.inf)
@@ -119,7 +117,7 @@ def _integrands(
     else:
         # Nearer than 1e-4 the difference D(Y) - D(1) loses four digits, and the series by D' and D'' is right to
         # rounding; where D bends sharply at the pole it holds less far, to 1 - Y = 0.005 |D'/D''|.
-        bending = 0.02 * abs(float(pole[2][0])) / max(abs(float(pole[1][0])), 1e-300)
+        bending = 0.02 * abs(float(pole[2][0])) / max(abs(float(pole[1][0])), np.finfo(float).tiny)
         near = rest * max(1.0, bending) < 1e-4
         # Less the mean of D' from here to the pole, by the trapezoidal rule corrected at both ends.
         mean = 0.5 * (slope + pole[1]) + rest / 12.0 * (second - pole[2])

@@ -26,6 +26,7 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ...letters import value_text
 from ...roots import ROUNDING, safe_newton
+from .._arguments import TWELVE_DIGITS
 from ._arc_quadrature import Arcs, folded_cosine
 from ._extremal import Start, start_of, stretch_at
 from .surface_of_revolution import SurfaceOfRevolution
@@ -89,8 +90,7 @@ def conjugate_points(
     >>> print(points.time.round(9))  # pi on a sphere
     [3.14159265 3.14159265]
     """
-    check_object(surface, "SurfaceOfRevolution", "surface")
-    _check_order(order)
+    _check(surface, order)
     angle = finite_array(direction, "direction", unit="rad")
     return _points(surface, angle, start_of(surface, angle, latitude), order)[0]
 
@@ -107,11 +107,8 @@ def conjugate_points_of_momentum(surface: SurfaceOfRevolution, momentum: ArrayLi
     >>> print(np.abs(points.latitude).round(5))
     [0.04656 0.43376]
     """
-    check_object(surface, "SurfaceOfRevolution", "surface")
-    _check_order(order)
-    p, q, room = surface.parameters(momentum)
-    start = Start(momentum=p, q=q, room=room, phase=np.zeros(p.shape), side=np.ones(p.shape))
-    return _points(surface, np.asarray(surface.direction_of(p)), start, order)[0]
+    _check(surface, order)
+    return _points(surface, *_equatorial(surface, momentum), order)[0]
 
 
 def conjugate_locus(
@@ -137,8 +134,7 @@ def conjugate_locus(
     4
     """
     latitude = number_argument(latitude, "latitude", "rad")
-    check_object(surface, "SurfaceOfRevolution", "surface")
-    _check_order(order)
+    _check(surface, order)
     if isinstance(directions, int | np.integer):
         east = _eastward(surface, int(directions), latitude)
         if latitude == 0.0:
@@ -179,15 +175,14 @@ def conjugate_height_rate(surface: SurfaceOfRevolution, momentum: ArrayLike, ord
     >>> float(geodesics.conjugate_height_rate(geodesics.ellipsoid(0.8), 0.5)) > 0.0  # one cusp on each axis
     True
     """
-    check_object(surface, "SurfaceOfRevolution", "surface")
-    _check_order(order)
-    p, q, room = surface.parameters(momentum)
+    _check(surface, order)
+    angle, start = _equatorial(surface, momentum)
+    p, q, room = start.momentum, start.q, start.room
     if np.any(q == 0.0):
         raise ShapeError(
             f"momentum: below sqrt(m(0)) = {surface.greatest_momentum:.17g}, at which the rate is infinite"
         )
-    start = Start(momentum=p, q=q, room=room, phase=np.zeros(p.shape), side=np.ones(p.shape))
-    points, _, end = _points(surface, np.asarray(surface.direction_of(p)), start, order)
+    points, _, end = _points(surface, angle, start, order)
     xi = points.phase - order * np.pi
     value, slope, _ = stretch_at(surface, q, room, xi)
     second = surface.bend_rate(q, room, xi) + 2.0 * order * _whole_bend_rate(surface, q, room)
@@ -224,7 +219,6 @@ def cut_locus(surface: SurfaceOfRevolution, latitude: float = 0.0) -> CutLocus:
     >>> print(cut.kind, np.round(np.array(cut.longitudes) / np.pi, 9))
     parallel [0.8 1.2]
     """
-    check_object(surface, "SurfaceOfRevolution", "surface")
     kind = _kind(surface, latitude)
     phi = float(latitude)
     if kind == "point":
@@ -246,7 +240,6 @@ def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     >>> print(f"{sp.rigid_body.geodesics.cut_time(sp.rigid_body.geodesics.ellipsoid(1.0), 0.5):.9f} = pi")
     3.141592654 = pi
     """
-    check_object(surface, "SurfaceOfRevolution", "surface")
     kind = _kind(surface, latitude)
     angle = finite_array(direction, "direction", unit="rad")
     start = start_of(surface, angle, latitude)
@@ -272,9 +265,10 @@ def cut_time(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
 
 
 def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
+    check_object(surface, "SurfaceOfRevolution", "surface")
     if not surface.has_smooth_poles:
         raise ShapeError(f"a cut locus is known on smooth spheres of revolution; this one ends at a {surface.end}")
-    if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - 1e-12:
+    if np.ndim(latitude) != 0 or not abs(float(surface.height(latitude))) < 1.0 - TWELVE_DIGITS:
         raise ShapeError(f"latitude: one number between the poles is needed, got {value_text(latitude)}")
     trend = surface.curvature_trend()
     if trend != "neither":
@@ -285,6 +279,13 @@ def _kind(surface: SurfaceOfRevolution, latitude: float) -> str:
         "the curvature must fall, or rise, all the way from the equator to the poles, or the first return fall with p; "
         "they do not"
     )
+
+
+def _equatorial(surface: SurfaceOfRevolution, momentum: ArrayLike) -> tuple[Array, Start]:
+    """Directions and starts on the equator, northward, of extremals with these Clairaut constants."""
+    p, q, room = surface.parameters(momentum)
+    start = Start(momentum=p, q=q, room=room, phase=np.zeros(p.shape), side=np.ones(p.shape))
+    return np.asarray(surface.direction_of(p)), start
 
 
 def _points(surface: SurfaceOfRevolution, angle: Array, start: Start, order: int) -> tuple[ConjugatePoints, Arcs, Arcs]:
@@ -375,6 +376,7 @@ def _widest(surface: SurfaceOfRevolution, latitude: float) -> float:
     return float(np.arccos(surface.least_momentum / here)) * (1.0 - 1e-6)
 
 
-def _check_order(order: int) -> None:
+def _check(surface: SurfaceOfRevolution, order: int) -> None:
+    check_object(surface, "SurfaceOfRevolution", "surface")
     if whole_argument(order, "order", 1) > _HIGHEST_ORDER:
         raise ShapeError(f"order: a whole number from 1 to {_HIGHEST_ORDER} is needed, got {order}")

@@ -22,11 +22,9 @@ from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...roots import ROUNDING, safe_newton
-from .._arguments import above_zero
+from .._arguments import TWELVE_DIGITS, above_zero
 from ._arc_quadrature import Arcs, folded_cosine
 from .surface_of_revolution import SurfaceOfRevolution, surface_of_stretch
-
-_BEYOND_A_POLE = 1e-12  # relative: latitudes so little further are taken for the pole's
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ class EllipsoidStretch:
         """Y and 1 - Y, (N,) each -> D, D', D'', (N,) each."""
         flattening = (1.0 - self.aspect) * (1.0 + self.aspect)
         unit = np.sqrt(self.aspect**2 * rest + square)
-        return self.radius * unit, 0.5 * self.radius * flattening / unit, -0.25 * self.radius * flattening**2 / unit**3
+        return self.radius * unit, 0.5 * self.radius * flattening / unit, -self.radius * flattening**2 / (4.0 * unit**3)
 
     def arcs(self, p: Array, q: Array, _room: Array, chi: Array) -> Arcs:
         """The integrals along extremals, phases in [-pi/2, pi/2]: (N,) x 4 -> `Arcs`. Source: DLMF 19.25.5, 13, 14."""
@@ -82,8 +80,6 @@ def ellipsoid(aspect: float, equatorial_radius: float = 1.0) -> SurfaceOfRevolut
 
 def metric_coefficients(aspect: float, colatitude: ArrayLike) -> tuple[Array, Array]:
     """F_1 = cos^2 + epsilon^2 sin^2 and F_2 = sin^2 of the parametric colatitude, unit equator: (...) -> (...), (...).
-
-    Source: Bonnard et al., section 2.
 
     Examples
     --------
@@ -175,7 +171,7 @@ def latitude_of_geodetic(aspect: float, geodetic: ArrayLike, equatorial_radius: 
     """
     epsilon, radius = number_argument(aspect, "aspect"), number_argument(equatorial_radius, "equatorial_radius")
     angle = finite_array(geodetic, "geodetic", unit="rad")
-    if np.any(np.abs(angle) > 0.5 * np.pi * (1.0 + _BEYOND_A_POLE)):
+    if np.any(np.abs(angle) > 0.5 * np.pi * (1.0 + TWELVE_DIGITS)):
         raise ShapeError("geodetic: latitudes are between -pi/2 and pi/2 rad")
     bounded = np.clip(angle, -0.5 * np.pi, 0.5 * np.pi)
     parametric = np.arctan2(epsilon * np.sin(bounded), np.cos(bounded))
@@ -194,7 +190,7 @@ def geodetic_latitude(aspect: float, latitude: ArrayLike, equatorial_radius: flo
     epsilon, radius = number_argument(aspect, "aspect"), number_argument(equatorial_radius, "equatorial_radius")
     phi = finite_array(latitude, "latitude") / radius
     quarter = float(_from_equator(epsilon, np.asarray(0.5 * np.pi)))
-    if np.any(np.abs(phi) > quarter * (1.0 + _BEYOND_A_POLE)):
+    if np.any(np.abs(phi) > quarter * (1.0 + TWELVE_DIGITS)):
         raise ShapeError(f"latitude: the poles are at {quarter * radius:.17g}")
     distance = np.minimum(np.abs(phi), quarter).ravel()
 

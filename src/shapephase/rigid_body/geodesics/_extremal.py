@@ -13,6 +13,7 @@ from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import ROUNDING, safe_newton
+from .._flow import TOLERANCE
 from ._arc_quadrature import Arcs
 from .surface_of_revolution import SurfaceOfRevolution
 
@@ -69,10 +70,7 @@ class Extremal:
         return safe_newton(step, start.ravel(), -limit, limit, ROUNDING).reshape(p.shape) + turns * np.pi
 
     def state(self, times: ArrayLike) -> tuple[Array, Array, Array]:
-        """Latitude phi, longitude theta (continuous) [rad] and p_phi = d phi/dt at times t.
-
-        Source: Bonnard et al., section 2.1.
-        """
+        """Latitude phi, longitude theta (continuous) [rad] and p_phi = d phi/dt at times t."""
         t = finite_array(times, "times")
         p, q, _, first, side = self._spread_start(t)
         chi = self.phase(t)
@@ -90,12 +88,9 @@ class Extremal:
         `surface_of_revolution`.
         """
         t = finite_array(times, "times")
-        return self.jacobi_field_at(self.phase(t), t)
-
-    def jacobi_field_at(self, phase: Array, times: Array) -> Array:
-        """`jacobi_field` at known phases of the times."""
-        p, q, room, first, _ = self._spread_start(times)
-        bend = self._arcs(phase, times).bend - self.surface.trusted_arcs(p, q, room, first).bend
+        phase = self.phase(t)
+        p, q, room, first, _ = self._spread_start(t)
+        bend = self._arcs(phase, t).bend - self.surface.trusted_arcs(p, q, room, first).bend
         there, here = self._stretch(q, room, phase), self._stretch(q, room, first)
         return (
             np.cos(first) * there * np.sin(phase)
@@ -116,10 +111,7 @@ class Extremal:
         return field * p / distance, -field * slope / distance
 
     def poincare_field(self, times: ArrayLike) -> tuple[Array, Array]:
-        """J_2 = t dq/dt, of phi and theta: the end's derivative by the magnitude of the initial momentum, at times t.
-
-        Source: Bonnard et al., section 2.2.
-        """
+        """J_2 = t dq/dt, of phi and theta: the end's derivative by the magnitude of the initial momentum, at times t."""
         t = finite_array(times, "times")
         latitude, _, slope = self.state(t)
         return t * slope, t * _spread(self.start.momentum, t) / self.surface.metric(latitude)
@@ -148,7 +140,6 @@ def extremal(surface: SurfaceOfRevolution, direction: ArrayLike, latitude: float
     >>> print(f"{latitude:.9f}")  # on a sphere as far north as it went
     0.300000000
     """
-    check_object(surface, "SurfaceOfRevolution", "surface")
     return Extremal(surface=surface, start=start_of(surface, direction, latitude))
 
 
@@ -206,8 +197,7 @@ def variational_jacobi_field(
 
     state = [float(start.phase), 0.0, 1.0]
     span = (0.0, max(float(t[-1]), np.finfo(float).tiny))
-    # Just above the least tolerance that SciPy accepts: the integration is there to check the closed form.
-    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=3e-14, atol=1e-15)
+    solution = solve_ivp(rate, span, state, method="DOP853", t_eval=t, rtol=TOLERANCE, atol=1e-15)
     if not solution.success:
         raise AccuracyNotReached(f"Jacobi's equation could not be integrated: {solution.message}")
     return solution.y[1]

@@ -42,8 +42,8 @@ def momentum_flow(inverse_moments: Array, start: Array, times: Array) -> tuple[A
     longest = float((np.sqrt(np.maximum(p, q)) * np.abs(times)).max(initial=0.0))
     if longest > _MOST_STEPS:
         raise ShapeError(
-            f"t: in {np.abs(times).max():.6g} s the momentum goes round its curve about {longest / 6.0:.3g} times, "
-            "too far for a derivative; make the time shorter"
+            f"t: in {np.abs(times).max():.6g} s the momentum goes round its curve about {longest / (2.0 * np.pi):.3g} "
+            "times, too far for a derivative; make the time shorter"
         )
     count = max(1, int(np.ceil(longest)))
     functions = _step_functions(inverse_moments, start, p, q, times / count)

@@ -33,7 +33,7 @@ from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
 from ...letters import value_text
-from .._arguments import check_entries
+from .._arguments import HALVINGS, check_entries
 from ._andoyer_variables import AndoyerVariables, andoyer_variables
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
 
@@ -229,7 +229,7 @@ def _between_ends(tilt: Array) -> Array:
 def _tilt_of_action(metric: SerretAndoyerMetric, share: Array) -> Array:
     """The angle from the axis of the largest moment at which the action is this share of G: (...) -> (...) [rad]."""
     low, high = np.zeros(share.shape), np.full(share.shape, 0.5 * np.pi)
-    for _ in range(60):  # halvings of a right angle, which leave rounding
+    for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         momentum = _between_ends(middle)
         speed = np.sqrt(np.sum(momentum**2 / metric.moments, axis=-1))

@@ -30,7 +30,7 @@ from ...arrays import Array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ._momentum_flow import attitude_flow, exponential_derivative
-from .axisymmetric_cut import axisymmetric_metric
+from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
 from .left_invariant import LeftInvariantMetric
 
 _FEW, _MANY = 48, 384  # directions of a search, and of the last where it finds nothing as short as the upper bound
@@ -85,16 +85,19 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
         raise ShapeError(f"attitude: one rotation (3, 3) is needed, got {matrix.shape}; call it for each of them")
     target = metric.axes.T @ matrix @ metric.axes
     lower, upper = _bounds(metric, target)
+    closed, order = _axial_form(metric)
     momentum, length, residual = np.zeros(3), 0.0, float(so3.angle(target))
     if residual > _ROUNDING:
-        known = _axisymmetric_momentum(metric, target)
-        momentum = _searched(metric, target, upper) if known is None else known
+        if closed is None:
+            momentum = _searched(metric, target, upper)
+        else:
+            momentum[order] = closed.shortest_momentum(target[np.ix_(order, order)])
         length = float(np.sqrt(np.sum(metric.inverse_moments * momentum**2)))
         residual = float(np.linalg.norm(_rotation_errors(metric.inverse_moments, momentum[None], target)))
     return ShortestGeodesic(
         momentum=metric.axes @ momentum,
         length=length,
-        certified=not length or _before_cut(metric, momentum),
+        certified=not length or (closed is not None and bool(closed.cut_time(momentum[order]) >= 1.0 - _MARGIN)),
         lower_bound=lower,
         upper_bound=upper,
         residual=residual,
@@ -139,16 +142,12 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
     return best, nearest
 
 
-def _axisymmetric_momentum(metric: LeftInvariantMetric, target: Array) -> Array | None:
-    """That of the shortest geodesic, in principal axes, for two equal moments; None for three different ones."""
+def _axial_form(metric: LeftInvariantMetric) -> tuple[AxisymmetricMetric | None, list[int]]:
+    """The closed form of a metric with two equal moments, else None, and the axes with that of symmetry as third."""
     smallest, middle, largest = metric.moments.tolist()
     if smallest == middle:
-        return axisymmetric_metric(middle, largest).shortest_momentum(target)
-    if middle == largest:
-        order = _FIRST_AXIS_LAST
-        turned = axisymmetric_metric(largest, smallest).shortest_momentum(target[np.ix_(order, order)])
-        return turned[np.argsort(order)]
-    return None
+        return axisymmetric_metric(middle, largest), [0, 1, 2]
+    return axisymmetric_metric(largest, smallest) if middle == largest else None, _FIRST_AXIS_LAST
 
 
 def _searched(metric: LeftInvariantMetric, target: Array, upper: float) -> Array:
@@ -192,7 +191,7 @@ def _shortest_arrival(metric: LeftInvariantMetric, target: Array, count: int, le
 def _starts(count: int) -> Array:
     """Momenta in units of the largest along each axis: all directions, up to sqrt(2), where a loop closes."""
     directions = sphere.fibonacci_directions(count)
-    return np.concatenate([fraction * directions for fraction in (0.35, 0.7, 1.05, 1.4)])
+    return np.concatenate([fraction * directions for fraction in np.sqrt(2.0) / 4.0 * np.array([1, 2, 3, 4])])
 
 
 def _reach(metric: LeftInvariantMetric, length: float) -> Array:
@@ -246,7 +245,7 @@ def _arrivals(
         momenta[taken], errors[taken], sizes[taken] = trial[better], error[better], apart[better]
         derivative[taken] = exponential_derivative(inverse_moments, momenta[taken], times[taken])
         changed = np.where(better, 0.1 * damping[rows], 10.0 * damping[rows])
-        damping[rows] = np.clip(changed, 1e-16, 1e6)
+        damping[rows] = np.maximum(changed, np.finfo(float).eps)
         rows = rows[(sizes[rows] > missed * weights.max()) & (damping[rows] < 1e5)]
         if not rows.size:
             break
@@ -275,17 +274,6 @@ def _rotation_errors(inverse_moments: Array, momenta: Array, target: Array) -> A
     """Rotation vectors from where the momenta lead in a unit of time to the target."""
     reached = attitude_flow(inverse_moments, momenta, np.ones(len(momenta)))
     return so3.log(so3.transpose(reached) @ target)
-
-
-def _before_cut(metric: LeftInvariantMetric, momentum: Array) -> bool:
-    """True if an arrival at t = 1 is proven to be the shortest."""
-    smallest, middle, largest = metric.moments
-    if middle == largest:
-        symmetric = axisymmetric_metric(largest, smallest)
-        return bool(symmetric.cut_time(momentum[_FIRST_AXIS_LAST]) >= 1.0 - _MARGIN)
-    if smallest == middle:
-        return bool(axisymmetric_metric(middle, largest).cut_time(momentum) >= 1.0 - _MARGIN)
-    return False
 
 
 def _bounds(metric: LeftInvariantMetric, target: Array) -> tuple[float, float]:

@@ -27,11 +27,9 @@ from ...arrays import Array, common_batch, finite_array, real_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments, principal_axes
-from .._arguments import check_entries
+from .._arguments import TWELVE_DIGITS, check_entries
 from ._conjugate_search import conjugate_times
 from ._momentum_flow import attitude_flow, exponential_derivative
-
-_LEAST_SPEED = 1e-12  # of the largest speed of such a momentum: below, rounding decides whether it moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +56,7 @@ class LeftInvariantMetric:
         return bool(self.inverse_moments[2] == 0.0)
 
     def angular_velocity(self, momentum: ArrayLike) -> Array:
-        """u = a Pi, which maximises the pseudo-Hamiltonian: (..., 3) -> (..., 3), body axes [rad/s].
-
-        Source: Bonnard et al., section 3.1, u_i = H_i/I_i.
-        """
+        """u = a Pi, which maximises the pseudo-Hamiltonian: (..., 3) -> (..., 3), body axes [rad/s]."""
         return (self._principal(momentum) * self.inverse_moments) @ self.axes.T
 
     def pseudo_hamiltonian(self, momentum: ArrayLike, angular_velocity: ArrayLike) -> Array:
@@ -155,7 +150,7 @@ class LeftInvariantMetric:
     def _moving(self, momentum: Array) -> Array:
         """The speeds; raises unless all are above 0."""
         speed = self.speed(momentum)
-        still = ~(speed > _LEAST_SPEED * np.sqrt(self.inverse_moments[0]) * np.linalg.norm(momentum, axis=-1))
+        still = ~(speed > TWELVE_DIGITS * np.sqrt(self.inverse_moments[0]) * np.linalg.norm(momentum, axis=-1))
         forbidden = f", nor along the forbidden direction {self.axes[:, 2]}" if self.is_sub_riemannian else ""
         check_entries(still, momentum, "momentum", "nothing moves with it; it must not be zero" + forbidden)
         return speed
@@ -169,7 +164,6 @@ class LeftInvariantMetric:
 def left_invariant_metric(inertia: ArrayLike) -> LeftInvariantMetric:
     """The metric u.I u of an inertia, or of principal moments one of which may be infinite.
 
-    Source: Bonnard et al., sections 3.1 and 3.2.
     Raises ShapeError for another shape, moments not positive, or more than one infinite.
 
     Parameters

@@ -20,19 +20,16 @@ from ...arrays import Array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...roots import safe_newton
-from .._arguments import above_zero
+from .._arguments import TWELVE_DIGITS, above_zero
 from .surface_of_revolution import NEAREST, SurfaceOfRevolution, surface_of_stretch
 
 # x (N,) -> F_2 and dF_2/dx, (N,) each; the derivative with all its digits next to the equator, where it vanishes.
 Profile = Callable[[Array], tuple[Array, Array]]
 Meridian = Callable[[Array], Array]  # x (N,) -> F_1 > 0 (N,)
 
-_DEGREE = (
-    24  # of the polynomial on a panel: high enough for few panels, low enough for derivatives to keep their digits
-)
+_DEGREE = 24  # of a panel's polynomial: for few panels, and derivatives that keep their digits
 _EPS = float(np.finfo(float).eps)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
-_ROUNDING = 1e-12  # of the largest value: differences of F_1, F_2 and slopes that are rounding
 
 
 @dataclass(frozen=True)
@@ -81,7 +78,7 @@ class TabulatedStretch:
         return (
             value / root_rest,
             (slope + 0.5 * value / rest) / root_rest,
-            (second + slope / rest + 0.75 * value / rest**2) / root_rest,
+            (second + slope / rest + 3.0 * value / (4.0 * rest**2)) / root_rest,
         )
 
 
@@ -90,7 +87,6 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
 
     (A3), on the curvature, is `SurfaceOfRevolution.is_greatest_curvature_on_equator`.
 
-    Source: Bonnard et al., section 2.1.
     Raises ShapeError if the reach is not positive, or the functions give no finite numbers of the right shape, or F_2
     <= 0 inside.
 
@@ -113,17 +109,17 @@ def assumptions(profile: Profile, reach: float, meridian: Meridian | None = None
         raise ShapeError("F_1 and F_2 must be positive from the equator to the reach, not counting a pole there")
     steepness = np.abs(north_slope).max()
     end = "boundary"
-    if north[-1] <= _ROUNDING * scale:
+    if north[-1] <= TWELVE_DIGITS * scale:
         end = "pole"
-    elif abs(north_slope[-1]) <= 1e3 * _ROUNDING * steepness:
+    elif abs(north_slope[-1]) <= 1e3 * TWELVE_DIGITS * steepness:
         end = "parallel"
     return Assumptions(
-        equator_is_parallel=bool(abs(north_slope[0]) <= _ROUNDING * steepness),
+        equator_is_parallel=bool(abs(north_slope[0]) <= TWELVE_DIGITS * steepness),
         is_symmetric=bool(
-            np.abs(north - south).max() <= _ROUNDING * scale
+            np.abs(north - south).max() <= TWELVE_DIGITS * scale
             # A caller may have slopes by differences.
-            and np.abs(north_slope + south_slope).max() <= 1e2 * _ROUNDING * steepness
-            and np.abs(along - back).max() <= _ROUNDING * along.max()
+            and np.abs(north_slope + south_slope).max() <= 1e2 * TWELVE_DIGITS * steepness
+            and np.abs(along - back).max() <= TWELVE_DIGITS * along.max()
         ),
         falls_to_reach=bool((north_slope[1:-1] < 0.0).all()),
         end=end,

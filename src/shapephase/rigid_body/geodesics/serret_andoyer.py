@@ -29,11 +29,11 @@ from numpy.typing import ArrayLike
 
 from ... import elliptic
 from ...arguments import moments_argument
-from ...arrays import Array, common_shape, finite_array
+from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import ascending_moments
-from .._arguments import check_entries
+from .._arguments import check_entries, together
 from ._serret_andoyer_constants import constants_of, constants_of_momentum, moment_gaps, separatrix_constants
 from .serret_andoyer_geodesics import GeodesicFamily
 
@@ -121,7 +121,7 @@ class SerretAndoyerMetric:
         Also for |p_y| > p_x, which no rigid body has.
         Source: Bonnard et al. (6).
         """
-        angle, first, second = _checked(y=y, p_x=p_x, p_y=p_y)
+        angle, first, second = together(y=y, p_x=p_x, p_y=p_y)
         across, along = self.coefficients(angle)
         return 0.5 * (first**2 / across + second**2 / along)
 
@@ -161,7 +161,7 @@ class SerretAndoyerMetric:
         Its minimum is a_3 p_theta^2, on the equator, its maximum a_2 p_theta^2, at `crest`.
         Source: Bonnard et al., lemma 4.1.
         """
-        place, momentum = _checked(phi=phi, p_theta=p_theta)
+        place, momentum = together(phi=phi, p_theta=p_theta)
         return momentum**2 * self._inverse_m(place)
 
     def gauss_curvature(self, phi: ArrayLike) -> Array:
@@ -199,7 +199,6 @@ class SerretAndoyerMetric:
     def geodesics(self, p_theta: ArrayLike) -> GeodesicFamily:
         """The geodesics of unit speed from the equator with these p_theta, |p_theta| <= sqrt(I_3): (...).
 
-        Source: Bonnard et al., sections 4.2 and 4.3.
         Raises ShapeError if a p_theta is beyond `largest_momentum`.
         """
         return GeodesicFamily(constants=constants_of(self.moments, p_theta))
@@ -268,10 +267,3 @@ def serret_andoyer_metric(moments: ArrayLike) -> SerretAndoyerMetric:
             "oscillating geodesics, or its equator is not singled out"
         )
     return SerretAndoyerMetric(moments=values)
-
-
-def _checked(**values: ArrayLike) -> list[Array]:
-    """Finite arguments whose shapes broadcast together."""
-    arrays = {name: finite_array(value, name) for name, value in values.items()}
-    common_shape(**arrays)
-    return list(arrays.values())

@@ -84,8 +84,6 @@ class GeodesicFamily:
         "oscillating" about the equator (the momentum circles the axis of the largest moment, I_3) and its limit, the
         "equator" itself; "rotating" (the momentum circles the axis of the smallest, I_1); "separatrix"; "extended":
         |p_theta| below sqrt(I_1), where there is a geodesic but no rigid body.
-
-        Source: Bonnard et al., section 4.2.
         """
         names = np.array([member.name.lower() for member in GeodesicClass])[self.constants.kind]
         return str(names) if names.ndim == 0 else names
@@ -152,7 +150,6 @@ class GeodesicFamily:
         """The largest phi of oscillating geodesics, phi_+: (...) [sqrt(kg) m]; K/alpha on the separatrix.
 
         Raises ShapeError for rotating geodesics, which have none.
-        Source: Bonnard et al., section 4.2.
         """
         requirement = "a largest phi needs an oscillating geodesic, |p_theta| >= sqrt(I_2)"
         check_entries(self.constants.kind < GeodesicClass.SEPARATRIX, self.p_theta, "p_theta", requirement)
@@ -335,13 +332,13 @@ def _half_turns(amplitude: Array, cosine: Array) -> tuple[Array, Array]:
 
 
 def _second_derivative_of_k(m1: Array) -> Array:
-    """d^2 K/dm^2 by the hypergeometric series for m up to 0.4, else by Legendre's equation, which divides by m."""
+    """d^2 K/dm^2 by the hypergeometric series for m up to 1/2, else by Legendre's equation, which divides by m."""
     m = 1.0 - m1
-    by_series = m <= 0.4
-    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, 0.4))
-    large = np.maximum(m, 0.4)
+    by_series = m <= 0.5
+    series = 9.0 * np.pi / 64.0 * hyp2f1(2.5, 2.5, 3.0, np.minimum(m, 0.5))
+    large = np.maximum(m, 0.5)
     small = np.where(by_series, 1.0 - large, m1)
-    equation = (0.25 * elliptic.complete_k(small) - (small - large) * elliprd(0.0, 1.0, small) / 6.0) / (large * small)
+    equation = (elliptic.complete_k(small) / 4.0 - (small - large) * elliprd(0.0, 1.0, small) / 6.0) / (large * small)
     return np.where(by_series, series, equation)
 
 

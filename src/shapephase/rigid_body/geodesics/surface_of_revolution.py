@@ -39,14 +39,14 @@ from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
 from ...letters import value_text
 from ...roots import ROUNDING, safe_newton
-from .._arguments import above_zero, check_entries
+from .._arguments import FEW_ULPS, TWELVE_DIGITS, above_zero, check_entries
 from ._arc_quadrature import Arcs, Stretch, folded_cosine, graded_rule, quadrature, settled_splits
 
 ClosedArcs = Callable[[Array, Array, Array, Array], Arcs]  # p >= 0, q, depth - q, phases in [-pi/2, pi/2], all (N,)
 
 NEAREST = 1e-60  # least depth - Y: at a parallel the stretch is infinite, and the curvature has reached its limit
 _TABLE_ERROR = 1e-9  # relative error of tabulated metrics: of the slope at a smooth pole, of p next to a separatrix
-_PHASES = np.pi * np.arange(66) / 65  # at which the trends of the first return and of the curvature are sampled
+_PHASES = np.linspace(0.0, np.pi, 66)  # at which the trends of the first return and of the curvature are sampled
 
 
 @made_by("geodesics.spheroid(...) or surface_of_metric(...)")
@@ -108,7 +108,7 @@ class SurfaceOfRevolution:
         """y of latitudes phi: (...) -> (...). Raises ShapeError beyond the reach."""
         phi = finite_array(latitude, "latitude")
         reach = self.reach
-        beyond = np.abs(phi) > reach * (1.0 + 1e-12)
+        beyond = np.abs(phi) > reach * (1.0 + TWELVE_DIGITS)
         check_entries(beyond, phi, "latitude", f"the surface reaches to {reach:.17g}")
         distance = np.minimum(np.abs(phi), reach).ravel()
         top = np.sqrt(self.depth)
@@ -125,7 +125,7 @@ class SurfaceOfRevolution:
         """phi of y in [-sqrt(depth), sqrt(depth)], the arc length along a meridian: (...) -> (...)."""
         y = finite_array(height, "height")
         top = np.sqrt(self.depth)
-        check_entries(np.abs(y) > top * (1.0 + 1e-15), y, "height", f"the surface reaches to {top:.17g}")
+        check_entries(np.abs(y) > top * (1.0 + FEW_ULPS), y, "height", f"the surface reaches to {top:.17g}")
         value, _ = self._meridian(np.arcsin(np.clip(np.abs(y) / top, 0.0, 1.0)).ravel())
         return np.copysign(value.reshape(y.shape), y)[()]
 
@@ -166,7 +166,7 @@ class SurfaceOfRevolution:
         top, low = self.greatest_momentum, self.least_momentum
         magnitude = np.abs(p)
         # sqrt(m(0)) as rounded by a caller may be too large by its last digit.
-        check_entries(magnitude > top * (1.0 + 4e-16), p, "momentum", f"|p| is at most sqrt(m(0)) = {top:.17g}")
+        check_entries(magnitude > top * (1.0 + FEW_ULPS), p, "momentum", f"|p| is at most sqrt(m(0)) = {top:.17g}")
         magnitude = np.minimum(magnitude, top)
         if self.end == "pole":
             over_tip = (magnitude == 0.0) & (not self.has_smooth_poles)

@@ -26,8 +26,8 @@ from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ...inertia_tensor import principal_axes
-from .._arguments import one_array, one_tensor
-from .lie_algebra import WRITTEN_DIGITS
+from .._arguments import FEW_ULPS, one_array, one_tensor
+from .lie_algebra import NEAR_ZERO, WRITTEN_DIGITS
 
 # By the number of eigenvalues of the more frequent and of the less frequent sign.
 _GROUPS = {(3, 0): "SO(3)", (2, 1): "SO(2,1)", (2, 0): "SE(2)", (1, 1): "SE(1,1)", (1, 0): "Heisenberg", (0, 0): "R^3"}
@@ -169,7 +169,7 @@ def lie_group(form: ArrayLike) -> str:
     ['SO(3)', 'SO(2,1)', 'SE(2)']
     """
     values = np.linalg.eigvalsh(_form(form))
-    threshold = 1e-14 * np.max(np.abs(values))
+    threshold = NEAR_ZERO * np.max(np.abs(values))
     positive, negative = int(np.sum(values > threshold)), int(np.sum(values < -threshold))
     return _GROUPS[max(positive, negative), min(positive, negative)]
 
@@ -206,9 +206,7 @@ def _coefficients(moments: Array, row: Array, rounding: Array) -> Array:
     """a / I_i + b, zero where the terms cancel up to rounding."""
     inverse = row[0] / moments
     total = inverse + row[1]
-    return np.where(
-        np.abs(total) <= 16.0 * np.finfo(float).eps * (np.abs(inverse) * rounding + abs(row[1])), 0.0, total
-    )
+    return np.where(np.abs(total) <= FEW_ULPS * (np.abs(inverse) * rounding + abs(row[1])), 0.0, total)
 
 
 def _form(form: ArrayLike) -> Array:

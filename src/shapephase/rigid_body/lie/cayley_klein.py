@@ -11,15 +11,13 @@ Source: Marsden and Ratiu, exercise 15.4-1; theory.md G6.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...arguments import inverse_inertia_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError
-from .._arguments import ascending_times
+from .._arguments import SIX_DIGITS, ascending_times
 from .._flow import flow
 from .lie_algebra import complex_or_real, su2
 from .lie_poisson import angular_velocity, kinetic_energy
@@ -124,8 +122,15 @@ def cayley_klein_motion(inertia: ArrayLike, z: ArrayLike, times: ArrayLike) -> S
     >>> print(np.linalg.norm(sp.rigid_body.lie.cayley_klein_momentum(z), axis=-1).round(9))
     [1.3 1.3]
     """
-    inverse = inverse_inertia_argument(inertia)
-    return _collective_flow(lambda pi: (inverse @ pi[..., None])[..., 0], _spinor(z, "z"), ascending_times(times))
+    inverse, start = inverse_inertia_argument(inertia), _spinor(z, "z")
+
+    def rate(state: Array) -> Array:
+        spinor = state[..., :2] + 1j * state[..., 2:]
+        change = 0.5j * _turned((inverse @ _momentum_map(spinor)[..., None])[..., 0], spinor)
+        return np.concatenate([change.real, change.imag], axis=-1)
+
+    states = flow(rate, np.concatenate([start.real, start.imag], axis=-1), ascending_times(times))
+    return states[..., :2] + 1j * states[..., 2:]
 
 
 def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
@@ -144,34 +149,24 @@ def cayley_klein_attitude(start: ArrayLike, z: ArrayLike) -> Array:
     """
     first, last = _spinor(start, "start"), _spinor(z, "z")
     length, other = np.linalg.norm(first, axis=-1), np.linalg.norm(last, axis=-1)
-    if not np.all((length > 0.0) & (np.abs(length - other) <= 1e-6 * length)):
+    if not np.all((length > 0.0) & (np.abs(length - other) <= SIX_DIGITS * length)):
         raise ShapeError("z: not on the sphere |z| = |start| of a motion; equal lengths above 0 are needed")
-    a, b = (np.stack(_frame(x / n[..., None]), axis=-1) for x, n in ((first, length), (last, other)))
+    a, b = (_frame(x / n[..., None]) for x, n in ((first, length), (last, other)))
     unitary = a @ np.swapaxes(b.conj(), -1, -2)
     return 0.5 * np.einsum("jab,...bc,kcd,...ad->...jk", PAULI, unitary, PAULI, unitary.conj()).real
 
 
-def _frame(unit: Spinor) -> tuple[Spinor, Spinor]:
-    """A unit vector of C^2 and the one that completes it to a matrix of SU(2)."""
-    return unit, np.stack([-unit[..., 1].conj(), unit[..., 0].conj()], axis=-1)
+def _frame(unit: Spinor) -> Spinor:
+    """The matrix of SU(2) whose first column is a unit vector."""
+    return np.stack([unit, np.stack([-unit[..., 1].conj(), unit[..., 0].conj()], axis=-1)], axis=-1)
 
 
 def _momentum_map(spinor: Spinor) -> Array:
-    return -0.25 * np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real
+    return -np.einsum("...a,kab,...b->...k", spinor.conj(), PAULI, spinor).real / 4.0
 
 
 def _turned(omega: Array, spinor: Spinor) -> Spinor:
     return np.einsum("...k,kab,...b->...a", omega, PAULI, spinor)
-
-
-def _collective_flow(gradient: Callable[[Array], Array], start: Spinor, times: Array) -> Spinor:
-    def rate(state: Array) -> Array:
-        spinor = state[..., :2] + 1j * state[..., 2:]
-        change = 0.5j * _turned(gradient(_momentum_map(spinor)), spinor)
-        return np.concatenate([change.real, change.imag], axis=-1)
-
-    states = flow(rate, np.concatenate([start.real, start.imag], axis=-1), times)
-    return states[..., :2] + 1j * states[..., 2:]
 
 
 def _spinor(value: ArrayLike, name: str) -> Spinor:

@@ -17,6 +17,7 @@ from ... import so3
 from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
+from .._arguments import SIX_DIGITS
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +99,7 @@ def body_angular_velocity(attitude: ArrayLike, attitude_rate: ArrayLike) -> Arra
     rotation, rate = so3.rotation_argument(attitude, "attitude"), finite_array(attitude_rate, "attitude_rate", (3, 3))
     spin = so3.transpose(rotation) @ rate
     symmetric = np.abs(spin + so3.transpose(spin)).max(initial=0.0)
-    if symmetric > 1e-6 * np.abs(spin).max(initial=0.0):  # six written digits
+    if symmetric > SIX_DIGITS * np.abs(spin).max(initial=0.0):
         raise ShapeError(
             f"attitude_rate: not the rate of a rotation, R^T R' has a symmetric part of {symmetric:.3g}; "
             "R' = R hat(Omega) is needed"
@@ -181,8 +182,6 @@ def mass_inner_product(masses: ArrayLike, positions: ArrayLike, a: ArrayLike, b:
 
 def mass_inertia(masses: ArrayLike, positions: ArrayLike) -> Array:
     """The inertia tensor about the material origin, I a . b = <<a, b>>: (P,), (P, 3) -> (3, 3) [kg m^2].
-
-    Source: Marsden and Ratiu, section 15.3.
 
     Examples
     --------

@@ -19,12 +19,12 @@ from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import LieAlgebraError, ShapeError
 from ...letters import value_text
+from .._arguments import TWELVE_DIGITS
 
 Matrices = NDArray[Any]  # real or complex square matrices (..., n, n)
 
-_ROUNDING = 1e-12  # largest defect of antisymmetry, of Jacobi's identity and of a closed basis, relative to the entries
 WRITTEN_DIGITS = 1e-9  # relative error of the entries of a matrix that a user writes with nine digits
-_NEAR_ZERO = 1e-14  # ratio of eigenvalues, or distance of structure constants from integers, that is rounding
+NEAR_ZERO = 1e-14  # ratio of eigenvalues, or distance of structure constants from integers, that is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class LieAlgebra:
             raise ShapeError(f"structure: structure constants (d, d, d) are needed, got {structure.shape}")
         largest = float(np.abs(structure).max())
         defect = np.abs(structure + structure.swapaxes(0, 1))
-        if defect.max() > _ROUNDING * largest:
+        if defect.max() > TWELVE_DIGITS * largest:
             i, j, k = np.unravel_index(int(np.argmax(defect)), defect.shape)
             raise LieAlgebraError(
                 f"structure: not antisymmetric, c[{i}, {j}, {k}] = {structure[i, j, k]:.9g} and "
@@ -66,7 +66,7 @@ class LieAlgebra:
         structure = 0.5 * (structure - structure.swapaxes(0, 1))
         double = np.einsum("ijm,mkl->ijkl", structure, structure)
         cyclic = np.abs(double + double.transpose(1, 2, 0, 3) + double.transpose(2, 0, 1, 3))
-        if cyclic.max() > _ROUNDING * len(structure) * largest**2:
+        if cyclic.max() > TWELVE_DIGITS * len(structure) * largest**2:
             i, j, k, _ = np.unravel_index(int(np.argmax(cyclic)), cyclic.shape)
             raise LieAlgebraError(
                 f"structure: Jacobi's identity fails for e_{i}, e_{j}, e_{k} by {cyclic.max():.3g}; "
@@ -108,7 +108,7 @@ class LieAlgebra:
     @cached_property
     def is_unimodular(self) -> bool:
         """True if tr ad_a = 0 for every a, so that Lie-Poisson flows keep the volume of the dual."""
-        return bool(np.abs(np.einsum("ijj->i", self.structure)).max() <= _ROUNDING * np.abs(self.structure).max())
+        return bool(np.abs(np.einsum("ijj->i", self.structure)).max() <= TWELVE_DIGITS * np.abs(self.structure).max())
 
     def matrix(self, a: ArrayLike) -> Matrices:
         """The matrix a^i E_i of an element: (..., d) -> (..., n, n). Raises ShapeError, LieAlgebraError."""
@@ -170,7 +170,7 @@ def lie_algebra_from_matrices(basis: ArrayLike, name: str = "matrix Lie algebra"
     structure = _flat(_commutators(matrices)) @ np.linalg.pinv(_flat(matrices))
     # Constants that differ from integers by the rounding of the fit alone are integers.
     whole = np.round(structure)
-    near = np.abs(structure - whole) < _NEAR_ZERO * max(1.0, float(np.abs(structure).max()))
+    near = np.abs(structure - whole) < NEAR_ZERO * max(1.0, float(np.abs(structure).max()))
     structure = np.where(near, whole, structure)
     return LieAlgebra(structure, matrices, name)
 
@@ -282,7 +282,7 @@ def inertia_operator(algebra: LieAlgebra, inertia: ArrayLike) -> Array:
     if np.abs(operator - operator.T).max() > WRITTEN_DIGITS * float(np.abs(operator).max()):
         raise LieAlgebraError("inertia: the operator is not symmetric; <I a, b> = <I b, a> is needed")
     values = np.abs(np.linalg.eigvalsh(operator))
-    if values.min() <= _NEAR_ZERO * values.max():
+    if values.min() <= NEAR_ZERO * values.max():
         raise LieAlgebraError(f"inertia: the operator is singular, its eigenvalues have magnitudes {np.sort(values)}")
     return 0.5 * (operator + operator.T)
 
@@ -320,7 +320,7 @@ def _check_basis(basis: Matrices, structure: Array) -> None:
         raise ShapeError(f"basis: {len(structure)} square matrices are needed, got {basis.shape}")
     brackets = _commutators(basis)
     off = np.abs(brackets - np.einsum("ijk,kab->ijab", structure, basis)).max()
-    if off > _ROUNDING * len(basis) * np.abs(basis).max() ** 2:
+    if off > TWELVE_DIGITS * len(basis) * np.abs(basis).max() ** 2:
         raise LieAlgebraError(
             f"basis: the brackets AB - BA are not [e_i, e_j] = c[i, j, k] e_k, off by {off:.3g}; the matrices are not "
             "closed under the bracket, or the structure constants belong to another basis"

@@ -32,14 +32,13 @@ from ...arguments import check_function, check_object, check_pair, inverse_inert
 from ...arrays import Array, common_batch, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
-from .._arguments import ascending_times
+from .._arguments import TWELVE_DIGITS, ascending_times
 from .._flow import flow
 from .lie_algebra import WRITTEN_DIGITS, LieAlgebra, so
 
 Gradient = ArrayLike | Callable[[Array], ArrayLike]  # on the dual: values (..., d), or a callable of momenta (..., d)
 
 _SO3 = so(3)  # the algebra of a function that is not given one
-_RANK = 1e-12  # singular values of the Poisson tensor below this share of the largest are zero
 _NULL = 1e-10  # of linear equations in structure constants, which may have defects of 1e-12
 
 
@@ -220,7 +219,7 @@ def coadjoint_orbit_form(momentum: ArrayLike, first: ArrayLike, second: ArrayLik
     """
     mu = _momentum(momentum, algebra)
     tensor = poisson_tensor(mu, algebra)
-    inverse = np.linalg.pinv(tensor, rcond=_RANK)
+    inverse = np.linalg.pinv(tensor, rcond=TWELVE_DIGITS)
     u, v = finite_array(first, "first", mu.shape[-1:]), finite_array(second, "second", mu.shape[-1:])
     for name, vector in (("first", u), ("second", v)):
         off = np.linalg.norm((tensor @ inverse @ vector[..., None])[..., 0] - vector, axis=-1)
@@ -387,12 +386,8 @@ def double_bracket_motion(inertia: ArrayLike, momentum: ArrayLike, alpha: float,
     >>> print(pi[-1].round(4) + 0.0, np.linalg.norm(pi, axis=-1).round(6))
     [0.     0.     0.7874] [0.787401 0.787401]
     """
-    pi, instants, strength = (
-        finite_array(momentum, "momentum", (3,), unit="kg m^2/s"),
-        ascending_times(times),
-        finite_array(alpha, "alpha")[..., None],
-    )
-    inverse = inverse_inertia_argument(inertia)
+    pi, instants = finite_array(momentum, "momentum", (3,), unit="kg m^2/s"), ascending_times(times)
+    strength, inverse = finite_array(alpha, "alpha")[..., None], inverse_inertia_argument(inertia)
     start = np.array(np.broadcast_to(pi, np.broadcast_shapes(pi.shape, inverse.shape[:-1], (*strength.shape[:-1], 3))))
     return flow(lambda p: _rate(p, (inverse @ p[..., None])[..., 0], strength), start, instants)
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ...arguments import whole_argument
 from ...arrays import Array, finite_array
 from ...errors import ShapeError, SingularInertiaError
-from .lie_algebra import WRITTEN_DIGITS, so
+from .lie_algebra import NEAR_ZERO, WRITTEN_DIGITS, so
 
 _LARGEST_PFAFFIAN = 10  # its expansion has (n - 1)!! terms, 945 for ten
 
@@ -165,7 +165,7 @@ def _second_moment(value: ArrayLike) -> Array:
     if np.abs(j - j.T).max() > WRITTEN_DIGITS * np.abs(j).max():
         raise ShapeError(f"second_moment: not symmetric, off by {np.abs(j - j.T).max():.3g}")
     moments = np.linalg.eigvalsh(j)
-    if not moments[0] + moments[1] > 1e-14 * np.abs(moments).max():
+    if not moments[0] + moments[1] > NEAR_ZERO * np.abs(moments).max():
         raise SingularInertiaError(
             f"second_moment: the two least eigenvalues {moments[:2]} give a plane no inertia; their sum must be above 0"
         )
