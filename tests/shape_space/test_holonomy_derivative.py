@@ -144,14 +144,14 @@ def test_rows_that_open_the_loop_or_have_another_shape_are_refused():
     def opening(t: np.ndarray) -> np.ndarray:
         return np.broadcast_to(t[:, None, None], (len(t), 1, body.n_shape))
 
-    with pytest.raises(sp.errors.OpenPathError, match="the same at the end"):
+    with pytest.raises(sp.errors.OpenPathError, match="variation"):
         sp.holonomy_derivative(body, path, opening)
-    with pytest.raises(sp.errors.ShapeError, match="variation: expected"):
+    with pytest.raises(sp.errors.ShapeError, match="variation"):
         sp.holonomy_derivative(body, path, lambda t: np.zeros((len(t), body.n_shape)))
     with pytest.raises(sp.errors.ShapeError, match="finite"):
         sp.holonomy_derivative(body, path, lambda t: np.full((len(t), 1, body.n_shape), np.nan))
     open_path = sp.ShapePath.waypoints([0.0, 1.0], [np.zeros(body.n_shape), np.ones(body.n_shape)])
-    with pytest.raises(sp.errors.OpenPathError, match="open path"):
+    with pytest.raises(sp.errors.OpenPathError, match="open"):
         sp.holonomy_derivative(body, open_path, family.variation)
 
     def jumping(t: np.ndarray) -> np.ndarray:
