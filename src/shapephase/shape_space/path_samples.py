@@ -10,8 +10,8 @@ import numpy as np
 
 from ..arrays import Array, Integers, Mask
 from ..errors import WrongObjectError
-from .closing_arc import ClosingArc
 from .curves import PiecewisePolynomial, Reordered
+from .shape_geodesic import ClosingArc
 from .shape_path import PathOrigin, ShapePath, interpolated
 
 _REST_TO_REST = (10.0, -15.0, 6.0)  # quintic of least jerk from 0 to 1: coefficients of s^3, s^4, s^5

@@ -24,7 +24,6 @@ from ..display import Card, card_html, card_text, numbers
 from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
-from ._accelerations import exact_accelerations, resolved_accelerations
 from .curves import (
     CLOSED,
     Curve,
@@ -36,9 +35,9 @@ from .curves import (
     PiecewisePolynomial,
     Reordered,
     Repeated,
-    Reversed,
-    Stretched,
+    Retimed,
     Swings,
+    exact_accelerations,
     returned_pair,
     swings_of,
 )
@@ -53,7 +52,7 @@ from .interpolation import (
     sample_arguments,
     spline_curve,
 )
-from .path_series import spline_times
+from .path_series import resolved_accelerations, spline_times
 from .scan.function_scan import DerivedScan, FunctionScan, JoinedScan, check_rates, path_function
 from .scan.scanning import scanned
 
@@ -292,7 +291,7 @@ class ShapePath:
         """The path backwards in time."""
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
-        curve = Reversed(self.curve, self.duration)
+        curve = Retimed(self.curve, self.duration)
         return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"), origin=None)
 
     def stretched(self, factor: float) -> ShapePath:
@@ -301,7 +300,7 @@ class ShapePath:
         duration = self.duration * scale
         breaks = self.breaks * scale
         breaks[-1] = duration
-        curve = Stretched(self.curve, scale, self.duration)
+        curve = Retimed(self.curve, self.duration, scale)
         scanner = DerivedScan(self, "stretched", (scale,))
         return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner, origin=None)
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...arrays import Array, Mask, lock_arrays
 from ...display import short_repr
-from ..closing_arc import ClosingArc
 from ..curves import PiecewisePolynomial
 from ..linear_smoother import LinearSmoother
 from ..path_samples import PathSamples, path_samples
+from ..shape_geodesic import ClosingArc
 from ..shape_path import ShapePath, interpolated
 
 

@@ -14,10 +14,9 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import TrajectoryError, unknown_name
-from ..closing_arc import ClosingArc
 from ..connection import horizontal_lift
 from ..curves import CLOSED
-from ..shape_geodesic import shape_geodesic
+from ..shape_geodesic import ClosingArc, shape_geodesic
 from ..shape_path import ShapePath
 from .labels import amounts
 from .smoothing import Recorded, Smoothing, prepared_path

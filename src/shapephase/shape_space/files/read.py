@@ -23,8 +23,7 @@ from .closing import Closing, closed_path
 from .flight import Flight, in_flight
 from .inputs import read_input
 from .labels import amounts
-from .mapping_files import names_by_label
-from .options import Reading, ReadingOptions, show_options
+from .options import Reading, ReadingOptions, names_by_label, show_options
 from .recording import LONGEST_NAME, Recording, Table
 from .smoothing import Recorded, Smoothing, check_swings, is_even, prepared_path
 from .times import recording_of

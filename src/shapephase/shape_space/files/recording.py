@@ -15,10 +15,10 @@ from ...arguments import check_time_steps
 from ...arrays import Array, Integers, Mask
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 from ...files import no_such_file
-from .nameless_joints import NamelessJoints
 
 if TYPE_CHECKING:
     from ._segment_poses import SegmentMotion
+    from .formats.nameless_joints import NamelessJoints
 
 LONGEST_NAME = 256  # characters of a column's name, as of a joint's name in a body's file
 _UNEVEN_STEPS = 100.0  # over the median step, or under it: a gap, or one sample recorded twice

@@ -14,8 +14,8 @@ from ....body.body import Body
 from ....body.joint_orders import MUJOCO, OWN, simulator_order
 from ....body.virtual_base import way_names, way_poses
 from ....errors import ShapeError, TrajectoryError, unknown_name
-from ..nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
 from ..recording import Rates
+from .nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
 
 _NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot|qdot)[_\[ ]?([0-9]{1,6})\]?")  # qpos_0, qpos[0], qpos0
 _ROOT = 6  # coordinates of a free root: three slides, three hinges

@@ -15,10 +15,10 @@ from ....errors import ShapeError, TrajectoryError
 from ....files import npy_array, npz_arrays
 from ....letters import value_text
 from ..labels import SI
-from ..nameless_joints import FREE_JOINT, nameless_joints, placed_joints
 from ..recording import Rates, Simulated, Table, warn
 from .floating_arrays import FloatingMotion, floating_motion, numbered_columns, places_of, root_width
 from .named_arrays import arrays_table
+from .nameless_joints import FREE_JOINT, nameless_joints, placed_joints
 
 _NPZ = "NPZ"
 _SCALAR_FIRST = [1, 2, 3, 0]  # places of x, y, z, w in a quaternion w x y z

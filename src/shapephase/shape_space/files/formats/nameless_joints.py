@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ... import so3
-from ...arrays import Array
-from ...body.body import Body
-from ...body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, JointOrder, simulator_order
-from ...body.virtual_base import way_names
-from ...errors import TrajectoryError, TrajectoryWarning
+from .... import so3
+from ....arrays import Array
+from ....body.body import Body
+from ....body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, JointOrder, simulator_order
+from ....body.virtual_base import way_names
+from ....errors import TrajectoryError, TrajectoryWarning
 
 FREE_JOINT = 7  # entries of a free joint: a place and a quaternion
 _OFF_UNIT = 1e-3  # allowed error of a quaternion's length
