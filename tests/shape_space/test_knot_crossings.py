@@ -8,7 +8,6 @@ import pytest
 import shapephase as sp
 from shapephase.body import Coupling
 from shapephase.errors import ShapeError
-from shapephase.shape_space.body_path import route_along
 from support.coupled_bodies import KNOTS, LEG, TURN, TURNS, bounded, by_hand, couplings
 from support.long_runs import full_but
 
@@ -92,7 +91,7 @@ def test_crossings_are_found(kind, load_urdf):
     """As many as signs that change, at the same times."""
     body = load_urdf(LEG).with_couplings(couplings(TURN["spline"][0]))
     path = PATHS[kind]
-    breaks, expected = route_along(body, path).breaks, looked_for(path)
+    breaks, expected = sp.horizontal_lift(body, path, 1e-4).path.breaks, looked_for(path)
     apart = np.abs(breaks[:, None] - expected).min(axis=0)
     assert apart.max() < 1e-13 * path.duration
     known = np.union1d(path.breaks, path.duration / path.loops * np.arange(path.loops + 1))
@@ -139,7 +138,7 @@ def test_a_slow_joint_through_a_kink(load_urdf):
 def test_a_joint_that_rests_at_a_knot_crosses_none(load_urdf):
     body = load_urdf(LEG).with_couplings(couplings(LINE))
     path = sp.ShapePath.fourier([0.1, KNOTS[1]], [[0.3], [0.0]], [[0.2], [0.0]], 1.0)
-    assert route_along(body, path).breaks.tolist() == [0.0, 1.0]
+    assert sp.horizontal_lift(body, path, 1e-4).path.breaks.tolist() == [0.0, 1.0]
 
 
 def test_a_loop_that_winds_is_no_loop_of_what_follows(load_urdf):

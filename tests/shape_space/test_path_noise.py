@@ -7,7 +7,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.errors import ShapeError, WrongObjectError
-from shapephase.shape_space.files.smoothing import smoothed_path
+from shapephase.shape_space.files import smoothed_path
 
 NOISE = 0.01
 TIMES = np.linspace(0.0, 1.2, 41)

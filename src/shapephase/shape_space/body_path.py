@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from functools import partial
 
 import numpy as np
 
@@ -83,25 +84,17 @@ def path_sampler(body: Body | ParticleBody, path: ShapePath) -> Sampler:
     def evaluate(times: Array) -> tuple[Array, Array]:
         return body.sample(*path.at_samples(times))
 
-    def directly(times: Array) -> Array | None:
-        return channels_at(body, *path.at_samples(times))
-
-    return Sampler(evaluate, path.smoothness, directly)
+    return Sampler(evaluate, path.smoothness, partial(channels_along, body, path))
 
 
 def channels_along(body: Body | ParticleBody, path: ShapePath, times: Array) -> Array | None:
     """I^-1 (xx yy zz yz xz xy) and I^-1 L_o along a path, in machine code: (N,) -> (N, 9).
 
-    None where a tensor is nearly singular or a number is not finite.
+    None where a tensor is nearly singular or a number is not finite; without machine code or rows; for ball joints.
     """
-    return channels_at(body, *path.at_samples(times))
-
-
-def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array | None:
-    """Channels at shapes and rates (N, n); None without machine code, links or rows, and for ball joints."""
     if isinstance(body, ParticleBody) or not body.chain.has_rows or not machine_code.is_used():
         return None
-    return tree_channels(body.chain.rows, shapes, rates)
+    return tree_channels(body.chain.rows, *path.at_samples(times))
 
 
 class FamilyVariants:

@@ -96,7 +96,6 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordin
     >>> sp.curvature(cat, np.zeros(3))[1, 2].round(6).tolist()  # of waist_pitch and waist_yaw
     [0.0, 0.0625, 0.0]
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
     columns, slopes = connection_slopes(body, shape)
     bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
     curvatures = slopes - np.swapaxes(slopes, -2, -3) - bracket
@@ -114,9 +113,8 @@ def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Arra
     >>> print(columns.round(6).tolist(), slopes.shape)
     [[0.0, 0.5, 0.0], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0]] (3, 3, 3)
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     connection = mechanical_connection(body, shape)
+    inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     # dA_i = I^-1 (dJ_i - dI_i A), indices (i, axis, j)
     gradient = inverse @ (
         body.momentum_matrix_gradient(shape) - body.inertia_gradient(shape) @ connection[..., None, :, :]
@@ -153,11 +151,10 @@ def holonomy(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees: it turns over")
     180.000000 degrees: it turns over
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = users_route_along(body, path)
-    return _lift_of_loop(body, route, goal).end[0]
+    check_closed(body, route)
+    return _lift(body, route, goal).end[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,8 +234,6 @@ def horizontal_lift(body: Body | ParticleBody, path: ShapePath, tolerance: float
     >>> print(f"{np.degrees(sp.so3.angle(lift.attitude(loop.duration))):.6f} degrees: it turns over")
     180.000000 degrees: it turns over
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = users_route_along(body, path)
     return HorizontalLift(body, route, _lift(body, route, goal))
@@ -246,11 +241,6 @@ def horizontal_lift(body: Body | ParticleBody, path: ShapePath, tolerance: float
 
 def _lift(body: Body | ParticleBody, route: ShapePath, tolerance: float) -> SteppedRotation:
     return stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
-
-
-def _lift_of_loop(body: Body | ParticleBody, route: ShapePath, tolerance: float) -> SteppedRotation:
-    check_closed(body, route)
-    return _lift(body, route, tolerance)
 
 
 def holonomy_derivative(
@@ -296,12 +286,11 @@ def holonomy_derivative(
     >>> slope.shape
     (1, 3)
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
-    check_function(variation, "variation", "a function of times that gives changes of shape (N, m, n)")
     goal = tolerance_argument(tolerance)
     route = users_route_along(body, path)
-    lift = _lift_of_loop(body, route, goal)
+    check_function(variation, "variation", "a function of times that gives changes of shape (N, m, n)")
+    check_closed(body, route)
+    lift = _lift(body, route, goal)
     ends = np.array([0.0, route.duration])
     at_ends = _variation_at(variation, ends, body.n_shape)
     if np.abs(at_ends[1] - at_ends[0]).max(initial=0.0) > CLOSED * (1.0 + np.abs(at_ends).max(initial=0.0)):

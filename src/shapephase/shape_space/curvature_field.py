@@ -174,12 +174,10 @@ def stokes_holonomy(
     >>> print(np.abs(sp.stokes_holonomy(cat, loop) - sp.holonomy(cat, loop)).max().round(8))
     0.0
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
+    route = route_along(body, path)
     if isinstance(body, Body):
         check_smooth(body.chain.follows, "the theorem of Stokes needs")
-    route = route_along(body, path)
     check_closed(body, route)
     turned = np.flatnonzero(np.abs(route.gap) > CLOSED)
     if len(turned):

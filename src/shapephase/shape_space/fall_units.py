@@ -27,13 +27,8 @@ _AS_LONG = 0.8  # of the longest fall: among such long ones, the best parabola i
 _PARABOLA = 0.02  # [m] rms off a parabola, beyond the noise, of a motion that is no fall
 
 
-def check_gravity(fall: FreeFall, gravity: float, rate: float, where: str) -> None:
-    """Raise TrajectoryError where a fall is not by the gravity that is expected, and name the slips that fit."""
-    _check(fall.gravity, fall.gravity_bar, gravity, rate, where)
-
-
 def check_parabola(times: Array, centres: Array, noise: float, gravity: float, where: str) -> None:
-    """Check a stretch that is given in the same way: where it is a parabola, and bent enough for that to be seen.
+    """Check the gravity of a stretch that is given, where it is a parabola, and bent enough for that to be seen.
 
     Warns where the centre of mass leaves every parabola: no free flight, or a body of another size.
     """
@@ -53,7 +48,7 @@ def check_parabola(times: Array, centres: Array, noise: float, gravity: float, w
         )
     # What is not bent has no weight, or is too short to be compared.
     elif size > _BARS * bar:
-        _check(size, bar, gravity, 1.0 / float(np.median(np.diff(times))), where)
+        check_gravity(size, bar, gravity, times, where)
 
 
 def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up: str | None) -> FreeFall | None:
@@ -109,11 +104,12 @@ def _trials(rate: float) -> Iterator[_Trial]:
             yield _Trial(gravity=1.0 / speed**2, times=speed, lengths=1.0, arms=1.0)
 
 
-def _check(measured: float, bar: float, gravity: float, rate: float, where: str) -> None:
+def check_gravity(measured: float, bar: float, gravity: float, times: Array, where: str) -> None:
+    """Raise TrajectoryError where a fall is not by the gravity that is expected, and name the slips that fit."""
     off = abs(measured - gravity)
     if off <= _OFF * gravity or off <= _BARS * bar:
         return
-    slips = list(_slips(measured, bar, gravity, rate))
+    slips = list(_slips(measured, bar, gravity, 1.0 / float(np.median(np.diff(times)))))
     named = "; or ".join(slips) if slips else "no usual slip of a unit makes that of it"
     raise TrajectoryError(
         f"{where}: the centre of mass falls with {measured:.3g} ± {bar:.2g} m/s^2, {gravity:.4g} is expected: {named}. "

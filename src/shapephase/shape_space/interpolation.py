@@ -50,17 +50,6 @@ def path_joint_names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[s
     return names
 
 
-def joined_names(
-    first: tuple[int, tuple[str, ...] | None], second: tuple[int, tuple[str, ...] | None]
-) -> tuple[str, ...] | None:
-    """Names of two paths that follow each other, by the numbers and names of their joints. Raises TrajectoryError."""
-    if first[0] != second[0]:
-        raise TrajectoryError(f"paths of {first[0]} and {second[0]} joints cannot follow each other")
-    if first[1] and second[1] and first[1] != second[1]:
-        raise TrajectoryError(f"paths with other joints or another order of joints: {first[1]} and {second[1]}")
-    return first[1] or second[1]
-
-
 def fourier_curve(mean: ArrayLike, cosines: ArrayLike, sines: ArrayLike, period: float) -> Fourier:
     """A Fourier series, its coefficients checked. Raises ShapeError, TrajectoryError."""
     middle = finite_array(mean, "mean", (None,))

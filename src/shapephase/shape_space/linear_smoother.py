@@ -145,7 +145,9 @@ def likeliest(
     """
     system = _Roughness(times, periodic, order)
     penalties = np.zeros(values.shape[1])
-    widths = _widths(len(values))
+    most = min(_WIDEST, max(float(len(values)), 1.0))
+    number = int(_WIDTHS_A_DECADE * np.log10(most / _NARROWEST)) + 1
+    widths = _NARROWEST * 10.0 ** (np.arange(number) / _WIDTHS_A_DECADE)
     if not system.modes:
         return LinearSmoother(times, periodic, penalties, order)
     # About the first: what does not move has no digits to lose.
@@ -167,12 +169,6 @@ def width_of(smoother: LinearSmoother) -> float:
     unit = float(smoother.times[-1]) / (len(smoother.times) - 1)
     scaled = float(smoother.penalties.max(initial=0.0)) / unit ** (2 * smoother.order - 1)
     return scaled ** (0.5 / smoother.order)
-
-
-def _widths(count: int) -> Array:
-    most = min(_WIDEST, max(float(count), 1.0))
-    number = int(_WIDTHS_A_DECADE * np.log10(most / _NARROWEST)) + 1
-    return _NARROWEST * 10.0 ** (np.arange(number) / _WIDTHS_A_DECADE)
 
 
 def _least(places: Array, values: Array) -> float:

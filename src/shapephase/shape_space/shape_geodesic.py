@@ -19,7 +19,6 @@ from ..body.body import Body
 from ..body.couplings.coordinate_map import check_no_balls
 from ..body.momentum_gradients import energy_gradients
 from ..errors import TrajectoryError
-from .connection import mechanical_connection
 from .curves import PiecewisePolynomial
 from .shape_path import ShapePath, interpolated
 
@@ -53,7 +52,8 @@ def shape_speed(body: Body, shape: ArrayLike, rate: ArrayLike) -> Array:
     """
     check_object(body, "Body", "body")
     shapes, rates = np.broadcast_arrays(finite_array(shape, "shape", (None,)), finite_array(rate, "rate", (None,)))
-    return np.sqrt(np.maximum(2.0 * _energy(body, np.array(shapes), np.array(rates)), 0.0))
+    momenta = _gradients(body, np.array(shapes), np.array(rates))[1]
+    return np.sqrt(np.maximum(np.sum(rates * momenta, axis=-1), 0.0))
 
 
 def shape_geodesic(body: Body, start: ArrayLike, end: ArrayLike) -> ShapeGeodesic:
@@ -68,18 +68,17 @@ def shape_geodesic(body: Body, start: ArrayLike, end: ArrayLike) -> ShapeGeodesi
     """
     check_object(body, "Body", "body")
     check_no_balls(body.chain.follows, "geodesics of shapes need")
-    first, last = (
-        finite_array(start, "start", (body.n_shape,)).copy(),
-        finite_array(end, "end", (body.n_shape,)).copy(),
-    )
+    first = finite_array(start, "start", (body.n_shape,)).copy()
+    last = finite_array(end, "end", (body.n_shape,)).copy()
     nodes = 0.5 - 0.5 * np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)
-    once, twice = integrals(nodes)
+    once, twice = _integrals(nodes)
     straight = last - first
     shapes = first + nodes[:, None] * straight
     rates = np.broadcast_to(straight, shapes.shape)
     scale = float(np.abs(straight).max(initial=0.0))
+    too_far = TrajectoryError(f"no geodesic was found between two shapes whose joints differ by up to {scale:.6g}")
     for _ in range(_ROUNDS if scale > 0.0 else 0):
-        acceleration = _acceleration(body, shapes, rates)
+        acceleration = _acceleration(body, _metric(body, shapes), shapes, rates)
         bent = twice @ acceleration
         slope = straight - bent[-1]
         old, shapes = shapes, first + nodes[:, None] * slope + bent
@@ -87,18 +86,14 @@ def shape_geodesic(body: Body, start: ArrayLike, end: ArrayLike) -> ShapeGeodesi
         if not np.abs(shapes - old).max() > _SETTLED * scale:
             break
         if not np.abs(shapes - first).max() < 10.0 * scale:
-            raise _too_far(scale)
+            raise too_far
     else:
         if scale > 0.0:
-            raise _too_far(scale)
+            raise too_far
     return ShapeGeodesic(nodes, shapes, rates, float(shape_speed(body, shapes, rates).mean()))
 
 
-def _too_far(scale: float) -> TrajectoryError:
-    return TrajectoryError(f"no geodesic was found between two shapes whose joints differ by up to {scale:.6g}")
-
-
-def integrals(nodes: Array) -> tuple[Array, Array]:
+def _integrals(nodes: Array) -> tuple[Array, Array]:
     """Matrices from values at the nodes to the integral from 0 to each node, once and twice."""
     powers = np.vander(nodes, increasing=True)
     orders = np.arange(len(nodes))
@@ -108,61 +103,24 @@ def integrals(nodes: Array) -> tuple[Array, Array]:
     return once @ inverse, twice @ inverse
 
 
-def _energy(body: Body, shapes: Array, rates: Array) -> Array:
-    """Kinetic energy about the centre of mass without angular momentum: (..., n), (..., n) -> (...) [J]."""
-    turning = -np.einsum("...ij,...j->...i", mechanical_connection(body, shapes), rates)
-    return body.kinetic_energy(shapes, rates, turning)
-
-
-def _acceleration(body: Body, shapes: Array, rates: Array) -> Array:
-    """Acceleration of the geodesics with these rates: (N, n), (N, n) -> (N, n)."""
-    unit = np.eye(body.n_shape)
-    there, along = shapes[:, None, :], rates[:, None, :]
-    # Gradient of the energy, one coordinate after the other.
-    gradient = _energy(body, there + _STEP * unit, along + 0.0 * unit) - _energy(
-        body, there - _STEP * unit, along + 0.0 * unit
-    )
-    # Rate of the metric's momenta g r' while the shape moves and r' stays.
-    step = _STEP / float(np.abs(rates).max())
-    ahead, behind = (_momenta(body, there + sign * step * along, along, unit) for sign in (1.0, -1.0))
-    force = gradient / (2.0 * _STEP) - (ahead - behind) / (2.0 * step)
+def _acceleration(body: Body, metric: Array, shapes: Array, rates: Array) -> Array:
+    """Acceleration of the geodesics with these rates: (N, n, n), (N, n), (N, n) -> (N, n)."""
     try:
-        return np.asarray(np.linalg.solve(_metric(body, shapes), force[..., None])[..., 0], dtype=np.float64)
+        return np.asarray(np.linalg.solve(metric, _force(body, shapes, rates)[..., None])[..., 0], dtype=np.float64)
     except np.linalg.LinAlgError:
         raise TrajectoryError("there is no geodesic: some joints move no mass") from None
-
-
-def _momenta(body: Body, there: Array, along: Array, unit: Array) -> Array:
-    """g r' by its products with the unit vectors, from energies: (N, 1, n), (N, 1, n) -> (N, n)."""
-    shapes = there + 0.0 * unit
-    return 0.5 * (_energy(body, shapes, along + unit) - _energy(body, shapes, along - unit))
-
-
-def _metric(body: Body, shapes: Array) -> Array:
-    """The matrices g of twice the energy, r'.g r': (N, n) -> (N, n, n)."""
-    n = body.n_shape
-    unit = np.eye(n)
-    rows, columns = np.triu_indices(n)
-    there = np.repeat(shapes[:, None, :], len(rows), axis=1)
-    plus, minus = (
-        _energy(body, there, np.broadcast_to(unit[rows] + sign * unit[columns], there.shape)) for sign in (1.0, -1.0)
-    )
-    metric = np.empty((len(shapes), n, n))
-    metric[:, rows, columns] = metric[:, columns, rows] = 0.5 * (plus - minus)
-    return metric
 
 
 def changes_by_ends(body: Body, way: ShapeGeodesic) -> Array:
     """The derivatives of the shapes at the nodes by the start and by the end: (N, n, 2 n)."""
     n = way.shapes.shape[1]
-    once, twice = integrals(way.nodes)
+    once, twice = _integrals(way.nodes)
     share = way.nodes[:, None, None]
     unit = np.eye(n)
     straight = np.concatenate([(1.0 - share) * unit, share * unit], axis=2)
     slope = np.broadcast_to(np.concatenate([-unit, unit], axis=1), straight.shape)
-    metric = _gradient_metric(body, way.shapes)
-    force = _force(body, way.shapes, way.rates)
-    acceleration = np.asarray(np.linalg.solve(metric, force[..., None])[..., 0], dtype=np.float64)
+    metric = _metric(body, way.shapes)
+    acceleration = _acceleration(body, metric, way.shapes, way.rates)
     shapes, rates = straight, slope
     for _ in range(_ROUNDS):
         bent = _change_of_acceleration(body, way, metric, acceleration, shapes, rates)
@@ -195,8 +153,8 @@ def _force(body: Body, shapes: Array, rates: Array) -> Array:
     return _gradients(body, shapes, rates)[0] - (ahead - behind) / (2.0 * step)
 
 
-def _gradient_metric(body: Body, shapes: Array) -> Array:
-    """The matrices g: (N, n) -> (N, n, n)."""
+def _metric(body: Body, shapes: Array) -> Array:
+    """The matrices g of twice the energy, r'.g r': (N, n) -> (N, n, n)."""
     n = shapes.shape[1]
     there = np.broadcast_to(shapes[:, None], (len(shapes), n, n))
     return _gradients(body, there, np.broadcast_to(np.eye(n), there.shape))[1]

@@ -45,7 +45,6 @@ from .interpolation import (
     ball_columns,
     factors_between,
     fourier_curve,
-    joined_names,
     path_joint_names,
     rest_to_rest_curve,
     same_shape,
@@ -315,7 +314,13 @@ class ShapePath:
         TrajectoryError
             If the joints differ, or `other` starts at another shape than the one where this path ends.
         """
-        names = joined_names((self.n_shape, self.joint_names), (other.n_shape, other.joint_names))
+        if self.n_shape != other.n_shape:
+            raise TrajectoryError(f"paths of {self.n_shape} and {other.n_shape} joints cannot follow each other")
+        names = self.joint_names or other.joint_names
+        if names != (other.joint_names or names):
+            raise TrajectoryError(
+                f"paths with other joints or another order of joints: {names} and {other.joint_names}"
+            )
         end, start = self.shape(self.duration), other.shape(0.0)
         factors = factors_between(end, start, ball_columns(names))
         start = start * factors

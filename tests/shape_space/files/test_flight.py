@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.errors import ShapeError, TrajectoryError, TrajectoryWarning
-from shapephase.shape_space.files.read import read_recorded_motion
+from shapephase.shape_space.files import read_recorded_motion
 from shapephase.shape_space.free_fall import free_fall
 from support.motion_writers import write_delimited, write_opensim
 

@@ -18,6 +18,7 @@ from shapephase.cli.main import main
 from shapephase.errors import TrajectoryError, TrajectoryWarning
 from support.ball_bodies import BALLS
 
+pytestmark = pytest.mark.usefixtures("warm_engines")
 URDF = Path(__file__).parents[2] / "cases" / "boughs.urdf"
 BODY = sp.load_body(URDF)
 TIMES = np.linspace(0.0, 1.0, 41)

@@ -12,7 +12,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning, UnknownNameError
-from shapephase.shape_space.files.read import read_recorded_motion
+from shapephase.shape_space.files import read_recorded_motion
 from support.odd_motion_files import GOOD_ARRAYS, HEADER, LEFT, ODD_FILES, csv_text, npz_bytes, odd_file
 from support.reference_load import Effort
 

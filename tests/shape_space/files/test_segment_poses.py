@@ -17,6 +17,7 @@ from support import segment_files
 from support.bodies import link, urdf
 from support.segment_files import COUNT, LINKS, THEIR_NAMES, TIMES, moved, own_axes
 
+pytestmark = pytest.mark.usefixtures("warm_readers")
 ROUNDING = 1e-10
 SINGLE = 2e-6
 """C3D files have single precision, of lengths of some metres in mm."""

@@ -6,7 +6,7 @@ from scipy.interpolate import make_interp_spline
 
 import shapephase as sp
 from shapephase.errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
-from shapephase.shape_space.files.smoothing import smoothed_path
+from shapephase.shape_space.files import smoothed_path
 from shapephase.shape_space.linear_smoother import LinearSmoother
 
 NAMES = ("hip", "knee")

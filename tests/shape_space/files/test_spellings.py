@@ -14,7 +14,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.errors import MissingExtraError, ShapePhaseError, TrajectoryError, TrajectoryWarning, UnknownNameError
-from shapephase.shape_space.files.read import read_recorded_motion
+from shapephase.shape_space.files import read_recorded_motion
 from support.motion_writers import write_opensim
 
 pytestmark = pytest.mark.usefixtures("warm_readers")
@@ -439,7 +439,7 @@ def test_a_wheel_that_turns_far_is_asked_about_and_comes_back_as_it_was_written(
     ("module", "file", "extra"),
     [
         *(("openpyxl", "m.xlsx", "data"), ("pyarrow.parquet", "m.parquet", "data"), ("h5py", "m.h5", "data")),
-        *(("ezc3d", "m.c3d", "data"), ("rosbags.highlevel", "m.bag", "data"), ("yaml", "m.yaml", "data")),
+        *(("ezc3d", "m.c3d", "data"), ("rosbags.rosbag1", "m.bag", "data"), ("yaml", "m.yaml", "data")),
     ],
 )
 def test_a_missing_extra_is_named(tmp_path, monkeypatch, module, file, extra):

@@ -40,10 +40,7 @@ class Gaps:
         self._method: dict[str, str] = {}
 
     def held(self, table: Table, label: str) -> Array:
-        """A column with the last number before it in each gap, which `bridged` and `turned` then replace.
-
-        Raises TrajectoryError for a word, an infinite number, and a column without numbers.
-        """
+        """A column with the last number before it in each gap, which `bridged` and `turned` then replace."""
         if label not in self._missing:
             self._missing[label] = table.missing(label)
         missing = self._missing[label]
@@ -80,10 +77,7 @@ class Gaps:
         return filled
 
     def turned(self, labels: Sequence[str], turns: Array) -> Array:
-        """Rotations (N, 3, 3) of joined columns, in their gaps those of the C2 rotation spline through the others.
-
-        Raises TrajectoryError where a rotation across a gap is too large for its direction to be known.
-        """
+        """Rotations (N, 3, 3) of joined columns, in their gaps those of the C2 rotation spline through the others."""
         from scipy.spatial.transform import Rotation, RotationSpline
 
         missing = self._inside(labels[0])
@@ -106,10 +100,7 @@ class Gaps:
         return filled
 
     def settled(self) -> tuple[Integers, dict[str, Any] | None]:
-        """The samples without gaps at the ends, and what was filled and cut, ready for JSON.
-
-        Raises TrajectoryError for gaps that are not to be bridged.
-        """
+        """The samples without gaps at the ends, and what was filled and cut, ready for JSON."""
         ends = {label: np.flatnonzero(~missing)[[0, -1]].tolist() for label, missing in self._missing.items()}
         count = len(self._recording.times)
         low = max((first for first, _ in ends.values()), default=0)

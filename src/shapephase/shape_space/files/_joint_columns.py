@@ -363,8 +363,6 @@ def with_quaternions(
     tables that are made of BVH files name them.
 
     names : label -> name of the joint
-
-    Raises TrajectoryError if one of the three is missing, is no angle, or has a doubtful unit.
     """
     table = recording.table
     sources: dict[str, str] = {}
@@ -409,8 +407,6 @@ def continued_balls(shapes: Array, body: Body, recording: Recording, gaps: Gaps,
     """Shapes (N, n) with the quaternions of ball joints, bridged, in the sign that is nearer to the sample before.
 
     columns : joint -> label
-
-    Raises TrajectoryError if the length of one is far from one.
     """
     balls = ball_columns(body.joint_names) if body.ball_joints else ()
     for ball, joint in zip(balls, body.ball_joints, strict=True):

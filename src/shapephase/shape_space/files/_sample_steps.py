@@ -84,10 +84,7 @@ def warn_of_fast_turns(recording: Recording, motion: Matched, body: Body) -> Non
 
 
 def evenly_spaced(times: Array, motion: Matched, inside: slice, rate: float) -> tuple[Array, Matched, slice]:
-    """A motion at so many even times a second [1/s], by splines through its samples, and which of them are inside.
-
-    Raises TrajectoryError for more samples a second than there are: their noise would not be that of a recording.
-    """
+    """A motion at so many even times a second [1/s], by splines through its samples, and which of them are inside."""
     usual = 1.0 / float(np.median(np.diff(times)))
     if rate > _DENSER * usual:
         raise TrajectoryError(
@@ -160,21 +157,15 @@ def surrounded(
         warnings.simplefilter("ignore", TrajectoryWarning)
         whole = untrimmed()
         first = list(whole.table.rows).index(kept.table.rows[0])
-        start, stop = _readable(whole, first, first + len(kept.times), _broken(whole, motion.left_out, fill))
+        past, steps = first + len(kept.times), np.diff(whole.times)
+        apart = np.flatnonzero(steps > _GAP * float(np.median(steps[first : past - 1])))
+        broken = _broken(whole, motion.left_out, fill)
+        start = max([*(apart[apart < first] + 1), *(broken[broken < first] + 1), 0])
+        stop = min([*(apart[apart >= past - 1] + 1), *broken[broken >= past], len(whole.times)])
         part, around = match(part_of(whole, np.arange(start, stop)))
         begin = list(part.table.rows).index(kept.table.rows[0])
         return part, around, slice(begin, begin + len(kept.times))
     return kept, motion, slice(None)
-
-
-def _readable(whole: Recording, first: int, past: int, broken: Integers) -> tuple[int, int]:
-    """Ends of the stretch around some samples that has no gaps and no missing numbers."""
-    steps = np.diff(whole.times)
-    usual = float(np.median(steps[first : past - 1]))
-    apart = np.flatnonzero(steps > _GAP * usual)
-    before = np.concatenate([apart[apart < first] + 1, broken[broken < first] + 1, [0]])
-    after = np.concatenate([apart[apart >= past - 1] + 1, broken[broken >= past], [len(whole.times)]])
-    return int(before.max()), int(after.min())
 
 
 def _broken(whole: Recording, left_out: Collection[str], fill: float | None) -> Integers:

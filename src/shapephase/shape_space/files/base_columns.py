@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import permutations
 from typing import Any, NamedTuple
@@ -150,10 +150,7 @@ def base_choices(order: str | None, axes: Any) -> BaseChoices:
 
 
 def named_axes(text: str) -> Array:
-    """Rotation from base axes by words such as "x -z y", where x, y and z axis of the base point to.
-
-    Raises TrajectoryError.
-    """
+    """Rotation from base axes by words such as "x -z y", where x, y and z axis of the base point to."""
     words = text.replace(",", " ").split()
     matrix = np.zeros((3, 3))
     for column, word in enumerate(words[:3]):
@@ -395,27 +392,17 @@ def _vectors_of_mrps(parameters: Array) -> Array:
     return parameters * np.where(tiny, 4.0, 4.0 * np.arctan(sizes) / np.where(tiny, 1.0, sizes))
 
 
-class _Part(NamedTuple):
-    """Parts of a label: the kind, the words before it, and the component as it is written there."""
-
-    kind: str
-    stem: tuple[str, ...]
-    component: str
-
-
 def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, str]:
     """Label -> the name of a column of the base, of all labels that complete a quaternion, a place and so on.
 
     targets : label -> the name that it goes by
     own : names of joints and columns that are known already
-
-    Raises TrajectoryError for a quaternion numbered from 1, of which the number of the scalar part is not known.
     """
     families: dict[tuple[str, tuple[str, ...]], dict[str, str]] = {}
     for text, target in targets.items():
         part = None if target in own or label(target).name in own else _part(target)
         if part is not None:
-            families.setdefault((part.kind, part.stem), {})[part.component] = text
+            families.setdefault(part[:2], {})[part[2]] = text
     names: dict[str, str] = {}
     for (kind, _), texts in families.items():
         components = _components(kind, texts)
@@ -424,8 +411,8 @@ def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, st
     return names
 
 
-def _part(target: str) -> _Part | None:
-    """The kind and the component of a label; None of one that is no part of the base."""
+def _part(target: str) -> tuple[str, tuple[str, ...], str] | None:
+    """Kind, words before it and component of a label; None of one that is no part of the base."""
     plain = label(target).name
     rooted = "/" in plain or "." in plain
     tokens: list[str] = []
@@ -436,7 +423,7 @@ def _part(target: str) -> _Part | None:
         return None
     *before, last = tokens
     if last in _EULER:
-        return _Part(EULER, tuple(before), _EULER[last]) if _is_base(before, rooted) else None
+        return (EULER, tuple(before), _EULER[last]) if _is_base(before, rooted) else None
     if last not in (*"wxyz", *"01234"):
         return None
     for k, word in enumerate(before):
@@ -444,13 +431,12 @@ def _part(target: str) -> _Part | None:
             # `t1` to `t3` may be torques or temperatures; `r_BN_N_1` is a place.
             if _KIND_OF[word] == PLACE and len(word) == 1 and last.isdigit() and not before[k + 1 :]:
                 return None
-            return _Part(_KIND_OF[word], tuple(before), last) if _is_base(before[:k], rooted) else None
-    return _Part(PLACE, tuple(before), last) if last in "xyz" and set(before) <= _BASE else None
+            return (_KIND_OF[word], tuple(before), last) if _is_base(before[:k], rooted) else None
+    return (PLACE, tuple(before), last) if last in "xyz" and set(before) <= _BASE else None
 
 
-def _is_base(before: Iterable[str], rooted: bool) -> bool:
+def _is_base(words: list[str], rooted: bool) -> bool:
     """True if the words before a kind may be the base: known words, or the topic of a message."""
-    words = list(before)
     return set(words) <= _BASE or (rooted and (not words or words[-1] in _BASE))
 
 

@@ -151,10 +151,7 @@ def time_unit_argument(unit: str | None) -> str | None:
 
 
 def quantity(value: object, unit: str, what: str) -> float:
-    """A number in the unit of a joint, "rad", "m" or none, or a text such as `30deg` or `5 mm`, in SI units.
-
-    Raises TrajectoryError, which begins with `what`.
-    """
+    """A number in the unit of a joint, "rad", "m" or none, or a text such as `30deg` or `5 mm`, in SI units."""
     number, stated = _number_and_unit(value, what)
     sizes = ANGLES if unit == "rad" else LENGTHS
     if stated is None:
@@ -184,8 +181,6 @@ def amounts(value: object, what: str) -> dict[str, float]:
     """Amounts of an angle, a length, and a quaternion, which has half of its turn: {"rad": ..., "m": ..., "1": ...}.
 
     A number is both angle and length; a text such as `3deg` or `3deg,5mm` names them, and others are zero.
-
-    Raises TrajectoryError, which begins with `what`.
     """
     given: dict[str, float] = {}
     for part in value.split(",") if isinstance(value, str) else [value]:

@@ -93,13 +93,10 @@ class Reading:
     names : column or segment -> joint or link, None to leave it out; None: not given
     listed : True where names were a list, one for each column
     joints, segments, flight : how columns become joints and base, segments links, and what a flight is
-    time_unit, timestep, topic, joint_order : as `read_recorded_motion` has them
     trim : first and last time that are kept, as the file gives them
     rate, cut_off : of resampling and of the low-pass filter [1/s]
-    smooth, penalty : noise of the samples, and the penalty in place of that which follows from it
     close : largest gap that is closed; None: none
-    close_by : how it is closed, or None
-    loop : True where ends that meet are joined smoothly
+    given : all options, by name
     """
 
     names: Mapping[str, str | None] | None
@@ -107,18 +104,11 @@ class Reading:
     joints: JointChoices
     segments: SegmentChoices
     flight: FlightChoices
-    time_unit: str | None
-    timestep: float | None
-    topic: str | None
-    joint_order: str | None
     trim: tuple[float, float] | None
     rate: float | None
     cut_off: float | None
-    smooth: float | str | Mapping[str, float | str] | None
-    penalty: float | None
     close: float | str | None
-    close_by: str | None
-    loop: bool
+    given: Callable[[str], Any]
 
     @classmethod
     def of(cls, options: ReadingOptions) -> Reading:
@@ -134,8 +124,7 @@ class Reading:
         resample, lowpass = given("resample"), given("lowpass")
         rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
         cut_off = None if lowpass is None else positive_argument(lowpass, "lowpass", "a frequency in Hz")
-        smooth, penalty = given("smooth"), given("smooth_penalty")
-        if cut_off is not None and not (smooth is None and penalty is None):
+        if cut_off is not None and not (given("smooth") is None and given("smooth_penalty") is None):
             raise TrajectoryError(
                 "lowpass and smooth are two ways to do one thing; leave one of them out (lowpass, --lowpass; smooth, "
                 "--smooth; smooth_penalty, --smooth-penalty)"
@@ -162,18 +151,11 @@ class Reading:
                 names=names or {}, calibration=given("calibration"), length_tolerance=given("length_tolerance")
             ),
             flight=flight,
-            time_unit=given("time_unit"),
-            timestep=given("timestep"),
-            topic=given("topic"),
-            joint_order=order,
             trim=trim,
             rate=rate,
             cut_off=cut_off,
-            smooth=smooth,
-            penalty=penalty,
             close=close,
-            close_by=given("close_by"),
-            loop=given("close") is None,
+            given=given,
         )
 
 

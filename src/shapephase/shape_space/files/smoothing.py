@@ -275,8 +275,6 @@ def filtered_attitudes(times: Array, attitudes: Array, cut_off: float) -> Array:
     are left are filtered, and made unit again. For a small wobble at the frequency f on a turn whose rate differs from
     the mean by w [rad/s], this leaves the mean of the shares h of the frequencies f - w/(4 pi) and f + w/(4 pi), and
     half of their difference turned by a right angle about the axis of w, both over the share of w/(4 pi).
-
-    Raises TrajectoryError where turns are too fast for the cut-off.
     """
     steps = so3.log(attitudes[1:] @ so3.transpose(attitudes[:-1]))
     mean_turn = so3.exp((times - times[0])[:, None] * steps.sum(axis=0) / (times[-1] - times[0]))

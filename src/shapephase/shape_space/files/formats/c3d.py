@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import MissingExtraError, TrajectoryError
+from ....errors import TrajectoryError
 from ..labels import LENGTHS, unit_of
 from ..recording import Table
 from .column_tables import column_table
-from .parser_process import parsed
+from .parser_process import by_library, parsed
 from .segment_poses import matrix_poses
 
 INVERSE_KINEMATICS = (  # the way from markers to joints
@@ -33,11 +33,10 @@ def read_c3d(where: Path, data: bytes) -> Table:
 
     Without angles, the poses of segments in its group ROTATION, as markerless systems write them. The file is parsed in
     a process of its own: a damaged one can crash ezc3d.
-
-    Raises TrajectoryError for faults, with the frame, and for markers alone; MissingExtraError without ezc3d.
     """
-    if importlib.util.find_spec("ezc3d") is None:
-        raise MissingExtraError("C3D files need ezc3d; install it with: pip install 'shapephase[data]'")
+    with by_library(where, "C3D file", "ezc3d"):
+        if importlib.util.find_spec("ezc3d") is None:
+            raise ImportError
     _check_sizes(where, data)
     content = parsed(where, data, "C3D", __name__)
     labels, angles = content["labels"].tolist(), set(content["angles"].tolist())

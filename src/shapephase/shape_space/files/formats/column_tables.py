@@ -33,8 +33,6 @@ def column_table(
     units : label -> unit, where it is stated beside the label
     rows : (N,) the numbers of the samples in messages; None: from 0
     comma : True if texts have decimal commas
-
-    Raises TrajectoryError for labels that are no texts, empty or doubled, and columns of several lengths.
     """
     numbers: dict[str, Array] = {}
     faults: dict[str, dict[int, str]] = {}
@@ -122,10 +120,7 @@ def _seconds(times: Any) -> Array:
 
 
 def _dates(entries: Sequence[Any], place: str) -> Array | None:
-    """Dates, times of a day or durations of Python, or texts of them [s]; None for other entries.
-
-    Raises TrajectoryError for dates of which one cannot be read.
-    """
+    """Dates, times of a day or durations of Python, or texts of them [s]; None for other entries."""
     first = next((entry for entry in entries if entry is not None and entry != ""), None)
     if isinstance(first, str) and (DATE.fullmatch(first.strip()) or CLOCK.fullmatch(first.strip())):
         import pandas as pd

@@ -28,8 +28,6 @@ def read_deepmimic(where: Path, data: bytes) -> Table:
     Columns are called as DeepMimic's joints are, with `.x`, `.y`, `.z`, `.w` of spherical ones: the body has ball
     joints of these names. Quaternions are made as long as 1, as DeepMimic does it (`cKinTree::PostProcessPose`): its
     own files have some of other lengths.
-
-    Raises TrajectoryError for JSON that is no such motion.
     """
     try:
         motion = json.loads(data)

@@ -84,8 +84,6 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
     that are a quaternion of length one. Coordinates may stand along either axis.
 
     order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
-
-    Raises TrajectoryError, ShapeError for arrays that fit no order, or several.
     """
     kind = next((name for name in ("qpos", "q", "Q") if name in arrays), None)
     if kind is None:
@@ -177,10 +175,7 @@ def with_free_joint(
 
 
 def numbered_columns(columns: Mapping[str, Any], where: str) -> dict[str, list[str]]:
-    """Labels such as `qpos_0`, `q[1]` and `Qdot2`, by array in their order; of arrays whose numbers are 0, 1, 2, ...
-
-    Raises TrajectoryError for two labels of one number.
-    """
+    """Labels such as `qpos_0`, `q[1]` and `Qdot2`, by array in their order; of arrays whose numbers are 0, 1, 2, ..."""
     by_array: dict[str, dict[int, str]] = {}
     for label in columns:
         match = _NUMBERED.fullmatch(label.strip())

@@ -66,8 +66,6 @@ def arrays_motion(
     timestep : [s], for arrays without times
     order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
     kind : of the source, for people
-
-    Raises TrajectoryError for faults, with the array and the entry.
     """
     try:
         both = {"qpos", "q", "Q"} & set(arrays)
@@ -98,10 +96,7 @@ def arrays_motion(
 
 
 def of_numbered_columns(table: Table, body: Body, order: str | None) -> Table:
-    """The table with base and joints in place of columns such as `qpos_0`, `q[1]`.
-
-    Raises TrajectoryError, ShapeError if they are no order of coordinates of the body.
-    """
+    """The table with base and joints in place of columns such as `qpos_0`, `q[1]`."""
     numbered = numbered_columns(table.columns, table.where)
     taken = [label for labels in numbered.values() for label in labels]
     places = next((numbered[name] for name in ("qpos", "q", "Q") if name in numbered), [])
@@ -254,9 +249,6 @@ def named_columns(
     these behind a free joint, or a place and a quaternion x y z w; with a warning. Columns that `names` numbers keep
     their numbers. Numbers do not show where the scalar part of a free joint's quaternion stands, first (MuJoCo) or last
     (Pinocchio).
-
-    Raises TrajectoryError if the number of columns fits nothing, or two of these; for a free joint whose quaternion
-    `names` does not number.
     """
     numbered = [label for label in table.columns if label in names]
     if not table.numbered or len(numbered) == len(table.columns):

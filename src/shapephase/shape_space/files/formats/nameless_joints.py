@@ -108,9 +108,6 @@ def placed_joints(
     orders : 1: the quaternion is w x y z; 2: it may be x y z w, too
     names : of the columns; None: those of an order
     spins : (N, b, 3) angular velocities of the bodies, world axes [rad/s], where they are known, at `times` (N,) [s]
-
-    Raises TrajectoryError if no order lets the links lie where the bodies are and turn as fast, or several different
-    ones do.
     """
     if places.ndim != 3 or places.shape[::2] != (len(joints), 3):
         raise TrajectoryError(

@@ -32,10 +32,7 @@ _WHOLE_BODY = "center_of_mass"  # BodyKinematics' last columns, without angles
 
 
 def read_mvnx(where: Path, data: bytes) -> Table:
-    """The poses of a suit's segments, and its calibration poses; the room's z axis is up.
-
-    Raises TrajectoryError for faults, with the line.
-    """
+    """The poses of a suit's segments, and its calibration poses; the room's z axis is up."""
     try:
         suit = read_suit(data)
     except BvhFaultError as error:
@@ -82,8 +79,6 @@ def body_kinematics(table: Table, kind: str) -> Table:
     """The table of an OpenSim file with its columns `BODY_X`, ..., `BODY_Oz` as poses of segments, where it has them.
 
     kind : first line of the file
-
-    Raises TrajectoryError for velocities and accelerations, which have columns of these names, too.
     """
     bodies = [name.removesuffix("_Ox") for name in table.columns if name.endswith("_Ox")]
     labels = {body: [f"{body}_{axis}" for axis in _KINEMATICS] for body in bodies}
@@ -128,8 +123,6 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
     links.
 
     names : label or segment -> joint or link, or None for what is left out
-
-    Raises TrajectoryError if places are missing, a quaternion is none, or a unit is none of lengths.
     """
     parts: dict[str, dict[str, str]] = {}
     places: dict[str, dict[str, str]] = {}
