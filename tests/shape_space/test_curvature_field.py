@@ -169,9 +169,9 @@ def test_curvature_against_differences_of_order_eight(body, rng):
     ("name", "pairs"),
     [
         ("cat_two_halves", "all"),
-        ("cat", 3),
-        ("example:human", 3),
-        ("example:kinova", 3),
+        ("cat", 2),
+        ("example:human", 2),
+        ("example:kinova", 2),
         ("satellite", [("boom_extension", "wheel_spin"), ("left_wing_drive", "boom_extension")]),
     ],
 )

@@ -13,6 +13,7 @@ import pytest
 import shapephase as sp
 from shapephase import so3
 from support.independent import BODIES, body_of
+from support.long_runs import full_but
 
 HARMONICS, DURATION = 2, 2.0
 SIZES = {"satellite": 0.05}
@@ -46,7 +47,7 @@ class Family:
         return self.d_mean + waves + np.einsum("mnh,th->tmn", self.d_sines, np.sin(phase))
 
 
-@pytest.mark.parametrize("name", [*BODIES, "example:panda"])
+@pytest.mark.parametrize("name", full_but([*BODIES, "example:panda"], "cat_two_halves", "satellite", "example:panda"))
 def test_it_is_the_limit_of_differences(name: str):
     family = Family(name, seed=1)
     turned, derivative = sp.holonomy_derivative(family.body, family.path(), family.variation, 1e-12)

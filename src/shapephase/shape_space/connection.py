@@ -23,7 +23,7 @@ from .path_series import evenly_divided, panel_edges
 from .shape_path import CLOSED, ShapePath
 
 _GAUSS_RULE = np.polynomial.legendre.leggauss(16)  # 16 nodes resolve a few swings on a panel
-_PIECES = (2, 4, 8, 16, 32, 64)  # panels per piece, in turn: a change at 64 means an undeclared break
+_PIECES = [2**k for k in range(1, 7)]  # panels per piece, in turn: a change at 64 means an undeclared break
 
 
 def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordinates") -> Array:

@@ -29,7 +29,7 @@ _SEED = 15  # any fixed seed: repeatable results
 _NO_LIMIT = 1e3  # [rad or m] wider limits stand for none
 _ROUNDING = 16.0 * _EPS  # largest rounding of the curvature of 130 flat bodies
 _NODES = 12  # Gauss nodes per piece of a ray: they resolve one swing of the curvature
-_PIECES = (1, 2, 4, 8, 16, 32, 64)  # of a ray, tried until the integral settles
+_PIECES = [2**k for k in range(7)]  # of a ray, tried until the integral settles
 _ROWS = 2000  # rays, or pieces of rays, computed together: bounds memory
 _SHARE = 0.01  # of the tolerance for each ray: the sum over the path then keeps it
 
@@ -186,7 +186,8 @@ def stokes_holonomy(
             f"joint {body.joint_names[joint]} ends {route.gap[joint] / (2.0 * np.pi):.6g} turns from its start: no "
             "cone spans such a loop, whose holonomy is not made of curvature alone; use holonomy"
         )
-    times = route.duration / route.loops * (np.arange(256) + 0.5) / 256
+    middles = np.arange(256) + 0.5
+    times = route.duration / route.loops * middles / len(middles)
     tip = route.curve(times)[0].mean(axis=0) if centre is None else _one_shape(body, centre, "centre")
     cone = _Cone(body, route, tip, goal)
     carried = Sampler(cone.sample, route.smoothness)

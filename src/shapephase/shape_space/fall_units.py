@@ -10,9 +10,10 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import TrajectoryError, TrajectoryWarning
+from .files.labels import LENGTHS
 from .free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
 
-_LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}  # [m] units mixed up by mistake
+_LENGTHS = {**LENGTHS, "in": 0.0254, "ft": 0.3048}  # [m] units mixed up by mistake
 # [1/s] usual frame rates.
 _RATES = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 200, 240, 250, 300, 400, 480, 500, 1000)
 _MOST_TIMES = 10.0  # largest error of the frame rate

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
@@ -279,14 +280,14 @@ def _butterworth(count: int, periodic: bool) -> tuple[Any, Any]:
     splines = count if periodic else max(count - BUTTERWORTH, 0)
     first = np.arange(splines)
 
-    def band(entries: list[float], shift: int, rows: int) -> Any:
+    def band(entries: Sequence[float] | Array, shift: int, rows: int) -> Any:
         places = first[:, None] + np.arange(len(entries)) + shift
         columns, values = np.broadcast_to(first[:, None], places.shape), np.broadcast_to(entries, places.shape)
         inside = np.ones_like(places, dtype=bool) if periodic else (places >= 0) & (places < rows)
         there = (values[inside], (places[inside] % max(rows, 1), columns[inside]))
         return coo_array(there, shape=(rows, splines)).tocsc()
 
-    return band([1.0, -2.0, 1.0], 0, count), band([1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16], -2, splines)
+    return band([1.0, -2.0, 1.0], 0, count), band(np.array([1, 4, 6, 4, 1]) / 16, -2, splines)
 
 
 def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:

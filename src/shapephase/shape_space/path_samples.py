@@ -11,10 +11,9 @@ import numpy as np
 from ..arrays import Array, Integers, Mask
 from ..errors import WrongObjectError
 from .curves import PiecewisePolynomial, Reordered
+from .interpolation import REST_TO_REST
 from .shape_geodesic import ClosingArc
 from .shape_path import PathOrigin, ShapePath, interpolated
-
-_REST_TO_REST = (10.0, -15.0, 6.0)  # quintic of least jerk from 0 to 1: coefficients of s^3, s^4, s^5
 
 
 class SampleOrigin(PathOrigin, Protocol):
@@ -231,7 +230,7 @@ def path_samples(path: ShapePath) -> PathSamples:
 def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
     """Convert derivatives by coefficients (6, pieces, m) to those by values at the knots: (pieces + 1, m)."""
     by_move = sum(
-        factor * by_coefficients[power] / widths[:, None] ** power for power, factor in enumerate(_REST_TO_REST, 3)
+        factor * by_coefficients[power] / widths[:, None] ** power for power, factor in enumerate(REST_TO_REST, 3)
     )
     by_knots = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
     by_knots[:-1] += by_coefficients[0] - by_move

@@ -51,7 +51,7 @@ from .interpolation import (
     sample_arguments,
     spline_curve,
 )
-from .path_series import resolved_accelerations, spline_times
+from .path_series import SAME_TIME, resolved_accelerations, spline_times
 from .scan.function_scan import DerivedScan, FunctionScan, JoinedScan, check_rates, path_function
 from .scan.scanning import scanned
 
@@ -277,7 +277,7 @@ class ShapePath:
         if self.scanner is not None:
             return self.scanner()
         period = self.duration / self.loops
-        edges = self.breaks[self.breaks <= period * (1.0 + 1e-12)]
+        edges = self.breaks[self.breaks <= period * (1.0 + SAME_TIME)]
         return scanned(path_function(self.curve, self.n_shape, self.joint_names), edges)
 
     @property

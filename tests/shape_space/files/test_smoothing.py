@@ -8,6 +8,7 @@ import shapephase as sp
 from shapephase.errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
 from shapephase.shape_space.files import smoothed_path
 from shapephase.shape_space.linear_smoother import LinearSmoother
+from support.long_runs import full_but
 
 NAMES = ("hip", "knee")
 
@@ -78,7 +79,7 @@ def test_it_is_the_spline_of_least_jerk(penalty):
     np.testing.assert_allclose(path.shape(t), expected, atol=1e-8, rtol=0)
 
 
-@pytest.mark.parametrize("width", [3.0, 30.0, 300.0])
+@pytest.mark.parametrize("width", full_but([3.0, 30.0, 300.0], 30.0))
 def test_wide_penalties_keep_their_digits(width):
     """Over a loop of even times the map is a convolution, known by its Fourier transform; a width is where half of what
     swings goes, so that what swings 40 times as slowly is kept to 40^-6."""

@@ -13,8 +13,8 @@ from ...errors import TrajectoryError
 from .labels import seconds
 from .recording import Recording, Table, listed
 
-_UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] a larger rotation across a gap has an unknown direction
-_ROUNDING = 1e-9  # relative excess of a sum of time steps
+UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] a larger rotation across a gap has an unknown direction
+ROUNDING = 1e-9  # relative excess of a sum of time steps
 _MOST_SHOWN = 4  # columns and gaps that an error lists
 
 
@@ -29,7 +29,6 @@ def fill_argument(fill: float | str | None) -> float | None:
 class Gaps:
     """Samples that columns of a recording lack, and their bridges.
 
-    recording : whose times the samples have
     longest : gap that is bridged [s], from the last number before it to the first one after it; None: none is
     """
 
@@ -87,7 +86,7 @@ class Gaps:
         samples, times = np.flatnonzero(~self._missing[labels[0]]), self._recording.times
         known = turns[samples]
         steps = so3.angle(so3.transpose(known[:-1]) @ known[1:])
-        wide = np.flatnonzero((np.diff(samples) > 1) & (steps > _UNRESOLVED))
+        wide = np.flatnonzero((np.diff(samples) > 1) & (steps > UNRESOLVED))
         if len(wide):
             before, after = int(samples[wide[0]]), int(samples[wide[0] + 1])
             raise TrajectoryError(
@@ -144,14 +143,14 @@ class Gaps:
     def _check(self, gaps: dict[tuple[int, int], list[str]], outer: Sequence[tuple[str, list[str], int, int]]) -> None:
         """Raise TrajectoryError for gaps longer than those to be bridged."""
         lengths = {gap: self._length(*gap) for gap in gaps}
-        longest = -1.0 if self._longest is None else self._longest * (1.0 + _ROUNDING)
+        longest = -1.0 if self._longest is None else self._longest * (1.0 + ROUNDING)
         refused = sorted(gap for gap, length in lengths.items() if length > longest)
         where = self._recording.table.where
         if refused:
             shown = [f"{_columns(gaps[gap])} {self._span(*gap)}" for gap in refused[:_MOST_SHOWN]]
             more = f"; and {len(refused) - len(shown)} more" if len(refused) > len(shown) else ""
             beyond = "" if self._longest is None else f"; longer than the {self._longest:g} s to be bridged"
-            need = f"{np.ceil(1e3 * max(lengths.values()) * (1.0 - _ROUNDING)) / 1e3:g}"
+            need = f"{np.ceil(1e3 * max(lengths.values()) * (1.0 - ROUNDING)) / 1e3:g}"
             raise TrajectoryError(
                 f"{where}: no number in {'; '.join(shown)}{more}{beyond}; bridge gaps of that length with fill={need} "
                 f"(--fill {need}s), or keep a stretch without them (trim, {self._trim_option(*refused[0])})"

@@ -38,7 +38,7 @@ from .labels import (
     warn_of_limits,
     warn_of_turns,
 )
-from .recording import LONGEST_NAME, Recording, Table, checked_quaternions, listed, warn
+from .recording import LONGEST_NAME, NEARLY_UNIT, Recording, Table, checked_quaternions, listed, warn
 from .times import is_clock, part_of
 
 _STILL = 1e-9  # [rad, m or degrees] range of a locked coordinate
@@ -47,23 +47,13 @@ _MOST_SHOWN = 50  # columns that an error lists
 _NO_JOINT = "no joint of the body"
 _SAME = 1e-6  # relative to their range: printed digits of a coordinate that follows another
 _TURN = re.compile(r"(?P<joint>.+)(?:\.r(?P<small>[xyz])|_(?P<large>[XYZ])rotation)", re.DOTALL)
-_OFF_UNIT = 0.1  # allowed error of a quaternion's length: splines between unit quaternions are shorter
 _ACROSS = 1e-6  # cosine of the angle between orthogonal axes
 _JUMP = 0.5 * np.pi  # [rad] per sample of two hinges, while the link turns by less than a third of it
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointChoices:
-    """How columns become joints, checked.
-
-    names : label -> name of the joint, with a unit if need be; None for a column to be left out
-    base : how columns become the motion of the base
-    degrees : True if turning joints are in degrees; None: as the file states. A sliding joint never is
-    rest : joint -> value [rad or m] or a text with its unit, of joints without a column
-    rest_missing : True to let joints without a column rest at zero, or at the limit that is nearest to it
-    ignore_extra : True to leave out columns that match no joint
-    fill : longest gap that is bridged [s]; None: none is
-    """
+    """How columns become joints, checked: options of `read_recorded_motion`; names of columns as labels."""
 
     names: Mapping[str, str | None]
     base: BaseChoices
@@ -108,16 +98,11 @@ class Matched(NamedTuple):
 
 
 def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Recording, Matched]:
-    """The recording without gaps at its ends, and its motion of the body's joints and base.
-
-    Raises UnknownNameError if a column is no joint of the body; TrajectoryError if a joint is missing or doubled, a
-    value is no possible coordinate, a gap is not to be bridged, or a unit is doubtful. Warns where a joint leaves its
-    limits, or jumps by about a whole turn from one sample to the next.
-    """
+    """The recording without gaps at its ends, and its motion of the body's joints and base."""
     where = recording.table.where
     for text in recording.table.columns:
         if len(text) > LONGEST_NAME:
-            raise TrajectoryError(f"{where}: a column's name has {len(text)} characters: {text[:40]!r}...")
+            raise TrajectoryError(f"{where}: a column's name has {len(text)} characters: {text!r:.40}...")
     gaps = Gaps(recording, choices.fill)
     recording, sources = with_quaternions(recording, body, choices.names, choices.degrees, gaps)
     table = recording.table
@@ -361,8 +346,6 @@ def with_quaternions(
     The columns `shoulder.rz`, `shoulder.rx`, `shoulder.ry` of a ball joint, in the order in which they stand, are turns
     about z, x and y, each about its axis as those before have turned it; so are `shoulder_Zrotation` and so on, as
     tables that are made of BVH files name them.
-
-    names : label -> name of the joint
     """
     table = recording.table
     sources: dict[str, str] = {}
@@ -410,7 +393,7 @@ def continued_balls(shapes: Array, body: Body, recording: Recording, gaps: Gaps,
     """
     balls = ball_columns(body.joint_names) if body.ball_joints else ()
     for ball, joint in zip(balls, body.ball_joints, strict=True):
-        quaternions = checked_quaternions(shapes[:, ball], recording, f"ball joint {joint}", _OFF_UNIT)
+        quaternions = checked_quaternions(shapes[:, ball], recording, f"ball joint {joint}", NEARLY_UNIT)
         labels = [columns[column] for column in range(ball.start, ball.stop) if column in columns]
         turns = so3.matrix_from_quat(quaternions)
         bridged = gaps.turned(labels, turns) if labels else turns

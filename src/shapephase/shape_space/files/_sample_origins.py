@@ -21,13 +21,11 @@ from ..shape_path import ShapePath, interpolated
 class Prepared:
     """Samples, from which turns and drift are taken off, which are smoothed, and through which a spline is put.
 
-    samples : (N, n) as recorded [rad or m]
     smoother : of columns (n,); has the times of the samples, and whether the spline is periodic
     pilot : a smoother of a higher order, by whose motion it is known what the other one takes off; None: unknown
     inside : the samples between whose times the path is, of those that are smoothed
     turns : (n,) whole turns that a loop makes, evenly [rad]
     drift : True if the gap between the last sample and the first is taken off evenly in time
-    joint_names : n names, or None
     """
 
     samples: Array
@@ -137,8 +135,6 @@ class Prepared:
 class Resampled:
     """Values of a path through samples, evenly in time, through which another spline is put.
 
-    inner : the path through samples
-    times : (M,) of its values [s]
     count : how many values may differ: of a periodic spline the last is the first
     """
 

@@ -15,6 +15,7 @@ from ... import so3
 from ...arrays import Array, Integers
 from ...body.body import Body
 from ...errors import TrajectoryError, TrajectoryWarning
+from ._gaps import ROUNDING, UNRESOLVED
 from ._joint_columns import Matched
 from .labels import IN_A_SECOND
 from .recording import Recording, warn
@@ -26,9 +27,7 @@ _NEXT = 1.0  # [s]
 _FEWEST = 4  # steps in that second: fewer are no recording with small steps
 _NO_POSE = 0.02  # [rad or m] a smaller first step is noise, or a body that hardly moves
 _DENSER = 1.1  # largest even rate over the usual rate of uneven samples
-_ROUNDING = 1e-9  # in steps of time
 _GAP = 5.0  # usual steps: samples farther apart belong to different motions
-_UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] per sample: a turn of twice that, the other way round, gives the same samples
 
 
 def without_first_pose(recording: Recording, motion: Matched, body: Body) -> tuple[Recording, Matched]:
@@ -71,10 +70,10 @@ def warn_of_fast_turns(recording: Recording, motion: Matched, body: Body) -> Non
         return
     steps = np.stack([_angles(ball.turns(motion.shapes)) for ball in balls], axis=1)
     sample, column = divmod(int(np.argmax(steps)), len(balls))
-    if steps[sample, column] < _UNRESOLVED:
+    if steps[sample, column] < UNRESOLVED:
         return
     clock = recording.first + recording.times[sample + 1] * IN_A_SECOND[recording.time_unit]
-    others = int(np.count_nonzero(steps >= _UNRESOLVED)) - 1
+    others = int(np.count_nonzero(steps >= UNRESOLVED)) - 1
     warn(
         f"{recording.place(sample + 1)}: {balls[column].name} turns by {np.degrees(steps[sample, column]):.3g} deg "
         f"from {recording.table.row} {recording.table.rows[sample]}, at {clock:.6g} {recording.time_unit}"
@@ -92,7 +91,7 @@ def evenly_spaced(times: Array, motion: Matched, inside: slice, rate: float) -> 
             f"own; give that rate or less (resample={usual:.4g}, --resample {usual:.4g})"
         )
     start, stop = times[inside][[0, -1]]
-    before, past, after = (int((t - start) * rate + _ROUNDING) for t in (2.0 * start - times[0], stop, times[-1]))
+    before, past, after = (int((t - start) * rate + ROUNDING) for t in (2.0 * start - times[0], stop, times[-1]))
     at = np.clip(start + np.arange(-before, after + 1) / rate, times[0], times[-1])
     base = motion.base
     if base.attitude is not None:
@@ -145,13 +144,7 @@ def surrounded(
     match: Callable[[Recording], tuple[Recording, Matched]],
     fill: float | None,
 ) -> tuple[Recording, Matched, slice]:
-    """The samples that are kept with those that the file has before and after them, and which of these are kept.
-
-    kept, motion : the samples that are kept
-    untrimmed : the whole recording, where that can be read
-    match : the joints and the base of a recording
-    fill : the longest gap that is bridged [s], or None
-    """
+    """The samples that are kept with those that the file has before and after them, and which of these are kept."""
     # Faults and doubts of these samples, which the caller left out, are not reported.
     with suppress(TrajectoryError), warnings.catch_warnings():
         warnings.simplefilter("ignore", TrajectoryWarning)

@@ -47,12 +47,7 @@ _MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}  # kind of model whose links are
 
 @dataclass(frozen=True, kw_only=True)
 class SegmentChoices:
-    """How segments become links, checked.
-
-    names : segment -> link, or None for a segment to be left out
-    calibration : a time, as the file gives it; the name of a pose of the file; "links"; None: as the file states
-    length_tolerance : share by which lengths may differ from the body's
-    """
+    """How segments become links, checked: options of `read_recorded_motion`."""
 
     names: Mapping[str, str | None]
     calibration: float | str | None = None

@@ -18,14 +18,13 @@ from ...errors import TrajectoryError
 from ...letters import value_text
 from ._gaps import Gaps
 from .labels import NO_UNIT, Label, angles_in_rad, check_range, label, lengths_in_m
-from .recording import Recording, checked_quaternions
+from .recording import OFF_UNIT, Recording, checked_quaternions
 
 ESTIMATE = "estimate"  # axes of the base that a fit determines
 _FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")  # of `Motion.write_csv`; they follow from the rest
 _VELOCITIES = ("base_vx_m_s", "base_vy_m_s", "base_vz_m_s")  # written by `export_motion`
 _AGREES = 0.1  # median error of turns between samples, relative to the rates: both agree
 _CONTRADICTS = 0.5  # relative to the rates: turns that are off by more contradict them
-_OFF_UNIT = 1e-3  # allowed error of a quaternion's length: recordings keep as few as three digits
 _LEAST_SLIDES = 2  # sliding joints that determine the place of the base; with one, the other directions are fixed
 _SAME_AXES = "x y z"
 _OPENSIM_AXES = "x -z y"  # base axes of URDF (x forward, z up) in OpenSim's (x forward, y up, z right)
@@ -99,9 +98,8 @@ KNOWN = frozenset(name for group in _GROUPS for name in group.names)
 
 @dataclass(frozen=True, kw_only=True)
 class BaseChoices:
-    """How columns become the motion of the base, checked.
+    """How columns become the motion of the base, checked: options of `read_recorded_motion`.
 
-    order : of angles, as "zxy"; None: the default of such columns
     axes : (3, 3) base axes to the axes of the columns, ESTIMATE, or None for the default
     given : these axes as the caller wrote them
     """
@@ -357,7 +355,7 @@ class BaseColumns:
         return way_poses(self.way, values, len(self.recording.times))
 
     def _by_quaternions(self, quaternions: Array) -> Array:
-        return so3.matrix_from_quat(checked_quaternions(quaternions, self.recording, "the base", _OFF_UNIT))
+        return so3.matrix_from_quat(checked_quaternions(quaternions, self.recording, "the base", OFF_UNIT))
 
     def _texts(self, group: _Group) -> tuple[str, ...]:
         return tuple(self.columns[name][0] for name in group.names)
@@ -395,7 +393,6 @@ def _vectors_of_mrps(parameters: Array) -> Array:
 def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, str]:
     """Label -> the name of a column of the base, of all labels that complete a quaternion, a place and so on.
 
-    targets : label -> the name that it goes by
     own : names of joints and columns that are known already
     """
     families: dict[tuple[str, tuple[str, ...]], dict[str, str]] = {}

@@ -78,16 +78,11 @@ class Closing:
 def closed_path(
     recorded: Recorded, body: Body, *, within: float | str, by: str | None, penalty: float | None = None
 ) -> tuple[ShapePath, Smoothing, Closing]:
-    """The loop of a recorded cycle.
-
-    within : the largest gap that is closed, a number in rad or m, or a text as "3deg" or "3deg,5mm"
-    by : one of `WAYS`; None: a periodic smoother where a noise is given, else by the drift
-    penalty : of the smoothing, as for `smoothed_path`
-    """
+    """The loop of a recorded cycle."""
     check_object(body, "Body", "body")
     way = ("smooth" if recorded.smoothed else "drift") if by is None else by
     if not isinstance(way, str) or way not in WAYS:
-        raise unknown_name("way of closing", str(way)[:40], WAYS)
+        raise unknown_name("way of closing", f"{way!s:.40}", WAYS)
     first, last = recorded.around().shapes[[0, -1]]
     for ball in body.chain.follows.balls:
         if last[ball.columns] @ first[ball.columns] < 0.0:

@@ -72,11 +72,8 @@ class Flight:
 
 @dataclass(frozen=True)
 class FlightChoices:
-    """How a flight is found in a recording, checked.
+    """How a flight is found in a recording, checked: options of `read_recorded_motion`.
 
-    request : a word, two times, or None: no flight is requested
-    up : the axis that points up, or None for that of the format
-    gravity : [m/s^2]; or None: units are not checked
     number : of the flight in time, from 1 on; None: the longest one
     """
 

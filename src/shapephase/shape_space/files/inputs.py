@@ -79,10 +79,6 @@ def read_input(
     """The table of a file, of standard input (`-`), or of objects in memory; and the time step, if it is still needed.
 
     source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or an `Input`
-    topic : which part of a bag, a workbook or a `.mat` file; None: the only one
-    timestep : [s], for sources without times
-    order : of the joints in arrays without names, or None
-    names : of columns, as a caller gives them
     """
     if topic is not None and not isinstance(topic, str):
         raise ShapeError(f"topic: a name is needed, got {value_text(topic)}")

@@ -218,11 +218,7 @@ def _number_and_unit(value: object, what: str) -> tuple[float, str | None]:
 
 
 def angle_unit(table: Table, text: str, stated: str | None, degrees: bool | None) -> tuple[str, bool]:
-    """Unit of a column of angles, and True where its label, the file or the caller states it. Raises TrajectoryError.
-
-    stated : by the label, or None
-    degrees : as the caller states it, or None
-    """
+    """Unit of a column of angles, and True where its label (`stated`), the file or the caller states it."""
     if stated is not None:
         if degrees is not None and degrees != (stated == "deg"):
             spelled = "degrees" if stated == "deg" else stated
@@ -283,8 +279,6 @@ def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> N
 
     That is so for angles like degrees, or lengths like millimetres: in radians or metres they would be far beyond the
     limits and in the other unit within, or a joint without limits would turn too far.
-
-    values : (N,) [rad or m], if these are the units
     """
     name, unit, table = body.joint_names[joint], body.joint_units[joint], recording.table
     if unit == NO_UNIT:
@@ -351,7 +345,7 @@ def doubtful_turns(values: Array) -> bool:
 def warn_of_turns(values: Array, name: str, recording: Recording) -> None:
     """Warn where a joint that turns without end jumps by about 2 pi: it is read as written, as a turn."""
     jumps = np.diff(values)
-    turns = np.flatnonzero((np.abs(jumps) > 1.5 * np.pi) & (np.abs(jumps) < 2.5 * np.pi))
+    turns = np.flatnonzero(np.abs(np.abs(jumps) - _WHOLE_TURN) < 0.5 * _HALF_TURN)
     if len(turns):
         i = int(turns[0])
         row, rows = recording.table.row, recording.table.rows

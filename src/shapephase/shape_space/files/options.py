@@ -93,10 +93,6 @@ class Reading:
     names : column or segment -> joint or link, None to leave it out; None: not given
     listed : True where names were a list, one for each column
     joints, segments, flight : how columns become joints and base, segments links, and what a flight is
-    trim : first and last time that are kept, as the file gives them
-    rate, cut_off : of resampling and of the low-pass filter [1/s]
-    close : largest gap that is closed; None: none
-    given : all options, by name
     """
 
     names: Mapping[str, str | None] | None

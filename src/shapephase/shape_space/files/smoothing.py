@@ -167,7 +167,6 @@ class Recorded:
 
     times, shapes : (N,) ascending [s], (N, n) [rad or m]
     noise : (n,) rms [rad or m]
-    joint_names : n names, or None
     inside : the samples that are kept; those before and after them are smoothed with them
     cut_off : of the low-pass filter that takes the place of a spline [Hz], or None
     """
@@ -309,7 +308,9 @@ def _filtered(
     for ball in ball_columns(recorded.joint_names):
         _check_lengths((first + by_narrow)[:, ball], cut_off, f"a ball joint (column {ball.start})")
     response, wide_response = narrow.responses(count), narrow.twice.responses(count)
-    noise = np.sqrt(((values - by_wide) ** 2).sum(axis=0) / max(((1.0 - wide_response) ** 2).sum(), 1e-300))
+    noise = np.sqrt(
+        ((values - by_wide) ** 2).sum(axis=0) / max(((1.0 - wide_response) ** 2).sum(), np.finfo(float).tiny)
+    )
     noise = np.where(noise > _EXACT * _spread(values), noise, 0.0)
     path = steps.path(samples.shapes)
     inside = samples.times[samples.inside]
@@ -380,7 +381,7 @@ def _report(samples: Recorded, steps: Prepared, path: ShapePath) -> Smoothing:
 
 
 def _check_gap(gap: Array, noise: Array, joint_names: Sequence[str]) -> None:
-    wide = np.abs(gap) > np.maximum(_WIDEST_GAP * noise, 1e-9)
+    wide = np.abs(gap) > np.maximum(_WIDEST_GAP * noise, CLOSED)
     if wide.any():
         joint = int(np.argmax(np.where(wide, np.abs(gap), 0.0)))
         raise TrajectoryError(

@@ -121,7 +121,7 @@ def loops_of_third_order(
     loops = []
     for axis in new:
         v, w = _best_eight(slopes @ axis)
-        turned = -0.25 * np.pi * np.einsum("k,i,j,kija->a", v, v, w, slopes)
+        turned = -np.pi / 4 * np.einsum("k,i,j,kija->a", v, v, w, slopes)
         size = float(turned @ axis)
         planes, frequencies, powers = np.array([[v, 0.5 * w]]), np.array([[1, 2]]), np.ones(1)
         if len(known):

@@ -6,6 +6,7 @@ import importlib.util
 import re
 import tempfile
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -54,11 +55,11 @@ def read_c3d(where: Path, data: bytes) -> Table:
         columns = [(f"{label}_{axis}", values[row, k]) for k, label in places for row, axis in enumerate(_AXES)]
         units, poses = {} if unit is None else {name: unit for name, _ in columns}, None
     else:
-        count = min(len(segments), matrices.shape[2])
-        names = tuple(re.sub(r"_?4[xX]4$", "", label) for label in segments[:count])
+        known = min(len(segments), matrices.shape[2])
+        names = tuple(re.sub(r"_?4[xX]4$", "", label) for label in segments[:known])
         frames = first * matrices.shape[3] // max(int(content["frames"]), 1) + np.arange(matrices.shape[3])
         metre = LENGTHS.get(unit_of(str(content["length_unit"])) or "")
-        columns, units, poses = [], {}, matrix_poses(names, matrices[:, :, :count], metre)
+        columns, units, poses = [], {}, matrix_poses(names, matrices[:, :, :known], metre)
     table = column_table(
         str(where), "C3D", [("time", frames / rate), *columns], units=units | {"time": "s"}, row="frame"
     )
@@ -116,7 +117,7 @@ def _check_sizes(where: Path, data: bytes) -> None:
 def _texts(group: Any, name: str) -> list[str]:
     """A parameter of texts, and those that continue it under the same name with a number: at most 255 fit into one."""
     texts: list[str] = []
-    for k in range(1, 100):
+    for k in count(1):
         key = name if k == 1 else f"{name}{k}"
         if key not in group:
             break

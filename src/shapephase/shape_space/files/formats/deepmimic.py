@@ -61,7 +61,7 @@ def read_deepmimic(where: Path, data: bytes) -> Table:
         row="frame",
         times=np.concatenate([[0.0], np.cumsum(durations)]),
         by_format=True,
-        base_quat_xyzw=frames[:, [5, 6, 7, 4]],
+        base_quat_xyzw=frames[:, [*range(5, _BASE), 4]],
         base_position=frames[:, 1:4],
         up="y",
     )

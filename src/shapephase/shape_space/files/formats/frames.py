@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from ....errors import TrajectoryError
-from ..labels import joint_part, unit_of
-from ..recording import Table
+from ..labels import IN_A_SECOND, joint_part, unit_of
+from ..recording import OFF_UNIT, Table
 from .column_tables import column_table
 
 _PANDAS = ("DataFrame",)
 _XARRAY = ("Dataset", "DataArray")
 _STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))  # names of the two parts of a ROS stamp
-_NANO = 1_000_000_000
+_NANO = int(IN_A_SECOND["ns"])
 _NAMES = ("name", "joint", "joint_name", "jointname")  # columns that name the joint of a row
 _VALUES = ("position", "pos", "angle", "joint_position")  # columns with its coordinate
 _STAMP = 3  # columns of a header: seconds, nanoseconds, frame
@@ -261,8 +261,10 @@ def _is_pose(rest: list[Any], texts: int) -> bool:
     """True where numbers behind the frames are a place and a quaternion of unit length."""
     if texts > 2 or len(rest) not in (len(_POSE), len(_POSE) + _MATRIX, len(_POSE) + 2 * _MATRIX + 6):
         return False
-    lengths = np.linalg.norm(np.stack([np.asarray(entries, dtype=np.float64) for entries in rest[3:7]]), axis=0)
-    return bool((np.abs(lengths - 1.0) < 1e-3).all())
+    lengths = np.linalg.norm(
+        np.stack([np.asarray(entries, dtype=np.float64) for entries in rest[3 : len(_POSE)]]), axis=0
+    )
+    return bool((np.abs(lengths - 1.0) < OFF_UNIT).all())
 
 
 def _constant(values: Any) -> str | None:

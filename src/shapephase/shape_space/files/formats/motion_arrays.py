@@ -15,7 +15,7 @@ from ....errors import ShapeError, TrajectoryError
 from ....files import npy_array, npz_arrays
 from ....letters import value_text
 from ..labels import SI
-from ..recording import Rates, Simulated, Table, warn
+from ..recording import OFF_UNIT, Rates, Simulated, Table, warn
 from .floating_arrays import FloatingMotion, floating_motion, numbered_columns, places_of, root_width
 from .named_arrays import arrays_table
 from .nameless_joints import FREE_JOINT, nameless_joints, placed_joints
@@ -25,7 +25,6 @@ _SCALAR_FIRST = [1, 2, 3, 0]  # places of x, y, z, w in a quaternion w x y z
 # TUM RGB-D benchmark: pose behind the time, in trajectories of visual odometry
 _TUM = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 _FREE = ("base_x", "base_y", "base_z", "base_qw", "base_qx", "base_qy", "base_qz")  # MuJoCo's free joint
-_OFF_UNIT = 1e-3
 _READ = (  # arrays with a meaning
     *("time", "timestep", "fps", "shapes", "qpos", "qvel", "q", "v", "qdot", "Q", "Qdot", "joint_names", "provenance"),
     *("joint_pos", "joint_vel", "body_pos_w", "body_quat_w", "body_ang_vel_w"),
@@ -62,10 +61,6 @@ def arrays_motion(
     Lab's: the base is the first of `body_pos_w` (N, b, 3) and `body_quat_w` (N, b, 4), and unnamed orders, of joints
     and of a quaternion's numbers, are those in which the links lie at `body_pos_w` and turn as `body_ang_vel_w`. With
     `shapes` there are `time` and `joint_names`, too; else vectors by name are the joints.
-
-    timestep : [s], for arrays without times
-    order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
-    kind : of the source, for people
     """
     try:
         both = {"qpos", "q", "Q"} & set(arrays)
@@ -258,7 +253,7 @@ def named_columns(
     first = ("time",) if has_times else ()
     rest = values[len(first) :]
     is_pose = len(rest) == FREE_JOINT and bool(
-        (np.abs(np.linalg.norm(np.stack(rest[3:]), axis=0) - 1.0) < _OFF_UNIT).all()
+        (np.abs(np.linalg.norm(np.stack(rest[3:]), axis=0) - 1.0) < OFF_UNIT).all()
     )
     joints = None
     try:

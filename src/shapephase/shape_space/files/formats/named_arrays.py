@@ -44,7 +44,6 @@ def arrays_table(
     """Table of arrays by name: vectors of one length, or a matrix beside the names of its columns.
 
     entries : name -> array of numbers, list of texts, or entries of a structure
-    chosen : the structure that has the motion; None: the arrays on top, or the only structure
     ordered : True if entries stand in the order in which they were written
     """
     inside: Mapping[str, Any] = entries

@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....errors import TrajectoryError, unknown_name
+from ..labels import IN_A_SECOND
 from ..recording import Table, check_text, number
 from .parser_process import by_library
 
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-_NANO = 10**9  # nanoseconds in a second
+_NANO = int(IN_A_SECOND["ns"])
 _LATEST = 1e12  # [s] larger times are none
 _WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")  # keys of goals and planners around a trajectory
 _UNITS = {"sec": _NANO, "secs": _NANO, "nanosec": 1, "nsecs": 1, "nsec": 1}  # parts of a time -> size [ns]

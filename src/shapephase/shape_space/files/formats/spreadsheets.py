@@ -10,20 +10,16 @@ from ....errors import TrajectoryError, unknown_name
 from ....warning_filters import quiet
 from ..labels import unit_of
 from .parser_process import by_library
-from .table_heads import head_of
+from .table_heads import HEAD_ROWS, head_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_HEAD_ROWS = 12
 _REMEDY = "save it anew, or as CSV"
 
 
 def read_excel(where: Path, data: bytes, sheet: str | None) -> pd.DataFrame:
-    """Frame of a sheet of an Excel workbook: a row of names, and rows of numbers or of formulas' last results.
-
-    sheet : its name; None: the only one that is not empty
-    """
+    """Frame of a sheet of an Excel workbook: a row of names, and rows of numbers or of formulas' last results."""
     with by_library(where, "workbook", "openpyxl", _REMEDY), quiet(module="openpyxl"):
         import openpyxl
 
@@ -56,7 +52,7 @@ def _cells(sheet: Any) -> list[tuple[int, list[Any]]]:
 def _sheet_frame(rows: list[tuple[int, list[Any]]], where: Path) -> pd.DataFrame:
     import pandas as pd
 
-    texts = [["" if entry is None else str(entry).strip() for entry in row] for _, row in rows[:_HEAD_ROWS]]
+    texts = [["" if entry is None else str(entry).strip() for entry in row] for _, row in rows[:HEAD_ROWS]]
     head = head_of(texts, None, str(where))
     width = len(head.names)
     for label, row in rows[head.skipped :]:

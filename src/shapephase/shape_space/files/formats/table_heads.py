@@ -18,6 +18,7 @@ CLOCK = re.compile(r"\d{1,3}:\d\d(:\d\d([.,]\d+)?)?", re.ASCII)
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 _NO_UNIT_CELLS = ("[]", "()", "-")
 _KINDS = ("joints", "model outputs", "segments", "trajectories", "devices", "imus")
+HEAD_ROWS = 12  # from which the head of another table follows
 _HEAD = 5  # rows of the head: kind, rate, names, axes, units
 _FRAMES = ("Frame", "Sub Frame")
 
@@ -29,7 +30,6 @@ class Head(NamedTuple):
     units : name -> unit, of a row of units
     skipped : rows before the first one of numbers; lines, where the delimiter is known
     numbered : True if there are no names, and columns are called by their numbers from 1
-    delimiter : between columns
     rate : frames a second, where the header states it and no column has times
     """
 
@@ -44,7 +44,6 @@ class Head(NamedTuple):
 def head_of(rows: Sequence[Sequence[str]], comment: Sequence[str] | None, where: str) -> Head:
     """The head of a table by its first rows.
 
-    rows : the first rows that are not empty, comments above them left out
     comment : the entries of the last line of comment above them, which may be the names
     """
     first, second = rows[0], rows[1] if len(rows) > 1 else ()
@@ -79,7 +78,7 @@ def check_names(names: Sequence[str], where: str) -> None:
     """Raise TrajectoryError for names that stand twice."""
     doubled = [name for name, count in Counter(names).items() if count > 1 and name]
     if doubled:
-        shown = ", ".join(name[:40] for name in doubled[:5])
+        shown = ", ".join(f"{name:.40}" for name in doubled[:4])
         raise TrajectoryError(f"{where}: column {shown} stands twice in the header; give each its own name")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ....arrays import Integers
 from ....errors import TrajectoryError
-from .table_heads import COMMA_NUMBER, COMMENT, Head, head_of, is_value, nexus_head, numbers
+from .table_heads import COMMA_NUMBER, COMMENT, HEAD_ROWS, Head, head_of, is_value, nexus_head, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 _DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
 BLANKS = " "  # delimiter: any number of blanks
 _HEAD_BYTES = 2**18  # beginning of a text, from which its layout follows
-_HEAD_ROWS = 12
 _SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)  # a spreadsheet's first line that names the separator
 _COMMA_ENTRY = rb"\s*([-+]?\d*,\d+(?:,\d+)*(?:[eE][-+]?\d+)?)\s*"
 _PLAIN = re.compile(rb'(?:^|[;\t\n"])' + _COMMA_ENTRY + rb'(?=[;\t\n"]|$)')
@@ -38,10 +37,6 @@ def read_text(
     Columns are separated by commas, tabs, semicolons or blanks; decimal points, or all of them commas. A header may
     stand in the first row, behind `#` or `%`, in several rows as Vicon Nexus writes it, or nowhere; a row of units may
     follow. The frame's `attrs` have the rest of the header.
-
-    section : which part of a file of Nexus with several of them
-    start : lines before the table
-    delimiter : between columns; None: by the header
     """
     text = unix_text(data, where)
     layout = _layout(text, where, section, start, delimiter)
@@ -93,7 +88,7 @@ def _layout(text: bytes, where: Path, section: str | None, start: int, stated: s
         elif lines[place].strip():
             break
         place += 1
-    shown = [k for k in range(place, len(lines)) if lines[k].strip()][:_HEAD_ROWS]
+    shown = [k for k in range(place, len(lines)) if lines[k].strip()][:HEAD_ROWS]
     if not shown:
         raise TrajectoryError(f"{where}: empty; a header `time,<joint names>` and rows of numbers are needed")
     nexus = nexus_head(text, lines, place, section, str(where))
