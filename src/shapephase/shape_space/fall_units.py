@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -60,15 +59,15 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
     stride = 1 + len(times) // _MOST_SAMPLES
     seen, rate = times[::stride], 1.0 / float(np.median(np.diff(times)))
     falls: list[tuple[float, float, FreeFall]] = []
-    for trial in _trials(rate):
-        centres = positions[::stride] + trial.arms * arms[::stride]
+    for share, speed, lengths, longer in _trials(rate):
+        centres = positions[::stride] + longer * arms[::stride]
         for axis in UP_AXES[:3] if up is None else (up,):
-            found = falls_along(seen, centres, axis, gravity * trial.gravity)
+            found = falls_along(seen, centres, axis, gravity * share)
             if found is None:
                 continue
-            time = lasts(seen, found.ends) / trial.times
+            time = lasts(seen, found.ends) / speed
             # In the lengths of the file, too: whatever moves smoothly bends a little, and resembles a slow fall.
-            if is_long(found, seen, trial.lengths) and found.gravity > _SEEN * found.gravity_bar:
+            if is_long(found, seen, lengths) and found.gravity > _SEEN * found.gravity_bar:
                 falls.append((time, found.off / found.gravity, found))
     if not falls:
         return None
@@ -82,27 +81,19 @@ def is_long(fall: FreeFall, times: Array, lengths: float = 1.0) -> bool:
     return fall.gravity / lengths * lasts(times, fall.ends) ** 2 > _LONG
 
 
-class _Trial(NamedTuple):
-    """A slip: what it makes of gravity and of times; and by what lengths of the recording and of arms are off."""
-
-    gravity: float
-    times: float
-    lengths: float
-    arms: float
-
-
-def _trials(rate: float) -> Iterator[_Trial]:
+def _trials(rate: float) -> Iterator[tuple[float, float, float, float]]:
+    """What slips make of gravity and of times, and by what lengths of the recording and of arms are off."""
     for size in _LENGTHS.values():
         for other in _LENGTHS.values():
             share = size / other
             if size != other and 1.0 / _MOST_LENGTHS < share < _MOST_LENGTHS:
                 # Lengths of the body are from the same file, or they are right, and its arms scale with what is not.
-                yield _Trial(gravity=share, times=1.0, lengths=share, arms=1.0)
-                yield _Trial(gravity=share, times=1.0, lengths=share, arms=share)
+                yield share, 1.0, share, 1.0
+                yield share, 1.0, share, share
     for known in _RATES:
         speed = known / rate
         if 1.0 / _MOST_TIMES < speed < _MOST_TIMES and abs(speed**2 - 1.0) > _OFF:
-            yield _Trial(gravity=1.0 / speed**2, times=speed, lengths=1.0, arms=1.0)
+            yield 1.0 / speed**2, speed, 1.0, 1.0
 
 
 def check_gravity(measured: float, bar: float, gravity: float, times: Array, where: str) -> None:
