@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from ...arrays import Array, Integers, Mask
-from ...chebyshev import inside, values_to_coefficients
+from ...chebyshev import inside
 from ...integrator.resolved import DEGREE
 
 _SAMPLES = 5200  # of the whole path: with the jitter below no gap is above 1/4,000 of the duration
@@ -96,9 +96,19 @@ def polynomials(x: Array) -> Array:
 
 
 @lru_cache(maxsize=1)
+def transform() -> Array:
+    """Values at the nodes of a panel -> coefficients, from angles that are multiples of pi/DEGREE to rounding."""
+    degrees, nodes = np.arange(DEGREE + 1)[:, None], np.arange(DEGREE + 1)
+    matrix = np.cos(np.pi / DEGREE * (degrees * (DEGREE - nodes) % (2 * DEGREE))) * (2.0 / DEGREE)
+    matrix[:, [0, -1]] *= 0.5
+    matrix[[0, -1], :] *= 0.5
+    return matrix
+
+
+@lru_cache(maxsize=1)
 def check_matrix() -> Array:
     """Values at the nodes of a panel -> at its check points."""
-    return polynomials(2.0 * CHECKS - 1.0) @ values_to_coefficients(DEGREE)
+    return polynomials(2.0 * CHECKS - 1.0) @ transform()
 
 
 @lru_cache(maxsize=1)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ... import run_progress
 from ...arrays import Array, Integers, Mask
-from ...chebyshev import derivative_matrix, nodes_on, unit_nodes, values_to_coefficients
+from ...chebyshev import derivative_matrix, nodes_on, unit_nodes
 from ...errors import AccuracyNotReached, NoisyPathError, TrajectoryError, UndeclaredBreakWarning
 from ...integrator.resolved import DEGREE, ResolvedPath
 from ..curves import CLOSED
@@ -29,6 +29,7 @@ from ._scan_panels import (
     integral_matrix,
     polynomials,
     sample_times,
+    transform,
 )
 from .function_scan import FunctionScan, ScannedFunction
 
@@ -188,7 +189,7 @@ class _Scan:
             scatter = self._scatter(both[:, -_NOISE_TIMES:])
         else:
             misfit = np.zeros((count, values.shape[2]))
-        coefficients = values_to_coefficients(DEGREE) @ values
+        coefficients = transform() @ values
         floor = self._floor(values, right - left)
         np.maximum(misfit, 0.5 * np.abs(coefficients[:, -3:]).max(axis=1, initial=0.0), out=misfit)
         starts, ends = np.searchsorted(self._times, left), np.searchsorted(self._times, right)
