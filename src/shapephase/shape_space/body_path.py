@@ -6,14 +6,15 @@ import warnings
 from functools import partial
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_object
-from ..arrays import Array, Integers, Mask
+from ..arrays import Array, Integers, Mask, finite_array
 from ..body.body import Body
 from ..body.family import BodyFamily
 from ..body.particles.point_masses import ParticleBody
-from ..errors import OpenPathError, TrajectoryWarning
+from ..errors import OpenPathError, ShapeError, TrajectoryWarning
 from ..integrator import machine_code
 from ..integrator.families import many_inverted
 from ..integrator.link_tree import tree_channels, trees_channels
@@ -49,6 +50,17 @@ def users_route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
     route = route_along(body, path)
     warn_of_degrees(body, route)
     return route
+
+
+def one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
+    """Return a shape of the body (n,), checked. Raises ShapeError."""
+    shape = finite_array(value, name)
+    if shape.shape != (body.n_shape,):
+        raise ShapeError(
+            f"{name}: expected ({body.n_shape},), one entry per joint of {body.name} ({', '.join(body.joint_names)}), "
+            f"got shape {shape.shape}"
+        )
+    return shape
 
 
 def path_gap(body: Body | ParticleBody, path: ShapePath) -> Array:

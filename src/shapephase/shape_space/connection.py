@@ -159,20 +159,13 @@ def holonomy(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class HorizontalLift:
-    """The attitude of a body with zero angular momentum along a path of its joints.
+    """The attitude of a body with zero angular momentum along a path of its joints. Made by `horizontal_lift`.
 
     Attributes
     ----------
     body : who moves
     path : how the joints move, in the body's order
     solution : the integrated rotation
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, np.radians(30.0))
-    >>> lift = sp.horizontal_lift(cat, loop)
-    >>> print(f"{np.degrees(sp.so3.angle(lift.attitude([0.0, loop.duration]))).round(3)} degrees")
-    [ 0.    70.454] degrees
     """
 
     body: Body | ParticleBody

@@ -19,7 +19,7 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import Sampler
 from ..letters import value_text
-from .body_path import check_closed, route_along
+from .body_path import check_closed, one_shape, route_along
 from .connection import connection_slopes
 from .shape_path import CLOSED, ShapePath
 
@@ -119,7 +119,7 @@ def curvature_on_plane(
         if row.ndim != 1:
             raise ShapeError(f"{name}: a row of coordinates is needed, got shape {row.shape}")
     shapes = np.empty((len(across), len(along), body.n_shape))
-    shapes[:] = body.shape() if shape is None else _one_shape(body, shape, "shape")
+    shapes[:] = body.shape() if shape is None else one_shape(body, shape, "shape")
     shapes[:, :, i], shapes[:, :, j] = across[:, None], along
     rows = shapes.reshape(-1, body.n_shape)
     unit = np.eye(body.n_shape)
@@ -188,7 +188,7 @@ def stokes_holonomy(
         )
     middles = np.arange(256) + 0.5
     times = route.duration / route.loops * middles / len(middles)
-    tip = route.curve(times)[0].mean(axis=0) if centre is None else _one_shape(body, centre, "centre")
+    tip = route.curve(times)[0].mean(axis=0) if centre is None else one_shape(body, centre, "centre")
     cone = _Cone(body, route, tip, goal)
     carried = Sampler(cone.sample, route.smoothness)
     round_loop = stepped_rotation(carried, np.zeros((1, 3)), 0.9 * goal)
@@ -351,13 +351,3 @@ def _two_joints(body: Body | ParticleBody, joints: Sequence[str | int]) -> tuple
     if places[0] == places[1]:
         raise ShapeError(f"joints: two different joints are needed, got {body.joint_names[places[0]]} twice")
     return places[0], places[1]
-
-
-def _one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
-    shape = finite_array(value, name)
-    if shape.shape != (body.n_shape,):
-        raise ShapeError(
-            f"{name}: expected ({body.n_shape},), one entry per joint of {body.name} ({', '.join(body.joint_names)}), "
-            f"got shape {shape.shape}"
-        )
-    return shape

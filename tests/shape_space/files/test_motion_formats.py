@@ -431,7 +431,7 @@ def test_trajectories_follow_each_other_by_their_headers(tmp_path):
 # Bytes at random
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(2000, marks=pytest.mark.full)], ids=["few", "many"])
+@pytest.mark.parametrize("count", [15, pytest.param(2000, marks=pytest.mark.full)], ids=["few", "many"])
 @pytest.mark.parametrize("file", [name for name in WRITERS if "." in name] + ["l.db3", "m.mcap"])
 def test_a_damaged_file_is_an_error_or_a_finite_path(tmp_path, file, count):
     sample = Sample.random(SATELLITE)

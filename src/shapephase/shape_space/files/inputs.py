@@ -112,7 +112,8 @@ def read_input(
     if suffix in _BAGS or os.path.isdir(where):
         if timestep is not None:
             raise TrajectoryError(f"{where}: timestep is for files without times; this one has its times")
-        _check_exists(where)
+        if not os.path.exists(where):
+            raise no_such_file(where)
         return Input(read_bag(where, topic), str(source), digest(where)), None
     if suffix in _SIMILAR:
         raise TrajectoryError(f"{where}: {suffix} files are not read: {_SIMILAR[suffix]}")
@@ -121,7 +122,6 @@ def read_input(
         raise unknown_name(
             f"ending of the motion file {where}:", where.suffix, dict.fromkeys((".csv", ".npz", *kinds, *_BAGS))
         )
-    _check_exists(where)
     if topic is not None and suffix not in _WITH_PARTS:
         raise TrajectoryError(
             f"{where}: topic={value_text(topic)} is for bags, workbooks and .mat files; this one has no parts"
@@ -146,11 +146,6 @@ def _table(where: Path, data: bytes, topic: str | None) -> Table:
     if data.lstrip().startswith(b"{"):
         return read_deepmimic(where, data)
     return file_table(TABLES[where.suffix.lower()](where, data, topic), str(where))
-
-
-def _check_exists(where: Path) -> None:
-    if not os.path.exists(where):
-        raise no_such_file(where)
 
 
 def _no_topic(topic: str | None, source: str) -> None:

@@ -35,7 +35,7 @@ _MOST_SAMPLES = 2_000_000  # of a resampled path: 16 MB for each joint
 @made_by(ShapePath="it is recorded.path")
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
-    """Recorded joint motion and the path made of it.
+    """Recorded joint motion and the path made of it. Made by `read_recorded_motion`.
 
     Attributes
     ----------
@@ -51,13 +51,6 @@ class RecordedMotion:
     closing : how a cycle was closed, and what that changed; None: it was not
     flight : the free flight that was kept; None: none was requested
     segments : angular momentum from poses of segments beside that of base and joints; None: the file has no such poses
-
-    Examples
-    --------
-    >>> sp.write_shape_path(sp.examples.cat_righting(), "cat.csv")
-    >>> recorded = sp.read_recorded_motion("cat.csv", sp.load_body("cat"))
-    >>> print(recorded.format, recorded.times[-1])
-    CSV 2.0
     """
 
     path: ShapePath
