@@ -75,21 +75,6 @@ def test_connection_and_curvature_check_their_shapes(load_urdf):
 # ---- Curvature ------------------------------------------------------------------------------------------------------
 
 
-def test_curvature_against_central_differences_of_the_connection(body, rng):
-    """B6: F_ij = d_i A_j - d_j A_i - A_i x A_j, the slopes taken numerically."""
-    n, step = body.n_shape, 1e-3
-    shape = random_shapes(body, rng, 1)[0]
-    around = shape + step * np.array([-2, -1, 1, 2])[:, None, None] * np.eye(n)
-    a, b, c, d = sp.mechanical_connection(body, around)
-    slopes = np.swapaxes((a - 8 * b + 8 * c - d) / (12 * step), -1, -2)  # (i, j, axis)
-    columns = sp.mechanical_connection(body, shape).T
-    want = slopes - np.swapaxes(slopes, 0, 1) - np.cross(columns[:, None], columns[None])
-    found = sp.curvature(body, shape)
-    assert found.shape == (n, n, 3)
-    np.testing.assert_allclose(found, want, atol=1e-7 * max(1.0, np.abs(want).max()) * 1e-2, rtol=0)
-    np.testing.assert_array_equal(found, -np.swapaxes(found, 0, 1))
-
-
 def test_curvature_of_a_batch(rng):
     cat = sp.load_body("cat_two_halves")
     shapes = random_shapes(cat, rng, 6).reshape(2, 3, 3)
