@@ -448,12 +448,6 @@ def _components(kind: str, texts: Mapping[str, str]) -> dict[str, str] | None:
             f"quaternion {', '.join(texts[k] for k in '1234')}: its scalar part may be the first or the last; say "
             f"which: --names '{first}=qw' and so on, or '{first}=qx' to '{last}=qw' (names={{{first!r}: 'qw', ...}})"
         )
-    numbered = {
-        QUATERNION: {"0123": "wxyz"},
-        PLACE: {"012": "xyz", "123": "xyz"},
-        MRP: {"012": "123", "123": "123", "xyz": "123"},
-        VECTOR: {"012": "xyz", "123": "xyz"},
-    }[kind]
-    plain = {QUATERNION: "wxyz", MRP: "", PLACE: "xyz", VECTOR: "xyz"}[kind]
-    meant = plain if there == plain else numbered.get(there)
-    return None if not meant else dict(zip(there, meant, strict=True))
+    three = "".join(CANONICAL[kind])
+    meant = {"wxyz": "wxyz", "0123": "wxyz"} if kind == QUATERNION else dict.fromkeys(("012", "123", "xyz"), three)
+    return dict(zip(there, meant[there], strict=True)) if there in meant else None
