@@ -32,8 +32,7 @@ _TURN_TOLERANCE = 1e-12  # change of the integral of the connection's size at wh
 
 @dataclass(frozen=True, eq=False)
 class MinimumPerturbation:
-    """A frame U(r) for each shape of a region, in which the connection is as small as can be. Made by
-    `minimum_perturbation`.
+    """A frame U(r) for each shape of a region, with the least connection. Made by `minimum_perturbation`.
 
     Attributes
     ----------
