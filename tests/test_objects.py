@@ -29,10 +29,10 @@ MOMENTUM = (0.01, 0.02, 0.03)
 # Functions that other functions of the library call with what they have checked.
 INNER = ("deformation.frames", "shape_space.body_path", "plots.plot_style", "optimal_control.task",
          "optimal_control.symbolic", "body.drawing", "examples.slow_deformation.first_loop",
-         "shape_space.connection.connection_slopes", "shape_space.closing_arc", "plots.pages",
+         "shape_space.connection.connection_slopes", "shape_space.shape_geodesic.ClosingArc", "plots.pages",
          "shape_space.path_samples", "shape_space.path_series", "shape_space.files.formats", "phases.split_text",
-         "phases.momentum_curve", "body.engines", "shape_space.files.flight", "shape_space.files.nameless_joints",
-         "shape_space.files.inputs", "shape_space.files.times", "shape_space.unit_doubts", "shape_space.knot_crossings",
+         "phases.momentum_curve", "body.engines", "shape_space.files.flight",
+         "shape_space.files.inputs", "shape_space.files.times", "shape_space.files.labels", "shape_space.knot_crossings",
          "dynamics.moving_body", "error_bars.error_sources", "plots.named_figures.figure_image",
          "shape_space.files.smoothing.check_swings",
          "shape_space.shape_geodesic.changes_by_ends",

@@ -10,7 +10,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.cli.main import main
-from shapephase.shape_space.files.read import read_recorded_motion
+from shapephase.shape_space.files import read_recorded_motion
 
 # What is computed is the same with and without machine code, which is quicker.
 

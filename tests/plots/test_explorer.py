@@ -13,7 +13,7 @@ from shapephase import so3
 from shapephase.errors import ShapeError, UnknownNameError
 from shapephase.plots.explorer import explore
 from shapephase.plots.pages.plane_series import least_perturbation_turns, plane_series
-from shapephase.shape_space.connection import holonomy, mechanical_connection
+from shapephase.shape_space import holonomy, mechanical_connection
 from support.browser import opened
 
 JOINTS = ("waist_pitch", "waist_yaw")

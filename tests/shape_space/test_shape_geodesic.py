@@ -66,5 +66,5 @@ def test_shapes_that_are_the_same_or_too_far_apart():
     way = shape_geodesic(body, [0.1, 0.2], [0.1, 0.2])
     assert way.length == 0.0
     np.testing.assert_array_equal(way.shapes, np.tile([0.1, 0.2], (len(way.nodes), 1)))
-    with pytest.raises(TrajectoryError, match="no geodesic was found"):
+    with pytest.raises(TrajectoryError, match="geodesic"):
         shape_geodesic(body, [0.0, 0.0], [3e4, -2e4])

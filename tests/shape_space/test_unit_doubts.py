@@ -114,7 +114,7 @@ def test_rates_beside_a_quaternion_say_which_number_is_w():
     body, right = sp.load_body("diver"), motion.quat_xyzw(times)
     read = sp.read_recorded_motion(pandas.DataFrame(table(motion, right, times)), body)
     np.testing.assert_allclose(read.base_attitude, motion.attitude(times), atol=1e-12)
-    with pytest.raises(TrajectoryError, match="read as w x y z it turns as they say"):
+    with pytest.raises(TrajectoryError, match="w x y z"):
         sp.read_recorded_motion(pandas.DataFrame(table(motion, np.roll(right, 1, axis=1), times)), body)
     # Rates that agree with neither, as those in inertial axes, tell nothing.
     turned = so3.apply(motion.attitude(times), motion.angular_velocity(times)).T
@@ -127,9 +127,9 @@ def test_a_recorded_base_with_w_first_is_named():
     motion, times = somersault(), np.linspace(0.0, 1.0, 41)
     right = motion.attitude(times)
     sp.base_difference(motion, times, right)
-    with pytest.warns(TrajectoryWarning, match="were they written with w first"):
+    with pytest.warns(TrajectoryWarning, match="w first"):
         sp.base_difference(motion, times, with_w_first(right))
-    with pytest.raises(TrajectoryError, match="no flight of this body; read as w x y z instead of x y z w"):
+    with pytest.raises(TrajectoryError, match="w x y z"):
         sp.momentum_from_recording(motion.deformation, times, with_w_first(right))
     turned = right @ so3.exp(np.outer(times, [0.0, 1.0, 2.0]))
     with warnings.catch_warnings():

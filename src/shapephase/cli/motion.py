@@ -24,7 +24,7 @@ from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import ProgressCallback
 from ..shape_space.files.base_columns import ESTIMATE
 from ..shape_space.files.flight import ANY_GRAVITY, RECORDED
-from ..shape_space.files.mapping_files import name_pair, read_names
+from ..shape_space.files.options import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
 from .joint_values import joint_values

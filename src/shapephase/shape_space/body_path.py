@@ -1,23 +1,33 @@
-"""A shape path as the motion of a particular body: its columns in order, where it closes, how it is sampled."""
+"""A shape path as the motion of a particular body: columns in order, closure, samples, doubts about degrees."""
 
 from __future__ import annotations
 
+import warnings
+from functools import partial
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_object
-from ..arrays import Array, Integers, Mask
+from ..arrays import Array, Integers, Mask, finite_array
 from ..body.body import Body
 from ..body.family import BodyFamily
 from ..body.particles.point_masses import ParticleBody
-from ..errors import OpenPathError
+from ..errors import OpenPathError, ShapeError, TrajectoryWarning
 from ..integrator import machine_code
 from ..integrator.families import many_inverted
 from ..integrator.link_tree import tree_channels, trees_channels
 from ..integrator.sampling import Sampler
+from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import with_crossings
+from .path_series import evenly_divided, panel_edges
 from .shape_path import CLOSED, ShapePath
-from .unit_doubts import warn_of_degrees
+
+_FAR_BEYOND = 0.2  # of the width of a joint's limits: noise leaves them by less
+_HALF_TURN = np.pi  # [rad] beyond its limits a joint may go by less, to try forbidden postures
+_LOOKS = 65  # times of the first loop of a function, at multiples of the golden ratio: no swing repeats them
+_LOOKS_OF_A_SWING = 8  # times: a sine is then within 8 % of its largest value
 
 
 def in_joint_order(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
@@ -36,10 +46,21 @@ def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
 
 
 def users_route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
-    """Return the same of a path that a user gave. Warns as `warn_of_degrees`."""
+    """Return `route_along` of a path that a user gave. Warns as `warn_of_degrees`."""
     route = route_along(body, path)
     warn_of_degrees(body, route)
     return route
+
+
+def one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
+    """Return a shape of the body (n,), checked. Raises ShapeError."""
+    shape = finite_array(value, name)
+    if shape.shape != (body.n_shape,):
+        raise ShapeError(
+            f"{name}: expected ({body.n_shape},), one entry per joint of {body.name} ({', '.join(body.joint_names)}), "
+            f"got shape {shape.shape}"
+        )
+    return shape
 
 
 def path_gap(body: Body | ParticleBody, path: ShapePath) -> Array:
@@ -75,25 +96,17 @@ def path_sampler(body: Body | ParticleBody, path: ShapePath) -> Sampler:
     def evaluate(times: Array) -> tuple[Array, Array]:
         return body.sample(*path.at_samples(times))
 
-    def directly(times: Array) -> Array | None:
-        return channels_at(body, *path.at_samples(times))
-
-    return Sampler(evaluate, path.smoothness, directly)
+    return Sampler(evaluate, path.smoothness, partial(channels_along, body, path))
 
 
 def channels_along(body: Body | ParticleBody, path: ShapePath, times: Array) -> Array | None:
     """I^-1 (xx yy zz yz xz xy) and I^-1 L_o along a path, in machine code: (N,) -> (N, 9).
 
-    None where a tensor is nearly singular or a number is not finite.
+    None where a tensor is nearly singular or a number is not finite; without machine code or rows; for ball joints.
     """
-    return channels_at(body, *path.at_samples(times))
-
-
-def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array | None:
-    """Channels at shapes and rates (N, n); None without machine code, links or rows, and for ball joints."""
     if isinstance(body, ParticleBody) or not body.chain.has_rows or not machine_code.is_used():
         return None
-    return tree_channels(body.chain.rows, shapes, rates)
+    return tree_channels(body.chain.rows, *path.at_samples(times))
 
 
 class FamilyVariants:
@@ -118,3 +131,58 @@ class FamilyVariants:
     def alone(self, row: int) -> Sampler:
         """Sampler of one of them."""
         return path_sampler(self._family[row], self._path)
+
+
+def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:
+    """True if values are far beyond limits, and within them in a unit of this size, in SI units: (N,) [rad or m]."""
+    room = _FAR_BEYOND * (upper - lower)
+    lowest, highest = float(values.min()), float(values.max())
+    far = lowest < lower - room or highest > upper + room
+    return far and factor * lowest >= lower - room and factor * highest <= upper + room
+
+
+def warn_of_degrees(body: Body | ParticleBody, path: ShapePath) -> None:
+    """Warn where the angles of a path, its columns in the order of the body's joints, resemble degrees.
+
+    Warns if a joint goes more than half a turn beyond its limits, and in degrees all would stay within theirs. The
+    unit of a recording is checked when it is read.
+    """
+    if path.record is not None or _farthest(path) <= _HALF_TURN:
+        return
+    times = _looked_at(path)
+    shapes, _ = path.curve(times)
+    limited = np.isfinite(body.joint_limits).all(axis=1) & (np.array(body.joint_units) == "rad")
+    beyond = np.maximum(body.joint_limits[:, 0] - shapes, shapes - body.joint_limits[:, 1])
+    far = [k for k in np.flatnonzero(limited) if beyond[:, k].max() > _HALF_TURN]
+    if not far or not all(looks_like(shapes[:, k], np.radians(1.0), *body.joint_limits[k]) for k in far):
+        return
+    worst = max(far, key=lambda k: float(beyond[:, k].max()))
+    row = int(np.argmax(beyond[:, worst]))
+    lower, upper = body.joint_limits[worst]
+    warnings.warn(
+        f"joint {body.joint_names[worst]} of {body.name} is at {shapes[row, worst]:.6g} rad at {times[row]:.6g} s, far "
+        f"beyond its limits {lower:.4g} to {upper:.4g} rad, and within them in degrees: are the angles of this path in "
+        "degrees? A ShapePath is in radians: np.radians(angles) makes them. If radians are meant, nothing is wrong",
+        TrajectoryWarning,
+        stacklevel=4,
+    )
+
+
+def _farthest(path: ShapePath) -> float:
+    """A bound of the joint coordinates, without looking at a spline or a series in time [rad or m]."""
+    if isinstance(path.curve, Fourier):
+        curve = path.curve
+        sizes = np.abs(curve.mean) + np.abs(curve.cosines).sum(axis=1) + np.abs(curve.sines).sum(axis=1)
+    elif isinstance(path.curve, PiecewisePolynomial):
+        sizes = np.abs(path.curve.coefficients[0])
+    else:
+        sizes = np.abs(path.curve(_looked_at(path))[0])
+    return float(sizes.max(initial=0.0))
+
+
+def _looked_at(path: ShapePath) -> Array:
+    if isinstance(path.curve, PiecewisePolynomial):
+        return path.breaks
+    if path.swings.most is not None:
+        return evenly_divided(panel_edges(path), _LOOKS_OF_A_SWING)
+    return path.duration / path.loops * np.mod(0.6180339887498949 * np.arange(_LOOKS), 1.0)

@@ -23,7 +23,7 @@ from .path_series import evenly_divided, panel_edges
 from .shape_path import CLOSED, ShapePath
 
 _GAUSS_RULE = np.polynomial.legendre.leggauss(16)  # 16 nodes resolve a few swings on a panel
-_PIECES = (2, 4, 8, 16, 32, 64)  # panels per piece, in turn: a change at 64 means an undeclared break
+_PIECES = [2**k for k in range(1, 7)]  # panels per piece, in turn: a change at 64 means an undeclared break
 
 
 def mechanical_connection(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordinates") -> Array:
@@ -96,7 +96,6 @@ def curvature(body: Body | ParticleBody, shape: ArrayLike, *, of: str = "coordin
     >>> sp.curvature(cat, np.zeros(3))[1, 2].round(6).tolist()  # of waist_pitch and waist_yaw
     [0.0, 0.0625, 0.0]
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
     columns, slopes = connection_slopes(body, shape)
     bracket = np.cross(columns[..., :, None, :], columns[..., None, :, :])
     curvatures = slopes - np.swapaxes(slopes, -2, -3) - bracket
@@ -114,9 +113,8 @@ def connection_slopes(body: Body | ParticleBody, shape: ArrayLike) -> tuple[Arra
     >>> print(columns.round(6).tolist(), slopes.shape)
     [[0.0, 0.5, 0.0], [0.0, 0.0, 0.5], [0.5, 0.0, 0.0]] (3, 3, 3)
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     connection = mechanical_connection(body, shape)
+    inverse = inverse_inertia(body.locked_inertia(shape))[..., None, :, :]
     # dA_i = I^-1 (dJ_i - dI_i A), indices (i, axis, j)
     gradient = inverse @ (
         body.momentum_matrix_gradient(shape) - body.inertia_gradient(shape) @ connection[..., None, :, :]
@@ -153,29 +151,21 @@ def holonomy(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees: it turns over")
     180.000000 degrees: it turns over
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = users_route_along(body, path)
-    return _lift_of_loop(body, route, goal).end[0]
+    check_closed(body, route)
+    return _lift(body, route, goal).end[0]
 
 
 @dataclass(frozen=True, eq=False)
 class HorizontalLift:
-    """The attitude of a body with zero angular momentum along a path of its joints.
+    """The attitude of a body with zero angular momentum along a path of its joints. Made by `horizontal_lift`.
 
     Attributes
     ----------
     body : who moves
     path : how the joints move, in the body's order
     solution : the integrated rotation
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, np.radians(30.0))
-    >>> lift = sp.horizontal_lift(cat, loop)
-    >>> print(f"{np.degrees(sp.so3.angle(lift.attitude([0.0, loop.duration]))).round(3)} degrees")
-    [ 0.    70.454] degrees
     """
 
     body: Body | ParticleBody
@@ -237,8 +227,6 @@ def horizontal_lift(body: Body | ParticleBody, path: ShapePath, tolerance: float
     >>> print(f"{np.degrees(sp.so3.angle(lift.attitude(loop.duration))):.6f} degrees: it turns over")
     180.000000 degrees: it turns over
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
     route = users_route_along(body, path)
     return HorizontalLift(body, route, _lift(body, route, goal))
@@ -246,11 +234,6 @@ def horizontal_lift(body: Body | ParticleBody, path: ShapePath, tolerance: float
 
 def _lift(body: Body | ParticleBody, route: ShapePath, tolerance: float) -> SteppedRotation:
     return stepped_rotation(path_sampler(body, route), np.zeros((1, 3)), tolerance)
-
-
-def _lift_of_loop(body: Body | ParticleBody, route: ShapePath, tolerance: float) -> SteppedRotation:
-    check_closed(body, route)
-    return _lift(body, route, tolerance)
 
 
 def holonomy_derivative(
@@ -296,12 +279,11 @@ def holonomy_derivative(
     >>> slope.shape
     (1, 3)
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
-    check_function(variation, "variation", "a function of times that gives changes of shape (N, m, n)")
     goal = tolerance_argument(tolerance)
     route = users_route_along(body, path)
-    lift = _lift_of_loop(body, route, goal)
+    check_function(variation, "variation", "a function of times that gives changes of shape (N, m, n)")
+    check_closed(body, route)
+    lift = _lift(body, route, goal)
     ends = np.array([0.0, route.duration])
     at_ends = _variation_at(variation, ends, body.n_shape)
     if np.abs(at_ends[1] - at_ends[0]).max(initial=0.0) > CLOSED * (1.0 + np.abs(at_ends).max(initial=0.0)):

@@ -19,7 +19,7 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
 from ..integrator.sampling import Sampler
 from ..letters import value_text
-from .body_path import check_closed, route_along
+from .body_path import check_closed, one_shape, route_along
 from .connection import connection_slopes
 from .shape_path import CLOSED, ShapePath
 
@@ -29,7 +29,7 @@ _SEED = 15  # any fixed seed: repeatable results
 _NO_LIMIT = 1e3  # [rad or m] wider limits stand for none
 _ROUNDING = 16.0 * _EPS  # largest rounding of the curvature of 130 flat bodies
 _NODES = 12  # Gauss nodes per piece of a ray: they resolve one swing of the curvature
-_PIECES = (1, 2, 4, 8, 16, 32, 64)  # of a ray, tried until the integral settles
+_PIECES = [2**k for k in range(7)]  # of a ray, tried until the integral settles
 _ROWS = 2000  # rays, or pieces of rays, computed together: bounds memory
 _SHARE = 0.01  # of the tolerance for each ray: the sum over the path then keeps it
 
@@ -119,7 +119,7 @@ def curvature_on_plane(
         if row.ndim != 1:
             raise ShapeError(f"{name}: a row of coordinates is needed, got shape {row.shape}")
     shapes = np.empty((len(across), len(along), body.n_shape))
-    shapes[:] = body.shape() if shape is None else _one_shape(body, shape, "shape")
+    shapes[:] = body.shape() if shape is None else one_shape(body, shape, "shape")
     shapes[:, :, i], shapes[:, :, j] = across[:, None], along
     rows = shapes.reshape(-1, body.n_shape)
     unit = np.eye(body.n_shape)
@@ -174,12 +174,10 @@ def stokes_holonomy(
     >>> print(np.abs(sp.stokes_holonomy(cat, loop) - sp.holonomy(cat, loop)).max().round(8))
     0.0
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
     goal = tolerance_argument(tolerance)
+    route = route_along(body, path)
     if isinstance(body, Body):
         check_smooth(body.chain.follows, "the theorem of Stokes needs")
-    route = route_along(body, path)
     check_closed(body, route)
     turned = np.flatnonzero(np.abs(route.gap) > CLOSED)
     if len(turned):
@@ -188,8 +186,9 @@ def stokes_holonomy(
             f"joint {body.joint_names[joint]} ends {route.gap[joint] / (2.0 * np.pi):.6g} turns from its start: no "
             "cone spans such a loop, whose holonomy is not made of curvature alone; use holonomy"
         )
-    times = route.duration / route.loops * (np.arange(256) + 0.5) / 256
-    tip = route.curve(times)[0].mean(axis=0) if centre is None else _one_shape(body, centre, "centre")
+    middles = np.arange(256) + 0.5
+    times = route.duration / route.loops * middles / len(middles)
+    tip = route.curve(times)[0].mean(axis=0) if centre is None else one_shape(body, centre, "centre")
     cone = _Cone(body, route, tip, goal)
     carried = Sampler(cone.sample, route.smoothness)
     round_loop = stepped_rotation(carried, np.zeros((1, 3)), 0.9 * goal)
@@ -352,13 +351,3 @@ def _two_joints(body: Body | ParticleBody, joints: Sequence[str | int]) -> tuple
     if places[0] == places[1]:
         raise ShapeError(f"joints: two different joints are needed, got {body.joint_names[places[0]]} twice")
     return places[0], places[1]
-
-
-def _one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
-    shape = finite_array(value, name)
-    if shape.shape != (body.n_shape,):
-        raise ShapeError(
-            f"{name}: expected ({body.n_shape},), one entry per joint of {body.name} ({', '.join(body.joint_names)}), "
-            f"got shape {shape.shape}"
-        )
-    return shape

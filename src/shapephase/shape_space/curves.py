@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_picklable
-from ..arrays import Array, Integers, check_reach, lock_arrays, read_only, real_array
+from ..arrays import Array, Integers, Mask, check_reach, lock_arrays, read_only, real_array
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
 
 CLOSED = 1e-9  # [rad or m] largest gap of a loop: files are written with ten digits or more
 _WHOLE_TURN = 2.0 * np.pi
-_SAME_TIME = 1e-12  # relative to the last break: nearer times are one after stretching or reversing
 _MOST_REPEATED = 100_000  # knots of a repeated loop that are written out
 _MOST_KEPT = 32  # sets of times with kept values; with the next number, 16 MB
 _MOST_NUMBERS = 2_000_000
@@ -74,18 +73,21 @@ class KeptValues:
         return {"_known": {}}
 
 
-@dataclass(frozen=True, eq=False)
-class Fourier:
+class _Known:
+    """Base of curves: prints in a line, arrays that nobody changes, swings unknown."""
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fourier(_Known):
     """mean + sum a_k cos(2 pi k t/T) + b_k sin(2 pi k t/T)."""
 
     mean: Array
     cosines: Array
     sines: Array
     period: float
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Shapes and rates."""
@@ -94,6 +96,12 @@ class Fourier:
         both = np.concatenate([np.cos(phase), np.sin(phase)], axis=1) @ weights
         n_shape = len(self.mean)
         return both[:, :n_shape] + self.mean, both[:, n_shape:]
+
+    def accelerations(self, times: Array) -> Array:
+        """Second derivatives: (N,) -> (N, n)."""
+        harmonics, _ = self._weights
+        phase, squares = times[:, None] * harmonics, harmonics**2
+        return -(np.cos(phase) @ (self.cosines * squares).T + np.sin(phase) @ (self.sines * squares).T)
 
     @property
     def occupied(self) -> Integers:
@@ -117,8 +125,8 @@ class Fourier:
 Interpolation = Literal["not-a-knot", "periodic", "rest to rest"]
 
 
-@dataclass(frozen=True, eq=False)
-class PiecewisePolynomial:
+@dataclass(frozen=True, eq=False, repr=False)
+class PiecewisePolynomial(_Known):
     """sum_p coefficients[p, i] (t - knots[i])^p on the i-th interval; coefficients (order, pieces, n).
 
     `through`: by which rule the polynomials follow from their values at the knots; None: by none.
@@ -128,10 +136,6 @@ class PiecewisePolynomial:
     coefficients: Array
     through: Interpolation | None = None
     swings: ClassVar[Swings] = Swings(0.5)
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Shapes and rates."""
@@ -145,6 +149,15 @@ class PiecewisePolynomial:
             shapes += coefficients[piece]
         return shapes, rates
 
+    def accelerations(self, times: Array) -> Array:
+        """Second derivatives, at a knot those of the piece on the right: (N,) -> (N, n)."""
+        piece = np.searchsorted(self.knots[1:-1], times, side="right")
+        since = (times - self.knots[piece])[:, None]
+        accelerations = np.zeros((len(times), self.coefficients.shape[2]))
+        for power in range(len(self.coefficients) - 1, 1, -1):
+            accelerations = accelerations * since + power * (power - 1) * self.coefficients[power, piece]
+        return accelerations
+
 
 def polynomial_pieces(curve: Curve) -> PiecewisePolynomial | None:
     """Polynomials between knots that are the curve; None for other curves."""
@@ -155,33 +168,37 @@ def polynomial_pieces(curve: Curve) -> PiecewisePolynomial | None:
         if first is None or second is None:
             return None
         return _joined_pieces([first, second], [np.zeros_like(curve.offset), curve.offset])
-    made = isinstance(curve, Reversed | Stretched | Reordered | Repeated | Multiplied)
-    inner = polynomial_pieces(curve.curve) if made else None
+    inner = polynomial_pieces(curve.curve) if isinstance(curve, Changed) else None
     if inner is None:
         return None
-    if isinstance(curve, Multiplied):
-        return PiecewisePolynomial(inner.knots, inner.coefficients * curve.factors)
-    if isinstance(curve, Reversed):
+    if isinstance(curve, Retimed) and curve.factor < 0.0:
         return _reversed_pieces(inner)
-    if isinstance(curve, Stretched):
+    if isinstance(curve, Retimed):
         powers = curve.factor ** -np.arange(len(inner.coefficients), dtype=np.float64)
         return PiecewisePolynomial(curve.factor * inner.knots, inner.coefficients * powers[:, None, None])
-    if isinstance(curve, Reordered):
-        return PiecewisePolynomial(inner.knots, inner.coefficients[:, :, curve.order])
+    if isinstance(curve, Reordered | Multiplied):
+        return PiecewisePolynomial(inner.knots, curve._outer(inner.coefficients))
     if isinstance(curve, Repeated) and curve.count * len(inner.knots) <= _MOST_REPEATED:
         return _joined_pieces([inner] * curve.count, [loop * curve.turns for loop in range(curve.count)])
     return None
 
 
-def _moved(coefficients: Array, by: Array) -> Array:
-    """Polynomials (order, pieces, n) about centres that are moved: (pieces,)."""
-    if not by.any():
-        return coefficients
-    order, moved = len(coefficients), np.zeros_like(coefficients)
-    for power in range(order):
-        for k in range(power, order):
-            moved[power] += comb(k, power) * by[:, None] ** (k - power) * coefficients[k]
-    return moved
+def exact_accelerations(curve: Curve, times: Array) -> Array | None:
+    """r'' of a curve at times of its interval: (N,) -> (N, n); None where a function of a user is in it."""
+    if isinstance(curve, Fourier | PiecewisePolynomial):
+        return curve.accelerations(times)
+    if isinstance(curve, Joined):
+        late, inside = curve.late(times)
+        first, second = exact_accelerations(curve.first, times[~late]), exact_accelerations(curve.second, inside)
+        if first is None or second is None:
+            return None
+        joined = np.empty((len(times), len(curve.offset)))
+        joined[~late], joined[late] = first, second
+        return joined
+    if not isinstance(curve, Changed):
+        return None
+    inner = exact_accelerations(curve.curve, curve._inner(times))
+    return None if inner is None else curve._outer(inner) / curve.factor**2
 
 
 def _joined_pieces(parts: list[PiecewisePolynomial], offsets: list[Array]) -> PiecewisePolynomial:
@@ -216,14 +233,12 @@ def returned_pair(returned: object) -> tuple[Array, Array]:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Function:
+@dataclass(frozen=True, eq=False, repr=False)
+class Function(_Known):
     """A user's function, its results checked at every call."""
 
     f: Callable[[Array], tuple[ArrayLike, ArrayLike]]
     n_shape: int
-
-    __repr__ = short_repr
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickled state. Raises LocalFunctionError for a lambda."""
@@ -250,92 +265,96 @@ class Function:
         return shapes, rates
 
 
-@dataclass(frozen=True, eq=False)
-class Reversed:
-    """A curve run through backwards."""
+class Changed(_Known):
+    """Base of curves that are another one, `factor` times as slowly, or with other columns."""
 
     curve: Curve
-    duration: float
-
-    __repr__ = short_repr
+    factor: float = 1.0
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Shapes and rates."""
-        shapes, rates = self.curve(self.duration - times)
-        return shapes, -rates
+        shapes, rates = self.curve(self._inner(times))
+        return self._outer(shapes), self._outer(rates) / self.factor
+
+    def _inner(self, times: Array) -> Array:
+        return times
+
+    def _outer(self, values: Array) -> Array:
+        return values
 
 
-@dataclass(frozen=True, eq=False)
-class Stretched:
-    """A curve run through `factor` times as slowly."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Retimed(Changed):
+    """A curve of some duration run through `factor` times as slowly, or backwards with -1."""
 
     curve: Curve
-    factor: float
     duration: float
+    factor: float = -1.0
 
-    __repr__ = short_repr
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        """Shapes and rates."""
-        shapes, rates = self.curve(np.minimum(times / self.factor, self.duration))
-        return shapes, rates / self.factor
+    def _inner(self, times: Array) -> Array:
+        return self.duration - times if self.factor < 0.0 else np.minimum(times / self.factor, self.duration)
 
 
-@dataclass(frozen=True, eq=False)
-class Reordered:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reordered(Changed):
     """The columns of a curve in another order."""
 
     curve: Curve
     order: Integers
 
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        """Shapes and rates."""
-        shapes, rates = self.curve(times)
-        return shapes[:, self.order], rates[:, self.order]
+    def _outer(self, values: Array) -> Array:
+        return values[..., self.order]
 
 
-@dataclass(frozen=True, eq=False)
-class Multiplied:
+@dataclass(frozen=True, eq=False, repr=False)
+class Multiplied(Changed):
     """The columns of a curve, each times a factor."""
 
     curve: Curve
     factors: Array
 
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        """Shapes and rates."""
-        shapes, rates = self.curve(times)
-        return shapes * self.factors, rates * self.factors
+    def _outer(self, values: Array) -> Array:
+        return values * self.factors
 
 
-@dataclass(frozen=True, eq=False)
-class Widened:
+@dataclass(frozen=True, eq=False, repr=False)
+class Widened(Changed):
     """The columns of a curve among more, of which the others rest at zero."""
 
     curve: Curve
     columns: Integers
     n_shape: int
 
-    __repr__ = short_repr
+    def _outer(self, values: Array) -> Array:
+        widened = np.zeros((len(values), self.n_shape))
+        widened[:, self.columns] = values
+        return widened
 
-    __post_init__ = lock_arrays
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Repeated(Changed):
+    """A loop `count` times, each time `turns` (whole turns) further."""
+
+    curve: Curve
+    period: float
+    count: int
+    turns: Array
+
+    def _inner(self, times: Array) -> Array:
+        return np.minimum(times - self.period * self._loops(times), self.period)
 
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Shapes and rates."""
-        shapes, rates = np.zeros((2, len(times), self.n_shape))
-        shapes[:, self.columns], rates[:, self.columns] = self.curve(times)
-        return shapes, rates
+        shapes, rates = self.curve(self._inner(times))
+        return shapes + self._loops(times)[:, None] * self.turns, rates
+
+    def _loops(self, times: Array) -> Integers:
+        # Compared with the very numbers that stand in the breaks, so that a time just before one stays in its loop.
+        return np.searchsorted(self.period * np.arange(self.count), times, side="right") - 1
 
 
-@dataclass(frozen=True, eq=False)
-class Joined:
+@dataclass(frozen=True, eq=False, repr=False)
+class Joined(_Known):
     """A curve, and after it another, shifted by `offset` (whole turns)."""
 
     first: Curve
@@ -344,41 +363,19 @@ class Joined:
     second_duration: float
     offset: Array
 
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
-
     def __call__(self, times: Array) -> tuple[Array, Array]:
         """Shapes and rates."""
-        late = times >= self.first_duration
+        late, inside = self.late(times)
         shapes, rates = (np.empty((len(times), len(self.offset))) for _ in range(2))
         shapes[~late], rates[~late] = self.first(times[~late])
-        inside = np.minimum(times[late] - self.first_duration, self.second_duration)
         shapes[late], rates[late] = self.second(inside)
         shapes[late] += self.offset
         return shapes, rates
 
-
-@dataclass(frozen=True, eq=False)
-class Repeated:
-    """A loop `count` times, each time `turns` (whole turns) further."""
-
-    curve: Curve
-    period: float
-    count: int
-    turns: Array
-
-    __repr__ = short_repr
-
-    __post_init__ = lock_arrays
-
-    def __call__(self, times: Array) -> tuple[Array, Array]:
-        """Shapes and rates."""
-        # Compared with the very numbers that stand in the breaks, so that a time just before one stays in its loop.
-        starts = self.period * np.arange(self.count)
-        loop = np.searchsorted(starts, times, side="right") - 1
-        shapes, rates = self.curve(np.minimum(times - starts[loop], self.period))
-        return shapes + loop[:, None] * self.turns, rates
+    def late(self, times: Array) -> tuple[Mask, Array]:
+        """True for times of the second curve, and its own times there."""
+        late = times >= self.first_duration
+        return late, np.minimum(times[late] - self.first_duration, self.second_duration)
 
 
 def swings_of(curve: Curve) -> Swings:
@@ -388,6 +385,6 @@ def swings_of(curve: Curve) -> Swings:
     if isinstance(curve, Repeated):
         loop = swings_of(curve.curve)
         return loop._replace(most=loop.most * curve.count) if loop.smooth_loop and loop.most else loop
-    if isinstance(curve, Reversed | Stretched | Reordered | Multiplied | Widened):
+    if isinstance(curve, Changed):
         return swings_of(curve.curve)
     return getattr(curve, "swings", Swings())

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
 from ..arrays import Array
 from ..errors import TrajectoryError, TrajectoryWarning
+from .files.labels import LENGTHS
 from .free_fall import UP_AXES, FreeFall, falls_along, lasts, measured_fall
 
-_LENGTHS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}  # [m] units mixed up by mistake
+_LENGTHS = {**LENGTHS, "in": 0.0254, "ft": 0.3048}  # [m] units mixed up by mistake
 # [1/s] usual frame rates.
 _RATES = (24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 125, 144, 150, 200, 240, 250, 300, 400, 480, 500, 1000)
 _MOST_TIMES = 10.0  # largest error of the frame rate
@@ -27,13 +27,8 @@ _AS_LONG = 0.8  # of the longest fall: among such long ones, the best parabola i
 _PARABOLA = 0.02  # [m] rms off a parabola, beyond the noise, of a motion that is no fall
 
 
-def check_gravity(fall: FreeFall, gravity: float, rate: float, where: str) -> None:
-    """Raise TrajectoryError where a fall is not by the gravity that is expected, and name the slips that fit."""
-    _check(fall.gravity, fall.gravity_bar, gravity, rate, where)
-
-
 def check_parabola(times: Array, centres: Array, noise: float, gravity: float, where: str) -> None:
-    """Check a stretch that is given in the same way: where it is a parabola, and bent enough for that to be seen.
+    """Check the gravity of a stretch that is given, where it is a parabola, and bent enough for that to be seen.
 
     Warns where the centre of mass leaves every parabola: no free flight, or a body of another size.
     """
@@ -53,7 +48,7 @@ def check_parabola(times: Array, centres: Array, noise: float, gravity: float, w
         )
     # What is not bent has no weight, or is too short to be compared.
     elif size > _BARS * bar:
-        _check(size, bar, gravity, 1.0 / float(np.median(np.diff(times))), where)
+        check_gravity(size, bar, gravity, times, where)
 
 
 def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up: str | None) -> FreeFall | None:
@@ -64,15 +59,15 @@ def slipped_fall(times: Array, positions: Array, arms: Array, gravity: float, up
     stride = 1 + len(times) // _MOST_SAMPLES
     seen, rate = times[::stride], 1.0 / float(np.median(np.diff(times)))
     falls: list[tuple[float, float, FreeFall]] = []
-    for trial in _trials(rate):
-        centres = positions[::stride] + trial.arms * arms[::stride]
+    for share, speed, lengths, longer in _trials(rate):
+        centres = positions[::stride] + longer * arms[::stride]
         for axis in UP_AXES[:3] if up is None else (up,):
-            found = falls_along(seen, centres, axis, gravity * trial.gravity)
+            found = falls_along(seen, centres, axis, gravity * share)
             if found is None:
                 continue
-            time = lasts(seen, found.ends) / trial.times
+            time = lasts(seen, found.ends) / speed
             # In the lengths of the file, too: whatever moves smoothly bends a little, and resembles a slow fall.
-            if is_long(found, seen, trial.lengths) and found.gravity > _SEEN * found.gravity_bar:
+            if is_long(found, seen, lengths) and found.gravity > _SEEN * found.gravity_bar:
                 falls.append((time, found.off / found.gravity, found))
     if not falls:
         return None
@@ -86,34 +81,27 @@ def is_long(fall: FreeFall, times: Array, lengths: float = 1.0) -> bool:
     return fall.gravity / lengths * lasts(times, fall.ends) ** 2 > _LONG
 
 
-class _Trial(NamedTuple):
-    """A slip: what it makes of gravity and of times; and by what lengths of the recording and of arms are off."""
-
-    gravity: float
-    times: float
-    lengths: float
-    arms: float
-
-
-def _trials(rate: float) -> Iterator[_Trial]:
+def _trials(rate: float) -> Iterator[tuple[float, float, float, float]]:
+    """What slips make of gravity and of times, and by what lengths of the recording and of arms are off."""
     for size in _LENGTHS.values():
         for other in _LENGTHS.values():
             share = size / other
             if size != other and 1.0 / _MOST_LENGTHS < share < _MOST_LENGTHS:
                 # Lengths of the body are from the same file, or they are right, and its arms scale with what is not.
-                yield _Trial(gravity=share, times=1.0, lengths=share, arms=1.0)
-                yield _Trial(gravity=share, times=1.0, lengths=share, arms=share)
+                yield share, 1.0, share, 1.0
+                yield share, 1.0, share, share
     for known in _RATES:
         speed = known / rate
         if 1.0 / _MOST_TIMES < speed < _MOST_TIMES and abs(speed**2 - 1.0) > _OFF:
-            yield _Trial(gravity=1.0 / speed**2, times=speed, lengths=1.0, arms=1.0)
+            yield 1.0 / speed**2, speed, 1.0, 1.0
 
 
-def _check(measured: float, bar: float, gravity: float, rate: float, where: str) -> None:
+def check_gravity(measured: float, bar: float, gravity: float, times: Array, where: str) -> None:
+    """Raise TrajectoryError where a fall is not by the gravity that is expected, and name the slips that fit."""
     off = abs(measured - gravity)
     if off <= _OFF * gravity or off <= _BARS * bar:
         return
-    slips = list(_slips(measured, bar, gravity, rate))
+    slips = list(_slips(measured, bar, gravity, 1.0 / float(np.median(np.diff(times)))))
     named = "; or ".join(slips) if slips else "no usual slip of a unit makes that of it"
     raise TrajectoryError(
         f"{where}: the centre of mass falls with {measured:.3g} ± {bar:.2g} m/s^2, {gravity:.4g} is expected: {named}. "

@@ -103,8 +103,11 @@ def free_fall(times: Array, centres: Array, where: str, *, up: str | None = None
         longest = falls_along(times, centres, up, gravity)
         downwards = None
     else:
-        falls = {axis: falls_along(times, centres, axis, gravity) for axis in UP_AXES}
-        longest, downwards = (_longer([falls[axis] for axis in part], times) for part in (UP_AXES[:3], UP_AXES[3:]))
+        falls = [falls_along(times, centres, axis, gravity) for axis in UP_AXES]
+        longest, downwards = (
+            max((fall for fall in part if fall is not None), key=lambda fall: lasts(times, fall.ends), default=None)
+            for part in (falls[:3], falls[3:])
+        )
     if downwards is not None and (longest is None or lasts(times, downwards.ends) > lasts(times, longest.ends)):
         first, last = times[downwards.first], times[downwards.last]
         raise TrajectoryError(
@@ -148,10 +151,6 @@ def _shortest(noise: float, gravity: float) -> float:
     return float(np.sqrt(_CLEAR * noise / (0.5 * gravity * _OF_A_PARABOLA)))
 
 
-def _longer(falls: list[FreeFall | None], times: Array) -> FreeFall | None:
-    return max((fall for fall in falls if fall is not None), key=lambda fall: lasts(times, fall.ends), default=None)
-
-
 def _fall(times: Array, centres: Array, up: str, gravity: float) -> FreeFall | None:
     """The longest stretch on which the centre of mass falls by one acceleration."""
     noise = centre_noise(times, centres)
@@ -189,12 +188,14 @@ def _described(
 ) -> FreeFall:
     inside = slice(ends[0], ends[1] + 1)
     sign, axis = ("-" if up.startswith("-") else "+"), "xyz".index(up[-1])
-    measured, bar = measured_fall(times[inside], centres[inside], noise)
+    t = times[inside]
+    measured, bar = measured_fall(t, centres[inside], noise)
+    off = _off_lines(t[None, :, None], straight[None, inside], np.ones((1, len(t), 1)))
     return FreeFall(
         *ends,
         f"{sign}{up[-1]}",
         noise,
-        _off_line(times[inside], straight[inside]),
+        float(np.sqrt((off**2).sum() / (3.0 * (len(t) - 2.0)))),
         float(-float(f"{sign}1") * measured[axis]),
         bar,
         all_ends,
@@ -302,9 +303,3 @@ def _off_lines(t: Array, values: Array, inside: Array) -> Array:
     t = (t - (inside * t).sum(axis=1, keepdims=True) / count) * inside
     values = (values - (inside * values).sum(axis=1, keepdims=True) / count) * inside
     return values - t * ((t * values).sum(axis=1, keepdims=True) / (t * t).sum(axis=1, keepdims=True))
-
-
-def _off_line(times: Array, straight: Array) -> float:
-    """Rms of a coordinate about the best straight line [m]."""
-    off = _off_lines(times[None, :, None], straight[None], np.ones((1, len(times), 1)))
-    return float(np.sqrt((off**2).sum() / (3.0 * (len(times) - 2.0))))

@@ -14,7 +14,7 @@ from ..letters import value_text
 from .curves import CLOSED, Fourier, PiecewisePolynomial
 
 _PARTS = ("x", "y", "z", "w")  # endings of the four names, behind a dot
-_SAME = 1e-9  # difference of two unit quaternions of one rotation
+REST_TO_REST = (10.0, -15.0, 6.0)  # quintic of least jerk from 0 to 1: coefficients of s^3, s^4, s^5
 
 
 def sample_arguments(
@@ -48,17 +48,6 @@ def path_joint_names(joint_names: Sequence[str] | None, n_shape: int) -> tuple[s
     if len(names) != n_shape or len(set(names)) != len(names):
         raise TrajectoryError(f"joint_names: {n_shape} different names are needed, got {value_text(names)}")
     return names
-
-
-def joined_names(
-    first: tuple[int, tuple[str, ...] | None], second: tuple[int, tuple[str, ...] | None]
-) -> tuple[str, ...] | None:
-    """Names of two paths that follow each other, by the numbers and names of their joints. Raises TrajectoryError."""
-    if first[0] != second[0]:
-        raise TrajectoryError(f"paths of {first[0]} and {second[0]} joints cannot follow each other")
-    if first[1] and second[1] and first[1] != second[1]:
-        raise TrajectoryError(f"paths with other joints or another order of joints: {first[1]} and {second[1]}")
-    return first[1] or second[1]
 
 
 def fourier_curve(mean: ArrayLike, cosines: ArrayLike, sines: ArrayLike, period: float) -> Fourier:
@@ -108,8 +97,8 @@ def spline_curve(times: Array, shapes: Array, balls: Sequence[slice], periodic: 
 def rest_to_rest_curve(times: Array, shapes: Array) -> PiecewisePolynomial:
     """Straight moves from rest to rest through waypoints, each by the quintic of least jerk."""
     moves, steps = np.diff(shapes, axis=0), np.diff(times)[:, None]
-    coefficients = np.zeros((6, *moves.shape))
-    for power, factor in ((3, 10.0), (4, -15.0), (5, 6.0)):
+    coefficients = np.zeros((3 + len(REST_TO_REST), *moves.shape))
+    for power, factor in enumerate(REST_TO_REST, 3):
         coefficients[power] = factor * moves / steps**power
     coefficients[0] = shapes[:-1]
     return PiecewisePolynomial(times, coefficients, "rest to rest")
@@ -156,6 +145,6 @@ def factors_between(end: Array, start: Array, balls: Sequence[slice]) -> Array:
         length = float(start[ball] @ start[ball])
         factor = float(end[ball] @ start[ball]) / length if length else 1.0
         size = float(np.linalg.norm(end[ball]))
-        if factor and np.linalg.norm(end[ball] - factor * start[ball]) <= _SAME * size:
+        if factor and np.linalg.norm(end[ball] - factor * start[ball]) <= CLOSED * size:
             factors[ball] = factor
     return factors

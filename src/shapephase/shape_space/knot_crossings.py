@@ -17,13 +17,12 @@ from ..body.couplings.ball_joints import BallJoint
 from ..body.couplings.coordinate_map import CoordinateMap
 from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryError
-from .curves import Curve, PiecewisePolynomial
+from .curves import CLOSED, Curve, PiecewisePolynomial
 from .path_series import merged, panel_edges, resolved_series
 from .shape_path import ShapePath
 
 _ROUNDING = 64.0 * np.finfo(float).eps  # relative to a coordinate's size, where it crosses a knot
 _NEARLY_REAL = 1e-6  # imaginary part in half panels: rounding leaves the root of a double zero
-_WHOLE = 1e-9  # [rad or m] largest gap of a loop
 
 
 def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
@@ -38,7 +37,8 @@ def with_crossings(body: Body | ParticleBody, route: ShapePath) -> ShapePath:
         _check_signs(ball, route)
     if follows.is_linear:
         return route
-    if route.loops > 1 and _winds(body, route):
+    drivers = np.isin(np.array(body.joint_names, dtype=str), follows.drivers)
+    if route.loops > 1 and (np.abs(route.gap[drivers]) > CLOSED).any():
         # What follows by a curve is elsewhere in the next loop.
         route = replace(route, breaks=_loop_ends(route), loops=1, scanner=None)
     if follows.is_smooth:
@@ -119,13 +119,6 @@ def _zeros(series: Array, value: float) -> Array:
     roots = chebyshev.chebroots(shifted)
     real = roots.real[np.abs(roots.imag) < _NEARLY_REAL]
     return np.clip(real[np.abs(real) < 1.0 + _NEARLY_REAL], -1.0, 1.0)
-
-
-def _winds(body: Body, route: ShapePath) -> bool:
-    """True if a joint that others follow by a curve ends a loop whole turns from its start."""
-    ends, _ = route.curve(np.array([0.0, route.duration]))
-    moved = np.abs(ends[1] - ends[0])
-    return bool((moved[np.isin(np.array(body.joint_names, dtype=str), body.chain.follows.drivers)] > _WHOLE).any())
 
 
 def _loop_ends(route: ShapePath) -> Array:

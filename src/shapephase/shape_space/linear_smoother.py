@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
@@ -145,7 +146,9 @@ def likeliest(
     """
     system = _Roughness(times, periodic, order)
     penalties = np.zeros(values.shape[1])
-    widths = _widths(len(values))
+    most = min(_WIDEST, max(float(len(values)), 1.0))
+    number = int(_WIDTHS_A_DECADE * np.log10(most / _NARROWEST)) + 1
+    widths = _NARROWEST * 10.0 ** (np.arange(number) / _WIDTHS_A_DECADE)
     if not system.modes:
         return LinearSmoother(times, periodic, penalties, order)
     # About the first: what does not move has no digits to lose.
@@ -167,12 +170,6 @@ def width_of(smoother: LinearSmoother) -> float:
     unit = float(smoother.times[-1]) / (len(smoother.times) - 1)
     scaled = float(smoother.penalties.max(initial=0.0)) / unit ** (2 * smoother.order - 1)
     return scaled ** (0.5 / smoother.order)
-
-
-def _widths(count: int) -> Array:
-    most = min(_WIDEST, max(float(count), 1.0))
-    number = int(_WIDTHS_A_DECADE * np.log10(most / _NARROWEST)) + 1
-    return _NARROWEST * 10.0 ** (np.arange(number) / _WIDTHS_A_DECADE)
 
 
 def _least(places: Array, values: Array) -> float:
@@ -283,14 +280,14 @@ def _butterworth(count: int, periodic: bool) -> tuple[Any, Any]:
     splines = count if periodic else max(count - BUTTERWORTH, 0)
     first = np.arange(splines)
 
-    def band(entries: list[float], shift: int, rows: int) -> Any:
+    def band(entries: Sequence[float] | Array, shift: int, rows: int) -> Any:
         places = first[:, None] + np.arange(len(entries)) + shift
         columns, values = np.broadcast_to(first[:, None], places.shape), np.broadcast_to(entries, places.shape)
         inside = np.ones_like(places, dtype=bool) if periodic else (places >= 0) & (places < rows)
         there = (values[inside], (places[inside] % max(rows, 1), columns[inside]))
         return coo_array(there, shape=(rows, splines)).tocsc()
 
-    return band([1.0, -2.0, 1.0], 0, count), band([1 / 16, 4 / 16, 6 / 16, 4 / 16, 1 / 16], -2, splines)
+    return band([1.0, -2.0, 1.0], 0, count), band(np.array([1, 4, 6, 4, 1]) / 16, -2, splines)
 
 
 def _splines(times: Array, periodic: bool, order: int) -> tuple[Any, Any]:

@@ -22,20 +22,13 @@ from .shape_path import ShapePath
 
 @dataclass(frozen=True, eq=False)
 class FinalAttitudes:
-    """Final attitudes of many motions.
+    """Final attitudes of many motions. Made by `final_attitudes`.
 
     Attributes
     ----------
     attitude : (P, 3, 3) R(T), base axes to inertial axes
     error_estimate : (P,) of the largest attitude error over each motion [rad]
     evaluations : (P,) how often the locked inertia and internal momentum were computed
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> found = sp.final_attitudes(cat, [loop], np.zeros(3))
-    >>> print(np.degrees(sp.so3.angle(found.attitude)).round(3), found.error_estimate.max() < 1e-8)
-    [65.305] True
     """
 
     attitude: Array

@@ -20,7 +20,7 @@ _MOST_NUMBERS = 4_000_000  # in memory at once; more times are taken in parts
 
 @dataclass(frozen=True, eq=False)
 class PathErrors:
-    """Error bars of joints at some times, each from the noise of its own samples.
+    """Error bars of joints at some times, each from the noise of its own samples. Made by `path_errors`.
 
     Attributes
     ----------
@@ -28,13 +28,6 @@ class PathErrors:
     covariance : (N, n, 3, 3) of shape, rate and acceleration of each joint: by the noise, and by what the noise leaves
         open of the bias
     bias : (N, n, 3) what smoothing took off these, as far as it is known
-
-    Examples
-    --------
-    >>> times = np.linspace(0.0, 1.0, 41)
-    >>> path = sp.ShapePath.spline(times, np.sin(times)[:, None])
-    >>> print(sp.path_errors(path, [0.5], 0.01).shape.round(4))  # on a knot: that of the sample
-    [[0.01]]
     """
 
     times: Array

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, cast
+from typing import Protocol, cast
 
 import numpy as np
 
 from ..arrays import Array, Integers, Mask
 from ..errors import WrongObjectError
-from .closing_arc import ClosingArc
 from .curves import PiecewisePolynomial, Reordered
+from .interpolation import REST_TO_REST
+from .shape_geodesic import ClosingArc
 from .shape_path import PathOrigin, ShapePath, interpolated
-
-_REST_TO_REST = (10.0, -15.0, 6.0)  # quintic of least jerk from 0 to 1: coefficients of s^3, s^4, s^5
 
 
 class SampleOrigin(PathOrigin, Protocol):
@@ -39,22 +38,6 @@ class SampleOrigin(PathOrigin, Protocol):
         ...
 
 
-class PathBasis(NamedTuple):
-    """A path at N times by the coefficients of its polynomials.
-
-    pieces : (N,) the piece of each time
-    powers, slopes, bends : (N, order) derivatives of the shape, of its rate, and of its acceleration, by the
-        coefficients of that piece
-    total : of all pieces
-    """
-
-    pieces: Integers
-    powers: Array
-    slopes: Array
-    bends: Array
-    total: int
-
-
 @dataclass(frozen=True, eq=False)
 class PathSamples:
     """Samples of a path, its joints in the order of the path's columns.
@@ -72,8 +55,7 @@ class PathSamples:
 
     @property
     def count(self) -> int:
-        """Number of samples that may differ: the last of a periodic path is the first, unless both were
-        recorded."""
+        """Number of samples that may differ: the last of a periodic path is the first, unless both were recorded."""
         return self._at_knots if self.origin is None else len(self.origin.samples)
 
     @property
@@ -121,27 +103,29 @@ class PathSamples:
         """Sums over times of derivatives by shapes and rates, by the values at the knots: (k, knots n)."""
         from scipy.sparse import csc_array
 
-        basis = self.basis(times)
-        order, count = basis.powers.shape[1], len(times)
+        pieces, (powers, slopes, _) = self._basis(times)
+        order, count, total = powers.shape[1], len(times), self.curve.coefficients.shape[1]
         # Sums over the times in each piece, for each power, as products with a matrix that has a column for each time.
-        rows, ends = (np.arange(order) * basis.total + basis.pieces[:, None]).ravel(), order * np.arange(count + 1)
-        whole = np.zeros((order * basis.total, by_shape[0].size))
-        for factors, values in ((basis.powers, by_shape), (basis.slopes, by_rate)):
+        rows, ends = (np.arange(order) * total + pieces[:, None]).ravel(), order * np.arange(count + 1)
+        whole = np.zeros((order * total, by_shape[0].size))
+        for factors, values in ((powers, by_shape), (slopes, by_rate)):
             sums = csc_array((factors.ravel(), rows, ends), shape=(len(whole), count))
             whole += sums @ values.reshape(count, -1)
-        return self.by_knots_of(whole.reshape(order, basis.total, *by_shape.shape[1:]))
+        return self.by_knots_of(whole.reshape(order, total, *by_shape.shape[1:]))
 
-    def basis(self, times: Array) -> PathBasis:
-        """The path at times (N,) by the coefficients of its polynomials."""
+    def _basis(self, times: Array) -> tuple[Integers, Array]:
+        """Piece of each time (N,), and derivatives of shape, rate and acceleration there by its coefficients.
+
+        The latter (3, N, order).
+        """
         curve = self.curve
         piece = np.searchsorted(curve.knots[1:-1], times, side="right")
         exponents = np.arange(len(curve.coefficients))
-        powers = (times - curve.knots[piece])[:, None] ** exponents
-        slopes = np.zeros_like(powers)
-        slopes[:, 1:] = exponents[1:] * powers[:, :-1]
-        bends = np.zeros_like(powers)
-        bends[:, 1:] = exponents[1:] * slopes[:, :-1]
-        return PathBasis(piece, powers, slopes, bends, curve.coefficients.shape[1])
+        rows = np.zeros((3, len(times), len(exponents)))
+        rows[0] = (times - curve.knots[piece])[:, None] ** exponents
+        for order in (1, 2):
+            rows[order, :, 1:] = exponents[1:] * rows[order - 1, :, :-1]
+        return piece, rows
 
     def rows_by_knots(self, times: Array) -> Array:
         """Shape, rate and acceleration of a joint at times (N,), by its own values at the knots: (3, N, knots).
@@ -149,12 +133,11 @@ class PathSamples:
         No geodesic closes the path: that would couple the joints.
         """
         assert self.arc is None
-        basis, count = self.basis(times), len(times)
-        order = basis.powers.shape[1]
-        by_coefficients = np.zeros((order, basis.total, 3, count))
-        rows = np.stack([basis.powers, basis.slopes, basis.bends])
-        by_coefficients[:, basis.pieces, :, np.arange(count)] = np.moveaxis(rows, 1, 0).swapaxes(1, 2)
-        by_knots = self.by_knots_of(by_coefficients.reshape(order, basis.total, 3 * count, 1))
+        (pieces, rows), count = self._basis(times), len(times)
+        order, total, _ = self.curve.coefficients.shape
+        by_coefficients = np.zeros((order, total, 3, count))
+        by_coefficients[:, pieces, :, np.arange(count)] = np.moveaxis(rows, 1, 0).swapaxes(1, 2)
+        by_knots = self.by_knots_of(by_coefficients.reshape(order, total, 3 * count, 1))
         return by_knots.reshape(3, count, -1)
 
     def by_knots_of(self, by_coefficients: Array) -> Array:
@@ -231,7 +214,7 @@ def path_samples(path: ShapePath) -> PathSamples:
 def _rest_to_rest(widths: Array, by_coefficients: Array, _: bool) -> Array:
     """Convert derivatives by coefficients (6, pieces, m) to those by values at the knots: (pieces + 1, m)."""
     by_move = sum(
-        factor * by_coefficients[power] / widths[:, None] ** power for power, factor in enumerate(_REST_TO_REST, 3)
+        factor * by_coefficients[power] / widths[:, None] ** power for power, factor in enumerate(REST_TO_REST, 3)
     )
     by_knots = np.zeros((len(widths) + 1, by_coefficients.shape[2]))
     by_knots[:-1] += by_coefficients[0] - by_move

@@ -9,8 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Array, Integers
-from ..chebyshev import inside, nodes_on, restriction_matrix, values_to_coefficients
+from ..chebyshev import (
+    PiecewiseChebyshev,
+    inside,
+    nodes_on,
+    restriction_matrix,
+    values_to_coefficients,
+    widest_margin,
+)
 from ..errors import TrajectoryError
+from ..integrator.resolved import ResolvedPath
 from .curves import CLOSED, polynomial_pieces
 from .interpolation import ball_columns
 
@@ -19,6 +27,7 @@ if TYPE_CHECKING:
 
 SAME_TIME = 1e-12  # relative to the duration: nearer times are one
 _DEGREE = 16  # of the series on a panel: five times that of a spline's pieces
+_ROUNDING = 32.0 * float(np.finfo(float).eps)  # relative to the largest coefficient: the scan's resolution
 _RESOLVED = 1e-13  # last coefficients of a resolved series, relative to the largest value
 _LAST = 3  # coefficients that show whether a series is resolved
 _NARROWEST = 2.0**-16  # relative to the whole: narrower panels are not halved
@@ -26,7 +35,7 @@ _PANELS_AT_ONCE = 512  # some ten megabytes
 _EXTREME = 1e-14  # error of an extreme, relative to the largest value
 _MOST_HALVINGS = 60  # of a panel that may hold an extreme; a parabola needs 24
 _INTERVALS = 16  # of a table on each panel, at first
-_PLACES = np.array([0.25, 0.5, 0.75])  # in an interval, where a table's spline is compared
+_PLACES = np.arange(1, 4) / 4  # in an interval, where a table's spline is compared
 _MOST_PARTS = 16  # of an interval in one round: the error of a long one is not yet of fourth order
 _STEEPEST = 20.0  # ratio of neighbouring intervals: from 100 on a reader reports gaps and doubled samples
 _MOST_ROUNDS = 48  # intervals at a kink are halved about thirty times
@@ -103,6 +112,36 @@ def times_of_fastest(path: ShapePath) -> Array:
     edges = panel_edges(path)
     times = nodes_on(*inside(edges[:-1], edges[1:]), _DEGREE).ravel()
     return times[np.abs(path.rate(times)).argmax(axis=0)]
+
+
+def resolved_accelerations(resolved: ResolvedPath, loops: int, times: Array) -> Array:
+    """Accelerations by the derivative of the series of the rates, of all loops by the first one: (N, n)."""
+    n_shape, edges = resolved.coefficients.shape[2] // 2, resolved.edges
+    rates = PiecewiseChebyshev(edges, _continuous(resolved.coefficients[:, :, n_shape:], edges))
+    loop = np.minimum(np.floor(times / resolved.duration), loops - 1)
+    return rates.derivative()(times - loop * resolved.duration)
+
+
+def _continuous(series: Array, edges: Array) -> Array:
+    """Series (P, k, n) that meet where panels do, as far as rounding keeps them apart, by a change of their slopes.
+
+    What accelerations add up to is then what the rates change by, also where these are large for a short time. At a
+    break both sides were sampled at some distance from it, which counts as rounding of times.
+    """
+    degrees, widths = np.arange(series.shape[1])[:, None], np.diff(edges)[:, None]
+    signs = np.where(degrees % 2, -1.0, 1.0)
+    starts, ends = (signs * series).sum(axis=1), series.sum(axis=1)
+    sizes = np.abs(series)
+    slopes = 2.0 / widths * (degrees**2 * sizes).sum(axis=1)
+    noise = _ROUNDING * sizes.max(axis=1) + widest_margin(float(edges[-1])) * slopes
+    gaps = starts[1:] - ends[:-1]
+    gaps = np.where(np.abs(gaps) <= noise[1:] + noise[:-1], gaps, 0.0)
+    changed = series.copy()
+    none = np.zeros_like(series[:1, 0])
+    at_start, at_end = np.concatenate([none, -0.5 * gaps]), np.concatenate([0.5 * gaps, none])
+    changed[:, 0] += 0.5 * (at_start + at_end)
+    changed[:, 1] += 0.5 * (at_end - at_start)
+    return changed
 
 
 def spline_times(path: ShapePath) -> Array:

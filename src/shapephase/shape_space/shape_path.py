@@ -24,7 +24,6 @@ from ..display import Card, card_html, card_text, numbers
 from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
-from ._accelerations import exact_accelerations, resolved_accelerations
 from .curves import (
     CLOSED,
     Curve,
@@ -36,9 +35,9 @@ from .curves import (
     PiecewisePolynomial,
     Reordered,
     Repeated,
-    Reversed,
-    Stretched,
+    Retimed,
     Swings,
+    exact_accelerations,
     returned_pair,
     swings_of,
 )
@@ -46,14 +45,13 @@ from .interpolation import (
     ball_columns,
     factors_between,
     fourier_curve,
-    joined_names,
     path_joint_names,
     rest_to_rest_curve,
     same_shape,
     sample_arguments,
     spline_curve,
 )
-from .path_series import spline_times
+from .path_series import SAME_TIME, resolved_accelerations, spline_times
 from .scan.function_scan import DerivedScan, FunctionScan, JoinedScan, check_rates, path_function
 from .scan.scanning import scanned
 
@@ -279,7 +277,7 @@ class ShapePath:
         if self.scanner is not None:
             return self.scanner()
         period = self.duration / self.loops
-        edges = self.breaks[self.breaks <= period * (1.0 + 1e-12)]
+        edges = self.breaks[self.breaks <= period * (1.0 + SAME_TIME)]
         return scanned(path_function(self.curve, self.n_shape, self.joint_names), edges)
 
     @property
@@ -292,7 +290,7 @@ class ShapePath:
         """The path backwards in time."""
         breaks = self.duration - self.breaks[::-1]
         breaks[[0, -1]] = 0.0, self.duration
-        curve = Reversed(self.curve, self.duration)
+        curve = Retimed(self.curve, self.duration)
         return replace(self, curve=curve, breaks=breaks, scanner=DerivedScan(self, "reversed"), origin=None)
 
     def stretched(self, factor: float) -> ShapePath:
@@ -301,7 +299,7 @@ class ShapePath:
         duration = self.duration * scale
         breaks = self.breaks * scale
         breaks[-1] = duration
-        curve = Stretched(self.curve, scale, self.duration)
+        curve = Retimed(self.curve, self.duration, scale)
         scanner = DerivedScan(self, "stretched", (scale,))
         return replace(self, curve=curve, duration=duration, breaks=breaks, scanner=scanner, origin=None)
 
@@ -316,7 +314,13 @@ class ShapePath:
         TrajectoryError
             If the joints differ, or `other` starts at another shape than the one where this path ends.
         """
-        names = joined_names((self.n_shape, self.joint_names), (other.n_shape, other.joint_names))
+        if self.n_shape != other.n_shape:
+            raise TrajectoryError(f"paths of {self.n_shape} and {other.n_shape} joints cannot follow each other")
+        names = self.joint_names or other.joint_names
+        if names != (other.joint_names or names):
+            raise TrajectoryError(
+                f"paths with other joints or another order of joints: {names} and {other.joint_names}"
+            )
         end, start = self.shape(self.duration), other.shape(0.0)
         factors = factors_between(end, start, ball_columns(names))
         start = start * factors

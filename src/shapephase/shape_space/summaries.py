@@ -24,14 +24,7 @@ _KINDS = {"rad": "revolute", "m": "prismatic", "1": "ball"}
 class JointSummary:
     """One joint: its kind ("revolute", "continuous" or "prismatic"), limits (infinite where there are none), unit.
 
-    A ball joint ("ball") has four of them, one for each number.
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> joint = sp.body_summary(cat).joints[0]
-    >>> joint.name, joint.kind, joint.unit
-    ('waist_pitch', 'revolute', 'rad')
+    A ball joint ("ball") has four of them, one for each number. Made by `body_summary`.
     """
 
     name: str
@@ -45,7 +38,7 @@ class JointSummary:
 
 @dataclass(frozen=True, eq=False)
 class PartSummary:
-    """Rigid part: a link and those that are fixed to it.
+    """Rigid part: a link and those that are fixed to it. Made by `body_summary`.
 
     Attributes
     ----------
@@ -53,12 +46,6 @@ class PartSummary:
     mass : [kg]
     centre_of_mass : (3,) axes of the first link [m]
     principal_moments : (3,) ascending, about the centre of mass [kg m^2]
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> [part.mass for part in sp.body_summary(cat).parts]
-    [1.0, 0.0, 0.0, 1.0]
     """
 
     links: tuple[str, ...]
@@ -71,7 +58,7 @@ class PartSummary:
 
 @dataclass(frozen=True, eq=False)
 class BodySummary:
-    """A body at its neutral shape.
+    """A body at its neutral shape. Made by `body_summary`.
 
     Attributes
     ----------
@@ -85,12 +72,6 @@ class BodySummary:
     followers : of each joint that follows others, in words, how
     links : all of them, by name
     parts : what moves as one, the base first
-
-    Examples
-    --------
-    >>> summary = sp.body_summary(sp.load_body("satellite"))
-    >>> summary.mass, len(summary.joints), len(summary.links)
-    (139.5, 10, 16)
     """
 
     name: str
@@ -110,7 +91,7 @@ class BodySummary:
 
 @dataclass(frozen=True, eq=False)
 class PathSummary:
-    """A joint motion for a body.
+    """A joint motion for a body. Made by `path_summary`.
 
     Attributes
     ----------
@@ -124,12 +105,6 @@ class PathSummary:
     still_joints : names of the joints that do not move
     gap : (n,) where it ends, from where it begins, whole turns of continuous joints taken off
     is_loop : True if it closes
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> print(np.degrees(sp.path_summary(cat, loop).highest).round(3))
-    [28.648 28.648  3.738]
     """
 
     duration: float

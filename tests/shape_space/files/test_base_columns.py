@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.errors import ShapeError, TrajectoryError
-from shapephase.shape_space.files.read import read_recorded_motion
+from shapephase.shape_space.files import read_recorded_motion
 from support.motion_writers import write_delimited, write_opensim
 
 DIVER = sp.load_body("diver")

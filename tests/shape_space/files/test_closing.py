@@ -7,8 +7,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.errors import OpenPathError, ShapePhaseError, TrajectoryError, UnknownNameError
 from shapephase.examples.scenarios import cat_righting
-from shapephase.shape_space.files.read import read_recorded_motion
-from shapephase.shape_space.files.smoothing import smoothed_path
+from shapephase.shape_space.files import read_recorded_motion, smoothed_path
 
 DIVER = sp.load_body("diver")
 T = np.arange(61) / 60.0

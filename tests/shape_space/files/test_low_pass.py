@@ -124,7 +124,7 @@ def test_a_ball_joint_at_a_constant_rate_is_off_at_the_ends_alone(ball):
     assert off[MIDDLE].max() < 1e-11
     # An open end has the weights of a natural spline, which miss what bends there: (f/cut_off)^2 of its size.
     assert 1e-4 < off.max() < (8.0 / (4.0 * np.pi) / CUT_OFF) ** 2
-    with pytest.raises(TrajectoryError, match="turns too fast"):
+    with pytest.raises(TrajectoryError, match="lowpass"):
         sp.read_shape_path(of_ball(turns), ball, lowpass=0.3)
 
 
@@ -194,7 +194,7 @@ def test_uneven_samples_are_put_on_even_times_first():
     shapes = np.stack([np.sin(uneven), np.cos(uneven)], axis=1)
     turns = Rotation.from_rotvec(8.0 * uneven[:, None] * AXIS)
     table = frame(shapes, uneven, **base_of(turns))
-    with pytest.raises(TrajectoryError, match=r"--resample 100"):
+    with pytest.raises(TrajectoryError, match="--resample"):
         sp.read_recorded_motion(table, DIVER, lowpass=CUT_OFF)
     with pytest.raises(TrajectoryError, match="--resample"):
         sp.read_recorded_motion(table, DIVER, lowpass=CUT_OFF, resample=200)

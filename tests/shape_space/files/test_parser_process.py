@@ -52,5 +52,5 @@ def test_what_goes_wrong_is_named(parser, kind, words):
 
 def test_what_never_ends_is_stopped(parser, monkeypatch):
     monkeypatch.setattr(parser_process, "_SECONDS", 0.5)
-    with pytest.raises(TrajectoryError, match=r"m\.c3d: reading it took more than 0\.5 s and was stopped"):
+    with pytest.raises(TrajectoryError, match="stopped"):
         parsed(Path("m.c3d"), b"12345", "C3D", parser("endless"))

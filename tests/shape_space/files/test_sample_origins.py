@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.shape_space.files.read import read_recorded_motion
+from shapephase.shape_space.files import read_recorded_motion
 from shapephase.shape_space.path_samples import path_samples
 
 DIVER = sp.load_body("diver")

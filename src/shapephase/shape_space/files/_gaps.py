@@ -13,8 +13,8 @@ from ...errors import TrajectoryError
 from .labels import seconds
 from .recording import Recording, Table, listed
 
-_UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] a larger rotation across a gap has an unknown direction
-_ROUNDING = 1e-9  # relative excess of a sum of time steps
+UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] a larger rotation across a gap has an unknown direction
+ROUNDING = 1e-9  # relative excess of a sum of time steps
 _MOST_SHOWN = 4  # columns and gaps that an error lists
 
 
@@ -29,7 +29,6 @@ def fill_argument(fill: float | str | None) -> float | None:
 class Gaps:
     """Samples that columns of a recording lack, and their bridges.
 
-    recording : whose times the samples have
     longest : gap that is bridged [s], from the last number before it to the first one after it; None: none is
     """
 
@@ -40,10 +39,7 @@ class Gaps:
         self._method: dict[str, str] = {}
 
     def held(self, table: Table, label: str) -> Array:
-        """A column with the last number before it in each gap, which `bridged` and `turned` then replace.
-
-        Raises TrajectoryError for a word, an infinite number, and a column without numbers.
-        """
+        """A column with the last number before it in each gap, which `bridged` and `turned` then replace."""
         if label not in self._missing:
             self._missing[label] = table.missing(label)
         missing = self._missing[label]
@@ -80,10 +76,7 @@ class Gaps:
         return filled
 
     def turned(self, labels: Sequence[str], turns: Array) -> Array:
-        """Rotations (N, 3, 3) of joined columns, in their gaps those of the C2 rotation spline through the others.
-
-        Raises TrajectoryError where a rotation across a gap is too large for its direction to be known.
-        """
+        """Rotations (N, 3, 3) of joined columns, in their gaps those of the C2 rotation spline through the others."""
         from scipy.spatial.transform import Rotation, RotationSpline
 
         missing = self._inside(labels[0])
@@ -93,7 +86,7 @@ class Gaps:
         samples, times = np.flatnonzero(~self._missing[labels[0]]), self._recording.times
         known = turns[samples]
         steps = so3.angle(so3.transpose(known[:-1]) @ known[1:])
-        wide = np.flatnonzero((np.diff(samples) > 1) & (steps > _UNRESOLVED))
+        wide = np.flatnonzero((np.diff(samples) > 1) & (steps > UNRESOLVED))
         if len(wide):
             before, after = int(samples[wide[0]]), int(samples[wide[0] + 1])
             raise TrajectoryError(
@@ -106,10 +99,7 @@ class Gaps:
         return filled
 
     def settled(self) -> tuple[Integers, dict[str, Any] | None]:
-        """The samples without gaps at the ends, and what was filled and cut, ready for JSON.
-
-        Raises TrajectoryError for gaps that are not to be bridged.
-        """
+        """The samples without gaps at the ends, and what was filled and cut, ready for JSON."""
         ends = {label: np.flatnonzero(~missing)[[0, -1]].tolist() for label, missing in self._missing.items()}
         count = len(self._recording.times)
         low = max((first for first, _ in ends.values()), default=0)
@@ -153,14 +143,14 @@ class Gaps:
     def _check(self, gaps: dict[tuple[int, int], list[str]], outer: Sequence[tuple[str, list[str], int, int]]) -> None:
         """Raise TrajectoryError for gaps longer than those to be bridged."""
         lengths = {gap: self._length(*gap) for gap in gaps}
-        longest = -1.0 if self._longest is None else self._longest * (1.0 + _ROUNDING)
+        longest = -1.0 if self._longest is None else self._longest * (1.0 + ROUNDING)
         refused = sorted(gap for gap, length in lengths.items() if length > longest)
         where = self._recording.table.where
         if refused:
             shown = [f"{_columns(gaps[gap])} {self._span(*gap)}" for gap in refused[:_MOST_SHOWN]]
             more = f"; and {len(refused) - len(shown)} more" if len(refused) > len(shown) else ""
             beyond = "" if self._longest is None else f"; longer than the {self._longest:g} s to be bridged"
-            need = f"{np.ceil(1e3 * max(lengths.values()) * (1.0 - _ROUNDING)) / 1e3:g}"
+            need = f"{np.ceil(1e3 * max(lengths.values()) * (1.0 - ROUNDING)) / 1e3:g}"
             raise TrajectoryError(
                 f"{where}: no number in {'; '.join(shown)}{more}{beyond}; bridge gaps of that length with fill={need} "
                 f"(--fill {need}s), or keep a stretch without them (trim, {self._trim_option(*refused[0])})"

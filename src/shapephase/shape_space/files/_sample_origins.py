@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,10 +10,10 @@ import numpy as np
 
 from ...arrays import Array, Mask, lock_arrays
 from ...display import short_repr
-from ..closing_arc import ClosingArc
 from ..curves import PiecewisePolynomial
 from ..linear_smoother import LinearSmoother
 from ..path_samples import PathSamples, path_samples
+from ..shape_geodesic import ClosingArc
 from ..shape_path import ShapePath, interpolated
 
 
@@ -20,13 +21,11 @@ from ..shape_path import ShapePath, interpolated
 class Prepared:
     """Samples, from which turns and drift are taken off, which are smoothed, and through which a spline is put.
 
-    samples : (N, n) as recorded [rad or m]
     smoother : of columns (n,); has the times of the samples, and whether the spline is periodic
     pilot : a smoother of a higher order, by whose motion it is known what the other one takes off; None: unknown
     inside : the samples between whose times the path is, of those that are smoothed
     turns : (n,) whole turns that a loop makes, evenly [rad]
     drift : True if the gap between the last sample and the first is taken off evenly in time
-    joint_names : n names, or None
     """
 
     samples: Array
@@ -136,8 +135,6 @@ class Prepared:
 class Resampled:
     """Values of a path through samples, evenly in time, through which another spline is put.
 
-    inner : the path through samples
-    times : (M,) of its values [s]
     count : how many values may differ: of a periodic spline the last is the first
     """
 
@@ -163,29 +160,26 @@ class Resampled:
 
     def path(self, samples: Array) -> ShapePath:
         """Return the path that the steps make of other samples (N, n)."""
-        return resampled(path_samples(self.inner).path_through(samples), self.times, self.inner.joint_names)
+        names = self.inner.joint_names
+        return resampled(replace(path_samples(self.inner).path_through(samples), joint_names=names), self.times)
 
     def by_samples(self, by_values: Array) -> Array:
         """Return derivatives by the samples from those by the values at the knots."""
-        samples = path_samples(self.inner)
-        return self._of_inner(samples.by_samples(self._by_knots(samples, by_values)), samples.count)
+        return self._through(PathSamples.by_samples, by_values)
 
     def bias_by_samples(self, by_values: Array) -> Array:
         """Return derivatives of the bias by the samples from those by the bias."""
+        return self._through(PathSamples.bias_by_samples, by_values)
+
+    def _through(self, rule: Callable[[PathSamples, Array], Array], by_values: Array) -> Array:
         samples = path_samples(self.inner)
-        return self._of_inner(samples.bias_by_samples(self._by_knots(samples, by_values)), samples.count)
-
-    def _by_knots(self, samples: PathSamples, by_values: Array) -> Array:
-        return samples.by_knots(self.times[: self.count], by_values, np.zeros_like(by_values))
-
-    @staticmethod
-    def _of_inner(found: Array, count: int) -> Array:
-        return np.moveaxis(found.reshape(len(found), count, -1), 0, 1)
+        found = rule(samples, samples.by_knots(self.times[: self.count], by_values, np.zeros_like(by_values)))
+        return np.moveaxis(found.reshape(len(found), samples.count, -1), 0, 1)
 
 
-def resampled(path: ShapePath, times: Array, joint_names: tuple[str, ...] | None) -> ShapePath:
+def resampled(path: ShapePath, times: Array) -> ShapePath:
     """The spline through values of a path at times (M,), which remembers the samples of that path."""
-    plain = ShapePath.spline(times, path.shape(times), joint_names=joint_names)
+    plain = ShapePath.spline(times, path.shape(times), joint_names=path.joint_names)
     curve = plain.curve
     assert isinstance(curve, PiecewisePolynomial)
     if isinstance(path.origin, ClosingArc):

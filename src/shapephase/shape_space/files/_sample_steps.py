@@ -15,6 +15,7 @@ from ... import so3
 from ...arrays import Array, Integers
 from ...body.body import Body
 from ...errors import TrajectoryError, TrajectoryWarning
+from ._gaps import ROUNDING, UNRESOLVED
 from ._joint_columns import Matched
 from .labels import IN_A_SECOND
 from .recording import Recording, warn
@@ -26,9 +27,7 @@ _NEXT = 1.0  # [s]
 _FEWEST = 4  # steps in that second: fewer are no recording with small steps
 _NO_POSE = 0.02  # [rad or m] a smaller first step is noise, or a body that hardly moves
 _DENSER = 1.1  # largest even rate over the usual rate of uneven samples
-_ROUNDING = 1e-9  # in steps of time
 _GAP = 5.0  # usual steps: samples farther apart belong to different motions
-_UNRESOLVED = 2.0 * np.pi / 3.0  # [rad] per sample: a turn of twice that, the other way round, gives the same samples
 
 
 def without_first_pose(recording: Recording, motion: Matched, body: Body) -> tuple[Recording, Matched]:
@@ -71,10 +70,10 @@ def warn_of_fast_turns(recording: Recording, motion: Matched, body: Body) -> Non
         return
     steps = np.stack([_angles(ball.turns(motion.shapes)) for ball in balls], axis=1)
     sample, column = divmod(int(np.argmax(steps)), len(balls))
-    if steps[sample, column] < _UNRESOLVED:
+    if steps[sample, column] < UNRESOLVED:
         return
     clock = recording.first + recording.times[sample + 1] * IN_A_SECOND[recording.time_unit]
-    others = int(np.count_nonzero(steps >= _UNRESOLVED)) - 1
+    others = int(np.count_nonzero(steps >= UNRESOLVED)) - 1
     warn(
         f"{recording.place(sample + 1)}: {balls[column].name} turns by {np.degrees(steps[sample, column]):.3g} deg "
         f"from {recording.table.row} {recording.table.rows[sample]}, at {clock:.6g} {recording.time_unit}"
@@ -84,10 +83,7 @@ def warn_of_fast_turns(recording: Recording, motion: Matched, body: Body) -> Non
 
 
 def evenly_spaced(times: Array, motion: Matched, inside: slice, rate: float) -> tuple[Array, Matched, slice]:
-    """A motion at so many even times a second [1/s], by splines through its samples, and which of them are inside.
-
-    Raises TrajectoryError for more samples a second than there are: their noise would not be that of a recording.
-    """
+    """A motion at so many even times a second [1/s], by splines through its samples, and which of them are inside."""
     usual = 1.0 / float(np.median(np.diff(times)))
     if rate > _DENSER * usual:
         raise TrajectoryError(
@@ -95,7 +91,7 @@ def evenly_spaced(times: Array, motion: Matched, inside: slice, rate: float) -> 
             f"own; give that rate or less (resample={usual:.4g}, --resample {usual:.4g})"
         )
     start, stop = times[inside][[0, -1]]
-    before, past, after = (int((t - start) * rate + _ROUNDING) for t in (2.0 * start - times[0], stop, times[-1]))
+    before, past, after = (int((t - start) * rate + ROUNDING) for t in (2.0 * start - times[0], stop, times[-1]))
     at = np.clip(start + np.arange(-before, after + 1) / rate, times[0], times[-1])
     base = motion.base
     if base.attitude is not None:
@@ -148,33 +144,21 @@ def surrounded(
     match: Callable[[Recording], tuple[Recording, Matched]],
     fill: float | None,
 ) -> tuple[Recording, Matched, slice]:
-    """The samples that are kept with those that the file has before and after them, and which of these are kept.
-
-    kept, motion : the samples that are kept
-    untrimmed : the whole recording, where that can be read
-    match : the joints and the base of a recording
-    fill : the longest gap that is bridged [s], or None
-    """
+    """The samples that are kept with those that the file has before and after them, and which of these are kept."""
     # Faults and doubts of these samples, which the caller left out, are not reported.
     with suppress(TrajectoryError), warnings.catch_warnings():
         warnings.simplefilter("ignore", TrajectoryWarning)
         whole = untrimmed()
         first = list(whole.table.rows).index(kept.table.rows[0])
-        start, stop = _readable(whole, first, first + len(kept.times), _broken(whole, motion.left_out, fill))
+        past, steps = first + len(kept.times), np.diff(whole.times)
+        apart = np.flatnonzero(steps > _GAP * float(np.median(steps[first : past - 1])))
+        broken = _broken(whole, motion.left_out, fill)
+        start = max([*(apart[apart < first] + 1), *(broken[broken < first] + 1), 0])
+        stop = min([*(apart[apart >= past - 1] + 1), *broken[broken >= past], len(whole.times)])
         part, around = match(part_of(whole, np.arange(start, stop)))
         begin = list(part.table.rows).index(kept.table.rows[0])
         return part, around, slice(begin, begin + len(kept.times))
     return kept, motion, slice(None)
-
-
-def _readable(whole: Recording, first: int, past: int, broken: Integers) -> tuple[int, int]:
-    """Ends of the stretch around some samples that has no gaps and no missing numbers."""
-    steps = np.diff(whole.times)
-    usual = float(np.median(steps[first : past - 1]))
-    apart = np.flatnonzero(steps > _GAP * usual)
-    before = np.concatenate([apart[apart < first] + 1, broken[broken < first] + 1, [0]])
-    after = np.concatenate([apart[apart >= past - 1] + 1, broken[broken >= past], [len(whole.times)]])
-    return int(before.max()), int(after.min())
 
 
 def _broken(whole: Recording, left_out: Collection[str], fill: float | None) -> Integers:

@@ -47,12 +47,7 @@ _MODELS = {"opensim": ".osim", "mvnx": ".mvnx"}  # kind of model whose links are
 
 @dataclass(frozen=True, kw_only=True)
 class SegmentChoices:
-    """How segments become links, checked.
-
-    names : segment -> link, or None for a segment to be left out
-    calibration : a time, as the file gives it; the name of a pose of the file; "links"; None: as the file states
-    length_tolerance : share by which lengths may differ from the body's
-    """
+    """How segments become links, checked: options of `read_recorded_motion`."""
 
     names: Mapping[str, str | None]
     calibration: float | str | None = None
@@ -83,10 +78,17 @@ class Frame(NamedTuple):
 
 
 class Calibration(NamedTuple):
-    """Turns from segment axes to those of the frames (k, 3, 3), and the segments' origins there (k, 3) [m]."""
+    """Turns from segment axes to those of the frames (k, 3, 3), and the segments' origins there (k, 3) [m].
+
+    error, worst : largest angle between recorded and own ways [rad], and which way that is
+    by_origins : True if origins show how the base is turned
+    """
 
     turns: Array
     origins: Array
+    error: float = 0.0
+    worst: str = ""
+    by_origins: bool = False
 
 
 class Links:
@@ -140,10 +142,7 @@ class Links:
         return _THOUSAND[0] * own <= recorded <= _THOUSAND[1] * own
 
     def calibration(self, recording: Recording, choices: SegmentChoices, record: dict[str, Any]) -> Calibration:
-        """Turns and origins of the segments in their frames; the record gets how they were found.
-
-        Raises TrajectoryError if they are unknown, or the body does not stand in its zero pose.
-        """
+        """Turns and origins of the segments in their frames; the record gets how they were found."""
         at, stands, file = choices.calibration, dict(self.poses.stands or {}), self.body.file
         if at is None and file is not None and file.suffix.lower() == _MODELS.get(self.poses.of_model or ""):
             at = OWN_AXES
@@ -180,7 +179,7 @@ class Links:
                 "most. Give a time at which it does: calibration=T (--calibration T)"
             )
         for other, candidate in fits.items():
-            apart = so3.angle(so3.transpose(candidate.calibration.turns) @ fit.calibration.turns)
+            apart = so3.angle(so3.transpose(candidate.turns) @ fit.turns)
             if candidate.error <= MOST_OFF_WAY and apart.max() > _OTHER_POSE:
                 raise TrajectoryError(
                     f"{self.where}: both {kind} and {other} may be the zero pose of {self.body.name}, and "
@@ -195,7 +194,7 @@ class Links:
                 f"{self.where}: at {kind} the base of {self.body.name} is taken to have the axes of the room: the "
                 "places of segments do not tell how it is turned"
             )
-        return fit.calibration
+        return fit
 
     def _origins(self) -> Array:
         """Places in the frames of the segments: centres of mass, or the origins of links."""
@@ -216,7 +215,7 @@ class Links:
             )
         return self.poses.turns[sample], None if self.poses.origins is None else self.poses.origins[sample]
 
-    def _fitted(self, turns: Array, origins: Array | None) -> _Fit:
+    def _fitted(self, turns: Array, origins: Array | None) -> Calibration:
         used = [f.segment for f in self.frames]
         rest = self.frame_poses(self.body.shape()[None])
         turned = np.stack([rest[f.frame][0][0] for f in self.frames])
@@ -239,7 +238,7 @@ class Links:
                 apart = angle_of_ways(ends[k] - ends[above], base @ (own[k] - own[above]))
                 if apart > error:
                     error, worst = apart, f"from {self.frames[above].link} to {self.frames[k].link}"
-        return _Fit(error, worst, by_origins, Calibration(so3.transpose(turns[used]) @ base @ turned, inside))
+        return Calibration(so3.transpose(turns[used]) @ base @ turned, inside, error, worst, by_origins)
 
     def _matched(self, names: Mapping[str, str | None]) -> dict[int, Frame]:
         """Frame of the chain -> the segment that shows it, parents before children."""
@@ -279,15 +278,6 @@ class Links:
                 f"{segment}={lacking[0]}), or leave a segment out: --names {segment}="
             )
         return dict(sorted(frames.items()))
-
-
-class _Fit(NamedTuple):
-    """A calibration, its largest angle between ways and where, and whether the base is turned by origins."""
-
-    error: float
-    worst: str
-    by_origins: bool
-    calibration: Calibration
 
 
 def known_links(body: Body, segments: Iterable[str]) -> dict[str, str]:

@@ -78,11 +78,7 @@ class SegmentMotion:
 def without_segments(
     table: Table, body: Body, choices: SegmentChoices, time_unit: str | None, timestep: float | None
 ) -> tuple[Table, dict[str, str | None]]:
-    """The table with joints and base in the place of poses of segments, and the names that are left for its columns.
-
-    Raises TrajectoryError if segments and links do not match, axes are not known, or lengths, ways between joints or
-    turns of hinges are none that the body can have.
-    """
+    """The table with joints and base in the place of poses of segments, and the names that are left for its columns."""
     names = dict(choices.names)
     if table.poses is None:
         table = pose_columns(table, names, body)

@@ -1,7 +1,9 @@
-"""Columns of a recording that hold place and attitude of the base, and the axes in which they do."""
+"""Columns of a recording that hold place and attitude of the base: names that programs give them, axes, motion."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import permutations
 from typing import Any, NamedTuple
@@ -15,20 +17,47 @@ from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import value_text
 from ._gaps import Gaps
-from ._pose_columns import CANONICAL, MRP, VECTOR
-from ._unit_doubts import angles_in_rad, check_range, lengths_in_m
-from .labels import NO_UNIT, Label, label
-from .recording import Recording, checked_quaternions
+from .labels import NO_UNIT, Label, angles_in_rad, check_range, label, lengths_in_m
+from .recording import OFF_UNIT, Recording, checked_quaternions
 
 ESTIMATE = "estimate"  # axes of the base that a fit determines
 _FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")  # of `Motion.write_csv`; they follow from the rest
 _VELOCITIES = ("base_vx_m_s", "base_vy_m_s", "base_vz_m_s")  # written by `export_motion`
 _AGREES = 0.1  # median error of turns between samples, relative to the rates: both agree
 _CONTRADICTS = 0.5  # relative to the rates: turns that are off by more contradict them
-_OFF_UNIT = 1e-3  # allowed error of a quaternion's length: recordings keep as few as three digits
 _LEAST_SLIDES = 2  # sliding joints that determine the place of the base; with one, the other directions are fixed
 _SAME_AXES = "x y z"
 _OPENSIM_AXES = "x -z y"  # base axes of URDF (x forward, z up) in OpenSim's (x forward, y up, z right)
+QUATERNION = "quaternion"
+PLACE = "place"
+MRP = "mrp"
+VECTOR = "vector"
+EULER = "euler"
+_KINDS = {
+    QUATERNION: ("q", "quat", "quaternion", "orientation", "rotation", "attitude", "rot", "att"),
+    PLACE: ("p", "t", "r", "pos", "position", "trans", "translation", "location"),
+    MRP: ("sigma", "mrp", "mrps"),
+    VECTOR: ("rotvec", "rv", "axisangle"),
+}
+_KIND_OF = {word: kind for kind, words in _KINDS.items() for word in words}
+_EULER = {"roll": "roll", "pitch": "pitch", "yaw": "yaw", "heading": "yaw"}
+_BASE = frozenset(  # words before the kind that name no other part of the body
+    ("base", "link", "root", "pelvis", "body", "pose", "odom", "odometry", "state", "states", "transform", "field")
+) | {"free", "floating", "freeflyer"}
+_FRAME = re.compile(r"[a-z]{1,2}")  # frames between a kind and its component, as in `p_RS_R_x`
+_JOINED = re.compile(r"(q|quat|t|p|r|mrp|sigma|rotvec|pos)([wxyz]|\d)")
+_SPLIT = re.compile(r"[/.\s_\[\]()]+")
+CANONICAL = {  # kind -> component -> name of its column
+    QUATERNION: {part: f"base_q{part}" for part in "xyzw"},
+    PLACE: {part: f"base_{part}" for part in "xyz"},
+    MRP: {part: f"base_mrp_{part}" for part in "123"},
+    VECTOR: {part: f"base_rotvec_{part}" for part in "xyz"},
+    EULER: {part: f"base_{part}" for part in ("roll", "pitch", "yaw")},
+}
+HINT = (  # in messages about columns of the base
+    "columns of the base are base_x, base_y, base_z and base_qx, base_qy, base_qz, base_qw or base_roll, base_pitch, "
+    "base_yaw or base_mrp_1, base_mrp_2, base_mrp_3"
+)
 
 
 class _Group(NamedTuple):
@@ -69,9 +98,8 @@ KNOWN = frozenset(name for group in _GROUPS for name in group.names)
 
 @dataclass(frozen=True, kw_only=True)
 class BaseChoices:
-    """How columns become the motion of the base, checked.
+    """How columns become the motion of the base, checked: options of `read_recorded_motion`.
 
-    order : of angles, as "zxy"; None: the default of such columns
     axes : (3, 3) base axes to the axes of the columns, ESTIMATE, or None for the default
     given : these axes as the caller wrote them
     """
@@ -120,10 +148,7 @@ def base_choices(order: str | None, axes: Any) -> BaseChoices:
 
 
 def named_axes(text: str) -> Array:
-    """Rotation from base axes by words such as "x -z y", where x, y and z axis of the base point to.
-
-    Raises TrajectoryError.
-    """
+    """Rotation from base axes by words such as "x -z y", where x, y and z axis of the base point to."""
     words = text.replace(",", " ").split()
     matrix = np.zeros((3, 3))
     for column, word in enumerate(words[:3]):
@@ -330,7 +355,7 @@ class BaseColumns:
         return way_poses(self.way, values, len(self.recording.times))
 
     def _by_quaternions(self, quaternions: Array) -> Array:
-        return so3.matrix_from_quat(checked_quaternions(quaternions, self.recording, "the base", _OFF_UNIT))
+        return so3.matrix_from_quat(checked_quaternions(quaternions, self.recording, "the base", OFF_UNIT))
 
     def _texts(self, group: _Group) -> tuple[str, ...]:
         return tuple(self.columns[name][0] for name in group.names)
@@ -363,3 +388,66 @@ def _vectors_of_mrps(parameters: Array) -> Array:
     sizes = np.linalg.norm(parameters, axis=-1, keepdims=True)
     tiny = sizes < np.finfo(np.float64).tiny
     return parameters * np.where(tiny, 4.0, 4.0 * np.arctan(sizes) / np.where(tiny, 1.0, sizes))
+
+
+def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, str]:
+    """Label -> the name of a column of the base, of all labels that complete a quaternion, a place and so on.
+
+    own : names of joints and columns that are known already
+    """
+    families: dict[tuple[str, tuple[str, ...]], dict[str, str]] = {}
+    for text, target in targets.items():
+        part = None if target in own or label(target).name in own else _part(target)
+        if part is not None:
+            families.setdefault(part[:2], {})[part[2]] = text
+    names: dict[str, str] = {}
+    for (kind, _), texts in families.items():
+        components = _components(kind, texts)
+        if components is not None:
+            names |= {texts[written]: CANONICAL[kind][part] for written, part in components.items()}
+    return names
+
+
+def _part(target: str) -> tuple[str, tuple[str, ...], str] | None:
+    """Kind, words before it and component of a label; None of one that is no part of the base."""
+    plain = label(target).name
+    rooted = "/" in plain or "." in plain
+    tokens: list[str] = []
+    for token in filter(None, _SPLIT.split(plain.lower())):
+        joined = _JOINED.fullmatch(token)
+        tokens += joined.groups() if joined is not None else (token,)
+    if not tokens:
+        return None
+    *before, last = tokens
+    if last in _EULER:
+        return (EULER, tuple(before), _EULER[last]) if _is_base(before, rooted) else None
+    if last not in (*"wxyz", *"01234"):
+        return None
+    for k, word in enumerate(before):
+        if word in _KIND_OF and all(map(_FRAME.fullmatch, before[k + 1 :])):
+            # `t1` to `t3` may be torques or temperatures; `r_BN_N_1` is a place.
+            if _KIND_OF[word] == PLACE and len(word) == 1 and last.isdigit() and not before[k + 1 :]:
+                return None
+            return (_KIND_OF[word], tuple(before), last) if _is_base(before[:k], rooted) else None
+    return (PLACE, tuple(before), last) if last in "xyz" and set(before) <= _BASE else None
+
+
+def _is_base(words: list[str], rooted: bool) -> bool:
+    """True if the words before a kind may be the base: known words, or the topic of a message."""
+    return set(words) <= _BASE or (rooted and (not words or words[-1] in _BASE))
+
+
+def _components(kind: str, texts: Mapping[str, str]) -> dict[str, str] | None:
+    """Written component -> component, where all are there; numbers count from 0, with the scalar first, or from 1."""
+    there = "".join(sorted(texts)) if kind != EULER else ""
+    if kind == EULER:
+        return {name: name for name in texts} if len(texts) == len(CANONICAL[EULER]) else None
+    if kind == QUATERNION and there == "1234":
+        first, last = texts["1"], texts["4"]
+        raise TrajectoryError(
+            f"quaternion {', '.join(texts[k] for k in '1234')}: its scalar part may be the first or the last; say "
+            f"which: --names '{first}=qw' and so on, or '{first}=qx' to '{last}=qw' (names={{{first!r}: 'qw', ...}})"
+        )
+    three = "".join(CANONICAL[kind])
+    meant = {"wxyz": "wxyz", "0123": "wxyz"} if kind == QUATERNION else dict.fromkeys(("012", "123", "xyz"), three)
+    return dict(zip(there, meant[there], strict=True)) if there in meant else None

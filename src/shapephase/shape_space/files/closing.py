@@ -14,10 +14,9 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import TrajectoryError, unknown_name
-from ..closing_arc import ClosingArc
 from ..connection import horizontal_lift
 from ..curves import CLOSED
-from ..shape_geodesic import shape_geodesic
+from ..shape_geodesic import ClosingArc, shape_geodesic
 from ..shape_path import ShapePath
 from .labels import amounts
 from .smoothing import Recorded, Smoothing, prepared_path
@@ -79,19 +78,11 @@ class Closing:
 def closed_path(
     recorded: Recorded, body: Body, *, within: float | str, by: str | None, penalty: float | None = None
 ) -> tuple[ShapePath, Smoothing, Closing]:
-    """The loop of a recorded cycle.
-
-    within : the largest gap that is closed, a number in rad or m, or a text as "3deg" or "3deg,5mm"
-    by : one of `WAYS`; None: a periodic smoother where a noise is given, else by the drift
-    penalty : of the smoothing, as for `smoothed_path`
-
-    Raises UnknownNameError for another way; TrajectoryError if the ends differ by more, or a joint that does not close
-    has no noise to smooth.
-    """
+    """The loop of a recorded cycle."""
     check_object(body, "Body", "body")
     way = ("smooth" if recorded.smoothed else "drift") if by is None else by
     if not isinstance(way, str) or way not in WAYS:
-        raise unknown_name("way of closing", str(way)[:40], WAYS)
+        raise unknown_name("way of closing", f"{way!s:.40}", WAYS)
     first, last = recorded.around().shapes[[0, -1]]
     for ball in body.chain.follows.balls:
         if last[ball.columns] @ first[ball.columns] < 0.0:
@@ -104,10 +95,17 @@ def closed_path(
     _check_gap(gap, amounts(within, "close"), body)
     opened, smoothing = prepared_path(recorded, periodic=False, penalty=penalty)
     if way == "geodesic":
-        closed = _with_geodesic(opened, turns, body)
+        arc = ClosingArc(body, opened, shape_geodesic(body, opened.shape(opened.duration), opened.shape(0.0) + turns))
+        # A gap of rounding takes no time.
+        still = np.abs(gap).max(initial=0.0) <= CLOSED or arc.speed == 0.0
+        closed = opened if still else arc.closed
     else:
-        if way == "smooth" and recorded.cut_off is None:
-            _check_noise(gap, recorded.noise, body)
+        silent = np.flatnonzero((recorded.noise == 0.0) & (np.abs(gap) > CLOSED))
+        if way == "smooth" and recorded.cut_off is None and len(silent):
+            raise TrajectoryError(
+                f"joint {body.joint_names[silent[0]]} does not close, and no noise is given that a smoother could use; "
+                "give smooth (--smooth), or close it by drift or geodesic (close_by, --close-by)"
+            )
         closed, smoothing = prepared_path(recorded, periodic=True, penalty=penalty, turns=turns, drift=way == "drift")
     return closed, smoothing, Closing(by=way, gap=gap, opened=opened, closed=closed, body=body)
 
@@ -133,21 +131,3 @@ def _check_gap(gap: Array, within: dict[str, float], body: Body) -> None:
             f"joint {name} ends {shown} from its start, and gaps up to {allowed[joint]:.6g} {unit} are to be closed; "
             "cut the recording at a full cycle (trim, --flight), or allow more (close, --close)"
         )
-
-
-def _check_noise(gap: Array, noise: Array, body: Body) -> None:
-    open_joints = np.flatnonzero((noise == 0.0) & (np.abs(gap) > CLOSED))
-    if len(open_joints):
-        raise TrajectoryError(
-            f"joint {body.joint_names[int(open_joints[0])]} does not close, and no noise is given that a smoother "
-            "could use; give smooth (--smooth), or close it by drift or geodesic (close_by, --close-by)"
-        )
-
-
-def _with_geodesic(opened: ShapePath, turns: Array, body: Body) -> ShapePath:
-    """The open path, and from its end to its start a geodesic, as fast as the path itself, rms."""
-    first, last = opened.curve(np.array([0.0, opened.duration]))[0]
-    arc = ClosingArc(body, opened, shape_geodesic(body, last, first + turns))
-    # A gap of rounding takes no time.
-    still = np.abs(last - first - turns).max(initial=0.0) <= CLOSED or arc.speed == 0.0
-    return opened if still else arc.closed

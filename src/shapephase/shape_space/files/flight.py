@@ -72,11 +72,8 @@ class Flight:
 
 @dataclass(frozen=True)
 class FlightChoices:
-    """How a flight is found in a recording, checked.
+    """How a flight is found in a recording, checked: options of `read_recorded_motion`.
 
-    request : a word, two times, or None: no flight is requested
-    up : the axis that points up, or None for that of the format
-    gravity : [m/s^2]; or None: units are not checked
     number : of the flight in time, from 1 on; None: the longest one
     """
 
@@ -119,11 +116,7 @@ def turns(attitudes: Array | None) -> bool:
 def in_flight(
     recording: Recording, motion: Matched, body: Body, choices: FlightChoices
 ) -> tuple[Recording, Matched, Flight | None]:
-    """The part of a recording and of its motion that is the flight; all of them where none is requested.
-
-    Raises TrajectoryError if the attitude of the base was not recorded, or, where the flight is to be found, its
-    position; if none is found, or it has less than three samples; if it falls otherwise than by gravity.
-    """
+    """The part of a recording and of its motion that is the flight; all of them where none is requested."""
     request, where, base = choices.request, recording.table.where, motion.base
     if request is None or (request == RECORDED and not turns(base.attitude)):
         return recording, motion, None
@@ -143,7 +136,12 @@ def in_flight(
         if fall is not None and centres is not None:
             flights = tuple((float(clock[first]), float(clock[last])) for first, last in fall.all_ends)
             if choices.number is not None:
-                _check_number(choices.number, flights, recording)
+                if choices.number > len(flights):
+                    known = ", ".join(f"{first:.6g} to {last:.6g}" for first, last in flights)
+                    raise TrajectoryError(
+                        f"{where}: there is no flight number {choices.number}, there are {len(flights)}: {known} "
+                        f"{recording.time_unit}; take one of them (--flight auto:{len(flights)})"
+                    )
                 fall = fall_number(times, centres, fall, choices.number)
             samples = np.arange(fall.first, fall.last + 1)
     elif centres is not None and choices.gravity is not None and len(samples) >= _FEWEST:
@@ -158,15 +156,6 @@ def in_flight(
     part = part_of(recording, samples)
     method = AUTO if fall is not None else ALL if isinstance(request, str) else "times"
     return part, motion.kept(samples), Flight(part.first, part.last, method, fall, request != RECORDED, flights)
-
-
-def _check_number(number: int, flights: tuple[tuple[float, float], ...], recording: Recording) -> None:
-    if number > len(flights):
-        known = ", ".join(f"{first:.6g} to {last:.6g}" for first, last in flights)
-        raise TrajectoryError(
-            f"{recording.table.where}: there is no flight number {number}; there {'are' if len(flights) > 1 else 'is'} "
-            f"{len(flights)}: {known} {recording.time_unit}; take one of them (--flight auto:{len(flights)})"
-        )
 
 
 def _fall(recording: Recording, motion: Matched, centres: Array | None, choices: FlightChoices) -> FreeFall | None:
@@ -194,7 +183,7 @@ def _fall(recording: Recording, motion: Matched, centres: Array | None, choices:
         if slipped is not None and (fall is None or lasts(times, slipped.ends) > 2.0 * lasts(times, fall.ends)):
             fall = slipped
     if fall is not None and choices.gravity is not None:
-        check_gravity(fall, choices.gravity, 1.0 / float(np.median(np.diff(times))), where)
+        check_gravity(fall.gravity, fall.gravity_bar, choices.gravity, times, where)
     if fall is None and missing is not None and choices.request == AUTO:
         raise missing
     return fall

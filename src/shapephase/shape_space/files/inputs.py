@@ -25,7 +25,7 @@ from .formats.named_arrays import read_hdf5, read_matlab
 from .formats.opensim import has_header, read_opensim
 from .formats.ros_motion_files import read_bag, read_ros_yaml
 from .formats.segment_poses import read_mvnx
-from .formats.spreadsheets import read_excel, read_feather, read_json_lines, read_parquet
+from .formats.spreadsheets import read_arrow, read_excel, read_json_lines
 from .formats.text_tables import read_text
 from .recording import Table, digest, file_bytes
 
@@ -37,28 +37,22 @@ JSON_LINES = (".jsonl", ".ndjson")
 TABLES: dict[str, Callable[[Path, bytes, str | None], Any]] = {  # ending -> reader of name, bytes and topic
     **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".log", ".tum"), lambda w, d, part: read_text(w, d, section=part)),
     **dict.fromkeys((".xlsx", ".xlsm"), read_excel),
-    ".parquet": lambda where, data, _: read_parquet(where, data),
-    ".feather": lambda where, data, _: read_feather(where, data),
+    **dict.fromkeys((".parquet", ".feather"), lambda where, data, _: read_arrow(where, data)),
     **dict.fromkeys(JSON_LINES, lambda where, data, _: read_json_lines(where, data)),
 }
-_TEXTS: dict[str, Callable[[Path, bytes], Table]] = {
-    ".mot": read_opensim,
-    ".sto": read_opensim,
-    ".yaml": read_ros_yaml,
-    ".yml": read_ros_yaml,
-    ".c3d": read_c3d,
-    ".json": read_deepmimic,
-    ".mvnx": read_mvnx,
-}
-_WITH_PARTS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
+_OTHERS: dict[str, Callable[[Path, bytes, str | None], Table]] = {
+    **dict.fromkeys((".mot", ".sto"), lambda where, data, _: read_opensim(where, data)),
+    **dict.fromkeys((".yaml", ".yml"), lambda where, data, _: read_ros_yaml(where, data)),
+    ".c3d": lambda where, data, _: read_c3d(where, data),
+    ".json": lambda where, data, _: read_deepmimic(where, data),
+    ".mvnx": lambda where, data, _: read_mvnx(where, data),
     ".mat": read_matlab,
-    ".h5": read_hdf5,
-    ".hdf5": read_hdf5,
+    **dict.fromkeys((".h5", ".hdf5"), read_hdf5),
 }
+_WITH_PARTS = (*TABLES, ".mat", ".h5", ".hdf5")
 _ARRAYS = (".npz", ".npy")
-_WITH_BODY: dict[str, Callable[[Path, bytes, Body], Table]] = {".bvh": read_bvh}
 _BAGS = (".bag", ".mcap", ".db3")
-_OTHERS = {  # similar files, and how to turn them into joint motions
+_SIMILAR = {  # files that are not read, and how to turn them into joint motions
     ".trc": INVERSE_KINEMATICS,
     ".mvn": "it is a suit's recording as its own program keeps it; export it there as MVNX, or as BVH",
     ".xls": "Excel's older files are not read; save it as .xlsx or .csv",
@@ -87,12 +81,6 @@ def read_input(
     """The table of a file, of standard input (`-`), or of objects in memory; and the time step, if it is still needed.
 
     source : a file's name, a frame of pandas or xarray, a mapping of arrays, `(times, array, names)`, or an `Input`
-    topic : which part of a bag, a workbook or a `.mat` file; None: the only one
-    timestep : [s], for sources without times
-    order : of the joints in arrays without names, or None
-    names : of columns, as a caller gives them
-
-    Raises InputFileNotFoundError; UnknownNameError for an unknown ending or part; TrajectoryError for faults.
     """
     if topic is not None and not isinstance(topic, str):
         raise ShapeError(f"topic: a name is needed, got {value_text(topic)}")
@@ -126,17 +114,17 @@ def read_input(
     if suffix in _BAGS or os.path.isdir(where):
         if timestep is not None:
             raise TrajectoryError(f"{where}: timestep is for files without times; this one has its times")
-        _check_exists(where)
+        if not os.path.exists(where):
+            raise no_such_file(where)
         return Input(read_bag(where, topic), str(source), digest(where)), None
-    if suffix in _OTHERS:
-        raise TrajectoryError(f"{where}: {suffix} files are not read: {_OTHERS[suffix]}")
-    kinds = (*TABLES, *_TEXTS, *_WITH_PARTS, *_WITH_BODY, *_ARRAYS)
+    if suffix in _SIMILAR:
+        raise TrajectoryError(f"{where}: {suffix} files are not read: {_SIMILAR[suffix]}")
+    kinds = (*TABLES, *_OTHERS, ".bvh", *_ARRAYS)
     if suffix not in kinds:
         raise unknown_name(
             f"ending of the motion file {where}:", where.suffix, dict.fromkeys((".csv", ".npz", *kinds, *_BAGS))
         )
-    _check_exists(where)
-    if topic is not None and suffix not in (*TABLES, *_WITH_PARTS):
+    if topic is not None and suffix not in _WITH_PARTS:
         raise TrajectoryError(
             f"{where}: topic={value_text(topic)} is for bags, workbooks and .mat files; this one has no parts"
         )
@@ -148,10 +136,9 @@ def read_input(
     if suffix in _ARRAYS:
         table, step = read_arrays(where, data, body, timestep, order)
         return Input(table, name, sha256), step
-    if suffix in _WITH_BODY:
-        return Input(_WITH_BODY[suffix](where, data, body), name, sha256), timestep
-    table = _WITH_PARTS[suffix](where, data, topic) if suffix in _WITH_PARTS else _TEXTS[suffix](where, data)
-    return Input(of_numbered_columns(table, body, order), name, sha256), timestep
+    if suffix == ".bvh":
+        return Input(read_bvh(where, data, body), name, sha256), timestep
+    return Input(of_numbered_columns(_OTHERS[suffix](where, data, topic), body, order), name, sha256), timestep
 
 
 def _table(where: Path, data: bytes, topic: str | None) -> Table:
@@ -161,11 +148,6 @@ def _table(where: Path, data: bytes, topic: str | None) -> Table:
     if data.lstrip().startswith(b"{") and where.suffix.lower() not in JSON_LINES:
         return read_deepmimic(where, data)
     return file_table(TABLES[where.suffix.lower()](where, data, topic), str(where))
-
-
-def _check_exists(where: Path) -> None:
-    if not os.path.exists(where):
-        raise no_such_file(where)
 
 
 def _no_topic(topic: str | None, source: str) -> None:

@@ -1,18 +1,20 @@
-"""Keyword arguments of the functions that read recorded motions, and their check."""
+"""Keyword arguments of the functions that read recorded motions, their check, and names of columns for joints."""
 
 from __future__ import annotations
 
 import inspect
+import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, TypedDict, TypeVar
 
 from numpy.typing import ArrayLike
 
-from ...arguments import check_choice, positive_argument
+from ...arguments import check_choice, check_file_name, positive_argument
 from ...body.joint_orders import WORDS
-from ...errors import TrajectoryError, WrongObjectError, unknown_name
+from ...errors import ShapeError, TrajectoryError, WrongObjectError, unknown_name
 from ...letters import value_text
 from ._gaps import fill_argument
 from ._joint_columns import JointChoices
@@ -20,7 +22,8 @@ from ._segment_links import SegmentChoices
 from .base_columns import base_choices
 from .closing import close_argument
 from .flight import FlightChoices, flight_choices
-from .mapping_files import names_argument
+from .labels import label
+from .recording import check_text, file_bytes
 from .times import trim_argument
 
 Read = TypeVar("Read", bound=Callable[..., Any])
@@ -90,13 +93,6 @@ class Reading:
     names : column or segment -> joint or link, None to leave it out; None: not given
     listed : True where names were a list, one for each column
     joints, segments, flight : how columns become joints and base, segments links, and what a flight is
-    time_unit, timestep, topic, joint_order : as `read_recorded_motion` has them
-    trim : first and last time that are kept, as the file gives them
-    rate, cut_off : of resampling and of the low-pass filter [1/s]
-    smooth, penalty : noise of the samples, and the penalty in place of that which follows from it
-    close : largest gap that is closed; None: none
-    close_by : how it is closed, or None
-    loop : True where ends that meet are joined smoothly
     """
 
     names: Mapping[str, str | None] | None
@@ -104,18 +100,11 @@ class Reading:
     joints: JointChoices
     segments: SegmentChoices
     flight: FlightChoices
-    time_unit: str | None
-    timestep: float | None
-    topic: str | None
-    joint_order: str | None
     trim: tuple[float, float] | None
     rate: float | None
     cut_off: float | None
-    smooth: float | str | Mapping[str, float | str] | None
-    penalty: float | None
     close: float | str | None
-    close_by: str | None
-    loop: bool
+    given: Callable[[str], Any]
 
     @classmethod
     def of(cls, options: ReadingOptions) -> Reading:
@@ -131,8 +120,7 @@ class Reading:
         resample, lowpass = given("resample"), given("lowpass")
         rate = None if resample is None else positive_argument(resample, "resample", "a number of samples a second")
         cut_off = None if lowpass is None else positive_argument(lowpass, "lowpass", "a frequency in Hz")
-        smooth, penalty = given("smooth"), given("smooth_penalty")
-        if cut_off is not None and not (smooth is None and penalty is None):
+        if cut_off is not None and not (given("smooth") is None and given("smooth_penalty") is None):
             raise TrajectoryError(
                 "lowpass and smooth are two ways to do one thing; leave one of them out (lowpass, --lowpass; smooth, "
                 "--smooth; smooth_penalty, --smooth-penalty)"
@@ -159,16 +147,105 @@ class Reading:
                 names=names or {}, calibration=given("calibration"), length_tolerance=given("length_tolerance")
             ),
             flight=flight,
-            time_unit=given("time_unit"),
-            timestep=given("timestep"),
-            topic=given("topic"),
-            joint_order=order,
             trim=trim,
             rate=rate,
             cut_off=cut_off,
-            smooth=smooth,
-            penalty=penalty,
             close=close,
-            close_by=given("close_by"),
-            loop=given("close") is None,
+            given=given,
         )
+
+
+def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:
+    """Read a mapping from columns to joints, for the argument `names` of `read_recorded_motion`.
+
+    A file that ends with `.json` holds one object, `{"column": "joint", "other": null}`. Any other is a text with a
+    line `column=joint` for each, where nothing behind the equals sign leaves the column out, and `#` begins a comment.
+
+    Raises
+    ------
+    InputFileNotFoundError
+        If there is no such file.
+    ShapeError
+        For anything else in it, with the line.
+
+    Examples
+    --------
+    >>> with open("names.txt", "w") as file:
+    ...     _ = file.write("LKnee=left_knee")
+    >>> sp.shape_space.files.read_names("names.txt")
+    {'LKnee': 'left_knee'}
+    """
+    check_file_name(file, "file")
+    where = Path(file)
+    data = file_bytes(where)
+    check_text(data, where)
+    text = data.decode("utf-8-sig")
+    if where.suffix.lower() == ".json":
+        return _from_json(text, where)
+    names: dict[str, str | None] = {}
+    for count, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or line.strip().startswith("#"):
+            continue
+        column, joint = name_pair(line, f"{where}: line {count}")
+        if column in names:
+            raise ShapeError(f"{where}: line {count}: {column!r:.60} stands twice")
+        names[column] = joint
+    return names
+
+
+def name_pair(text: str, where: str) -> tuple[str, str | None]:
+    """One `column=joint`; without a joint the column is left out. Raises ShapeError, which begins with `where`."""
+    column, mark, joint = text.strip().rpartition("=")
+    if not mark or not column.strip():
+        raise ShapeError(f"{where}: COLUMN=JOINT is needed, got {text.strip()!r:.60}")
+    return column.strip(), joint.strip() or None
+
+
+def names_argument(names: Any) -> Mapping[str, str | None] | None:
+    """Names with a file of them read, and a list as names of columns by their numbers. Raises ShapeError."""
+    if isinstance(names, str | os.PathLike):
+        return read_names(names)
+    if isinstance(names, list | tuple):
+        return {str(number): name for number, name in enumerate(names, start=1)}
+    if names is not None and not isinstance(names, Mapping):
+        raise ShapeError(f"names: a mapping, name in the file -> joint, is needed, got {value_text(names)}")
+    return names
+
+
+def names_by_label(names: Mapping[str, str | None], labels: Iterable[str]) -> dict[str, str | None]:
+    """Label of the file -> name; keys may lack the label's unit.
+
+    Raises ShapeError for names that are no texts; KeyError with the name, if no label has it; TrajectoryError if
+    several do.
+    """
+    known = list(labels)
+    plain: dict[str, list[str]] = {}
+    for text in known:
+        plain.setdefault(label(text).name, []).append(text)
+    by_label: dict[str, str | None] = {}
+    for column, name in names.items():
+        if not isinstance(column, str) or not (name is None or isinstance(name, str)):
+            raise ShapeError(
+                f"names: texts are needed (None leaves a column out), got {value_text(column)}: {name!r:.40}"
+            )
+        candidates = [column] if column in known else plain.get(column, [])
+        if not candidates:
+            raise KeyError(column)
+        if len(candidates) > 1:
+            raise TrajectoryError(f"names: {column!r} may be {' or '.join(map(repr, candidates))}; write it in full")
+        by_label[candidates[0]] = name
+    return by_label
+
+
+def _from_json(text: str, where: Path) -> dict[str, str | None]:
+    try:
+        pairs = json.loads(text, object_pairs_hook=tuple)
+    except (ValueError, RecursionError) as error:
+        raise ShapeError(f"{where}: no JSON ({error!s:.100})") from None
+    # Only an object becomes a tuple, of pairs.
+    if not isinstance(pairs, tuple) or not all(name is None or isinstance(name, str) for _, name in pairs):
+        raise ShapeError(f'{where}: one object of texts, {{"column": "joint", "other": null}}, is needed')
+    names = dict(pairs)
+    if len(names) < len(pairs):
+        raise ShapeError(f"{where}: a column stands twice")
+    return names

@@ -23,8 +23,7 @@ from .closing import Closing, closed_path
 from .flight import Flight, in_flight
 from .inputs import read_input
 from .labels import amounts
-from .mapping_files import names_by_label
-from .options import Reading, ReadingOptions, show_options
+from .options import Reading, ReadingOptions, names_by_label, show_options
 from .recording import LONGEST_NAME, Recording, Table
 from .smoothing import Recorded, Smoothing, check_swings, is_even, prepared_path
 from .times import recording_of
@@ -36,7 +35,7 @@ _MOST_SAMPLES = 2_000_000  # of a resampled path: 16 MB for each joint
 @made_by(ShapePath="it is recorded.path")
 @dataclass(frozen=True, eq=False)
 class RecordedMotion:
-    """Recorded joint motion and the path made of it.
+    """Recorded joint motion and the path made of it. Made by `read_recorded_motion`.
 
     Attributes
     ----------
@@ -52,13 +51,6 @@ class RecordedMotion:
     closing : how a cycle was closed, and what that changed; None: it was not
     flight : the free flight that was kept; None: none was requested
     segments : angular momentum from poses of segments beside that of base and joints; None: the file has no such poses
-
-    Examples
-    --------
-    >>> sp.write_shape_path(sp.examples.cat_righting(), "cat.csv")
-    >>> recorded = sp.read_recorded_motion("cat.csv", sp.load_body("cat"))
-    >>> print(recorded.format, recorded.times[-1])
-    CSV 2.0
     """
 
     path: ShapePath
@@ -206,15 +198,16 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     """
     check_object(body, "Body", "body")
     how = Reading.of(options)
-    given, step = read_input(file, body, how.topic, how.timestep, how.joint_order, how.names)
-    table, names = without_segments(given.table, body, how.segments, how.time_unit, step)
+    option, unit = how.given, how.given("time_unit")
+    given, step = read_input(file, body, option("topic"), option("timestep"), option("joint_order"), how.names)
+    table, names = without_segments(given.table, body, how.segments, unit, step)
     joints = replace(how.joints, names=_names_of_columns(names, how, table))
-    stretch = partial(recording_of, table, body.joint_names, joints.names, how.time_unit, step)
+    stretch = partial(recording_of, table, body.joint_names, joints.names, unit, step)
     recording, motion = without_first_pose(*matched(stretch(how.trim), body, joints), body)
     warn_of_fast_turns(recording, motion, body)
     recording, motion, flight = in_flight(recording, motion, body, how.flight)
     try:
-        noise = _noise_levels(how.smooth, body)
+        noise = _noise_levels(option("smooth"), body)
         around = recording, motion, slice(None)
         if (noise.any() or how.cut_off is not None) and (how.trim is not None or flight is not None):
             around = surrounded(
@@ -235,15 +228,19 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         closing = None
         if how.close is not None:
             path, smoothing, closing = closed_path(
-                samples, body, within=how.close, by=how.close_by, penalty=how.penalty
+                samples, body, within=how.close, by=option("close_by"), penalty=option("smooth_penalty")
             )
         else:
-            path, smoothing = prepared_path(samples, periodic=how.loop and samples.meets, penalty=how.penalty)
+            loop = option("close") is None and samples.meets
+            path, smoothing = prepared_path(samples, periodic=loop, penalty=option("smooth_penalty"))
         check_swings(path, body)
     except (TrajectoryError, ShapeError) as error:
         raise TrajectoryError(f"{table.where}: {error}") from None
     if how.rate is not None and even_rate is None:
-        path = _resampled(path, how.rate, table.where)
+        count = max(round(path.duration * how.rate), 2)
+        if count > _MOST_SAMPLES:
+            raise TrajectoryError(f"{table.where}: resample: {count} samples; up to {_MOST_SAMPLES} are made")
+        path = resampled(path, np.linspace(0.0, path.duration, count + 1))
     kept_times = times[inside] - times[inside][0]
     residual = np.zeros(body.n_shape)
     if samples.smoothed or how.rate is not None or closing is not None:
@@ -296,7 +293,7 @@ def read_shape_path(file: Any, body: Body, **options: Unpack[ReadingOptions]) ->
 
 def _names_of_columns(names: Mapping[str, str | None], how: Reading, table: Table) -> dict[str, str | None]:
     """Label of a column -> joint, or None. Raises TrajectoryError; UnknownNameError for an unknown column."""
-    if how.joint_order is not None and table.nameless is None:
+    if how.given("joint_order") is not None and table.nameless is None:
         raise TrajectoryError(
             f"{table.where}: joint_order is for arrays without names; columns here have names: leave it "
             "out (--joint-order)"
@@ -316,9 +313,8 @@ def _names_of_columns(names: Mapping[str, str | None], how: Reading, table: Tabl
 
 def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
     """Content of the recording and its columns, ready for JSON."""
-    table, segments = recording.table, None
-    if table.segments is not None and table.times is not None:
-        segments = table.segments.within(float(table.times[0]), float(table.times[-1]))
+    table = recording.table
+    ends = None if table.times is None else table.times[[0, -1]].tolist()
     return {
         "format": table.format,
         "samples": len(recording.times),
@@ -331,27 +327,16 @@ def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
         "left_out": motion.left_out,
         "base": motion.base.record,
         "gaps": motion.gaps,
-        "segments": segments,
+        "segments": None if table.segments is None or ends is None else table.segments.within(*ends),
         "joint_order": None if table.nameless is None else table.nameless.record,
     }
 
 
-def _resampled(path: ShapePath, rate: float, where: str) -> ShapePath:
-    """The spline through evenly spaced values of a path, about so many a second."""
-    count = max(round(path.duration * rate), 2)
-    if count > _MOST_SAMPLES:
-        raise TrajectoryError(f"{where}: resample: {count} samples; up to {_MOST_SAMPLES} are made")
-    return resampled(path, np.linspace(0.0, path.duration, count + 1), path.joint_names)
-
-
 def _noise_levels(smooth: float | str | Mapping[str, float | str] | None, body: Body) -> Array:
     """The noise of each joint: (n,) [rad or m]."""
-    given: dict[str, float | str] = dict.fromkeys(body.joint_names, 0.0)
-    if isinstance(smooth, Mapping):
-        for name in smooth:
-            body.joint_index(name)
-        given.update(smooth)
-    elif smooth is not None:
-        given = dict.fromkeys(body.joint_names, smooth)
-    units = zip(given.items(), body.joint_units, strict=True)
-    return np.array([amounts(level, f"smooth, joint {name}")[unit] for (name, level), unit in units])
+    level = 0.0 if smooth is None else smooth
+    by_joint = level if isinstance(level, Mapping) else dict.fromkeys(body.joint_names, level)
+    for name in by_joint:
+        body.joint_index(name)
+    units = zip(body.joint_names, body.joint_units, strict=True)
+    return np.array([amounts(by_joint.get(name, 0.0), f"smooth, joint {name}")[unit] for name, unit in units])

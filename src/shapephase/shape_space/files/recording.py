@@ -15,11 +15,15 @@ from ...arguments import check_time_steps
 from ...arrays import Array, Integers, Mask
 from ...errors import InputFileNotFoundError, TrajectoryError, TrajectoryWarning
 from ...files import no_such_file
-from .nameless_joints import NamelessJoints
 
 if TYPE_CHECKING:
     from ._segment_poses import SegmentMotion
+    from .formats.nameless_joints import NamelessJoints
 
+OFF_UNIT = 1e-3  # allowed error of a quaternion's length: recordings keep as few as three digits
+NEARLY_UNIT = (
+    0.1  # the same of splines between unit quaternions, which are shorter, and where an audit looks for faults
+)
 LONGEST_NAME = 256  # characters of a column's name, as of a joint's name in a body's file
 _UNEVEN_STEPS = 100.0  # over the median step, or under it: a gap, or one sample recorded twice
 
@@ -55,7 +59,6 @@ class Simulated(NamedTuple):
 class SegmentPoses:
     """Poses of k segments at N times.
 
-    names : of the segments
     turns : (N, k, 3, 3) segment axes to the room's; NaN where they were not recorded
     origins : (N, k, 3) or None [m]
     stands : name of a calibration pose of the file -> turns (k, 3, 3) and origins (k, 3)
@@ -170,10 +173,8 @@ class Table:
 class Recording:
     """A table whose times are known.
 
-    table : the columns, without that of the times
     times : (N,) from 0 [s]
     first, last : of the times kept, as the file gives them
-    time_unit : in which the file gives them
     """
 
     table: Table

@@ -167,7 +167,6 @@ class Recorded:
 
     times, shapes : (N,) ascending [s], (N, n) [rad or m]
     noise : (n,) rms [rad or m]
-    joint_names : n names, or None
     inside : the samples that are kept; those before and after them are smoothed with them
     cut_off : of the low-pass filter that takes the place of a spline [Hz], or None
     """
@@ -275,8 +274,6 @@ def filtered_attitudes(times: Array, attitudes: Array, cut_off: float) -> Array:
     are left are filtered, and made unit again. For a small wobble at the frequency f on a turn whose rate differs from
     the mean by w [rad/s], this leaves the mean of the shares h of the frequencies f - w/(4 pi) and f + w/(4 pi), and
     half of their difference turned by a right angle about the axis of w, both over the share of w/(4 pi).
-
-    Raises TrajectoryError where turns are too fast for the cut-off.
     """
     steps = so3.log(attitudes[1:] @ so3.transpose(attitudes[:-1]))
     mean_turn = so3.exp((times - times[0])[:, None] * steps.sum(axis=0) / (times[-1] - times[0]))
@@ -311,7 +308,9 @@ def _filtered(
     for ball in ball_columns(recorded.joint_names):
         _check_lengths((first + by_narrow)[:, ball], cut_off, f"a ball joint (column {ball.start})")
     response, wide_response = narrow.responses(count), narrow.twice.responses(count)
-    noise = np.sqrt(((values - by_wide) ** 2).sum(axis=0) / max(((1.0 - wide_response) ** 2).sum(), 1e-300))
+    noise = np.sqrt(
+        ((values - by_wide) ** 2).sum(axis=0) / max(((1.0 - wide_response) ** 2).sum(), np.finfo(float).tiny)
+    )
     noise = np.where(noise > _EXACT * _spread(values), noise, 0.0)
     path = steps.path(samples.shapes)
     inside = samples.times[samples.inside]
@@ -382,7 +381,7 @@ def _report(samples: Recorded, steps: Prepared, path: ShapePath) -> Smoothing:
 
 
 def _check_gap(gap: Array, noise: Array, joint_names: Sequence[str]) -> None:
-    wide = np.abs(gap) > np.maximum(_WIDEST_GAP * noise, 1e-9)
+    wide = np.abs(gap) > np.maximum(_WIDEST_GAP * noise, CLOSED)
     if wide.any():
         joint = int(np.argmax(np.where(wide, np.abs(gap), 0.0)))
         raise TrajectoryError(

@@ -35,12 +35,6 @@ def recording_of(
     """Samples of a table between two of its times, with times that begin at 0.
 
     joint_names : of the body: a joint of the name `t` is no column of times
-    names : label -> name or None
-    time_unit : of the column of times; None: as the file states
-    timestep : [s], where no column has times
-    trim : the first and the last time to be kept, as the file gives them
-
-    Raises TrajectoryError if there are no times, they do not ascend, or their unit is doubtful.
     """
     unit = time_unit_argument(time_unit)
     doubtful = False

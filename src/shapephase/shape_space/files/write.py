@@ -19,8 +19,7 @@ from ...files import output_target, write_whole
 from ...provenance import provenance
 from ..path_series import spline_error
 from ..shape_path import ShapePath
-from ._unit_doubts import doubtful_turns
-from .labels import SI
+from .labels import SI, doubtful_turns
 from .times import doubtful_steps
 
 _WRITTEN = (".csv", ".npz", ".tsv")

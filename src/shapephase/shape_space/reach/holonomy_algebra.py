@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import check_object, made_by, number_argument, whole_argument
-from ...arrays import Array, finite_array, lock_arrays
+from ...arrays import Array, lock_arrays
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_smooth
 from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import ShapeError
+from ..body_path import one_shape
 from ..connection import connection_slopes, curvature, horizontal_lift
 from ..shape_path import ShapePath
 from .smallest_loops import AxisLoop, loops_of_second_order, loops_of_third_order
@@ -23,7 +24,7 @@ _NODES = 25  # Chebyshev points on a ray, the shape among them: they resolve six
 _HALF_WIDTH = 0.4  # [strokes] of those rays; rounding of the m-th derivative grows as (25/0.4)^m
 _RAYS = 4  # random directions: derivatives are vectors in three dimensions, which three directions span
 _FAR_SHAPES = 6  # random shapes at the ends of straight paths
-_LOOKS = (0.25, 0.5, 0.75, 1.0)  # places on those paths
+_LOOKS = np.arange(1, 5) / 4  # places on those paths
 _FAR = 0.6  # [strokes] largest distance of such a shape, in each joint
 _SEED = 26  # any fixed seed: repeatable results
 _LIFT_TOLERANCE = 1e-12  # [rad] of the lift that carries a curvature back
@@ -31,7 +32,7 @@ _LIFT_TOLERANCE = 1e-12  # [rad] of the lift that carries a curvature back
 
 @dataclass(frozen=True, eq=False)
 class OrderReach:
-    """Axes of the turns by loops small to some order of their stroke.
+    """Axes of the turns by loops small to some order of their stroke. Made by `reachable`.
 
     Attributes
     ----------
@@ -39,12 +40,6 @@ class OrderReach:
     rank : of all axes up to this order
     axes : (rank, 3) orthonormal, those of lower orders first, base axes
     singular_values : (3,) of what this order alone gives [rad per stroke^order]
-
-    Examples
-    --------
-    >>> first = sp.reachable(sp.load_body("cat_two_halves")).orders[0]
-    >>> first.order, first.rank
-    (2, 3)
     """
 
     order: int
@@ -58,7 +53,7 @@ class OrderReach:
 
 @dataclass(frozen=True, eq=False)
 class PairTurn:
-    """Turn of the body by a small loop of two joints.
+    """Turn of the body by a small loop of two joints. Made by `reachable`.
 
     Attributes
     ----------
@@ -66,12 +61,6 @@ class PairTurn:
     rate : |F_ij| [rad per product of the joints' units]
     axis : (3,) of the turn of a loop that goes from the first joint to the second, base axes
     units : of the product, as "rad^2"
-
-    Examples
-    --------
-    >>> best = sp.reachable(sp.load_body("cat_two_halves")).pairs[0]
-    >>> best.joints, round(best.degrees, 3), best.units
-    (('waist_pitch', 'waist_yaw'), 100.268, 'rad^2')
     """
 
     joints: tuple[str, str]
@@ -106,12 +95,6 @@ class Reach:
     orders : what is reached at each order of the stroke, up to the first at which `rank` is complete
     loops : for each axis the smallest loop that turns about it, of second or third order
     pairs : of joints, those that turn the body most first
-
-    Examples
-    --------
-    >>> found = sp.reachable(sp.load_body("diver"))
-    >>> found.rank, [(each.order, each.rank) for each in found.orders]
-    (3, [(2, 1), (3, 3)])
     """
 
     name: str
@@ -189,12 +172,7 @@ def reachable(
         raise ShapeError(
             f"most_orders and tolerance: 2 to 6, and a number between 0 and 1, are needed, got {highest} and {least:g}"
         )
-    place = body.shape() if shape is None else finite_array(shape, "shape").copy()
-    if place.shape != (body.n_shape,):
-        raise ShapeError(
-            f"shape: expected ({body.n_shape},), one entry per joint of {body.name} ({', '.join(body.joint_names)}), "
-            f"got shape {place.shape}"
-        )
+    place = body.shape() if shape is None else one_shape(body, shape, "shape").copy()
     strokes = _strokes(body, place)
     field = _Field(body, place, strokes)
     noise = least * field.magnitude

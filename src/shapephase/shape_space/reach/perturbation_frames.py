@@ -32,8 +32,7 @@ _TURN_TOLERANCE = 1e-12  # change of the integral of the connection's size at wh
 
 @dataclass(frozen=True, eq=False)
 class MinimumPerturbation:
-    """A frame U(r) for each shape of a region, in which the connection is as small as can be. Made by
-    `minimum_perturbation`.
+    """A frame U(r) for each shape of a region, with the least connection. Made by `minimum_perturbation`.
 
     Attributes
     ----------
@@ -43,15 +42,6 @@ class MinimumPerturbation:
     powers : (K, n) exponents of the terms of the polynomials
     layers : (S, K, 3) coefficients; U is the product of the exponentials of S polynomials, the last one on the left
     mean_square : of the connection over the region, in this frame and in that of the base [1]
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> frames = sp.minimum_perturbation(cat, [0.0, 0.0, 0.0], 0.5)
-    >>> loop = sp.ShapePath.fourier([0, 0, 0], [[0.4], [0], [0]], [[0], [0.4], [0]], 1.0)
-    >>> error = sp.so3.angle(frames.first_order_turn(loop).T @ sp.holonomy(cat, loop))
-    >>> bool(error < 0.01)
-    True
     """
 
     body: Body | ParticleBody

@@ -85,12 +85,6 @@ def loops_of_second_order(
     The bivectors B of unit norm with the largest turn F(B) = F_ij B_ij / 2 are the singular vectors of F; of two and
     more planes each is gone round with a frequency of its own. The least energy of all loops with that bivector has
     the largest plane at the lowest frequency.
-
-    Examples
-    --------
-    >>> found = sp.reachable(sp.load_body("cat_two_halves")).loops
-    >>> [each.order for each in found]
-    [2, 2, 2]
     """
     first, second = np.triu_indices(len(centre), 1)
     left, values, right = np.linalg.svd(here[first, second].T, full_matrices=False)
@@ -121,19 +115,13 @@ def loops_of_third_order(
 
     They enclose no area and turn it by minus pi/4 D_v F(v, w). Unit v and w with the largest turn about the axis
     are found by climbing. Their turns about axes of second order are cancelled by small circles there.
-
-    Examples
-    --------
-    >>> found = sp.reachable(sp.load_body("diver")).loops
-    >>> [each.order for each in found]
-    [2, 3, 3]
     """
     first, second = np.triu_indices(len(centre), 1)
     span = here[first, second].T
     loops = []
     for axis in new:
         v, w = _best_eight(slopes @ axis)
-        turned = -0.25 * np.pi * np.einsum("k,i,j,kija->a", v, v, w, slopes)
+        turned = -np.pi / 4 * np.einsum("k,i,j,kija->a", v, v, w, slopes)
         size = float(turned @ axis)
         planes, frequencies, powers = np.array([[v, 0.5 * w]]), np.array([[1, 2]]), np.ones(1)
         if len(known):

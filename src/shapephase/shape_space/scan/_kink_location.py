@@ -33,7 +33,7 @@ def located_kink(
     limits : between which the function may be evaluated
     floor : (c,) rounding of the values
     """
-    scale = np.maximum(floor, 1e-300)
+    scale = np.maximum(floor, np.finfo(float).tiny)
     tick = float(np.spacing(stretch[1]))
     where = _narrowed(at, stretch, limits, scale, tick)
     if where is None:

@@ -188,17 +188,6 @@ class FunctionScan:
         """Scan of the path with its joints in another order."""
         return replace(self, resolved=self.resolved.reordered(order))
 
-    @staticmethod
-    def of_several(scans: Sequence[FunctionScan], resolved: ResolvedPath, found_breaks: Array) -> FunctionScan:
-        """Scan of paths one after another."""
-        return FunctionScan(
-            resolved=resolved,
-            found_breaks=found_breaks,
-            evaluations=sum(scan.evaluations for scan in scans),
-            calls=sum(scan.calls for scan in scans),
-            noise=max(scan.noise for scan in scans),
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class DerivedScan:
@@ -234,7 +223,13 @@ class JoinedScan:
         for scan, path in zip(scans, self.paths, strict=True):
             found += [start + scan.duration * loop + scan.found_breaks for loop in range(path.loops)]
             start += path.duration
-        return FunctionScan.of_several(scans, joined(whole), np.concatenate(found))
+        return FunctionScan(
+            resolved=joined(whole),
+            found_breaks=np.concatenate(found),
+            evaluations=sum(scan.evaluations for scan in scans),
+            calls=sum(scan.calls for scan in scans),
+            noise=max(scan.noise for scan in scans),
+        )
 
 
 def check_rates(curve: Curve, breaks: Array) -> None:

@@ -16,6 +16,7 @@ from ....errors import TrajectoryError
 from ..recording import Table
 
 _WHOLE_TURN = 360.0  # [deg] files wrap angles; hinges go on to the nearest value
+_LOAD = "load the body from this file"
 _ZERO = 1e-5  # [deg] rounding of an angle of zero with six decimals
 _OTHER_AXES = 0.5  # least cosine between a bone's offsets in two files: other persons differ by less than other axes
 
@@ -26,9 +27,6 @@ def read_bvh(where: Path, data: bytes, body: Body) -> Table:
     Three angles of a bone are a rotation, in any order: a quaternion for the body's ball joint. An angle of a hinge
     that jumps by more than half a turn from one frame to the next is continued by whole turns. Bones that the base
     hangs on move it.
-
-    Raises TrajectoryError for faults, with the line; for a body that is not from a BVH file, or from one whose bones
-    have other axes.
     """
     check_object(body, "Body", "body")
     metre = body.length_unit
@@ -68,6 +66,8 @@ def _table(where: Path, skeleton: Skeleton, body: Body, metre: float) -> Table:
         columns |= dict(zip(names, np.ascontiguousarray(turns), strict=True))
     check_lengths(skeleton, moving)
     turned, placed = skeleton.base_motion(base)
+    above = skeleton.above(base)[1:]
+    angles = [column for number, bone in enumerate(skeleton.bones) if number not in above for _, column in bone.turns]
     return Table(
         where=str(where),
         format="BVH",
@@ -80,18 +80,8 @@ def _table(where: Path, skeleton: Skeleton, body: Body, metre: float) -> Table:
         base_quat_xyzw=so3.quat_from_matrix(turned),
         base_position=None if placed is None else metre * placed,
         unread=unread,
-        zero_pose=_begins_at_zero(skeleton, base),
+        zero_pose=bool(np.all(np.abs(skeleton.frames[:1, angles]) <= _ZERO)),
     )
-
-
-_LOAD = "load the body from this file"
-
-
-def _begins_at_zero(skeleton: Skeleton, base: int) -> bool:
-    """True if all angles of the first frame are zero, but for those of nodes above the base."""
-    above = skeleton.above(base)[1:]
-    columns = [column for number, bone in enumerate(skeleton.bones) if number not in above for _, column in bone.turns]
-    return bool(np.all(np.abs(skeleton.frames[:1, columns]) <= _ZERO))
 
 
 def _check_axes(bone: Bone, names: list[str], skeleton: Skeleton, body: Body, metre: float) -> None:

@@ -6,16 +6,17 @@ import importlib.util
 import re
 import tempfile
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ....errors import MissingExtraError, TrajectoryError
+from ....errors import TrajectoryError
 from ..labels import LENGTHS, unit_of
 from ..recording import Table
 from .column_tables import column_table
-from .parser_process import parsed
+from .parser_process import by_library, parsed
 from .segment_poses import matrix_poses
 
 INVERSE_KINEMATICS = (  # the way from markers to joints
@@ -33,11 +34,10 @@ def read_c3d(where: Path, data: bytes) -> Table:
 
     Without angles, the poses of segments in its group ROTATION, as markerless systems write them. The file is parsed in
     a process of its own: a damaged one can crash ezc3d.
-
-    Raises TrajectoryError for faults, with the frame, and for markers alone; MissingExtraError without ezc3d.
     """
-    if importlib.util.find_spec("ezc3d") is None:
-        raise MissingExtraError("C3D files need ezc3d; install it with: pip install 'shapephase[data]'")
+    with by_library(where, "C3D file", "ezc3d"):
+        if importlib.util.find_spec("ezc3d") is None:
+            raise ImportError
     _check_sizes(where, data)
     content = parsed(where, data, "C3D", __name__)
     labels, angles = content["labels"].tolist(), set(content["angles"].tolist())
@@ -55,11 +55,11 @@ def read_c3d(where: Path, data: bytes) -> Table:
         columns = [(f"{label}_{axis}", values[row, k]) for k, label in places for row, axis in enumerate(_AXES)]
         units, poses = {} if unit is None else {name: unit for name, _ in columns}, None
     else:
-        count = min(len(segments), matrices.shape[2])
-        names = tuple(re.sub(r"_?4[xX]4$", "", label) for label in segments[:count])
+        known = min(len(segments), matrices.shape[2])
+        names = tuple(re.sub(r"_?4[xX]4$", "", label) for label in segments[:known])
         frames = first * matrices.shape[3] // max(int(content["frames"]), 1) + np.arange(matrices.shape[3])
         metre = LENGTHS.get(unit_of(str(content["length_unit"])) or "")
-        columns, units, poses = [], {}, matrix_poses(names, matrices[:, :, :count], metre)
+        columns, units, poses = [], {}, matrix_poses(names, matrices[:, :, :known], metre)
     table = column_table(
         str(where), "C3D", [("time", frames / rate), *columns], units=units | {"time": "s"}, row="frame"
     )
@@ -117,7 +117,7 @@ def _check_sizes(where: Path, data: bytes) -> None:
 def _texts(group: Any, name: str) -> list[str]:
     """A parameter of texts, and those that continue it under the same name with a number: at most 255 fit into one."""
     texts: list[str] = []
-    for k in range(1, 100):
+    for k in count(1):
         key = name if k == 1 else f"{name}{k}"
         if key not in group:
             break

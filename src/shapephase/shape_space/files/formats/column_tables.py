@@ -29,12 +29,7 @@ def column_table(
 ) -> Table:
     """Table of columns with labels: an entry that is no number is NaN and a fault; dates become seconds.
 
-    columns : label and values (N,)
-    units : label -> unit, where it is stated beside the label
     rows : (N,) the numbers of the samples in messages; None: from 0
-    comma : True if texts have decimal commas
-
-    Raises TrajectoryError for labels that are no texts, empty or doubled, and columns of several lengths.
     """
     numbers: dict[str, Array] = {}
     faults: dict[str, dict[int, str]] = {}
@@ -46,7 +41,7 @@ def column_table(
         if not name:
             raise TrajectoryError(f"{where}: column {position} has no name in the header; write one")
         if name in numbers:
-            raise TrajectoryError(f"{where}: column {name[:40]} stands twice in the header; give each its own name")
+            raise TrajectoryError(f"{where}: column {name:.40} stands twice in the header; give each its own name")
         numbers[name], faults[name], is_date = _numbers(values, comma, f"{where}: column {name!r:.60}")
         if is_date:
             units[name] = "s"
@@ -122,10 +117,7 @@ def _seconds(times: Any) -> Array:
 
 
 def _dates(entries: Sequence[Any], place: str) -> Array | None:
-    """Dates, times of a day or durations of Python, or texts of them [s]; None for other entries.
-
-    Raises TrajectoryError for dates of which one cannot be read.
-    """
+    """Dates, times of a day or durations of Python, or texts of them [s]; None for other entries."""
     first = next((entry for entry in entries if entry is not None and entry != ""), None)
     if isinstance(first, str) and (DATE.fullmatch(first.strip()) or CLOCK.fullmatch(first.strip())):
         import pandas as pd
@@ -147,7 +139,7 @@ def _dates(entries: Sequence[Any], place: str) -> Array | None:
     if all(isinstance(entry, datetime.timedelta) for entry in entries):
         return np.array([entry.total_seconds() for entry in entries])
     if all(isinstance(entry, datetime.time) for entry in entries):
-        entries = [datetime.datetime.combine(datetime.date(2000, 1, 1), entry) for entry in entries]
+        entries = [datetime.datetime.combine(datetime.date.min, entry) for entry in entries]
     if all(isinstance(entry, datetime.datetime) for entry in entries):
         try:
             return np.array([(entry - entries[0]).total_seconds() for entry in entries])

@@ -28,8 +28,6 @@ def read_deepmimic(where: Path, data: bytes) -> Table:
     Columns are called as DeepMimic's joints are, with `.x`, `.y`, `.z`, `.w` of spherical ones: the body has ball
     joints of these names. Quaternions are made as long as 1, as DeepMimic does it (`cKinTree::PostProcessPose`): its
     own files have some of other lengths.
-
-    Raises TrajectoryError for JSON that is no such motion.
     """
     try:
         motion = json.loads(data)
@@ -63,7 +61,7 @@ def read_deepmimic(where: Path, data: bytes) -> Table:
         row="frame",
         times=np.concatenate([[0.0], np.cumsum(durations)]),
         by_format=True,
-        base_quat_xyzw=frames[:, [5, 6, 7, 4]],
+        base_quat_xyzw=frames[:, [*range(5, _BASE), 4]],
         base_position=frames[:, 1:4],
         up="y",
     )

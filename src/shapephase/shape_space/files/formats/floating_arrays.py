@@ -14,12 +14,11 @@ from ....body.body import Body
 from ....body.joint_orders import MUJOCO, OWN, simulator_order
 from ....body.virtual_base import way_names, way_poses
 from ....errors import ShapeError, TrajectoryError, unknown_name
-from ..nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
-from ..recording import Rates
+from ..recording import NEARLY_UNIT, Rates
+from .nameless_joints import FREE_JOINT, NamelessJoints, joint_columns, nameless_joints
 
 _NUMBERED = re.compile(r"(qpos|qvel|q|v|Q|Qdot|qdot)[_\[ ]?([0-9]{1,6})\]?")  # qpos_0, qpos[0], qpos0
 _ROOT = 6  # coordinates of a free root: three slides, three hinges
-_OFF_UNIT = 0.1  # allowed error of a quaternion's length: an audit has to see what is wrong
 _NAMES_THAT_SAY_IT = (
     "store arrays under names that say the order: qpos (place, quaternion w x y z, joints), or base_position, "
     "base_quat_xyzw and shapes beside joint_names"
@@ -29,9 +28,7 @@ _NAMES_THAT_SAY_IT = (
 class FreeJoint(NamedTuple):
     """Layout of the coordinates of a free base, which stand before those of the joints.
 
-    title : of the program and its array
     quaternion : columns of x, y, z and w
-    position : columns of the place
     rate, velocity : columns of the angular and the linear velocity, and `rate_axes`, `velocity_axes` their axes
     order : the word for the order of joints without names
     """
@@ -55,12 +52,8 @@ DRAKE_Q = FreeJoint("Drake q", [1, 2, 3, 0], [4, 5, 6], [0, 1, 2], [3, 4, 5], "w
 class FloatingMotion(NamedTuple):
     """Base and joints of a floating body at N samples.
 
-    title : of the program and its array
-    names : of the columns of `joints`
-    joints : (N, m) [rad or m]
-    quaternion : (N, 4) x y z w of the base, or None
-    position : (N, 3) of the base [m], or None
-    rates : where they are stored, too
+    names : of the columns of `joints` (N, m) [rad or m]
+    quaternion, position : (N, 4) x y z w, (N, 3) of the base [m], or None
     nameless : how columns without names became those of joints; None: they have names, or the file's own order
     """
 
@@ -82,10 +75,6 @@ def floating_motion(arrays: Mapping[str, Any], where: str, body: Body, order: st
 
     The meaning of `q` follows from the number of its coordinates, and Pinocchio's or Drake's order from the columns
     that are a quaternion of length one. Coordinates may stand along either axis.
-
-    order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
-
-    Raises TrajectoryError, ShapeError for arrays that fit no order, or several.
     """
     kind = next((name for name in ("qpos", "q", "Q") if name in arrays), None)
     if kind is None:
@@ -177,10 +166,7 @@ def with_free_joint(
 
 
 def numbered_columns(columns: Mapping[str, Any], where: str) -> dict[str, list[str]]:
-    """Labels such as `qpos_0`, `q[1]` and `Qdot2`, by array in their order; of arrays whose numbers are 0, 1, 2, ...
-
-    Raises TrajectoryError for two labels of one number.
-    """
+    """Labels such as `qpos_0`, `q[1]` and `Qdot2`, by array in their order; of arrays whose numbers are 0, 1, 2, ..."""
     by_array: dict[str, dict[int, str]] = {}
     for label in columns:
         match = _NUMBERED.fullmatch(label.strip())
@@ -305,7 +291,7 @@ def _with_angles(values: Array, body: Body) -> Array:
 
 
 def _is_unit(quaternions: Array) -> bool:
-    return bool(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0).max(initial=0.0) <= _OFF_UNIT)
+    return bool(np.abs(np.linalg.norm(quaternions, axis=1) - 1.0).max(initial=0.0) <= NEARLY_UNIT)
 
 
 def _misfit(

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from ....errors import TrajectoryError
-from ..labels import joint_part, unit_of
-from ..recording import Table
+from ..labels import IN_A_SECOND, joint_part, unit_of
+from ..recording import OFF_UNIT, Table
 from .column_tables import column_table
 
 _PANDAS = ("DataFrame",)
 _XARRAY = ("Dataset", "DataArray")
 _STAMPS = (("sec", "nanosec"), ("secs", "nsecs"))  # names of the two parts of a ROS stamp
-_NANO = 1_000_000_000
+_NANO = int(IN_A_SECOND["ns"])
 _NAMES = ("name", "joint", "joint_name", "jointname")  # columns that name the joint of a row
 _VALUES = ("position", "pos", "angle", "joint_position")  # columns with its coordinate
 _STAMP = 3  # columns of a header: seconds, nanoseconds, frame
@@ -36,8 +36,6 @@ def read_frame(frame: Any) -> Table:
 
     Attributes `units` of variables of xarray are their units. In a two-dimensional array, the coordinate of the second
     dimension names the joints.
-
-    Raises TrajectoryError for faults, with column and row.
     """
     if not _is(frame, "pandas", _PANDAS):
         return _of_xarray(frame)
@@ -59,10 +57,7 @@ def read_frame(frame: Any) -> Table:
 
 
 def file_table(frame: Any, where: str) -> Table:
-    """The table of a frame that `read_table` has read: its head, and the numbers of its rows.
-
-    Raises TrajectoryError for faults.
-    """
+    """The table of a frame that `read_table` has read: its head, and the numbers of its rows."""
     head = frame.attrs
     frame, of_joints = _one_row_a_sample(frame, where)
     columns, dropped = _with_names([(str(label), frame.iloc[:, k].to_numpy()) for k, label in enumerate(frame)], where)
@@ -84,8 +79,6 @@ def _one_row_a_sample(frame: Any, where: str) -> tuple[Any, dict[str, str]]:
     """A table with one row for each joint and sample, `time,name,position`, as one with a column for each joint.
 
     Returns the columns left out, too: other quantities of each joint.
-
-    Raises TrajectoryError where the joints of a sample are others than those of the first.
     """
     lower = {str(label).strip().lower(): label for label in frame}
     name = next((lower[word] for word in _NAMES if word in lower), None)
@@ -123,10 +116,7 @@ def _is(value: object, package: str, kinds: tuple[str, ...]) -> bool:
 
 
 def _with_names(columns: Columns, where: str) -> tuple[Columns, dict[str, str]]:
-    """Columns that have names, and the meaning of those without one: an index that was written, or nothing.
-
-    Raises TrajectoryError for another column without a name.
-    """
+    """Columns that have names, and the meaning of those without one: an index that was written, or nothing."""
     named: Columns = []
     dropped: dict[str, str] = {}
     has_times = any(name.lower().startswith("time") for name, _ in columns)
@@ -188,13 +178,19 @@ def _of_xarray(data: Any) -> Table:
     (dimension,) = dimensions
     columns: list[tuple[object, Any]] = []
     units: dict[str, str] = {}
+
+    def keep(name: object, values: Any, attributes: Any) -> None:
+        columns.append((name, values))
+        # Climate data write the unit of times before the day that they count from.
+        unit = unit_of(str(attributes.get("units", "")).split(" since ")[0])
+        if unit is not None:
+            units[str(name)] = unit
+
     if dimension in data.coords:
-        columns.append((str(dimension), data.coords[dimension].to_numpy()))
-        _note_unit(units, str(dimension), data.coords[dimension].attrs)
+        keep(str(dimension), data.coords[dimension].to_numpy(), data.coords[dimension].attrs)
     for name, array in arrays.items():
         if array.ndim == 1:
-            columns.append((str(name), array.to_numpy()))
-            _note_unit(units, str(name), array.attrs)
+            keep(str(name), array.to_numpy(), array.attrs)
             continue
         second = array.dims[1]
         if second not in array.coords:
@@ -202,17 +198,8 @@ def _of_xarray(data: Any) -> Table:
                 f"{where}: the dimension {second!r} of {name} has no coordinate that names the joints; add one"
             )
         for k, joint in enumerate(array.coords[second].to_numpy().tolist()):
-            columns.append((joint, np.asarray(array[:, k])))
-            _note_unit(units, str(joint), array.attrs)
+            keep(joint, np.asarray(array[:, k]), array.attrs)
     return column_table(where, "xarray", columns, units=units, row="sample")
-
-
-def _note_unit(units: dict[str, str], name: str, attributes: Any) -> None:
-    # Climate data write the unit of times before the day that they count from.
-    stated = str(attributes.get("units", "")).split(" since ")[0]
-    unit = unit_of(stated)
-    if unit is not None:
-        units[name] = unit
 
 
 def echoed_columns(columns: Columns) -> tuple[Columns, dict[str, str]]:
@@ -274,8 +261,10 @@ def _is_pose(rest: list[Any], texts: int) -> bool:
     """True where numbers behind the frames are a place and a quaternion of unit length."""
     if texts > 2 or len(rest) not in (len(_POSE), len(_POSE) + _MATRIX, len(_POSE) + 2 * _MATRIX + 6):
         return False
-    lengths = np.linalg.norm(np.stack([np.asarray(entries, dtype=np.float64) for entries in rest[3:7]]), axis=0)
-    return bool((np.abs(lengths - 1.0) < 1e-3).all())
+    lengths = np.linalg.norm(
+        np.stack([np.asarray(entries, dtype=np.float64) for entries in rest[3 : len(_POSE)]]), axis=0
+    )
+    return bool((np.abs(lengths - 1.0) < OFF_UNIT).all())
 
 
 def _constant(values: Any) -> str | None:

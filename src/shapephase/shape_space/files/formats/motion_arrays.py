@@ -15,17 +15,16 @@ from ....errors import ShapeError, TrajectoryError
 from ....files import npy_array, npz_arrays
 from ....letters import value_text
 from ..labels import SI
-from ..nameless_joints import FREE_JOINT, nameless_joints, placed_joints
-from ..recording import Rates, Simulated, Table, warn
+from ..recording import OFF_UNIT, Rates, Simulated, Table, warn
 from .floating_arrays import FloatingMotion, floating_motion, numbered_columns, places_of, root_width
 from .named_arrays import arrays_table
+from .nameless_joints import FREE_JOINT, nameless_joints, placed_joints
 
 _NPZ = "NPZ"
 _SCALAR_FIRST = [1, 2, 3, 0]  # places of x, y, z, w in a quaternion w x y z
 # TUM RGB-D benchmark: pose behind the time, in trajectories of visual odometry
 _TUM = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 _FREE = ("base_x", "base_y", "base_z", "base_qw", "base_qx", "base_qy", "base_qz")  # MuJoCo's free joint
-_OFF_UNIT = 1e-3
 _READ = (  # arrays with a meaning
     *("time", "timestep", "fps", "shapes", "qpos", "qvel", "q", "v", "qdot", "Q", "Qdot", "joint_names", "provenance"),
     *("joint_pos", "joint_vel", "body_pos_w", "body_quat_w", "body_ang_vel_w"),
@@ -62,12 +61,6 @@ def arrays_motion(
     Lab's: the base is the first of `body_pos_w` (N, b, 3) and `body_quat_w` (N, b, 4), and unnamed orders, of joints
     and of a quaternion's numbers, are those in which the links lie at `body_pos_w` and turn as `body_ang_vel_w`. With
     `shapes` there are `time` and `joint_names`, too; else vectors by name are the joints.
-
-    timestep : [s], for arrays without times
-    order : of joints without names, one of `WORDS` of `body.joint_orders`, or None
-    kind : of the source, for people
-
-    Raises TrajectoryError for faults, with the array and the entry.
     """
     try:
         both = {"qpos", "q", "Q"} & set(arrays)
@@ -98,10 +91,7 @@ def arrays_motion(
 
 
 def of_numbered_columns(table: Table, body: Body, order: str | None) -> Table:
-    """The table with base and joints in place of columns such as `qpos_0`, `q[1]`.
-
-    Raises TrajectoryError, ShapeError if they are no order of coordinates of the body.
-    """
+    """The table with base and joints in place of columns such as `qpos_0`, `q[1]`."""
     numbered = numbered_columns(table.columns, table.where)
     taken = [label for labels in numbered.values() for label in labels]
     places = next((numbered[name] for name in ("qpos", "q", "Q") if name in numbered), [])
@@ -254,9 +244,6 @@ def named_columns(
     these behind a free joint, or a place and a quaternion x y z w; with a warning. Columns that `names` numbers keep
     their numbers. Numbers do not show where the scalar part of a free joint's quaternion stands, first (MuJoCo) or last
     (Pinocchio).
-
-    Raises TrajectoryError if the number of columns fits nothing, or two of these; for a free joint whose quaternion
-    `names` does not number.
     """
     numbered = [label for label in table.columns if label in names]
     if not table.numbered or len(numbered) == len(table.columns):
@@ -266,7 +253,7 @@ def named_columns(
     first = ("time",) if has_times else ()
     rest = values[len(first) :]
     is_pose = len(rest) == FREE_JOINT and bool(
-        (np.abs(np.linalg.norm(np.stack(rest[3:]), axis=0) - 1.0) < _OFF_UNIT).all()
+        (np.abs(np.linalg.norm(np.stack(rest[3:]), axis=0) - 1.0) < OFF_UNIT).all()
     )
     joints = None
     try:

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ....errors import MissingExtraError, TrajectoryError, unknown_name
+from ....errors import TrajectoryError, unknown_name
 from ....warning_filters import quiet
 from ..labels import unit_of
 from ..recording import Table
 from .column_tables import column_table
+from .parser_process import by_library
 
 _MATRICES = ("shapes", "data", "q", "values")
 _NAMES = ("joint_names", "names", "colheaders", "labels", "columns", "headers")
@@ -43,10 +44,7 @@ def arrays_table(
     """Table of arrays by name: vectors of one length, or a matrix beside the names of its columns.
 
     entries : name -> array of numbers, list of texts, or entries of a structure
-    chosen : the structure that has the motion; None: the arrays on top, or the only structure
     ordered : True if entries stand in the order in which they were written
-
-    Raises TrajectoryError, UnknownNameError if there is no motion, more than one, or no such structure.
     """
     inside: Mapping[str, Any] = entries
     if chosen is not None:
@@ -98,7 +96,7 @@ def arrays_table(
 
 def _matrix(where: str, entries: Mapping[str, Any]) -> tuple[list[tuple[object, Any]], tuple[str, ...]]:
     """The columns of a matrix that has names, and of vectors as long as it; and which entries these are."""
-    named = next((key for key in _NAMES if _are_texts(entries.get(key))), None)
+    named = next((k for k in _NAMES if isinstance(v := entries.get(k), list) and {*map(type, v)} == {str}), None)
     key = next((key for key in _MATRICES if isinstance(v := entries.get(key), np.ndarray) and v.ndim == 2), None)
     if named is None or key is None:
         return [], ()
@@ -140,31 +138,16 @@ def _vector(where: str, name: str, value: Any) -> Any:
     return value.ravel() if value.dtype.kind in "bfiumM" else None
 
 
-def _are_texts(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(entry, str) for entry in value)
-
-
 def _described(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"an array {value.shape} of {value.dtype}" if value.size != 1 else "a single value"
     return "a structure" if isinstance(value, Mapping) else "text" if isinstance(value, list) else "of another kind"
 
 
-def is_hdf5(data: bytes) -> bool:
-    """True for bytes that begin as HDF5 does."""
-    return any(data[start : start + len(_MAGIC)] == _MAGIC for start in _STARTS)
-
-
 def read_hdf5(where: Path, data: bytes, chosen: str | None) -> Table:
-    """Motion in an HDF5 file, its arrays as those of a `.mat` file; the attribute `units` of one is its unit.
-
-    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults; for a structure that is not there; without
-    h5py.
-    """
-    try:
+    """Motion in an HDF5 file, its arrays as those of a `.mat` file; the attribute `units` of one is its unit."""
+    with by_library(where, "HDF5 file", "h5py"):
         import h5py
-    except ImportError:
-        raise MissingExtraError("HDF5 files need h5py; install it with: pip install 'shapephase[data]'") from None
     entries: dict[str, Any] = {}
     units: dict[str, str] = {}
 
@@ -184,14 +167,9 @@ def read_hdf5(where: Path, data: bytes, chosen: str | None) -> Table:
         value = np.asarray(item.asstr()[()] if is_text else item[()])
         inside[name] = value.ravel().tolist() if is_text else None if value.dtype.kind == "O" else value
 
-    try:
-        with h5py.File(io.BytesIO(data), "r") as file:
-            # Every object once, groups before their members; links that lead out of the file are not followed.
-            file.visititems(keep)
-    except Exception as error:  # a damaged file fails inside h5py in many ways
-        raise TrajectoryError(
-            f"{where}: no HDF5 file that can be read ({type(error).__name__}: {error!s:.200}); write it anew"
-        ) from None
+    with by_library(where, "HDF5 file", "h5py"), h5py.File(io.BytesIO(data), "r") as file:
+        # Every object once, groups before their members; links that lead out of the file are not followed.
+        file.visititems(keep)
     return arrays_table(str(where), "HDF5", entries, chosen, units, ordered=False)
 
 
@@ -199,24 +177,11 @@ def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:
     """Motion in a `.mat` file: vectors by name, or a matrix with names of its columns, on top or in a structure.
 
     Objects of MATLAB, tables among them, are not read.
-
-    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults; for a structure that is not there; without
-    pymatreader or h5py.
     """
-    try:
+    with by_library(where, "MATLAB file", "pymatreader and h5py", "save it anew with save(file, '-v7')"), quiet():
         import pymatreader
 
-        with quiet():
-            entries, listed = pymatreader.read_mat(where), pymatreader.whosmat(where)
-    except ImportError:
-        raise MissingExtraError(
-            "MATLAB files need pymatreader and h5py; install them with: pip install 'shapephase[data]'"
-        ) from None
-    except Exception as error:  # a damaged file fails inside SciPy and h5py in many ways
-        raise TrajectoryError(
-            f"{where}: no MATLAB file that can be read ({type(error).__name__}: {error!s:.200}); save it anew with "
-            "save(file, '-v7')"
-        ) from None
+        entries, listed = pymatreader.read_mat(where), pymatreader.whosmat(where)
     classes = {name: kind for name, _, kind in listed}
     objects = [name for name, kind in classes.items() if kind in _OBJECTS]
     if objects and len(objects) == len(classes):
@@ -225,7 +190,7 @@ def read_matlab(where: Path, data: bytes, chosen: str | None) -> Table:
             "parquetwrite or writetable, or save it as a structure with save(file, '-struct', 's')"
         )
     # HDF5 keeps no order of names, and pymatreader returns them in any.
-    unordered = is_hdf5(data)
+    unordered = any(data[start : start + len(_MAGIC)] == _MAGIC for start in _STARTS)
     names = sorted(entries) if unordered else list(entries)
     readable = {name: _plain(entries[name], unordered) for name in names if classes.get(name, "opaque") not in _OBJECTS}
     # pymatreader reads what is true or false as ones and zeros.

@@ -29,8 +29,6 @@ def read_opensim(where: Path, data: bytes) -> Table:
 
     `inDegrees` is the unit of rotational coordinates. In a file of states, `.../<coordinate>/value` is the coordinate
     and `.../<coordinate>/speed` is left out. A spreadsheet puts commas between columns when it saves the file.
-
-    Raises TrajectoryError for faults, with line and column.
     """
     text = unix_text(data, where)
     lines = text[:_HEADER_BYTES].decode(errors="replace").split("\n")

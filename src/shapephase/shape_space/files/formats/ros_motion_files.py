@@ -9,12 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
+from ....errors import TrajectoryError, unknown_name
+from ..labels import IN_A_SECOND
 from ..recording import Table, check_text, number
+from .parser_process import by_library
 
 _STATE = "sensor_msgs/msg/JointState"
 _TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
-_NANO = 10**9  # nanoseconds in a second
+_NANO = int(IN_A_SECOND["ns"])
 _LATEST = 1e12  # [s] larger times are none
 _WRAPPERS = ("goal", "request", "trajectory", "joint_trajectory")  # keys of goals and planners around a trajectory
 _UNITS = {"sec": _NANO, "secs": _NANO, "nanosec": 1, "nsecs": 1, "nsec": 1}  # parts of a time -> size [ns]
@@ -49,8 +51,6 @@ def read_ros_yaml(where: Path, data: bytes) -> Table:
     """Motion of a `JointTrajectory` in YAML, bare or in a goal, or documents of several, or of `JointState` messages.
 
     Several trajectories follow each other by their header stamps; states are merged as in a bag.
-
-    Raises TrajectoryError for faults, with line or point; MissingExtraError without PyYAML.
     """
     check_text(data, where)
     documents = [_unwrapped(document) for document in yaml_documents(data.decode("utf-8-sig"), str(where))]
@@ -81,22 +81,11 @@ def read_bag(where: Path, topic: str | None) -> Table:
     The time of a state is that of its header, or the time of recording where no header has one. Messages that carry
     some of the joints are merged when together they have all of them at each time. Message definitions in the bag are
     not used: a bag with other definitions of these types is refused.
-
-    Raises InputFileNotFoundError, UnknownNameError for an unknown file or topic; TrajectoryError for more than one
-    topic with motions and none chosen, and for faults, with the message; MissingExtraError without rosbags.
     """
-    try:
-        import rosbags.highlevel  # noqa: F401
-    except ImportError:
-        raise MissingExtraError("ROS bags need rosbags; install it with: pip install 'shapephase[data]'") from None
     if where.is_dir() and not (where / "metadata.yaml").is_file():
         raise TrajectoryError(f"{where}: a folder without metadata.yaml, so no rosbag2; name a file in it")
-    try:
+    with by_library(where, "bag", "rosbags"):
         return _read_messages(where, topic)
-    except ShapePhaseError:
-        raise
-    except Exception as error:  # a damaged bag fails inside rosbags in many ways
-        raise TrajectoryError(f"{where}: no bag that can be read ({type(error).__name__}: {error!s:.200})") from None
 
 
 def _read_messages(where: Path, topic: str | None) -> Table:
@@ -324,15 +313,9 @@ def _whole(value: Any, place: str) -> int:
 
 
 def yaml_documents(text: str, where: str) -> list[Any]:
-    """Documents of a YAML text that are not empty: dictionaries by text, lists, and `Word`s.
-
-    Raises MissingExtraError without PyYAML; TrajectoryError for text that is not YAML, unknown tags, doubled keys and
-    merge keys, with the line.
-    """
-    try:
+    """Documents of a YAML text that are not empty: dictionaries by text, lists, and `Word`s."""
+    with by_library(Path(where), "YAML file", "PyYAML"):
         import yaml
-    except ImportError:
-        raise MissingExtraError("YAML files need PyYAML; install it with: pip install 'shapephase[data]'") from None
 
     # Without resolvers, plain values are texts.
     safe = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

@@ -17,7 +17,7 @@ from ....body.formats.mvnx_text import read_suit
 from ....errors import TrajectoryError
 from .._segment_links import known_links
 from ..labels import LENGTHS, SI, label
-from ..recording import SegmentPoses, Table
+from ..recording import NEARLY_UNIT, SegmentPoses, Table
 
 _QUATERNION = re.compile(r"(?P<segment>.+?)(?:_q|_quat_?|\.q|[./]orientation[./])(?P<part>[xyzw])", re.DOTALL)
 _PLACE = re.compile(r"(?P<segment>.+?)(?:_[pt]?|_pos_?|\.p?|[./]position[./])(?P<part>[xyz])", re.DOTALL)
@@ -26,16 +26,12 @@ _NPOSE = "npose"  # calibration pose with hanging arms
 _ARM = ("UpperArm", "ForeArm", "Hand")  # names behind the side, from the shoulder on
 _KINEMATICS = ("X", "Y", "Z", "Ox", "Oy", "Oz")  # BodyKinematics: centre of mass, intrinsic angles x y z
 _OFF_ROTATION = 1e-3  # largest entry of S^T S - 1: files have single precision
-_OFF_UNIT = 0.1  # allowed error of a quaternion's length, as interpolation leaves it
 _FEWEST = 2  # segments of a table: one alone is the base
 _WHOLE_BODY = "center_of_mass"  # BodyKinematics' last columns, without angles
 
 
 def read_mvnx(where: Path, data: bytes) -> Table:
-    """The poses of a suit's segments, and its calibration poses; the room's z axis is up.
-
-    Raises TrajectoryError for faults, with the line.
-    """
+    """The poses of a suit's segments, and its calibration poses; the room's z axis is up."""
     try:
         suit = read_suit(data)
     except BvhFaultError as error:
@@ -82,8 +78,6 @@ def body_kinematics(table: Table, kind: str) -> Table:
     """The table of an OpenSim file with its columns `BODY_X`, ..., `BODY_Oz` as poses of segments, where it has them.
 
     kind : first line of the file
-
-    Raises TrajectoryError for velocities and accelerations, which have columns of these names, too.
     """
     bodies = [name.removesuffix("_Ox") for name in table.columns if name.endswith("_Ox")]
     labels = {body: [f"{body}_{axis}" for axis in _KINEMATICS] for body in bodies}
@@ -126,10 +120,6 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
 
     One segment alone is the base, and stays as it is; so do, beside columns of joints, quaternions that are not of two
     links.
-
-    names : label or segment -> joint or link, or None for what is left out
-
-    Raises TrajectoryError if places are missing, a quaternion is none, or a unit is none of lengths.
     """
     parts: dict[str, dict[str, str]] = {}
     places: dict[str, dict[str, str]] = {}
@@ -160,7 +150,7 @@ def pose_columns(table: Table, names: Mapping[str, str | None], body: Body) -> T
     numbers = np.stack([[table.columns[parts[name][part]] for name in segments] for part in "xyzw"], axis=-1)
     numbers = numbers.transpose(1, 0, 2)
     lengths = np.linalg.norm(numbers, axis=-1)
-    wrong = np.argwhere(np.abs(lengths - 1.0) > _OFF_UNIT)
+    wrong = np.argwhere(np.abs(lengths - 1.0) > NEARLY_UNIT)
     if len(wrong):
         row, segment = wrong[0]
         raise TrajectoryError(

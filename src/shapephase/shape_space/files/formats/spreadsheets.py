@@ -6,35 +6,25 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ....errors import MissingExtraError, ShapePhaseError, TrajectoryError, unknown_name
+from ....errors import TrajectoryError, unknown_name
 from ....warning_filters import quiet
 from ..labels import unit_of
-from .table_heads import head_of
+from .parser_process import by_library
+from .table_heads import HEAD_ROWS, head_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_HEAD_ROWS = 12
+_REMEDY = "save it anew, or as CSV"
 
 
 def read_excel(where: Path, data: bytes, sheet: str | None) -> pd.DataFrame:
-    """Frame of a sheet of an Excel workbook: a row of names, and rows of numbers or of formulas' last results.
-
-    sheet : its name; None: the only one that is not empty
-
-    Raises TrajectoryError, UnknownNameError, MissingExtraError for faults, with row and column; for a sheet that is not
-    there; without openpyxl.
-    """
-    try:
+    """Frame of a sheet of an Excel workbook: a row of names, and rows of numbers or of formulas' last results."""
+    with by_library(where, "workbook", "openpyxl", _REMEDY), quiet(module="openpyxl"):
         import openpyxl
-    except ImportError:
-        raise MissingExtraError("Excel files need openpyxl; install it with: pip install 'shapephase[data]'") from None
-    try:
-        with quiet(module="openpyxl"):
-            book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
-            sheets = {name: _cells(book[name]) for name in book.sheetnames if hasattr(book[name], "iter_rows")}
-    except Exception as error:  # a damaged workbook fails inside openpyxl in many ways
-        raise _unreadable(where, "workbook", error) from None
+
+        book = openpyxl.load_workbook(io.BytesIO(data), read_only=True, data_only=True, keep_links=False)
+        sheets = {name: _cells(book[name]) for name in book.sheetnames if hasattr(book[name], "iter_rows")}
     if sheet is not None and sheet not in sheets:
         raise unknown_name(f"sheet of {where}", sheet, sheets)
     filled = [name for name, rows in sheets.items() if rows]
@@ -62,7 +52,7 @@ def _cells(sheet: Any) -> list[tuple[int, list[Any]]]:
 def _sheet_frame(rows: list[tuple[int, list[Any]]], where: Path) -> pd.DataFrame:
     import pandas as pd
 
-    texts = [["" if entry is None else str(entry).strip() for entry in row] for _, row in rows[:_HEAD_ROWS]]
+    texts = [["" if entry is None else str(entry).strip() for entry in row] for _, row in rows[:HEAD_ROWS]]
     head = head_of(texts, None, str(where))
     width = len(head.names)
     for label, row in rows[head.skipped :]:
@@ -74,19 +64,6 @@ def _sheet_frame(rows: list[tuple[int, list[Any]]], where: Path) -> pd.DataFrame
     frame = pd.DataFrame(columns, index=[label for label, _ in rows[head.skipped :]], dtype=object)
     frame.attrs = {"format": "Excel", "units": head.units, "numbered": head.numbered}
     return frame
-
-
-def read_parquet(where: Path, data: bytes) -> pd.DataFrame:
-    """Frame of a Parquet file of numbers and times; the metadata `unit` or `units` of a column is its unit.
-
-    Raises TrajectoryError, MissingExtraError for faults, with row and column; without pyarrow.
-    """
-    return _arrow(where, data, "Parquet")
-
-
-def read_feather(where: Path, data: bytes) -> pd.DataFrame:
-    """Frame of a Feather file; see `read_parquet`."""
-    return _arrow(where, data, "Feather")
 
 
 def read_json_lines(where: Path, data: bytes) -> pd.DataFrame:
@@ -119,13 +96,13 @@ def read_json_lines(where: Path, data: bytes) -> pd.DataFrame:
     return frame
 
 
-def _arrow(where: Path, data: bytes, kind: str) -> pd.DataFrame:
-    try:
+def read_arrow(where: Path, data: bytes) -> pd.DataFrame:
+    """Frame of a Parquet or Feather file; the metadata `unit` or `units` of a column is its unit."""
+    kind = where.suffix[1:].title()
+    with by_library(where, f"{kind} file", "pyarrow", _REMEDY):
         import pyarrow.feather as feather
         import pyarrow.parquet as parquet
-    except ImportError:
-        raise MissingExtraError(f"{kind} files need pyarrow; install it with: pip install 'shapephase[data]'") from None
-    try:
+
         read: Any = parquet.read_table if kind == "Parquet" else feather.read_table
         table = read(io.BytesIO(data))
         units: dict[str, str] = {}
@@ -135,18 +112,8 @@ def _arrow(where: Path, data: bytes, kind: str) -> pd.DataFrame:
             if unit is not None:
                 units[field.name.strip()] = unit
         frame = table.to_pandas()
-    except ShapePhaseError:
-        raise
-    except Exception as error:  # a damaged file fails inside pyarrow in many ways
-        raise _unreadable(where, f"{kind} file", error) from None
     if frame.index.name is not None or frame.index.dtype.kind in "mM":
         frame = frame.reset_index(names=frame.index.name or "time")
     frame = frame.reset_index(drop=True)
     frame.attrs = {"format": kind, "units": units, "row": "sample"}
     return frame
-
-
-def _unreadable(where: Path, what: str, error: Exception) -> TrajectoryError:
-    return TrajectoryError(
-        f"{where}: no {what} that can be read ({type(error).__name__}: {error!s:.200}); save it anew, or as CSV"
-    )

@@ -18,6 +18,7 @@ CLOCK = re.compile(r"\d{1,3}:\d\d(:\d\d([.,]\d+)?)?", re.ASCII)
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf|infinity)", re.ASCII | re.IGNORECASE)
 _NO_UNIT_CELLS = ("[]", "()", "-")
 _KINDS = ("joints", "model outputs", "segments", "trajectories", "devices", "imus")
+HEAD_ROWS = 12  # from which the head of another table follows
 _HEAD = 5  # rows of the head: kind, rate, names, axes, units
 _FRAMES = ("Frame", "Sub Frame")
 
@@ -27,23 +28,23 @@ class Head(NamedTuple):
 
     names : of the columns; empty where a column has none
     units : name -> unit, of a row of units
-    skipped : rows before the first one of numbers
+    skipped : rows before the first one of numbers; lines, where the delimiter is known
     numbered : True if there are no names, and columns are called by their numbers from 1
+    rate : frames a second, where the header states it and no column has times
     """
 
     names: tuple[str, ...]
     units: dict[str, str]
     skipped: int
     numbered: bool = False
+    delimiter: str = ""
+    rate: float | None = None
 
 
 def head_of(rows: Sequence[Sequence[str]], comment: Sequence[str] | None, where: str) -> Head:
     """The head of a table by its first rows.
 
-    rows : the first rows that are not empty, comments above them left out
     comment : the entries of the last line of comment above them, which may be the names
-
-    Raises TrajectoryError if the first row may be numbers of columns or a sample; for names that stand twice.
     """
     first, second = rows[0], rows[1] if len(rows) > 1 else ()
     kinds = [is_value(entry) for entry in first if entry]
@@ -77,7 +78,7 @@ def check_names(names: Sequence[str], where: str) -> None:
     """Raise TrajectoryError for names that stand twice."""
     doubled = [name for name, count in Counter(names).items() if count > 1 and name]
     if doubled:
-        shown = ", ".join(name[:40] for name in doubled[:5])
+        shown = ", ".join(f"{name:.40}" for name in doubled[:4])
         raise TrajectoryError(f"{where}: column {shown} stands twice in the header; give each its own name")
 
 
@@ -100,28 +101,8 @@ def _counts(row: Sequence[str]) -> bool:
     return len(own) > 1 and [*own] == [str(k) for k in range(len(own))]
 
 
-class NexusHead(NamedTuple):
-    """Head of a section of a Nexus table.
-
-    names : of the columns, `KneeAngles_x` of the subject's `KneeAngles` and its axis X
-    units : name -> unit
-    rate : frames a second
-    first : the line of the first frame, from 0
-    delimiter : between columns
-    """
-
-    names: tuple[str, ...]
-    units: dict[str, str]
-    rate: float
-    first: int
-    delimiter: str
-
-
-def nexus_head(text: bytes, lines: list[str], start: int, section: str | None, where: str) -> NexusHead | None:
-    """The head of a section, or None for another kind of table.
-
-    Raises TrajectoryError, UnknownNameError: if there are several sections and none is chosen, or it is not there.
-    """
+def nexus_head(text: bytes, lines: list[str], start: int, section: str | None, where: str) -> Head | None:
+    """The head of a section, columns `KneeAngles_x` and so on; None for another kind of table."""
     delimiter = "\t" if "\t" in "".join(lines[start : start + _HEAD]) else ","
     if not _begins(lines, start, delimiter):
         if section is not None:
@@ -151,7 +132,7 @@ def nexus_head(text: bytes, lines: list[str], start: int, section: str | None, w
         title = above.rpartition(":")[2] if above else title
         names.append(axis if axis in _FRAMES or not title else f"{title}_{axis.lower()}" if axis else "")
     check_names(names, where)
-    return NexusHead(tuple(names), unit_row(names, units) or {}, float(rows[1][0]), place + _HEAD, delimiter)
+    return Head(tuple(names), unit_row(names, units) or {}, place + _HEAD, False, delimiter, float(rows[1][0]))
 
 
 def _kind(line: str, delimiter: str) -> str:

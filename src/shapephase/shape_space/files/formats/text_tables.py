@@ -6,13 +6,13 @@ import csv
 import io
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ....arrays import Integers
 from ....errors import TrajectoryError
-from .table_heads import COMMA_NUMBER, COMMENT, head_of, is_value, nexus_head, numbers
+from .table_heads import COMMA_NUMBER, COMMENT, HEAD_ROWS, Head, head_of, is_value, nexus_head, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 _DELIMITERS = {",": "commas", "\t": "tabs", ";": "semicolons", "|": "bars"}
 BLANKS = " "  # delimiter: any number of blanks
 _HEAD_BYTES = 2**18  # beginning of a text, from which its layout follows
-_HEAD_ROWS = 12
 _SEPARATOR = re.compile(r"sep=(.)", re.IGNORECASE)  # a spreadsheet's first line that names the separator
 _COMMA_ENTRY = rb"\s*([-+]?\d*,\d+(?:,\d+)*(?:[eE][-+]?\d+)?)\s*"
 _PLAIN = re.compile(rb'(?:^|[;\t\n"])' + _COMMA_ENTRY + rb'(?=[;\t\n"]|$)')
@@ -28,25 +27,6 @@ _QUOTED = re.compile(rb'(?:^|[,\n])\s*"' + _COMMA_ENTRY + rb'"(?=\s*[,\n]|$)')
 _POINT = re.compile(rb"\d\.\d")
 _THOUSANDS = re.compile(rb"[-+]?[1-9]\d{0,2}(?:,\d{3})+")
 _GAPS = ["", "nan", "NaN", "NAN", "-nan", "-NaN"]  # any other word is a fault
-
-
-class _Layout(NamedTuple):
-    """Layout of a text table.
-
-    names : of the columns
-    units : name -> unit
-    first : the line of the first sample, from 0
-    delimiter : between columns
-    rate : frames a second, where the header states it and no column has times
-    numbered : True if there are no names
-    """
-
-    names: tuple[str, ...]
-    units: dict[str, str]
-    first: int
-    delimiter: str
-    rate: float | None = None
-    numbered: bool = False
 
 
 def read_text(
@@ -57,16 +37,10 @@ def read_text(
     Columns are separated by commas, tabs, semicolons or blanks; decimal points, or all of them commas. A header may
     stand in the first row, behind `#` or `%`, in several rows as Vicon Nexus writes it, or nowhere; a row of units may
     follow. The frame's `attrs` have the rest of the header.
-
-    section : which part of a file of Nexus with several of them
-    start : lines before the table
-    delimiter : between columns; None: by the header
-
-    Raises TrajectoryError for a row of another length than the header, with its number; for bytes that are no text.
     """
     text = unix_text(data, where)
     layout = _layout(text, where, section, start, delimiter)
-    body = text.split(b"\n", layout.first)[-1] if layout.first else text
+    body = text.split(b"\n", layout.skipped)[-1] if layout.skipped else text
     if section is not None or layout.rate is not None:
         body = body.split(b"\n\n", 1)[0]
     comma = _has_decimal_commas(body, layout, where)
@@ -101,7 +75,7 @@ def unix_text(data: bytes, where: Path) -> bytes:
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
-def _layout(text: bytes, where: Path, section: str | None, start: int, stated: str | None) -> _Layout:
+def _layout(text: bytes, where: Path, section: str | None, start: int, stated: str | None) -> Head:
     """Names, separator and first line, by the beginning of a text."""
     lines = text[:_HEAD_BYTES].decode(errors="replace").split("\n")
     place, comment = start, None
@@ -114,18 +88,18 @@ def _layout(text: bytes, where: Path, section: str | None, start: int, stated: s
         elif lines[place].strip():
             break
         place += 1
-    shown = [k for k in range(place, len(lines)) if lines[k].strip()][:_HEAD_ROWS]
+    shown = [k for k in range(place, len(lines)) if lines[k].strip()][:HEAD_ROWS]
     if not shown:
         raise TrajectoryError(f"{where}: empty; a header `time,<joint names>` and rows of numbers are needed")
     nexus = nexus_head(text, lines, place, section, str(where))
     if nexus is not None:
-        return _Layout(nexus.names, nexus.units, nexus.first, nexus.delimiter, rate=nexus.rate)
+        return nexus
     delimiter = stated or _delimiter(lines[place], where)
     rows = [split_line(lines[k], delimiter) for k in shown]
     names = None if comment is None else split_line(COMMENT.sub("", comment, count=1).rstrip('"'), delimiter)
     head = head_of(rows, names, str(where))
     first = shown[head.skipped] if head.skipped < len(shown) else shown[-1] + 1
-    return _Layout(head.names, head.units, first, delimiter, numbered=head.numbered)
+    return head._replace(skipped=first, delimiter=delimiter)
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
@@ -155,7 +129,7 @@ def _delimiter(line: str, where: Path) -> str:
     return BLANKS if len(unquoted.split()) > 1 else ","
 
 
-def _has_decimal_commas(body: bytes, layout: _Layout, where: Path) -> bool:
+def _has_decimal_commas(body: bytes, layout: Head, where: Path) -> bool:
     """True where numbers have decimal commas. Raises TrajectoryError where these may be marks of thousands."""
     if (b'"' if layout.delimiter == "," else b",") not in body:
         return False
@@ -170,7 +144,7 @@ def _has_decimal_commas(body: bytes, layout: _Layout, where: Path) -> bool:
             return True
         doubtful = doubtful or match
     if doubtful is not None:
-        row = layout.first + 1 + body.count(b"\n", 0, doubtful.start(1))
+        row = layout.skipped + 1 + body.count(b"\n", 0, doubtful.start(1))
         raise TrajectoryError(
             f"{where}: row {row}: {doubtful[1].decode()!r:.40} may have a decimal comma or a mark of thousands, and no "
             "other entry tells which; write numbers with a decimal point, and no marks of thousands"
@@ -178,14 +152,14 @@ def _has_decimal_commas(body: bytes, layout: _Layout, where: Path) -> bool:
     return False
 
 
-def _checked_rows(body: bytes, layout: _Layout, where: Path) -> tuple[tuple[str, ...], Integers]:
+def _checked_rows(body: bytes, layout: Head, where: Path) -> tuple[tuple[str, ...], Integers]:
     """Names of all columns, and numbers of the lines that pandas takes as rows.
 
     Raises TrajectoryError for a row of another length than the header: pandas would fill or shift it.
     """
     delimiter, names, width = layout.delimiter, layout.names, len(layout.names)
     counts, lines = _quoted_counts(body, layout, where) if b'"' in body else _counts(body, delimiter)
-    lines += layout.first + 1
+    lines += layout.skipped + 1
     if len(counts) and (counts == width + 1).all() and delimiter != BLANKS:
         last = body.rstrip(b"\n").rsplit(b"\n", 1)[-1].rstrip()
         if last.endswith(delimiter.encode()):
@@ -199,7 +173,7 @@ def _checked_rows(body: bytes, layout: _Layout, where: Path) -> tuple[tuple[str,
     if len(wrong):
         line, count = int(lines[wrong[0]]), int(counts[wrong[0]])
         fault = f"{where}: row {line} has {count} entries, the header {len(layout.names)}"
-        entries = body.split(b"\n")[line - layout.first - 1].decode(errors="replace").split(delimiter)
+        entries = body.split(b"\n")[line - layout.skipped - 1].decode(errors="replace").split(delimiter)
         if count == 2 * len(layout.names) and all(entry.strip().lstrip("+-").isdigit() for entry in entries):
             remedy = "decimal commas between commas cannot be told apart, separate the columns by semicolons"
         else:
@@ -223,7 +197,7 @@ def _counts(body: bytes, delimiter: str) -> tuple[Integers, Integers]:
     return counts[lines], lines
 
 
-def _quoted_counts(body: bytes, layout: _Layout, where: Path) -> tuple[Integers, Integers]:
+def _quoted_counts(body: bytes, layout: Head, where: Path) -> tuple[Integers, Integers]:
     """Entries of each row of a text with quotes, in which lines may break, and its line from 0."""
     counts, lines = [], []
     text, mark = io.StringIO(body.decode(), newline=""), layout.delimiter
@@ -235,7 +209,7 @@ def _quoted_counts(body: bytes, layout: _Layout, where: Path) -> tuple[Integers,
                 lines.append(reader.line_num - 1)
     except csv.Error as error:
         raise TrajectoryError(
-            f"{where}: row {layout.first + reader.line_num}: {error}; close the quotation marks"
+            f"{where}: row {layout.skipped + reader.line_num}: {error}; close the quotation marks"
         ) from None
     return np.array(counts, dtype=np.int64), np.array(lines, dtype=np.int64)
 

@@ -11,15 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ... import so3
-from ...arrays import Array
-from ...body.body import Body
-from ...body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, JointOrder, simulator_order
-from ...body.virtual_base import way_names
-from ...errors import TrajectoryError, TrajectoryWarning
+from .... import so3
+from ....arrays import Array
+from ....body.body import Body
+from ....body.joint_orders import ISAAC, ISAAC_BY_NAME, MUJOCO, OWN, TITLES, JointOrder, simulator_order
+from ....body.virtual_base import way_names
+from ....errors import TrajectoryError, TrajectoryWarning
+from ..recording import OFF_UNIT
 
 FREE_JOINT = 7  # entries of a free joint: a place and a quaternion
-_OFF_UNIT = 1e-3  # allowed error of a quaternion's length
 _SAMPLES = 50  # at which places of bodies are compared: every joint has moved by then
 _FITS = 0.01  # relative to the body's extent, rms: links farther from the file's bodies are others
 _ALIKE = 5.0  # times the least distance: places with few digits do not distinguish such orders
@@ -32,7 +32,6 @@ class NamelessJoints:
     """Joints of the columns of an array.
 
     order : the word for their order, one of `WORDS`
-    names : of the columns behind the free joint
     free : the number of columns before them, 7 or none
     """
 
@@ -53,8 +52,6 @@ class NamelessJoints:
 
 def nameless_joints(body: Body, width: int, where: str, order: str | None) -> NamelessJoints:
     """Joints of an array of so many columns, with a free joint before them or without.
-
-    order : one of `WORDS`; None: MuJoCo's
 
     Raises TrajectoryError if the body has another number of joints. Warns where Isaac's order depends on how its
     importer sorted the joints of a link.
@@ -104,20 +101,15 @@ def placed_joints(
     joints : (N, n) without the free joint
     places : (N, b, 3) of the bodies, the base first [m]
     quaternions : (N, 4) of the base
-    order : one of `WORDS`; None: all are tried
     orders : 1: the quaternion is w x y z; 2: it may be x y z w, too
-    names : of the columns; None: those of an order
     spins : (N, b, 3) angular velocities of the bodies, world axes [rad/s], where they are known, at `times` (N,) [s]
-
-    Raises TrajectoryError if no order lets the links lie where the bodies are and turn as fast, or several different
-    ones do.
     """
     if places.ndim != 3 or places.shape[::2] != (len(joints), 3):
         raise TrajectoryError(
             f"{where}: the places of bodies have the shape {places.shape}; ({len(joints)}, bodies, 3) is needed"
         )
     norms = np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    if not np.all(np.abs(norms - 1.0) <= _OFF_UNIT):
+    if not np.all(np.abs(norms - 1.0) <= OFF_UNIT):
         raise TrajectoryError(f"{where}: the quaternions of the base are not of length 1")
     unit = quaternions / norms
     attitudes = [so3.matrix_from_quat(each) for each in (np.roll(unit, -1, axis=-1), unit)][:orders]
