@@ -8,6 +8,7 @@ import numpy as np
 
 from .. import so3
 from ..arguments import check_object
+from ..arrays import Array
 from ..body.body import Body
 from ..errors import AccuracyNotReached, unknown_name
 from ..shape_space.body_path import route_along
@@ -62,10 +63,12 @@ def _quadrature(body: Body, route: ShapePath, cost: str, panels: int) -> float:
     inside, weights, _ = gauss_tableau(_NODES)
     ends = np.concatenate([np.linspace(a, b, panels + 1)[:-1] for a, b in pairwise(route.breaks)] + [route.breaks[-1:]])
     steps = np.diff(ends)
-    shapes, rates = route.curve((ends[:-1, None] + steps[:, None] * inside).ravel())
+    curve = route.curve((ends[:-1, None] + steps[:, None] * inside).ravel())
+    return float((steps[:, None] * weights).ravel() @ cost_density(body, cost, *curve))
+
+
+def cost_density(body: Body, cost: str, shapes: Array, rates: Array) -> Array:
+    """Integrand of the cost "kinetic" or "rate": (N, n), (N, n) -> (N,)."""
     if cost == "rate":
-        density = 0.5 * np.sum(rates**2, axis=1)
-    else:
-        turning = -so3.apply(mechanical_connection(body, shapes), rates)
-        density = body.kinetic_energy(shapes, rates, turning)
-    return float((steps[:, None] * weights).ravel() @ density)
+        return 0.5 * np.sum(rates**2, axis=1)
+    return body.kinetic_energy(shapes, rates, -so3.apply(mechanical_connection(body, shapes), rates))

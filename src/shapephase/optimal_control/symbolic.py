@@ -167,6 +167,22 @@ def solve_linear(matrix: Any, right: Any) -> Any:
     return casadi.vertcat(*rows)
 
 
+def quaternion_rate(quaternion: Any, omega: Any) -> Any:
+    """Rate of an attitude's quaternion xyzw at an angular velocity in base axes."""
+    import casadi
+
+    vector, scalar = quaternion[:3], quaternion[3]
+    return 0.5 * casadi.vertcat(scalar * omega + casadi.cross(vector, omega), -casadi.dot(vector, omega))
+
+
+def turned_back(quaternion: Any, vector: Any) -> Any:
+    """Inertial vector in base axes, R^T vector, for a unit quaternion."""
+    import casadi
+
+    axis, scalar = quaternion[:3], quaternion[3]
+    return vector - 2.0 * scalar * casadi.cross(axis, vector) + 2.0 * casadi.cross(axis, casadi.cross(axis, vector))
+
+
 def _symbolic(body: Body) -> SymbolicBody:
     import casadi
 

@@ -19,7 +19,7 @@ from ...body.couplings.coordinate_map import check_no_balls, check_smooth
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, unknown_name
 from ...shape_space.connection import mechanical_connection
-from ..symbolic import call_casadi, solve_linear, symbolic_body
+from ..symbolic import call_casadi, quaternion_rate, solve_linear, symbolic_body
 
 _COSTS = ("kinetic", "rate")  # the integrals of a metric
 _LEAST_METRIC = 1e-12  # eigenvalue that still determines rates: the mass matrix is rounded to 1e-15
@@ -91,6 +91,28 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
         if metric not in of_body:
             of_body[metric] = _hamiltonian(body, metric)
         return of_body[metric]
+
+
+def flow(
+    body: Body,
+    equations: Hamiltonian,
+    shape: Array,
+    rate: Array,
+    charge: Array,
+    duration: float,
+    accuracy: float,
+    most: int | None = None,
+) -> Any:
+    """SciPy's dense solution of the extremal from a shape, the base at the identity (see `integrated`)."""
+    momenta, _ = natural_scales(body, equations, shape, rate, charge)
+    return integrated(
+        lambda now: call_casadi(equations.field, 1, now, charge)[0][0],
+        duration,
+        initial_state(equations, shape, rate, charge),
+        accuracy,
+        np.concatenate([np.ones(body.n_shape), momenta, np.ones(4)]),
+        most,
+    )
 
 
 def initial_state(equations: Hamiltonian, shape: Array, rate: Array, charge: Array) -> Array:
@@ -179,8 +201,7 @@ def _hamiltonian(body: Body, cost: str) -> Hamiltonian:
     speed = solve_linear(metric(here), kinetic)
     known = slopes(here, speed, turned_back)
     omega = -known[2 * n :]
-    quaternion_rate = 0.5 * casadi.vertcat(scalar * omega + casadi.cross(vector, omega), -casadi.dot(vector, omega))
-    field = casadi.densify(casadi.cse(casadi.vertcat(speed, known[:n], quaternion_rate)))
+    field = casadi.densify(casadi.cse(casadi.vertcat(speed, known[:n], quaternion_rate(state[2 * n :], omega))))
     return Hamiltonian(
         field=casadi.Function("field", [state, charge], [field]),
         energy=casadi.Function("energy", [state, charge], [0.5 * kinetic.T @ speed]),

@@ -30,8 +30,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...body.joint_chain import JointChain
-from ..symbolic import joint_frames, joint_screw
-from .spatial import Inertia, Twist
+from ..symbolic import joint_frames
+from .spatial import Twist, gathered, links_of, passed_on, screws_of
 
 SIZE = 16  # numbers in z
 _INERTIA_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -90,24 +90,13 @@ class _Tree:
     def __init__(self, chain: JointChain, place: Any, rate: Any, shape: Any) -> None:
         import casadi
 
-        frames = joint_frames(chain, place, shape)
-        joints = range(len(chain.parents))
-        self._screws = [Twist(*joint_screw(chain, number, frames[number + 1])) for number in joints]
-        none = casadi.SX(3, 1)
-        self._twists = [Twist(none, none)]
-        for number, parent in enumerate(chain.parents):
-            self._twists.append(self._twists[parent] + self._screws[number] * rate[number])
-        bodies = [
-            Inertia.of_link(float(mass), frame, centre, inertia)
-            for frame, mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True)
-        ]
-        momenta = [body.momentum(twist) for body, twist in zip(bodies, self._twists, strict=True)]
-        for number in reversed(joints):
-            parent = chain.parents[number]
-            bodies[parent] = bodies[parent] + bodies[number + 1]
-            momenta[parent] = momenta[parent] + momenta[number + 1]
-        self._bodies, self._momenta, self._rate = bodies, momenta, rate
-        self._forces = [bodies[number + 1].momentum(self._screws[number]) for number in joints]
+        frames, none = joint_frames(chain, place, shape), casadi.SX(3, 1)
+        self._screws, links, self._rate = screws_of(chain, frames), links_of(chain, frames), rate
+        steps = [screw * rate[number] for number, screw in enumerate(self._screws)]
+        self._twists = passed_on(chain, Twist(none, none), steps)
+        self._bodies = gathered(chain, links)
+        self._momenta = gathered(chain, [link.momentum(twist) for link, twist in zip(links, self._twists, strict=True)])
+        self._forces = [body.momentum(screw) for body, screw in zip(self._bodies[1:], self._screws, strict=True)]
 
     def values(self) -> tuple[Any, Any, Any]:
         """Return z and its derivatives by coordinates and rates."""
