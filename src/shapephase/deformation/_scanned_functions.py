@@ -14,11 +14,11 @@ every eighth sample of the scan.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 from ..shape_space.scan.function_scan import Judge, ScannedFunction, Words
 
 Pair = Callable[[Array], tuple[Array, Array]]
@@ -50,19 +50,14 @@ def inertia_and_momentum(sample: Pair, subject: str) -> ScannedFunction:
         sizes = np.repeat([np.abs(columns[:, :6]).max(), drift.max(), 0.0], (6, 3, 3))
         return weights, sizes
 
-    return ScannedFunction(
-        curve=curve,
-        judge=judge,
-        paired=np.zeros(6, dtype=bool),
-        angles=np.zeros(6, dtype=bool),
-        may_jump=np.ones(6, dtype=bool),
-        subject=subject,
-        columns=tuple(f"I_{entry}" for entry in _ENTRIES),
-        quantities=(
-            *(f"inertia I_{entry}" for entry in _ENTRIES),
-            *(f"internal momentum L_{axis}" for axis in _AXES),
-            *("nothing",) * 3,
-        ),
+    inertias, momenta = [f"inertia I_{entry}" for entry in _ENTRIES], [f"internal momentum L_{axis}" for axis in _AXES]
+    return _scanned(
+        curve,
+        judge,
+        subject,
+        [f"I_{entry}" for entry in _ENTRIES],
+        [*inertias, *momenta, *("nothing",) * 3],
+        may_jump=True,
         words=Words(
             units=("kg m^2", "kg m^2/s"),
             continuous="an inertia must be continuous, or have a break declared where it jumps",
@@ -120,7 +115,7 @@ def positions_and_velocities(masses: Array, motion: Pair, raw_size: Callable[[Ar
 
     names = [f"particle {k} along {axis}" for k in range(len(masses)) for axis in _AXES]
     quantities = [f"{kind} of {name}" for kind in ("position", "velocity") for name in names]
-    paired = np.ones(len(names), dtype=bool)
+    paired: bool | Mask = True
     if not few:
         names = [f"sum m {a}{b}" for a, b in _ENTRIES] + ["nothing"] * 3
         names += [f"sum {k} of all particles along {axis}" for k in range(_SUMS) for axis in _AXES]
@@ -128,15 +123,13 @@ def positions_and_velocities(masses: Array, motion: Pair, raw_size: Callable[[Ar
         rates[6:9] = [f"internal momentum L_{axis}" for axis in _AXES]
         quantities = names + rates
         paired = ~np.isin(np.arange(len(names)), (6, 7, 8))
-    return ScannedFunction(
-        curve=curve,
-        judge=judge,
+    return _scanned(
+        curve,
+        judge,
+        "the function of the positions",
+        names,
+        quantities,
         paired=paired,
-        angles=np.zeros(len(names), dtype=bool),
-        may_jump=np.zeros(len(names), dtype=bool),
-        subject="the function of the positions",
-        columns=tuple(names),
-        quantities=tuple(quantities),
         words=Words(
             units=("m", "m/s") if few else ("kg m or kg m^2", "kg m/s or kg m^2/s"),
             continuous="particles move continuously",
@@ -172,16 +165,14 @@ def turns_alone(turns: Callable[[Array], Array]) -> ScannedFunction:
 
 
 def _of_turns(curve: Pair, judge: Judge, *, paired: bool) -> ScannedFunction:
-    names = tuple(f"entry {row}, {column} of U" for row in range(3) for column in range(3))
-    return ScannedFunction(
-        curve=curve,
-        judge=judge,
-        paired=np.full(9, paired),
-        angles=np.zeros(9, dtype=bool),
-        may_jump=np.zeros(9, dtype=bool),
-        subject="the gauge's function U(t)",
-        columns=names,
-        quantities=(*names, *(f"rate of {name}" for name in names)),
+    names = [f"entry {row}, {column} of U" for row in range(3) for column in range(3)]
+    return _scanned(
+        curve,
+        judge,
+        "the gauge's function U(t)",
+        names,
+        [*names, *(f"rate of {name}" for name in names)],
+        paired=paired,
         words=Words(
             units=("rad", "rad/s"),
             continuous="a frame must turn continuously",
@@ -197,16 +188,39 @@ def rates_alone(spins: Callable[[Array], Array]) -> ScannedFunction:
     def judge(_times: Array, columns: Array) -> tuple[Array, Array]:
         return np.ones(6), np.repeat([0.0, float(np.linalg.norm(columns[:, 3:], axis=1).max())], 3)
 
-    return ScannedFunction(
-        curve=lambda times: (np.zeros((len(times), 3)), spins(times)),
-        judge=judge,
-        paired=np.zeros(3, dtype=bool),
-        angles=np.zeros(3, dtype=bool),
-        may_jump=np.zeros(3, dtype=bool),
-        subject="the function of the body rates of U",
-        columns=("nothing",) * 3,
-        quantities=("nothing",) * 3 + tuple(f"rate about {axis}" for axis in _AXES),
+    return _scanned(
+        lambda times: (np.zeros((len(times), 3)), spins(times)),
+        judge,
+        "the function of the body rates of U",
+        ["nothing"] * 3,
+        ["nothing"] * 3 + [f"rate about {axis}" for axis in _AXES],
         words=Words(units=("rad", "rad/s"), continuous="a frame must turn continuously"),
+    )
+
+
+def _scanned(
+    curve: Pair,
+    judge: Judge,
+    subject: str,
+    columns: Sequence[str],
+    quantities: Sequence[str],
+    *,
+    words: Words,
+    paired: bool | Mask = False,
+    may_jump: bool = False,
+) -> ScannedFunction:
+    """Return a function without angles; `paired` and `may_jump` hold for all columns."""
+    n = len(columns)
+    return ScannedFunction(
+        curve=curve,
+        judge=judge,
+        paired=np.full(n, paired),
+        angles=np.zeros(n, dtype=bool),
+        may_jump=np.full(n, may_jump),
+        subject=subject,
+        columns=tuple(columns),
+        quantities=tuple(quantities),
+        words=words,
     )
 
 

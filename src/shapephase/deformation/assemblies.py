@@ -100,10 +100,6 @@ class AssemblyDescription(UngaugedDescription):
         turned = 0.5 * so3.apply(inertia, turning) + momentum
         return np.sum(turning * turned, axis=-1) + 0.5 * self.about_centre(times).vis_viva
 
-    @property
-    def scan(self) -> FunctionScan | None:
-        return self._scan
-
     @cached_property
     def _scan(self) -> FunctionScan | None:
         if self.swings.most is not None:
@@ -326,9 +322,8 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
 
 
 def _columns(path: ShapePath, count: int, whose: str) -> ShapePath:
-    if not isinstance(path, ShapePath) or path.n_shape != count:
-        came = f"one of {path.n_shape} columns" if isinstance(path, ShapePath) else repr(type(path).__name__)
-        raise TrajectoryError(f"{whose} needs a ShapePath of {count} columns [m], got {came}")
+    if path.n_shape != count:
+        raise TrajectoryError(f"{whose} needs a ShapePath of {count} columns [m], got one of {path.n_shape} columns")
     if np.abs(path.gap).max() <= CLOSED:
         return path
     # A path of joints that advances by 2 pi in every loop is a loop; one of metres is not.

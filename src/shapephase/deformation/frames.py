@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_picklable, times_argument
+from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..chebyshev import PiecewiseChebyshev
 from ..display import short_repr
@@ -30,7 +30,7 @@ from ..shape_space.scan.scanning import scanned
 from ._principal_frame import Frames, principal_frames
 from ._scanned_functions import rates_alone, turns_alone, turns_and_rates
 from .deformation import Deformation
-from .descriptions import Description
+from .descriptions import Description, UserFunctions
 
 _LINK = "link:"  # beginning of a gauge named after a link: "link:torso"
 LIFT_TOLERANCE = 1e-12  # [rad] tighter than any motion that is seen from these frames
@@ -102,19 +102,12 @@ def _turns_of(u: Callable[[Array], Any], times: Array) -> tuple[Array, Array | N
 
 
 @dataclass(frozen=True, eq=False)
-class _GaugeFunction:
+class _GaugeFunction(UserFunctions):
     """Frames by a user's function."""
 
     function: Callable[[Array], Any]
 
-    def __getstate__(self) -> dict[str, Any]:
-        """State to pickle. Raises LocalFunctionError for a lambda."""
-        check_picklable(self.function, "a gauge")
-        return self.__dict__
-
-    def __deepcopy__(self, _: dict[int, Any]) -> Self:
-        """The frames themselves, which are immutable."""
-        return self
+    _holder = "a gauge"
 
 
 @dataclass(frozen=True, eq=False)

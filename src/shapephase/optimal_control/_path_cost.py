@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from .. import so3
-from ..arguments import check_object
+from ..arguments import check_choice, check_object
 from ..arrays import Array
 from ..body.body import Body
-from ..errors import AccuracyNotReached, unknown_name
+from ..errors import AccuracyNotReached
 from ..shape_space.body_path import route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
@@ -43,8 +43,7 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
-    if not isinstance(cost, str) or cost not in ("kinetic", "rate"):
-        raise unknown_name("cost of a path", cost, ("kinetic", "rate"))
+    check_choice(cost, "cost of a path", ("kinetic", "rate"))
     route = route_along(body, path)
     before = _quadrature(body, route, cost, _FIRST_PANELS)
     for panels in _PANELS:

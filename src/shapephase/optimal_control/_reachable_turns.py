@@ -336,9 +336,7 @@ def _with_angles(task: Reorientation, moves: Integers, plane: _ReachableTurns) -
 
 def _drawn(task: Reorientation) -> Array:
     """Coordinates drawn within the limits (N, m)."""
-    reach = _RADIUS * _strokes(task)
-    lower, upper = np.maximum(task.lower, task.start - reach), np.minimum(task.upper, task.start + reach)
-    return np.random.default_rng(_SEED).uniform(lower, upper, (_SHAPES, task.dimension))
+    return np.random.default_rng(_SEED).uniform(*task.reach(_RADIUS * _strokes(task)), (_SHAPES, task.dimension))
 
 
 def _is_analytic(body: Body) -> bool:

@@ -168,41 +168,31 @@ class CollocationProgram:
         pieces, count = basis.pieces, len(self.places)
         before, after = sparse.eye(pieces, pieces + 1), sparse.eye(pieces, pieces + 1, k=1)
         from_start = sparse.kron(before, np.ones((STAGES, 1)))
-        no_control = sparse.csr_matrix((4 * (count + pieces), task.dimension * basis.dimension + 1))
+
         quaternions = sparse.kron(
             sparse.block_array([[sparse.eye(count), -from_start], [None, after - before]]), sparse.eye(4)
         )
         limited = np.flatnonzero(np.isfinite(task.rate_limit))
         rates = sparse.kron(basis.rate_control, sparse.eye(task.dimension).tocsr()[limited])
-        rate_limits = np.tile(task.rate_limit[limited], basis.dimension - 1)[:, None]
-        no_quaternions = sparse.csr_matrix((rates.shape[0], quaternions.shape[1]))
+        rate_limits = sparse.csr_matrix(np.tile(task.rate_limit[limited], basis.dimension - 1)[:, None])
         conditions = sparse.kron(end_conditions(task, basis), sparse.eye(task.dimension)).tocsr()
-        linear = sparse.vstack(
+        no_places = sparse.csr_matrix((conditions.shape[0], self._open.stop - self._open.start))
+        linear = sparse.block_array(
             [
-                sparse.hstack([no_control, quaternions]),
-                sparse.hstack([rates, -rate_limits, no_quaternions]),
-                sparse.hstack([rates, rate_limits, no_quaternions]),
-                sparse.hstack([conditions, sparse.csr_matrix((conditions.shape[0], 1 + quaternions.shape[1]))]),
+                [None, None, quaternions, None],
+                [rates, -rate_limits, None, None],
+                [rates, rate_limits, None, None],
+                [conditions, None, None, no_places],
             ]
         )
-        turning = sparse.vstack(
-            [
-                sparse.kron(sparse.eye(pieces), step * integrals),
-                sparse.kron(sparse.eye(pieces), step * weights[None]),
-            ]
-        )
-        turning = sparse.vstack(
-            [
-                sparse.kron(turning, sparse.eye(4)),
-                sparse.csr_matrix((2 * rates.shape[0] + conditions.shape[0], 4 * count)),
-            ]
-        )
+        turning = sparse.vstack([sparse.kron(sparse.eye(pieces), step * rows) for rows in (integrals, weights[None])])
+        still = sparse.csr_matrix((2 * rates.shape[0] + conditions.shape[0], 4 * count))
+        turning = sparse.vstack([sparse.kron(turning, sparse.eye(4)), still])
         equal, zero = np.zeros(4 * (count + pieces)), np.zeros(rates.shape[0])
         unbounded = np.full(rates.shape[0], np.inf)
         met = np.zeros(conditions.shape[0])
         low, high = np.concatenate([equal, -unbounded, zero, met]), np.concatenate([equal, zero, unbounded, met])
-        no_places = sparse.csr_matrix((linear.shape[0], self._open.stop - self._open.start))
-        return sparse_matrix(sparse.hstack([linear, no_places])), sparse_matrix(turning), low, high
+        return sparse_matrix(linear), sparse_matrix(turning), low, high
 
     def _acceleration_cost(self, unknown: Any) -> Any:
         """Integral of half the squared second derivative: exact with two nodes of a piece or more."""

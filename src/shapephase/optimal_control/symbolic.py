@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..arguments import check_object
+from ..arguments import check_choice, check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.functions import JointFunction
@@ -26,7 +26,7 @@ _building = Lock()
 
 @dataclass(frozen=True, eq=False)
 class SymbolicBody:
-    """Functions of a body's shape r (n,), each a `casadi.Function` of r alone.
+    """Functions of a body's shape r (n,), each a `casadi.Function` of r alone. Made by `symbolic_body`.
 
     Called with symbols of CasADi's kind SX a function gives its expression, with MX one call in the larger graph, with
     numbers a DM. All are in base axes. Can be pickled, and each function has CasADi's own `serialize`. For numbers of
@@ -48,15 +48,6 @@ class SymbolicBody:
     Notes
     -----
     Source: Cabrera 2006, section 2.3 and equation (4); theory.md A3, A6, A7.
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> functions = sp.optimal_control.symbolic_body(cat)
-    >>> print(np.array(functions.connection(np.zeros(3))).round(6))
-    [[0.  0.  0.5]
-     [0.5 0.  0. ]
-     [0.  0.5 0. ]]
     """
 
     name: str
@@ -91,8 +82,7 @@ class SymbolicBody:
         """
         import casadi
 
-        if quantity not in QUANTITIES:
-            raise unknown_name("quantity", quantity, QUANTITIES)
+        check_choice(quantity, "quantity", QUANTITIES)
         key = f"{quantity}_derivative"
         if key not in self._made:
             shape = casadi.SX.sym("shape", self.n_shape)

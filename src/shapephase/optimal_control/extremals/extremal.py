@@ -26,7 +26,7 @@ _DEGREE = 12  # of the series of rates on a step of order 8: its error is that o
 @made_by("optimal_control.extremal(...)")
 @dataclass(frozen=True, eq=False)
 class Extremal:
-    """A motion with zero momentum that solves Wong's equations, as a function of time.
+    """A motion with zero momentum that solves Wong's equations, as a function of time. Made by `extremal`.
 
     With g the metric of the cost, A the connection and F its curvature, l = R^T charge:
     d/dt (g r')_i = 1/2 r' dg/dr_i r' + l . F_ik r'_k, R' = R hat(-A r'), R(0) = 1. The charge is constant in inertial
@@ -41,13 +41,6 @@ class Extremal:
     energy : 1/2 r' g r', kept by the motion [J, or rad^2/s^2]
     energy_drift : largest relative change of the computed energy at the steps
     solution : SciPy's: times -> states (2 n + 4, N): shapes, their canonical momenta, quaternion xyzw
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> path = sp.optimal_control.extremal(cat, np.zeros(3), [1.0, 0.0, 0.0], np.zeros(3), 1.0)
-    >>> print(f"{path.energy_drift < 1e-8} {path.shape(0.0)}")
-    True [0. 0. 0.]
     """
 
     body: Body

@@ -39,7 +39,7 @@ _FOLLOWS = 1e-9  # [rad or m], deviation from them: rounding of user input
 
 @dataclass(frozen=True, eq=False)
 class WongFit:
-    """Extremal that fits a path best, and the path's residual in Wong's equations.
+    """Extremal that fits a path best, and the path's residual in Wong's equations. Made by `wong_residual`.
 
     Attributes
     ----------
@@ -47,12 +47,6 @@ class WongFit:
     rate : (n,) at the start of that extremal [rad/s or m/s]
     residual : root mean square, in the metric of the cost, of the defect of p = p(0) + integral of dL/dr, relative to
         that of the rate
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> sp.optimal_control.wong_residual(cat, loop).charge.shape
-    (3,)
     """
 
     charge: Array
