@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
-from shapephase.errors import GaugeError, NoisyPathError, ShapeError, TrajectoryError, UndeclaredBreakWarning
+from shapephase.errors import NoisyPathError, ShapeError, TrajectoryError, UndeclaredBreakWarning
 from shapephase.integrator.integrate import stepped_rotation
 from support.bodies import random_loop
 from support.independent import (
@@ -666,20 +666,6 @@ def test_the_first_principal_frame_is_fixed_by_rule(loop):
     np.testing.assert_allclose(np.cross(axes[:, 0], axes[:, 1]), axes[:, 2], atol=1e-13, rtol=0)
 
 
-@pytest.mark.parametrize("count", [2, 32, 33])
-def test_the_principal_gauge_of_a_loop_gone_round_many_times(count, rng):
-    """The axes at a phase of the loop are those of the first round, up to sign; U is continuous all along."""
-    cat = sp.load_body("cat")
-    path = random_loop(cat, rng, duration=1.0, amplitude=0.8)
-    once = sp.principal_gauge(sp.articulated(cat, path))
-    many = sp.principal_gauge(sp.articulated(cat, path.repeated(count)))
-    t = np.linspace(0.0, 1.0, 50, endpoint=False)
-    np.testing.assert_allclose(many.frame(t), once.frame(t), atol=1e-11, rtol=0)
-    for loop in (1, count - 1):
-        np.testing.assert_allclose(np.abs(many.frame(loop + t)), np.abs(once.frame(t)), atol=1e-10, rtol=0)
-    np.testing.assert_allclose(closure_of(many), np.linalg.matrix_power(closure_of(once), count), atol=1e-10, rtol=0)
-
-
 def rotating(speed, moments=(1.0, 2.0, 3.0)):
     """A rigid tensor that turns as seen from the base."""
 
@@ -688,35 +674,6 @@ def rotating(speed, moments=(1.0, 2.0, 3.0)):
         return r @ np.diag(moments) @ transposed(r)
 
     return inertia
-
-
-@pytest.mark.parametrize("speed", [1.0, -2.0, 60.0])
-def test_the_principal_gauge_follows_turning_axes(speed):
-    """It turns with the tensor for many turns without a jump of sign, and undoes them: U(t) = U(0) R(t)^T."""
-    there = sp.principal_gauge(sp.prescribed(rotating(speed), None, 6.0))
-    t = np.linspace(0.0, 6.0, 60)
-    back = Rotation.from_rotvec(-speed * t[:, None] * FIRST).as_matrix()
-    np.testing.assert_allclose(there.frame(t), there.frame(0.0) @ back, atol=1e-12, rtol=0)
-    omega = rates_of(there.frame, T, step=1e-2 / abs(speed))
-    np.testing.assert_allclose(omega, np.stack([-speed * FIRST] * len(T)), atol=1e-9 * abs(speed), rtol=0)
-
-
-@pytest.mark.parametrize("width", [0.3, 0.1, 0.01])
-@pytest.mark.parametrize("middle", [3.0, 3.09375, 3.042])
-def test_moments_that_change_places_for_a_moment(width, middle):
-    """However briefly they cross: a GaugeError, or a frame that is a rotation wherever it is asked for; no garbage."""
-
-    def inertia(t):
-        first = 1.0 + 0.2 * np.exp(-(((t - middle) / width) ** 2))
-        return np.stack([np.diag([m, 1.1, 1.5]) for m in first])
-
-    deformation = sp.prescribed(inertia, None, 6.0)
-    t = middle + width * np.linspace(-3.0, 3.0, 61)
-    try:
-        frame = sp.principal_gauge(deformation).frame(t)
-    except GaugeError:
-        return
-    np.testing.assert_allclose(frame @ transposed(frame), np.stack([np.eye(3)] * 61), atol=1e-12, rtol=0)
 
 
 def test_horizontal_and_principal_gauges_differ():

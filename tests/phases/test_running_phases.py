@@ -694,14 +694,6 @@ def test_frames_of_the_body(name, gauge):
     assert abs(split.dynamic_phase - base.dynamic_phase) > 1e-3
 
 
-def test_the_base_link_is_the_base_gauge():
-    motion = some_motion("cat")
-    base, same = sp.split(motion, "base"), sp.split(motion, "link:trunk_front")
-    for field in ("dynamic_phase", "solid_angle", "montgomery_phase", "momentum_gap"):
-        assert getattr(same, field) == pytest.approx(getattr(base, field), abs=1e-11)
-    assert apart(same.closing_tilt, base.closing_tilt) < 1e-12
-
-
 def test_another_link_turns_by_its_own_pose():
     """The attitude of a link in space is that of the base times its pose."""
     motion, body = some_motion("example:human"), body_of("example:human")
@@ -864,17 +856,6 @@ def test_the_energy_of_a_rigid_body():
     assert float(motion.dynamic_phase(5.0)) == pytest.approx(truth, rel=1e-12)
 
 
-def test_energies_need_masses():
-    def inertia(times):
-        return np.broadcast_to(np.diag([1.0, 2.0, 2.5]), (len(times), 3, 3)) * (1.1 + np.sin(times))[:, None, None]
-
-    motion = sp.reconstruct(sp.prescribed(inertia, None, 1.0), [0.0, 1.0, 1.0])
-    with pytest.raises(GaugeError, match="inertia"):
-        dynamic_phase_from_energy(motion)
-    with pytest.raises(GaugeError, match="inertia"):
-        dynamic_phase_from_energy(seen_from(motion, turning))
-
-
 def test_energies_of_a_file(tmp_path):
     """A motion read back has lost its masses, and keeps its phases."""
     motion = some_motion("satellite")
@@ -888,10 +869,9 @@ def test_energies_of_a_file(tmp_path):
         np.testing.assert_allclose(theirs.montgomery_phase, ours.montgomery_phase, rtol=0, atol=1e-10)
 
 
-@pytest.mark.parametrize("method", ["spectral", "dop853"])
-def test_other_methods_have_running_phases_too(method):
+def test_other_methods_have_running_phases_too():
     momentum, attitude = random_vector(2, 12.0), random_rotation(3)
-    motion = sp.reconstruct(deformation_of("satellite"), momentum, attitude, tolerance=1e-9, method=method)
+    motion = sp.reconstruct(deformation_of("satellite"), momentum, attitude, tolerance=1e-9, method="dop853")
     best = some_motion("satellite")
     np.testing.assert_allclose(best.momentum, momentum, rtol=0, atol=0)
     times = np.linspace(0.0, 2.0, 11)

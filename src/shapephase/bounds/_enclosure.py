@@ -21,14 +21,16 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.interpolant import Interpolant
 
 ROUNDING = 32.0 * float(np.finfo(float).eps)  # relative, generous for every formula here: of a few operations each
-# Channels xx, yy, zz, yz, xz, xy of I^-1: of each entry of the matrix, and row and column of each channel.
-_FULL = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-_CHANNEL = ([0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1])
+# Channels xx, yy, zz, yz, xz, xy of I^-1, before those of w: row and column of each, and the channel of each entry.
+_CHANNEL = np.array([[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])
+_FULL = np.empty((3, 3), dtype=int)
+_FULL[*_CHANNEL] = _FULL[*_CHANNEL[::-1]] = np.arange(len(_CHANNEL[0]))
 _WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # entries that each channel stands for
 _MAX_CELLS = 4096  # limits the loop of `energy_bounds`; the bounds of coarser cells are looser, but they hold
 # Parts of a panel at which the interpolant is compared with the deformation: none is near a Chebyshev node, and they
 # are not symmetric, so that an error which is odd or even about the middle shows.
 _TEST_POINTS = np.array([0.0381, 0.2361, 0.6180, 0.8541])
+RESOLUTION = 5e-3  # share of their size by which the channels may vary on a cell
 ROUND_UP = 1.0 + 1e-12  # for products of positive bounds: thousands of times their rounding
 
 
@@ -156,7 +158,7 @@ def enclosure(
     *,
     magnitude: float = 1.0,
     tolerance: float = 1e-10,
-    resolution: float = 5e-3,
+    resolution: float = RESOLUTION,
 ) -> Enclosure:
     """Bounds of the channels of a deformation and of their rates over an interval.
 
@@ -192,10 +194,10 @@ def enclosure(
         inverse_radius=_matrix(radius) + error[0],
         inverse_rate=_matrix(rate_middle),
         inverse_rate_radius=_matrix(rate_radius) + error[0] * steepness,
-        drift=middle[:, 6:],
-        drift_radius=np.linalg.norm(radius[:, 6:], axis=1) + error[1],
-        drift_rate=rate_middle[:, 6:],
-        drift_rate_radius=np.linalg.norm(rate_radius[:, 6:], axis=1) + error[1] * steepness,
+        drift=middle[:, -3:],
+        drift_radius=np.linalg.norm(radius[:, -3:], axis=1) + error[1],
+        drift_rate=rate_middle[:, -3:],
+        drift_rate_radius=np.linalg.norm(rate_radius[:, -3:], axis=1) + error[1] * steepness,
         sampling_error=error,
     )
 
@@ -230,20 +232,20 @@ def _in_best_frame(edges: Array, coefficients: Array) -> tuple[Array, Array]:
     frame = axes[np.argmax(np.diff(values, axis=1).min(axis=1))]
     # Where the body's axes are the principal axes, the frame is exactly the identity or a permutation.
     frame = np.where(np.abs(frame) < ROUNDING, 0.0, frame)
-    turned = frame.T @ coefficients[:, :, :6][..., _FULL] @ frame
+    turned = frame.T @ coefficients[:, :, :-3][..., _FULL] @ frame
     series = np.empty_like(coefficients)
-    series[:, :, :6] = turned[:, :, _CHANNEL[0], _CHANNEL[1]]
-    series[:, :, 6:] = coefficients[:, :, 6:] @ frame
+    series[:, :, :-3] = turned[:, :, _CHANNEL[0], _CHANNEL[1]]
+    series[:, :, -3:] = coefficients[:, :, -3:] @ frame
     return frame, series
 
 
 def _matrix(channels: Array) -> Array:
-    return channels[:, :6][:, _FULL]
+    return channels[:, :-3][:, _FULL]
 
 
 def _matrix_radius(radius: Array) -> Array:
     """Frobenius norm, which bounds the spectral one."""
-    return np.sqrt((radius[:, :6] ** 2) @ _WEIGHTS) * (1.0 + ROUNDING)
+    return np.sqrt((radius[:, :-3] ** 2) @ _WEIGHTS) * (1.0 + ROUNDING)
 
 
 def _sampling_error(deformation: Deformation, sampled: Interpolant) -> Array:
@@ -315,7 +317,7 @@ def _fine(series: Array, width: Array, scale: Array, steepest: float, resolution
 
 def _norms(channels: Array) -> Array:
     """Norms of I^-1 (Frobenius) and of w (Euclidean): (K, 9) -> (K, 2)."""
-    return np.stack([_matrix_radius(channels), np.linalg.norm(channels[:, 6:], axis=1)], axis=-1)
+    return np.stack([_matrix_radius(channels), np.linalg.norm(channels[:, -3:], axis=1)], axis=-1)
 
 
 def _rates(series: Array, width: Array) -> Array:

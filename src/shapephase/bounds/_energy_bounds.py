@@ -23,7 +23,7 @@ from ..arguments import body_momentum_argument, check_object, made_by, number_ar
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
-from ._enclosure import ROUND_UP, ROUNDING, Enclosure, enclosure
+from ._enclosure import RESOLUTION, ROUND_UP, ROUNDING, Enclosure, enclosure
 
 
 @made_by("bounds.energy_bounds(deformation, momentum)")
@@ -76,7 +76,7 @@ def energy_bounds(
     attitude: ArrayLike | None = None,
     interval: tuple[float, float] | None = None,
     *,
-    resolution: float = 5e-3,
+    resolution: float = RESOLUTION,
 ) -> EnergyBounds:
     """Bounds of the energy E_t = Pi.I^-1 Pi/2 over an interval, before any motion is computed.
 

@@ -18,6 +18,7 @@ from ..display import short_repr
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion
 from ._arc_bounds import arc_length_bounds, azimuth_bounds, return_time_bounds
+from ._enclosure import RESOLUTION
 from ._energy_bounds import EnergyBounds
 from ._phase_bounds import dynamic_phase_bounds, dynamic_phase_bounds_by_extremes
 from .energy import energy_along, energy_rate, homoclinic_energy
@@ -54,7 +55,7 @@ class Bound:
 
 
 def bounds(
-    motion: Motion, interval: tuple[float, float] | None = None, *, resolution: float = 5e-3
+    motion: Motion, interval: tuple[float, float] | None = None, *, resolution: float = RESOLUTION
 ) -> tuple[Bound, ...]:
     """All bounds of one motion over an interval, each with its value.
 

@@ -19,7 +19,7 @@ from ..arguments import body_momentum_argument, made_by
 from ..arrays import Array, Mask, finite_array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
-from ._enclosure import Enclosure
+from ._enclosure import RESOLUTION, Enclosure
 from ._energy_bounds import EnergyBounds, energy_bounds
 
 _CHUNK = 2_000_000  # directions times cells that are compared at once: some 100 MB of arrays
@@ -163,7 +163,7 @@ def regime_certificate(
     attitude: ArrayLike | None = None,
     interval: tuple[float, float] | None = None,
     *,
-    resolution: float = 5e-3,
+    resolution: float = RESOLUTION,
 ) -> RegimeCertificate:
     """Principal axis that the momentum of a deforming body circles over an interval, if that is certain.
 

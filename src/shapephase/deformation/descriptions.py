@@ -27,6 +27,8 @@ from ..shape_space.shape_path import ShapePath
 from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 from ._scanned_functions import inertia_and_momentum, positions_and_velocities
 
+_SLOPE_DEGREE = 8  # of the polynomials that `rate_of` differentiates
+
 
 class Description(Protocol):
     """The functions of a deformation; all take times (N,) in [0, duration].
@@ -391,13 +393,13 @@ def rate_of(function: Callable[[Array], Array], times: Array, breaks: Array) -> 
     left, right = breaks[piece], breaks[piece + 1]
     half = 0.01 * (right - left)
     middle = np.clip(times, left + half, right - half)
-    nodes = unit_nodes(8)
+    nodes = unit_nodes(_SLOPE_DEGREE)
     first, last = inside(left, right)
     points = np.clip(middle[:, None] + half[:, None] * nodes, first[:, None], last[:, None])
     values = function(points.ravel())
-    values = values.reshape(len(times), 9, -1)
+    values = values.reshape(len(times), len(nodes), -1)
     local = (times - middle) / half
-    derivative = np.polynomial.chebyshev.chebder(values_to_coefficients(8))
+    derivative = np.polynomial.chebyshev.chebder(values_to_coefficients(_SLOPE_DEGREE))
     weights = np.polynomial.chebyshev.chebval(local, derivative).T / half[:, None]
     return np.einsum("nk,nkc->nc", weights, values).reshape(len(times), *function(times[:1]).shape[1:])
 

@@ -17,8 +17,7 @@ from ..shape_space.shape_path import ShapePath
 from ._spline_basis import gauss_tableau
 
 _NODES = 12  # Gauss nodes of a panel: exact for the rate cost of a cubic spline, ample for smooth paths
-_FIRST_PANELS = 2  # between two breaks, for the first value
-_PANELS = (4, 8, 16, 32, 64, 128)  # for the values that have to confirm it
+_HALVINGS = 6  # of two panels between two breaks, until the cost has converged
 _CONVERGED = 1e-10  # relative change between subdivisions: 100 roundings of the body's matrices
 
 
@@ -45,14 +44,15 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     check_object(path, "ShapePath", "path")
     check_choice(cost, "cost of a path", ("kinetic", "rate"))
     route = route_along(body, path)
-    before = _quadrature(body, route, cost, _FIRST_PANELS)
-    for panels in _PANELS:
+    before, panels = _quadrature(body, route, cost, 2), 2
+    for _ in range(_HALVINGS):
+        panels *= 2
         now = _quadrature(body, route, cost, panels)
         if abs(now - before) <= _CONVERGED * abs(now):
             return now
         before = now
     raise AccuracyNotReached(
-        f"the cost of the path of {body.name} does not converge on {_PANELS[-1]} panels between its breaks (last at "
+        f"the cost of the path of {body.name} does not converge on {panels} panels between its breaks (last at "
         f"{before:.9g}); declare the times of its jumps as breaks"
     )
 

@@ -235,16 +235,6 @@ class _ActiveSet:
         return rows.reshape(len(where), self.bounding.shape[1] * self.active.shape[1])
 
 
-def movable_points(task: Reorientation, basis: SplineBasis) -> Mask:
-    """Mask (k, m) of control points that may move: not those of the ends."""
-    free = np.tile(task.movable, (basis.dimension, 1))
-    fixed = list(range(task.equal_points))
-    free[fixed] = False
-    if task.end is not None:
-        free[[basis.dimension - 1 - place for place in fixed]] = False
-    return free
-
-
 def end_conditions(task: Reorientation, basis: SplineBasis) -> Array:
     """Rows (j, k) whose product with the control points of each coordinate is zero, besides the fixed points."""
     return basis.end_conditions(
@@ -253,9 +243,13 @@ def end_conditions(task: Reorientation, basis: SplineBasis) -> Array:
 
 
 def _free(task: Reorientation, basis: SplineBasis, control: Array) -> Mask:
-    """Mask (k, m) of movable control points that are not at their limits."""
+    """Mask (k, m) of control points that may move: not those of the ends, nor those at their limits."""
+    free = np.tile(task.movable, (basis.dimension, 1))
+    free[: task.equal_points] = False
+    if task.end is not None:
+        free[-task.equal_points :] = False
     reach = _ACTIVE * np.maximum(task.upper - task.lower, _LEAST_RANGE)
-    return movable_points(task, basis) & (control > task.lower + reach) & (control < task.upper - reach)
+    return free & (control > task.lower + reach) & (control < task.upper - reach)
 
 
 def _transported(generator: Array, basis: SplineBasis, duration: float) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import factorial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -218,8 +219,8 @@ def _weights(basis: SplineBasis, place: Any) -> Any:
     begin = np.unique(basis.knots)[:-1]
     begun, ended = np.append(-np.inf, begin[1:]), np.append(begin[1:], np.inf)
     powers, weights = casadi.logic_and(place >= casadi.DM(begun), place < casadi.DM(ended)), 0.0
-    for order, factorial in enumerate((1.0, 1.0, 2.0, 6.0)):
-        coefficients = basis.matrix(begin, order) / factorial
+    for order in range(4):
+        coefficients = basis.matrix(begin, order) / factorial(order)
         weights = weights + casadi.sparsify(casadi.DM(coefficients.T)) @ powers
         powers = powers * (place - casadi.DM(begin))
     return weights

@@ -229,7 +229,10 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonito
     for task in tasks:
         if first and monitor.stopped:
             break
-        basis = SplineBasis(int(search.pieces or _default_pieces(task)))
+        pieces = _PIECES if task.dimension <= _MANY_JOINTS else _PIECES_OF_MANY
+        if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate") and task.equal_points == 1:
+            pieces = _PIECES_OF_FEW
+        basis = SplineBasis(int(search.pieces or pieces))
         for jobs, starts in zip((first, spare), _starting_points(task, basis, search, monitor), strict=True):
             jobs.extend((task, basis, guess) for guess in starts)
     return first, spare
@@ -328,12 +331,6 @@ class _SearchMonitor:
         """Report the end of a search that was not stopped."""
         if self._progress is not None and not self.stopped:
             self._progress(1.0, "done")
-
-
-def _default_pieces(task: Reorientation) -> int:
-    if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate") and task.equal_points == 1:
-        return _PIECES_OF_FEW
-    return _PIECES if task.dimension <= _MANY_JOINTS else _PIECES_OF_MANY
 
 
 def _starting_points(

@@ -24,7 +24,7 @@ UP = np.array([0.0, 0.0, 1.0])  # inertial direction of the momentum
 _ROWS_AT_ONCE = 2048  # directions run through the loop together: parts have own samples, whichever process runs them
 _SLOPES_AT_ONCE = 128  # directions with derivatives, some milliseconds each
 _LONGEST_STEP = 0.3  # [rad] of Newton's method
-_TINY = 1e-300  # keeps quotients defined
+TINY = float(np.finfo(float).tiny)  # keeps quotients defined
 
 _PartResult = TypeVar("_PartResult")
 
@@ -183,7 +183,7 @@ def closed_points(
         by_magnitude[active] = so3.apply(basis, drift)
         slope[active] = basis @ slopes @ so3.transpose(basis) - np.eye(2)
         step = -solve_linear(slope[active], so3.apply(basis, ends - points[active]), 1e-7)
-        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.linalg.norm(step, axis=-1, keepdims=True), _TINY))
+        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.linalg.norm(step, axis=-1, keepdims=True), TINY))
         before, length[active] = length[active], np.linalg.norm(step, axis=-1)
         gap[active] = so3.angle_between(points[active], ends)
         settled = (gap[active] < 10.0 * tolerance) & (length[active] > 0.25 * before)
@@ -196,5 +196,5 @@ def closed_points(
 
 def solve_linear(slope: Array, right: Array, least: float) -> Array:
     """slope^-1 right (N, 2); zero along directions with singular values below `least` of the largest."""
-    scale = np.maximum(np.linalg.norm(slope, axis=(-1, -2)), _TINY)[:, None, None]
+    scale = np.maximum(np.linalg.norm(slope, axis=(-1, -2)), TINY)[:, None, None]
     return so3.apply(np.linalg.pinv(slope / scale, rcond=least) / scale, right)

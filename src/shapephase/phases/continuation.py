@@ -13,7 +13,7 @@ from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
-from ._loop_map import UP, MomentumLoop, closed_points, solve_linear, tangent_basis
+from ._loop_map import TINY, UP, MomentumLoop, closed_points, solve_linear, tangent_basis
 
 _LARGEST_STEP = 0.1  # [rad] of the direction from orbit to orbit, so that Newton's method stays on the branch
 _SMALLEST_STEP = 1e-6  # of the range: an orbit that needs shorter steps is lost, as at a fold
@@ -154,7 +154,7 @@ def _followed(loop: MomentumLoop, orbit: _Orbit, target: float, span: float) -> 
     passed, step = [orbit], abs(target - orbit.magnitude)
     while orbit.magnitude != target:
         left = target - orbit.magnitude
-        step = min(step, abs(left), _LARGEST_STEP / max(float(np.linalg.norm(orbit.drift)), 1e-300))
+        step = min(step, abs(left), _LARGEST_STEP / max(float(np.linalg.norm(orbit.drift)), TINY))
         magnitude = target if step == abs(left) else orbit.magnitude + float(np.copysign(step, left))
         moved = orbit.drift * (magnitude - orbit.magnitude)
         guess = so3.normalised(orbit.direction + moved)

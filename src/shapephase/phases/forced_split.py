@@ -206,7 +206,9 @@ def _direction(vector: Array, change: Array, magnitude: Array) -> tuple[Array, A
 def _least_momentum(motion: ForcedMotion) -> tuple[float, float]:
     """The least size of the momentum, and when: [kg m^2/s], [s]."""
     ends = motion.solution.times
-    times = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(8) / 8.0).ravel(), ends[-1])
+    times = np.append(
+        (ends[:-1, None] + np.diff(ends)[:, None] * np.linspace(0.0, 1.0, 8, endpoint=False)).ravel(), ends[-1]
+    )
     sizes = np.linalg.norm(motion.momentum(times), axis=-1)
     place = int(np.argmin(sizes))
     left, right = times[max(place - 1, 0)], times[min(place + 1, len(times) - 1)]

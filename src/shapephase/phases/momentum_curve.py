@@ -322,7 +322,7 @@ def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> CurvePieces:
     times = np.concatenate([part[0] for part in done])
     order = np.argsort(times)
     dynamic, slivers, missed, *starts = (
-        np.concatenate([part[k] for part in done], axis=1)[:, order] for k in range(1, 8)
+        np.concatenate([part[k] for part in done], axis=1)[:, order] for k in range(1, len(done[0]))
     )
     corners, *in_body = (np.concatenate(pair, axis=1) for pair in zip(starts, at_end, strict=True))
     edges = np.append(times[order], edges[-1])

@@ -31,7 +31,7 @@ from ._loop_map import UP, MomentumLoop, closed_points, ends_of, exact_slopes, t
 
 _REACHABLE = (1e-11, 1e-10, 1e-9, 1e-8)  # [rad] tolerances tried in turn; points are then known to ten times as much
 _LEFSCHETZ = 2  # sum of the indices of all fixed points of a map of the sphere that deforms to the identity
-_STARTS = (162, 642, 2562)  # directions that the searches start from, until the indices add up
+_STARTS = [10 * 4**k + 2 for k in (2, 3, 4)]  # directions that the searches start from, until the indices add up
 _FEWEST_DIRECTIONS = 1000  # with fewer the first search would end before its cells are small
 _SAME = 1e-6  # [rad] between equal fixed points: far above the error of Newton's method, far below usual distances
 _STABILITIES = ("elliptic", "hyperbolic", "inverse hyperbolic", "parabolic")

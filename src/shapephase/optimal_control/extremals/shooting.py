@@ -30,7 +30,7 @@ _RELAXATION = 4.0  # divides the damping after a step that helps
 _TIGHTENING = 64.0  # multiplies it after one that does not: few trials to where the linear model holds
 _LAST_DAMPING = 1e5  # at which the steps are too short to go on
 _SYMMETRY = 10.0  # integration accuracies below which a relative singular value belongs to a symmetry
-_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of a step, tried before the damping rises
+_SHARES = (0.5 ** np.arange(5)).tolist()  # of a step, tried before the damping rises
 _DECREASE = 0.1  # least relative decrease of the gap by a whole step, as in Armijo's rule
 _MOST_EVALUATIONS = 20_000  # of a trial, whose extremal then turns too fast to be a guide
 

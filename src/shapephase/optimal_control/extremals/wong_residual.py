@@ -28,7 +28,7 @@ _SERIES = np.polynomial.legendre.legint(np.eye(_STAGES), lbnd=-1.0)  # integrals
 _INTEGRAL = np.polynomial.legendre.legval(_NODES, _SERIES).T @ np.linalg.inv(
     np.polynomial.legendre.legvander(_NODES, _STAGES - 1)
 )
-_PANELS = (2, 4, 8, 16, 32, 64)  # between two breaks, until the residual has converged
+_PANELS = (2 ** np.arange(1, 7)).tolist()  # between two breaks, until the residual has converged
 _CONVERGED = 1e-9  # change of a converged residual: the accuracy of the attitude along the path
 _CONVERGED_SHARE = 1e-3  # relative change, which suffices too: it is read as an order of magnitude
 _LEAST_FELT = 1e-9  # share of all charges' effect below which a combination is set to 0

@@ -49,12 +49,12 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     import casadi
 
     m, chain = task.dimension, task.body.chain
-    mechanics, ends = node_mechanics(chain), _ends(task)
+    (mechanics, second_of_mechanics), ends = node_mechanics(chain), _ends(task)
     joints, second_of_joints = _joints(task)
     y = casadi.MX.sym("y", 2 * m + 5)
     place, rate, onward, back = joints(y[: 2 * m])
     shape = casadi.DM(task.coupling) @ y[:m] + casadi.DM(task.offset)
-    numbers, by_place, by_rate = mechanics.values(place, rate, shape)
+    numbers, by_place, by_rate = mechanics(place, rate, shape)
     bare = casadi.DM(task.coupling) @ y[m : 2 * m]
     effort = 0.5 * casadi.dot(bare, bare)
     inputs = casadi.vertcat(numbers, effort, y[2 * m :])
@@ -67,7 +67,7 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     jacobian = casadi.densify(ends.jacobian(inputs) @ through)
     multipliers, factor = casadi.MX.sym("multipliers", 4), casadi.MX.sym("factor")
     gradient, bend = ends.hessian(inputs, multipliers, factor)
-    places, mixed, rates = mechanics.second(place, rate, shape, gradient[:SIZE])
+    places, mixed, rates = second_of_mechanics(place, rate, shape, gradient[:SIZE])
     # Second derivatives by joints' coordinates and rates, chained to shape and its rate.
     lower = mixed @ onward + rates @ back
     corner = onward.T @ (places @ onward + mixed.T @ back) + back.T @ lower

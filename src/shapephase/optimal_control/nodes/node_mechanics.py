@@ -23,7 +23,6 @@ where h', J' are the derivatives of first moment and inertia along s, and alpha,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,23 +36,14 @@ SIZE = 16  # numbers in z
 _INERTIA_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-@dataclass(frozen=True, eq=False)
-class NodeMechanics:
+def node_mechanics(chain: JointChain) -> tuple[Any, Any]:
     """CasADi functions of coordinates and rates of all k joints of a tree, and the shape its ball joints are about.
 
-    Attributes
-    ----------
+    Returns
+    -------
     values : coordinates (k,), rates (k,), shape (n,) -> z (16,), its derivatives by both, (16, k) each
     second : coordinates, rates, shape, factors (16,) -> second derivatives of their product with z: by coordinates
         (k, k), by rates and coordinates (k, k), by rates (k, k)
-    """
-
-    values: Any
-    second: Any
-
-
-def node_mechanics(chain: JointChain) -> NodeMechanics:
-    """Return the functions of a tree, in symbols.
 
     Source: composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, section 6.2).
     """
@@ -75,8 +65,7 @@ def node_mechanics(chain: JointChain) -> NodeMechanics:
     mixed = (apart * (screws.T @ lent)) - (above * (turned.T @ forces)).T
     energies = above * (screws.T @ forces)
     rates = 2.0 * c[-1] * (energies + (apart * energies).T)
-    second = casadi.Function("mechanics_second", [q, u, r, c], [places, mixed, rates])
-    return NodeMechanics(values=values, second=second)
+    return values, casadi.Function("mechanics_second", [q, u, r, c], [places, mixed, rates])
 
 
 def carries(chain: JointChain) -> Array:
