@@ -30,14 +30,12 @@ MOST_LINES = 8
 LONG = (
     "shapephase.compile_steps",
     "shapephase.examples.closed_orbit",
-    "shapephase.optimal_control.Plan",
     "shapephase.plan_reorientation",
     "shapephase.plots.report",
 )
 # Half a second, and much the same as another example does.
 LIKE_ANOTHER = (
     "shapephase.ForcedSplit",
-    "shapephase.FreeHinges",
     "shapephase.auditing.write_audit_figure",
     "shapephase.auditing.audit_page",
     "shapephase.plots.explore",

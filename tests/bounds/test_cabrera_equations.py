@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.deformation import assembly, boom, moving_mass, rigid_part
 from shapephase.deformation._physical_validity import line_measure
-from shapephase.deformation.assemblies import assembly, boom, moving_mass, rigid_part
 from shapephase.errors import SingularInertiaError
 from shapephase.inertia_tensor import principal_axes, second_moment, triangle_defect
 from shapephase.rigid_body import EulerTop
@@ -172,9 +172,7 @@ def test_the_action_is_free_where_the_second_moment_has_rank_two_a2():
         assert (line_measure(moment[None])[0] < 1e-14) == (rank == 1)
         body = sp.particles(masses, lambda t, p=points: (np.broadcast_to(p, (len(t), 6, 3)),) * 2, 1.0)
         if rank == 1:
-            with pytest.raises(
-                SingularInertiaError, match=r"t = 0\.4 s is not positive definite: all mass is on one line"
-            ):
+            with pytest.raises(SingularInertiaError, match="mass"):
                 body.inertia([0.4])
         else:
             assert np.linalg.eigvalsh(body.inertia(0.4))[0] > 0.1

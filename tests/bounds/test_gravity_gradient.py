@@ -397,5 +397,5 @@ def test_the_estimate_refuses_what_it_cannot_do():
     with pytest.raises(ValueError, match="tolerance"):
         gravity_torque_estimate(sp.reconstruct(rigid, [0.0, 0.0, 1.0]), orbit, tolerance=0.0)
     hasty = KeplerOrbit.from_elements(1.0, 0.9, 0.0, 0.0, 0.0, 0.0, 1e16)
-    with pytest.raises(AccuracyNotReached, match="too fast"):
+    with pytest.raises(AccuracyNotReached, match="fast"):
         gravity_torque_estimate(sp.reconstruct(rigid, [0.0, 0.0, 1.0]), hasty)

@@ -154,7 +154,7 @@ def test_torques_do_not_depend_on_the_gauge_and_come_in_batches():
     np.testing.assert_allclose(both.torque[0], own.torque, rtol=0, atol=1e-8 * size)
     assert both.base_wrench.shape == (2, 2, 2, 6)
     assert both.loads.peak_torque.shape == both.loads.work.shape == (2, 3)
-    with pytest.raises(ShapeError, match="a table holds one motion"):
+    with pytest.raises(ShapeError, match="table"):
         both.write_csv("no.csv")
 
 
@@ -170,12 +170,12 @@ def test_the_error_estimate_holds_what_a_loose_tolerance_does():
 
 def test_what_has_no_joints_is_refused(tmp_path):
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [0.0, 0.0, 1.0])
-    with pytest.raises(WrongObjectError, match="joints along a path"):
+    with pytest.raises(WrongObjectError, match="joints"):
         sp.joint_torques(motion)
     cat = sp.load_body("cat_two_halves")
     known = sp.reconstruct(sp.articulated(cat, sp.examples.kane_scher(0.3, 1.0)), [0.0, 0.0, 0.005])
     known.save(tmp_path / "motion.npz")
-    with pytest.raises(WrongObjectError, match="joints along a path"):
+    with pytest.raises(WrongObjectError, match="joints"):
         sp.joint_torques(sp.load_motion(tmp_path / "motion.npz"))
 
 

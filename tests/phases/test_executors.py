@@ -75,5 +75,5 @@ def test_processes_and_a_cluster_give_the_same(deformation):
 
 @pytest.mark.parametrize(("function", "more"), [(sp.fixed_points, ()), (sp.stroboscopic_map, (np.eye(3),))])
 def test_what_is_no_executor_is_said(deformation, function, more):
-    with pytest.raises(WrongObjectError, match=r"executor: .* is needed, got 3"):
+    with pytest.raises(WrongObjectError, match="executor"):
         function(deformation, 0.05, *more, executor=3)

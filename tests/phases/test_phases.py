@@ -348,7 +348,7 @@ def test_another_link_as_base_is_a_gauge():
 
 
 def test_unknown_gauge():
-    with pytest.raises(UnknownNameError, match=r"'flat'.*horizontal, base, principal"):
+    with pytest.raises(UnknownNameError, match="base"):
         sp.split(some_motion("cat"), "flat")
 
 

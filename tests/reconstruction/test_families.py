@@ -182,15 +182,15 @@ def test_what_fails_is_named(load_urdf):
 
 def test_more_than_can_be_kept_is_refused(monkeypatch):
     monkeypatch.setattr(families, "_MOST_KEPT", 10_000)
-    with pytest.raises(AccuracyNotReached, match=r"40 motions on some \d+ samples .* GB; take slices of"):
+    with pytest.raises(AccuracyNotReached, match="samples"):
         sp.reconstruct(family(CAT, box=False), momentum_of(CAT))
 
 
 def test_arguments_are_checked():
     deformations = family(CAT, box=False)
-    with pytest.raises(ShapeError, match=r"one for all or one for each of 40 bodies is needed, got a batch of \(3,\)"):
+    with pytest.raises(ShapeError, match="bodies"):
         sp.reconstruct(deformations, np.zeros((3, 3)))
-    with pytest.raises(UnknownNameError, match="method for a family of bodies 'dop853'"):
+    with pytest.raises(UnknownNameError, match="method"):
         sp.reconstruct(deformations, np.zeros(3), method="dop853")
     with pytest.raises(ShapeError, match="threads"):
         sp.reconstruct(deformations, np.zeros(3), threads=0)
@@ -210,7 +210,7 @@ def test_all_may_start_at_one_rate():
     assert deformations.inertia(times).shape == (4, 1, 3, 3, 3)
     assert np.abs(deformations.inertia(times)[2] - deformations[2].inertia(times)).max() < 1e-14
     assert np.abs(deformations.internal_momentum(times)[2] - deformations[2].internal_momentum(times)).max() < 1e-13
-    with pytest.raises(ShapeError, match="do not broadcast"):
+    with pytest.raises(ShapeError, match="broadcast"):
         sp.momentum_from_rate(deformations, np.zeros((3, 3)))
 
 

@@ -154,7 +154,7 @@ def is_within_its_estimate(case: Case):
     assert distance(motion, truth) <= motion.error_estimate + truth.uncertainty
 
 
-@settings(max_examples=10, derandomize=True, deadline=None)
+@settings(max_examples=6, derandomize=True, deadline=None)
 @given(Range().cases)
 @example(Range().case(2009))
 @example(Range().case(26182))
@@ -183,7 +183,7 @@ def test_none_of_five_hundred_motions_is(case: Case):
 SLOW = Range(samples=(5, 5), loops=(2, 2), duration=(0.5, 0.5), spin=(0.5, 3.0), digits=(4.0, 8.0))
 
 
-@settings(max_examples=3, derandomize=True, deadline=None)
+@settings(max_examples=2, derandomize=True, deadline=None)
 @given(SLOW.cases)
 def test_nor_from_the_truth_of_another_code(case: Case):
     is_within_its_estimate_by_pinocchio(case)
@@ -250,7 +250,7 @@ def are_of_use(count: int):
 
 
 def test_estimates_are_of_use():
-    are_of_use(10)
+    are_of_use(6)
 
 
 @pytest.mark.full

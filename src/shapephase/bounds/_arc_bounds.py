@@ -19,7 +19,7 @@ from ._enclosure import ROUND_UP
 from ._energy_bounds import EnergyBounds, cross_product_bound
 from .regimes import Regime, RegimeCertificate
 
-_ROUND_DOWN = 1.0 - 1e-12  # counterpart of ROUND_UP for lower bounds
+_ROUND_DOWN = 2.0 - ROUND_UP  # for lower bounds
 
 
 @dataclass(frozen=True, eq=False)

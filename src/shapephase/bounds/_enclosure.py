@@ -20,15 +20,17 @@ from ..display import short_repr
 from ..inertia_tensor import inverse_inertia
 from ..integrator.interpolant import Interpolant
 
-_EPS = float(np.finfo(float).eps)  # the factors before it count the operations of each formula, generously
-# Channels xx, yy, zz, yz, xz, xy of I^-1: of each entry of the matrix, and row and column of each channel.
-_FULL = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
-_CHANNEL = ([0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1])
+ROUNDING = 32.0 * float(np.finfo(float).eps)  # relative, generous for every formula here: of a few operations each
+# Channels xx, yy, zz, yz, xz, xy of I^-1, before those of w: row and column of each, and the channel of each entry.
+_CHANNEL = np.array([[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])
+_FULL = np.empty((3, 3), dtype=int)
+_FULL[*_CHANNEL] = _FULL[*_CHANNEL[::-1]] = np.arange(len(_CHANNEL[0]))
 _WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # entries that each channel stands for
 _MAX_CELLS = 4096  # limits the loop of `energy_bounds`; the bounds of coarser cells are looser, but they hold
 # Parts of a panel at which the interpolant is compared with the deformation: none is near a Chebyshev node, and they
 # are not symmetric, so that an error which is odd or even about the middle shows.
 _TEST_POINTS = np.array([0.0381, 0.2361, 0.6180, 0.8541])
+RESOLUTION = 5e-3  # share of their size by which the channels may vary on a cell
 ROUND_UP = 1.0 + 1e-12  # for products of positive bounds: thousands of times their rounding
 
 
@@ -88,7 +90,7 @@ class Enclosure:
         By Weyl's monotonicity; lower bounds are cut at zero, because I^-1 is positive definite.
         """
         low, high = (np.linalg.eigvalsh(matrix) for matrix in self.inverse_range)
-        room = 8.0 * _EPS * np.abs(high).max(axis=1, keepdims=True)
+        room = ROUNDING * np.abs(high).max(axis=1, keepdims=True)
         return np.maximum(low - room, 0.0), high + room
 
     @property
@@ -101,7 +103,7 @@ class Enclosure:
     @property
     def drift_magnitude(self) -> Array:
         """The largest |I^-1 L_o| on each cell: (K,) [rad/s]."""
-        return np.linalg.norm(self.drift, axis=1) * (1.0 + 4.0 * _EPS) + self.drift_radius
+        return np.linalg.norm(self.drift, axis=1) * (1.0 + ROUNDING) + self.drift_radius
 
     @property
     def internal_momentum_magnitude(self) -> Array:
@@ -122,7 +124,7 @@ class Enclosure:
         """Bounds of u . I^-1 u for unit vectors in body axes: (..., 3) -> (..., K), (..., K) [1/(kg m^2)]."""
         u = direction @ self.frame
         low, high = (np.einsum("...i,kij,...j->...k", u, matrix, u) for matrix in self.inverse_range)
-        room = 16.0 * _EPS * np.abs(high)
+        room = ROUNDING * np.abs(high)
         return low - room, high + room
 
     def about(self, axis: Array, sign: float) -> tuple[Array, Array, Array]:
@@ -140,7 +142,7 @@ class Enclosure:
         turn = np.stack([along_axis, first, np.cross(along_axis, first)])
         low, high = (turn @ matrix @ turn.T for matrix in self.inverse_range)
         low, high = (low, high) if sign > 0.0 else (-high, -low)
-        room = 32.0 * _EPS * np.abs(high).max(axis=(1, 2))
+        room = ROUNDING * np.abs(high).max(axis=(1, 2))
         along = np.stack([low[:, 0, 0] - room, high[:, 0, 0] + room], axis=1)
         across = np.stack(
             [np.linalg.eigvalsh(low[:, 1:, 1:])[:, 0] - room, np.linalg.eigvalsh(high[:, 1:, 1:])[:, 1] + room], axis=1
@@ -156,7 +158,7 @@ def enclosure(
     *,
     magnitude: float = 1.0,
     tolerance: float = 1e-10,
-    resolution: float = 5e-3,
+    resolution: float = RESOLUTION,
 ) -> Enclosure:
     """Bounds of the channels of a deformation and of their rates over an interval.
 
@@ -192,10 +194,10 @@ def enclosure(
         inverse_radius=_matrix(radius) + error[0],
         inverse_rate=_matrix(rate_middle),
         inverse_rate_radius=_matrix(rate_radius) + error[0] * steepness,
-        drift=middle[:, 6:],
-        drift_radius=np.linalg.norm(radius[:, 6:], axis=1) + error[1],
-        drift_rate=rate_middle[:, 6:],
-        drift_rate_radius=np.linalg.norm(rate_radius[:, 6:], axis=1) + error[1] * steepness,
+        drift=middle[:, -3:],
+        drift_radius=np.linalg.norm(radius[:, -3:], axis=1) + error[1],
+        drift_rate=rate_middle[:, -3:],
+        drift_rate_radius=np.linalg.norm(rate_radius[:, -3:], axis=1) + error[1] * steepness,
         sampling_error=error,
     )
 
@@ -211,11 +213,11 @@ def ball(series: Array) -> tuple[Array, Array]:
 def _rounding(series: Array) -> Array:
     """A bound of the rounding errors in the values of a series: T_k is evaluated to k^2 eps."""
     degrees = np.arange(series.shape[-2], dtype=np.float64)
-    return 4.0 * _EPS * np.einsum("k,...kc->...c", degrees**2 + 16.0, np.abs(series))
+    return 2.0 * ROUNDING * np.einsum("k,...kc->...c", 1.0 + (degrees / 4.0) ** 2, np.abs(series))
 
 
 def _range(middle: Array, radius: Array) -> tuple[Array, Array]:
-    room = (radius.sum(axis=2) * (1.0 + 8.0 * _EPS))[:, :, None] * np.eye(3)
+    room = (radius.sum(axis=2) * (1.0 + ROUNDING))[:, :, None] * np.eye(3)
     return middle - room, middle + room
 
 
@@ -229,21 +231,21 @@ def _in_best_frame(edges: Array, coefficients: Array) -> tuple[Array, Array]:
     values, axes = np.linalg.eigh(_matrix(np.concatenate([middles, [widths @ middles / widths.sum()]])))
     frame = axes[np.argmax(np.diff(values, axis=1).min(axis=1))]
     # Where the body's axes are the principal axes, the frame is exactly the identity or a permutation.
-    frame = np.where(np.abs(frame) < 4.0 * _EPS, 0.0, frame)
-    turned = frame.T @ coefficients[:, :, :6][..., _FULL] @ frame
+    frame = np.where(np.abs(frame) < ROUNDING, 0.0, frame)
+    turned = frame.T @ coefficients[:, :, :-3][..., _FULL] @ frame
     series = np.empty_like(coefficients)
-    series[:, :, :6] = turned[:, :, _CHANNEL[0], _CHANNEL[1]]
-    series[:, :, 6:] = coefficients[:, :, 6:] @ frame
+    series[:, :, :-3] = turned[:, :, _CHANNEL[0], _CHANNEL[1]]
+    series[:, :, -3:] = coefficients[:, :, -3:] @ frame
     return frame, series
 
 
 def _matrix(channels: Array) -> Array:
-    return channels[:, :6][:, _FULL]
+    return channels[:, :-3][:, _FULL]
 
 
 def _matrix_radius(radius: Array) -> Array:
     """Frobenius norm, which bounds the spectral one."""
-    return np.sqrt((radius[:, :6] ** 2) @ _WEIGHTS) * (1.0 + 8.0 * _EPS)
+    return np.sqrt((radius[:, :-3] ** 2) @ _WEIGHTS) * (1.0 + ROUNDING)
 
 
 def _sampling_error(deformation: Deformation, sampled: Interpolant) -> Array:
@@ -278,14 +280,7 @@ def _within(sampled: Interpolant, start: float, end: float) -> tuple[Array, Arra
 
 
 def _cells(edges: Array, coefficients: Array, resolution: float, magnitude: float) -> tuple[Array, Array]:
-    """Cells on which the series hardly vary: edges (K + 1,) in order of time, coefficients (K, n, 9)."""
-    left, right, series = map(np.concatenate, zip(*_divided(edges, coefficients, resolution, magnitude), strict=True))
-    order = np.argsort(left)
-    return np.append(left[order], right[order][-1]), series[order]
-
-
-def _divided(edges: Array, coefficients: Array, resolution: float, magnitude: float) -> list[tuple[Array, ...]]:
-    """Panels halved until the series hardly vary on each: left ends, right ends, coefficients, in any order."""
+    """Panels halved until the series hardly vary on each: edges (K + 1,) in order of time, coefficients (K, n, 9)."""
     left, right, series = edges[:-1], edges[1:], coefficients
     count = series.shape[1]
     halves = restriction_matrix(count, -1.0, 0.0), restriction_matrix(count, 0.0, 1.0)
@@ -302,11 +297,13 @@ def _divided(edges: Array, coefficients: Array, resolution: float, magnitude: fl
         done.append((left[fine], right[fine], series[fine]))
         left, right, series = left[~fine], right[~fine], series[~fine]
         if not len(left):
-            return done
+            break
         middle = 0.5 * (left + right)
         left, right = np.concatenate([left, middle]), np.concatenate([middle, right])
         series = np.concatenate([half @ series for half in halves])
-    return [*done, (left, right, series)]
+    left, right, series = map(np.concatenate, zip(*done, (left, right, series), strict=True))
+    order = np.argsort(left)
+    return np.append(left[order], right[order][-1]), series[order]
 
 
 def _fine(series: Array, width: Array, scale: Array, steepest: float, resolution: float) -> Mask:
@@ -320,7 +317,7 @@ def _fine(series: Array, width: Array, scale: Array, steepest: float, resolution
 
 def _norms(channels: Array) -> Array:
     """Norms of I^-1 (Frobenius) and of w (Euclidean): (K, 9) -> (K, 2)."""
-    return np.stack([_matrix_radius(channels), np.linalg.norm(channels[:, 6:], axis=1)], axis=-1)
+    return np.stack([_matrix_radius(channels), np.linalg.norm(channels[:, -3:], axis=1)], axis=-1)
 
 
 def _rates(series: Array, width: Array) -> Array:

@@ -23,9 +23,7 @@ from ..arguments import body_momentum_argument, check_object, made_by, number_ar
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
-from ._enclosure import ROUND_UP, Enclosure, enclosure
-
-_EPS = float(np.finfo(float).eps)  # the factors before it count the operations of each formula, generously
+from ._enclosure import RESOLUTION, ROUND_UP, ROUNDING, Enclosure, enclosure
 
 
 @made_by("bounds.energy_bounds(deformation, momentum)")
@@ -78,7 +76,7 @@ def energy_bounds(
     attitude: ArrayLike | None = None,
     interval: tuple[float, float] | None = None,
     *,
-    resolution: float = 5e-3,
+    resolution: float = RESOLUTION,
 ) -> EnergyBounds:
     """Bounds of the energy E_t = Pi.I^-1 Pi/2 over an interval, before any motion is computed.
 
@@ -108,10 +106,10 @@ def energy_bounds(
         return EnergyBounds(known, 0.0, np.zeros(2), zero, zero, zero, zero)
     direction = body / magnitude @ known.frame
     e = float(direction @ known.start @ direction)
-    room = known.start_radius * ROUND_UP + 32.0 * _EPS * abs(e)
+    room = known.start_radius * ROUND_UP + ROUNDING * abs(e)
     lower, upper, slow, fast = _propagated(known, e - room, e + room)
     half = 0.5 * magnitude * magnitude
-    rounding = 8.0 * _EPS * half * np.abs(upper)
+    rounding = ROUNDING * half * np.abs(upper)
     return EnergyBounds(
         enclosure=known,
         magnitude=magnitude,
@@ -127,8 +125,7 @@ def _propagated(known: Enclosure, low: float, high: float) -> tuple[Array, Array
     """Bounds of e and of its rate on every cell, from those at the start."""
     least, greatest = (values[:, i].tolist() for values, i in zip(known.eigenvalues, (0, 2), strict=True))
     slowest, fastest = known.inverse_rate_range
-    rising = _lines(known, fastest)
-    falling = _lines(known, -slowest)
+    rising, falling = _lines(known, fastest), _lines(known, -slowest)
     drift = known.drift_magnitude.tolist()
     rows = []
     for cell, width in enumerate(known.widths.tolist()):
@@ -143,10 +140,10 @@ def _propagated(known: Enclosure, low: float, high: float) -> tuple[Array, Array
             slow = -_lowest(falling[cell], *inner) - by_drift
             inner = max(bottom, low + min(0.0, slow * width)), min(top, high + max(0.0, fast * width))
         rows.append((*inner, slow, fast))
-        slip = 16.0 * _EPS * top
+        slip = ROUNDING * top
         low, high = max(bottom, low + slow * width - slip), min(top, high + fast * width + slip)
     lower, upper, slow, fast = np.array(rows).T
-    return lower - 32.0 * _EPS * np.abs(lower), upper + 32.0 * _EPS * np.abs(upper), slow, fast
+    return lower - ROUNDING * np.abs(lower), upper + ROUNDING * np.abs(upper), slow, fast
 
 
 def _lines(known: Enclosure, rate: Array) -> list[list[tuple[float, float]]]:
@@ -163,7 +160,7 @@ def _lines(known: Enclosure, rate: Array) -> list[list[tuple[float, float]]]:
     slopes = np.concatenate([np.zeros((len(rate), 1)), np.where(apart, -rise / np.where(apart, run, 1.0), 0.0)], axis=1)
     cut = slopes[..., None, None]
     tops = np.linalg.eigvalsh(rate[:, None] + np.where(cut >= 0.0, cut * upper[:, None], cut * lower[:, None]))
-    room = 16.0 * _EPS * np.abs(tops).max(axis=-1)
+    room = ROUNDING * np.abs(tops).max(axis=-1)
     return np.stack([slopes, tops[..., 2] + room], axis=-1).tolist()
 
 
@@ -178,4 +175,4 @@ def cross_product_bound(bottom: float, top: float, low: float, high: float) -> f
     Its square is u.A^2 u - (u.A u)^2, a variance, and at most (top - u.Au)(u.Au - bottom).
     """
     e = min(max(0.5 * (bottom + top), low), high)
-    return max(0.0, (top - e) * (e - bottom)) ** 0.5 * (1.0 + 8.0 * _EPS)
+    return max(0.0, (top - e) * (e - bottom)) ** 0.5 * (1.0 + ROUNDING)

@@ -14,6 +14,7 @@ from ..arguments import check_object
 from ..display import short_repr
 from ..errors import ShapeError
 from ._arc_bounds import azimuth_bounds
+from ._enclosure import ROUND_UP
 from ._energy_bounds import EnergyBounds
 from .regimes import RegimeCertificate
 
@@ -133,5 +134,5 @@ def _by_integrals(bounds: EnergyBounds, low: float, high: float) -> PhaseBounds:
 
 
 def _rounded(lower: float, upper: float) -> PhaseBounds:
-    room = 1e-12 * (abs(lower) + abs(upper))
+    room = (ROUND_UP - 1.0) * (abs(lower) + abs(upper))
     return PhaseBounds(lower=lower - room, upper=upper + room)

@@ -7,7 +7,7 @@ The bounds come from the deformation and the initial momentum alone (`energy_bou
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import SupportsFloat
+from typing import NamedTuple, SupportsFloat
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from ..display import short_repr
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion
 from ._arc_bounds import arc_length_bounds, azimuth_bounds, return_time_bounds
+from ._enclosure import RESOLUTION
 from ._energy_bounds import EnergyBounds
 from ._phase_bounds import dynamic_phase_bounds, dynamic_phase_bounds_by_extremes
 from .energy import energy_along, energy_rate, homoclinic_energy
@@ -54,7 +55,7 @@ class Bound:
 
 
 def bounds(
-    motion: Motion, interval: tuple[float, float] | None = None, *, resolution: float = 5e-3
+    motion: Motion, interval: tuple[float, float] | None = None, *, resolution: float = RESOLUTION
 ) -> tuple[Bound, ...]:
     """All bounds of one motion over an interval, each with its value.
 
@@ -94,8 +95,7 @@ def bounds(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Track:
+class _Track(NamedTuple):
     """Ascending nodes of a quadrature (N,), its weights and the directions of Pi there; both ends have weight zero."""
 
     times: Array
@@ -157,12 +157,13 @@ def _phases(certificate: RegimeCertificate, motion: Motion, track: _Track) -> li
     known = certificate.bounds
     first, last = motion.dynamic_phase(track.times[[0, -1]])
     value = float(last - first)
-    rows = []
-    for name, phase_bounds in (("extremes", dynamic_phase_bounds_by_extremes), ("energy", dynamic_phase_bounds)):
-        phase = phase_bounds(known)
-        rows.append(_at_most(f"dynamic phase, most, by {name}", phase.upper, value))
-        rows.append(_at_least(f"dynamic phase, least, by {name}", phase.lower, value))
-    return rows
+    extremes, energy = dynamic_phase_bounds_by_extremes(known), dynamic_phase_bounds(known)
+    return [
+        _at_most("dynamic phase, most, by extremes", extremes.upper, value),
+        _at_least("dynamic phase, least, by extremes", extremes.lower, value),
+        _at_most("dynamic phase, most, by energy", energy.upper, value),
+        _at_least("dynamic phase, least, by energy", energy.lower, value),
+    ]
 
 
 def _about_axis(certificate: RegimeCertificate, track: _Track) -> list[Bound]:

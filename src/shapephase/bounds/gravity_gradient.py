@@ -109,7 +109,7 @@ class KeplerOrbit:
         mean_anomaly : [rad]
         """
         elements = [semi_major_axis, eccentricity, inclination, node, argument, mean_anomaly]
-        axis, e, tilt, turn, argument_angle, mean = finite_array(elements, "elements", (6,)).tolist()
+        axis, e, tilt, turn, argument_angle, mean = finite_array(elements, "elements", (len(elements),)).tolist()
         _refuse_parabola(1.0 - e)
         if e < 0.0 or axis * (1.0 - e) <= 0.0:
             raise ShapeError(
@@ -342,9 +342,9 @@ def _largest_effects(motion: Motion, orbit: KeplerOrbit, edges: Array) -> Array:
     for start in range(0, len(edges) - 1, _CHUNK):
         steps, torque = _step_matrices(motion, orbit, edges[start : start + _CHUNK + 1])
         largest[0] = max(largest[0], torque)
-        states = np.empty((len(steps), 6, 1))
+        states = np.empty((len(steps), *state.shape))
         for i, step in enumerate(steps):
-            state = states[i] = step[:, :6] @ state + step[:, 6:]
+            state = states[i] = step[:, :-1] @ state + step[:, -1:]
         reached = np.linalg.norm(states.reshape(-1, 2, 3), axis=-1).max(axis=0)
         largest[1:] = np.maximum(largest[1:], reached)
     return largest
@@ -360,17 +360,17 @@ def _step_matrices(motion: Motion, orbit: KeplerOrbit, edges: Array) -> tuple[Ar
     torque = so3.apply(attitude, gravity_gradient_torque(inertia, so3.apply(to_body, position), orbit.gm))
     inverse = attitude @ inverse_inertia(inertia, times) @ to_body
     # Rates of the state, with a seventh entry that stays 1.
-    rates = np.zeros((len(times), 7, 7))
-    rates[:, 3:6, :3], rates[:, 3:6, 3:6] = inverse, inverse @ so3.hat(motion.momentum)
-    rates[:, :3, 6] = torque
+    identity = np.eye(7)
+    rates = np.zeros((len(times), *identity.shape))
+    rates[:, 3:-1, :3], rates[:, 3:-1, 3:-1] = inverse, inverse @ so3.hat(motion.momentum)
+    rates[:, :3, -1] = torque
     first, middle, last = rates[:-2:2], rates[1:-1:2], rates[2::2]
     h = np.diff(edges)[:, None, None]
-    identity = np.eye(7)
     k2 = middle @ (identity + 0.5 * h * first)
     k3 = middle @ (identity + 0.5 * h * k2)
     k4 = last @ (identity + h * k3)
     steps = identity + h / 6.0 * (first + 2.0 * k2 + 2.0 * k3 + k4)
-    return steps[:, :6], float(np.linalg.norm(torque, axis=-1).max())
+    return steps[:, :-1], float(np.linalg.norm(torque, axis=-1).max())
 
 
 def _excess(x: Array, is_ellipse: bool) -> Array:

@@ -15,11 +15,11 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import body_momentum_argument, check_object, made_by
+from ..arguments import body_momentum_argument, made_by
 from ..arrays import Array, Mask, finite_array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
-from ._enclosure import Enclosure
+from ._enclosure import RESOLUTION, Enclosure
 from ._energy_bounds import EnergyBounds, energy_bounds
 
 _CHUNK = 2_000_000  # directions times cells that are compared at once: some 100 MB of arrays
@@ -81,7 +81,7 @@ class RegimeCertificate:
             ones = np.ones(len(known.widths))
             return -ones, ones
         sign = 1.0 if self.regime == Regime.ABOUT_SMALLEST else -1.0
-        low, high = self.bounds.quotients if sign > 0.0 else (-self.bounds.quotients[1], -self.bounds.quotients[0])
+        low, high = self.bounds.quotients if sign > 0.0 else (-values for values in self.bounds.quotients[::-1])
         along, across, coupling = known.about(self.axis, sign)
         # e = x along + (1 - x) across + 2 sqrt(x (1 - x)) coupling, x the cosine's square; 2 sqrt(...) <= 1.
         least = _share(low - coupling - across[:, 1], along[:, 1] - across[:, 1], 0.0)
@@ -163,7 +163,7 @@ def regime_certificate(
     attitude: ArrayLike | None = None,
     interval: tuple[float, float] | None = None,
     *,
-    resolution: float = 5e-3,
+    resolution: float = RESOLUTION,
 ) -> RegimeCertificate:
     """Principal axis that the momentum of a deforming body circles over an interval, if that is certain.
 
@@ -186,9 +186,8 @@ def regime_certificate(
     >>> certificate.regime.name, certificate.certain, certificate.axis.tolist()
     ('ABOUT_LARGEST', True, [0.0, 0.0, 1.0])
     """
-    check_object(deformation, "Deformation", "deformation")
-    body = body_momentum_argument(momentum, attitude)
     bounds = energy_bounds(deformation, momentum, attitude, interval, resolution=resolution)
+    body = body_momentum_argument(momentum, attitude)
     known = bounds.enclosure
     low, high = bounds.quotients
     half = 0.5 * bounds.magnitude * bounds.magnitude
@@ -228,7 +227,6 @@ def crown_region(
     >>> crown.contains([[0.1, 0.2, 2.0], [2.0, 0.2, 0.1]]).tolist()
     [True, False]
     """
-    check_object(deformation, "Deformation", "deformation")
     return CrownRegion(regime_certificate(deformation, momentum, attitude, interval))
 
 

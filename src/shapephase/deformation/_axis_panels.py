@@ -31,6 +31,11 @@ _FASTEST = 2e8  # [rad] in a loop: axes that turn faster count as a jump
 SEPARATE, SYMMETRIC, SPHERICAL = range(3)  # kinds of panels: all moments apart, two equal, all equal
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])  # quaternion xyzw
 THIRD = np.array([0.0, 0.0, 1.0])  # the distinct axis of a panel with two equal moments
+PANEL_NODES = -np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)  # ascending Chebyshev points inside (-1, 1)
+POINTS_BETWEEN = -np.cos(np.pi * np.arange(_NODES + 1) / _NODES)  # the points between the nodes, and the ends
+AT_NODES = chebyshev(PANEL_NODES, COUNT)  # Chebyshev coefficients -> values at the nodes: (N, n)
+# Values at the nodes -> Chebyshev coefficients of the polynomial nearest to them: (n, N).
+TO_SERIES = AT_NODES.T * (2.0 / _NODES) * np.where(np.arange(COUNT) > 0, 1.0, 0.5)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +115,7 @@ def moments_at(deformation: Deformation, time: float) -> str:
 
 def _fitted(deformation: Deformation, left: Array, right: Array) -> tuple[AxisPanels, Mask]:
     """Frames on panels, and on which of them they make the inertia diagonal."""
-    times, inertia = inertia_in(deformation, left, right, panel_nodes())
+    times, inertia = inertia_in(deformation, left, right, PANEL_NODES)
     moments, axes = np.linalg.eigh(inertia)
     low, high = np.moveaxis(np.diff(moments, axis=-1), -1, 0)
     kind = np.where(np.all(np.minimum(low, high) <= EQUAL, axis=-1), SYMMETRIC, SEPARATE)
@@ -124,19 +129,19 @@ def _fitted(deformation: Deformation, left: Array, right: Array) -> tuple[AxisPa
             fit = _diagonalising(_least_squares(quats, weights), inertia[rows], which)
             series[rows] = fit if which == SEPARATE else _without_spin(fit)
     panels = AxisPanels(left, right, series, kind, np.zeros((len(left), 3)))
-    seen = _seen_from(panels, panel_nodes(), inertia)
+    seen = _seen_from(panels, PANEL_NODES, inertia)
     panels = replace(panels, strength=np.abs(_gaps(seen)).max(axis=1))
     narrow = right - left < _NARROW * deformation.duration / deformation.loops
     limit = np.where(narrow, NEARLY_DIAGONAL, _DIAGONAL)[:, None].repeat(3, axis=1)
     limit[kind == SYMMETRIC, 2] = limit[kind == SPHERICAL] = NEARLY_DIAGONAL
     good = _is_diagonal(seen, limit)
     # What turns that fast bridges a jump where hardly anything is off the diagonal.
-    quats = so3.normalised(panels.quats(panel_nodes()))
+    quats = so3.normalised(panels.quats(PANEL_NODES))
     speed = 2.0 * np.linalg.norm(np.diff(quats, axis=1), axis=-1) / np.diff(times, axis=1)
     good &= speed.max(axis=-1) <= _FASTEST * deformation.loops / deformation.duration
     rows = np.flatnonzero(good)
     if len(rows):
-        good[rows] = is_diagonal_at(deformation, panels.kept(rows), points_between(), limit[rows])
+        good[rows] = is_diagonal_at(deformation, panels.kept(rows), POINTS_BETWEEN, limit[rows])
     return panels, good
 
 
@@ -210,7 +215,7 @@ def _same_sign(vectors: Array) -> Array:
 
 def _diagonalising(series: Array, inertia: Array, kind: int) -> Array:
     """Frames (P, n, 4) improved twice by Newton's method; each axis' turn is weighted by how well it is known."""
-    basis = chebyshev(panel_nodes(), COUNT)
+    basis = AT_NODES
     for _ in range(2):
         quats = so3.normalised(basis @ series)
         frames = so3.matrix_from_quat(quats)
@@ -221,19 +226,19 @@ def _diagonalising(series: Array, inertia: Array, kind: int) -> Array:
         turn = np.divide(np.swapaxes(_off_diagonal(seen), 1, 2), gap, out=np.zeros_like(gap), where=gap != 0.0)
         smooth = _least_squares(turn.reshape(-1, _NODES, 1), np.abs(gap).reshape(-1, _NODES))
         turn = basis @ smooth.reshape(-1, 3, COUNT).swapaxes(1, 2)
-        series = to_series() @ so3.quat_product(so3.quat_from_rotation_vector(turn), quats)
+        series = TO_SERIES @ so3.quat_product(so3.quat_from_rotation_vector(turn), quats)
     return series
 
 
 def _without_spin(series: Array) -> Array:
     """The frames (P, n, 4) turned about their third axes so that these alone turn them: parallel transport."""
-    basis = chebyshev(panel_nodes(), COUNT)
+    basis = AT_NODES
     quats = basis @ series
     slope = basis[:, :-1] @ np.polynomial.chebyshev.chebder(series, axis=1)
     norm = np.linalg.norm(quats, axis=-1, keepdims=True)
     rate = so3.apply(so3.matrix_from_quat(quats / norm), so3.turn_of(quats, slope) / norm**2)
-    spin = np.polynomial.chebyshev.chebint((to_series() @ rate[..., 2:])[:, :-1], axis=1)
-    return to_series() @ so3.quat_product(so3.quat_from_rotation_vector(-(basis @ spin) * THIRD), quats / norm)
+    spin = np.polynomial.chebyshev.chebint((TO_SERIES @ rate[..., 2:])[:, :-1], axis=1)
+    return TO_SERIES @ so3.quat_product(so3.quat_from_rotation_vector(-(basis @ spin) * THIRD), quats / norm)
 
 
 def _least_squares(values: Array, weights: Array) -> Array:
@@ -243,34 +248,14 @@ def _least_squares(values: Array, weights: Array) -> Array:
     small, so that uncertain values do not fill the high degrees.
     """
     top = weights.max(axis=-1)
-    series = to_series() @ values
+    series = TO_SERIES @ values
     uncertain = np.flatnonzero((weights.min(axis=-1) < np.maximum(0.03 * top, 1e-4)) & (top > 0.0))
     if len(uncertain):
         part = weights[uncertain, :, None] / top[uncertain, None, None]
         rest = _ROUNDING / top[uncertain, None, None] * np.diag(np.logspace(0.0, 14.0, COUNT))
-        q, r = np.linalg.qr(np.concatenate([part * chebyshev(panel_nodes(), COUNT), rest], axis=1))
+        q, r = np.linalg.qr(np.concatenate([part * AT_NODES, rest], axis=1))
         series[uncertain] = np.linalg.solve(r, so3.transpose(q[:, :_NODES]) @ (part * values[uncertain]))
     return series
-
-
-@lru_cache(maxsize=1)
-def panel_nodes() -> Array:
-    """Ascending Chebyshev points inside (-1, 1): (N,)."""
-    return -np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-
-
-@lru_cache(maxsize=1)
-def points_between() -> Array:
-    """The points between the nodes, and the ends: (N + 1,)."""
-    return -np.cos(np.pi * np.arange(_NODES + 1) / _NODES)
-
-
-@lru_cache(maxsize=1)
-def to_series() -> Array:
-    """Values at the nodes -> Chebyshev coefficients of the polynomial nearest to them: (n, N)."""
-    matrix = chebyshev(panel_nodes(), COUNT).T * (2.0 / _NODES)
-    matrix[0] *= 0.5
-    return matrix
 
 
 @lru_cache(maxsize=1)

@@ -11,22 +11,26 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from ..chebyshev import PiecewiseChebyshev, chebyshev, exact_local_coordinate
+from ..chebyshev import PiecewiseChebyshev, exact_local_coordinate
 from ..errors import GaugeError
 from ._axis_panels import (
-    COUNT,
+    AT_NODES,
     EQUAL,
     NEARLY_DIAGONAL,
     NO_TURN,
+    PANEL_NODES,
+    POINTS_BETWEEN,
     SEPARATE,
     SPHERICAL,
     SYMMETRIC,
     THIRD,
+    TO_SERIES,
     AxisPanels,
     cube_turns,
     halves,
@@ -35,10 +39,7 @@ from ._axis_panels import (
     is_diagonal_at,
     moments_at,
     nearest_cube_turn,
-    panel_nodes,
-    points_between,
     resolved,
-    to_series,
 )
 from .deformation import Deformation
 
@@ -144,16 +145,14 @@ def _over_loops(deformation: Deformation) -> AxisPanels:
 # ---- From panel to panel --------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class _Freedom:
+class _Freedom(NamedTuple):
     """Turns from the left that the whole frame may still make: all, those about an axis, or none."""
 
     kind: int
     axis: Array
 
 
-@dataclass(frozen=True)
-class _EqualMoments:
+class _EqualMoments(NamedTuple):
     """Panels `first` to `last` where moments are equal, all of one kind and one distinct axis."""
 
     first: int
@@ -257,10 +256,10 @@ def _oriented(panels: AxisPanels, shortest: float) -> tuple[AxisPanels, _Freedom
     for interval, turn in orientation.spins:
         rows = slice(interval.first, interval.last + 1)
         left, right = panels.left[rows, None], panels.right[rows, None]
-        times = 0.5 * (left + right) + 0.5 * (right - left) * panel_nodes()
+        times = 0.5 * (left + right) + 0.5 * (right - left) * PANEL_NODES
         part = (times - left[0]) / (right[-1] - left[0])
         spin = so3.quat_from_rotation_vector(part[..., None] * turn)
-        series[rows] = to_series() @ so3.quat_product(spin, chebyshev(panel_nodes(), COUNT) @ series[rows])
+        series[rows] = TO_SERIES @ so3.quat_product(spin, AT_NODES @ series[rows])
     strength = so3.apply(so3.matrix_from_quat(orientation.turns) ** 2, panels.strength)
     return replace(panels, series=series, strength=strength), orientation.freedom
 
@@ -299,17 +298,13 @@ def _continuous(deformation: Deformation, panels: AxisPanels) -> tuple[AxisPanel
     rows = np.flatnonzero(np.abs(shift).max(axis=(0, -1)) > 0.5 * NEARLY_DIAGONAL)
     wrong = np.zeros(len(series), dtype=bool)
     if len(rows):
-        limit = _AT_JOINTS + _jumps_of_inertia(deformation, panels)[rows, None]
-        wrong[rows] = ~is_diagonal_at(deformation, moved.kept(rows), points_between(), limit)
+        # Jumps of the inertia of inexact data at the ends of each panel, per trace.
+        _, inertia = inertia_in(deformation, panels.left, panels.right, np.array([-1.0, 1.0]))
+        jump = np.abs(inertia[1:, 0] - inertia[:-1, 1]).max(axis=(-1, -2))
+        jump = np.where(jump < _SLOPPY, 2.0 * jump, 0.0)
+        limit = _AT_JOINTS + (np.append(jump, 0.0) + np.append(0.0, jump))[rows, None]
+        wrong[rows] = ~is_diagonal_at(deformation, moved.kept(rows), POINTS_BETWEEN, limit)
     return moved, np.where(wrong[1:] | wrong[:-1], gap, 0.0)
-
-
-def _jumps_of_inertia(deformation: Deformation, panels: AxisPanels) -> Array:
-    """Jumps of the inertia of inexact data at the ends of each panel, per trace: (P,)."""
-    _, inertia = inertia_in(deformation, panels.left, panels.right, np.array([-1.0, 1.0]))
-    jump = np.abs(inertia[1:, 0] - inertia[:-1, 1]).max(axis=(-1, -2))
-    jump = np.where(jump < _SLOPPY, 2.0 * jump, 0.0)
-    return np.append(jump, 0.0) + np.append(0.0, jump)
 
 
 # ---- The choice at the start ----------------------------------------------------------------------------------------

@@ -14,17 +14,18 @@ every eighth sample of the scan.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Mask
 from ..shape_space.scan.function_scan import Judge, ScannedFunction, Words
 
 Pair = Callable[[Array], tuple[Array, Array]]
 
 _ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")  # of a symmetric tensor, in these rows and columns
 _ROWS, _COLUMNS = np.array([[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])
+_COUNT = len(_ENTRIES)
 _AXES = ("x", "y", "z")
 _LEAST_MOMENT = 1e-9  # of the largest moment: the integrator refuses a thinner body
 _FEW_PARTICLES = 32  # more are scanned by sums over all of them, so that memory stays bounded
@@ -43,26 +44,21 @@ def inertia_and_momentum(sample: Pair, subject: str) -> ScannedFunction:
         return inertia[:, _ROWS, _COLUMNS], np.concatenate([momentum, np.zeros_like(momentum)], axis=1)
 
     def judge(times: Array, columns: Array) -> tuple[Array, Array]:
-        drift = np.linalg.norm(columns[:, 6:9], axis=1)
-        least = least_moment(_tensors(columns[::_STRIDE, :6]))
+        drift = np.linalg.norm(columns[:, _COUNT : _COUNT + 3], axis=1)
+        least = least_moment(_tensors(columns[::_STRIDE, :_COUNT]))
         turn = float(drift.mean()) * float(times.max()) / least
-        weights = np.repeat([(1.0 + turn) / least, 1.0 / least], 6)
-        sizes = np.repeat([np.abs(columns[:, :6]).max(), drift.max(), 0.0], (6, 3, 3))
+        weights = np.repeat([(1.0 + turn) / least, 1.0 / least], _COUNT)
+        sizes = np.repeat([np.abs(columns[:, :_COUNT]).max(), drift.max(), 0.0], (_COUNT, 3, 3))
         return weights, sizes
 
-    return ScannedFunction(
-        curve=curve,
-        judge=judge,
-        paired=np.zeros(6, dtype=bool),
-        angles=np.zeros(6, dtype=bool),
-        may_jump=np.ones(6, dtype=bool),
-        subject=subject,
-        columns=tuple(f"I_{entry}" for entry in _ENTRIES),
-        quantities=(
-            *(f"inertia I_{entry}" for entry in _ENTRIES),
-            *(f"internal momentum L_{axis}" for axis in _AXES),
-            *("nothing",) * 3,
-        ),
+    inertias, momenta = [f"inertia I_{entry}" for entry in _ENTRIES], [f"internal momentum L_{axis}" for axis in _AXES]
+    return _scanned(
+        curve,
+        judge,
+        subject,
+        [f"I_{entry}" for entry in _ENTRIES],
+        [*inertias, *momenta, *("nothing",) * 3],
+        may_jump=True,
         words=Words(
             units=("kg m^2", "kg m^2/s"),
             continuous="an inertia must be continuous, or have a break declared where it jumps",
@@ -83,7 +79,7 @@ def positions_and_velocities(masses: Array, motion: Pair, raw_size: Callable[[Ar
         if few:
             points, speeds = motion(times)
             return points.reshape(len(times), -1), speeds.reshape(len(times), -1)
-        chunk = max(1, _CHUNK // (6 * len(masses)))
+        chunk = max(1, _CHUNK // (_COUNT * len(masses)))
         parts = [sums(times[start : start + chunk]) for start in range(0, len(times), chunk)]
         return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
@@ -107,36 +103,35 @@ def positions_and_velocities(masses: Array, motion: Pair, raw_size: Callable[[Ar
             second = np.einsum("m,nmi,nmj->nij", masses, points, points)
             reach = np.sqrt((points**2).sum(axis=2).max(axis=0))
         else:
-            second, reach = _tensors(thinned[:, :6]), np.zeros(1)
+            second, reach = _tensors(thinned[:, :_COUNT]), np.zeros(1)
         trace = np.trace(second, axis1=1, axis2=2)
         least = least_moment(trace[:, None, None] * np.eye(3) - second)
         lever = np.maximum(reach, 0.1 * np.sqrt(float(trace.max()) / float(masses.sum()))) / least
         if few:
             return np.tile(np.repeat(masses * lever, 3), 2), np.concatenate([np.full(n, raw), np.zeros(n)])
-        each = np.repeat([1.0 / least, 1.0 / least, float(lever[0])], (6, 3, n - 9))
+        kinds = _COUNT, 3, n - _COUNT - 3
+        each = np.repeat([1.0 / least, 1.0 / least, float(lever[0])], kinds)
         total = float(masses.sum())
-        sizes = np.repeat([total * raw * np.sqrt(float(trace.max()) / total), 0.0, total * raw], (6, 3, n - 9))
+        sizes = np.repeat([total * raw * np.sqrt(float(trace.max()) / total), 0.0, total * raw], kinds)
         return np.tile(each, 2), np.concatenate([sizes, np.zeros(n)])
 
     names = [f"particle {k} along {axis}" for k in range(len(masses)) for axis in _AXES]
     quantities = [f"{kind} of {name}" for kind in ("position", "velocity") for name in names]
-    paired = np.ones(len(names), dtype=bool)
+    paired: bool | Mask = True
     if not few:
         names = [f"sum m {a}{b}" for a, b in _ENTRIES] + ["nothing"] * 3
         names += [f"sum {k} of all particles along {axis}" for k in range(_SUMS) for axis in _AXES]
         rates = [f"rate of {name}" for name in names]
-        rates[6:9] = [f"internal momentum L_{axis}" for axis in _AXES]
+        rates[_COUNT : _COUNT + 3] = [f"internal momentum L_{axis}" for axis in _AXES]
         quantities = names + rates
-        paired = ~np.isin(np.arange(len(names)), (6, 7, 8))
-    return ScannedFunction(
-        curve=curve,
-        judge=judge,
+        paired = ~np.isin(np.arange(len(names)) - _COUNT, range(3))
+    return _scanned(
+        curve,
+        judge,
+        "the function of the positions",
+        names,
+        quantities,
         paired=paired,
-        angles=np.zeros(len(names), dtype=bool),
-        may_jump=np.zeros(len(names), dtype=bool),
-        subject="the function of the positions",
-        columns=tuple(names),
-        quantities=tuple(quantities),
         words=Words(
             units=("m", "m/s") if few else ("kg m or kg m^2", "kg m/s or kg m^2/s"),
             continuous="particles move continuously",
@@ -153,11 +148,11 @@ def turns_and_rates(frames: Pair) -> ScannedFunction:
     def curve(times: Array) -> tuple[Array, Array]:
         turned, spin = frames(times)
         slope = np.cross(turned, spin[:, None])
-        return turned.reshape(-1, 9), slope.reshape(-1, 9)
+        return turned.reshape(len(times), -1), slope.reshape(len(times), -1)
 
     def judge(_times: Array, columns: Array) -> tuple[Array, Array]:
-        fastest = float(np.linalg.norm(columns[:, 9:], axis=1).max())
-        return np.ones(18), np.repeat([1.0, fastest], 9)
+        count = columns.shape[1] // 2
+        return np.ones(2 * count), np.repeat([1.0, float(np.linalg.norm(columns[:, count:], axis=1).max())], count)
 
     return _of_turns(curve, judge, paired=True)
 
@@ -166,22 +161,25 @@ def turns_alone(turns: Callable[[Array], Array]) -> ScannedFunction:
     """The entries of U, whose slopes are not given."""
 
     def curve(times: Array) -> tuple[Array, Array]:
-        return turns(times).reshape(-1, 9), np.zeros((len(times), 9))
+        values = turns(times).reshape(len(times), -1)
+        return values, np.zeros_like(values)
 
-    return _of_turns(curve, lambda _t, _c: (np.repeat([_SLOPES, 0.0], 9), np.repeat([1.0, 0.0], 9)), paired=False)
+    def judge(_times: Array, columns: Array) -> tuple[Array, Array]:
+        known = np.repeat([1.0, 0.0], columns.shape[1] // 2)
+        return _SLOPES * known, known
+
+    return _of_turns(curve, judge, paired=False)
 
 
 def _of_turns(curve: Pair, judge: Judge, *, paired: bool) -> ScannedFunction:
-    names = tuple(f"entry {row}, {column} of U" for row in range(3) for column in range(3))
-    return ScannedFunction(
-        curve=curve,
-        judge=judge,
-        paired=np.full(9, paired),
-        angles=np.zeros(9, dtype=bool),
-        may_jump=np.zeros(9, dtype=bool),
-        subject="the gauge's function U(t)",
-        columns=names,
-        quantities=(*names, *(f"rate of {name}" for name in names)),
+    names = [f"entry {row}, {column} of U" for row in range(3) for column in range(3)]
+    return _scanned(
+        curve,
+        judge,
+        "the gauge's function U(t)",
+        names,
+        [*names, *(f"rate of {name}" for name in names)],
+        paired=paired,
         words=Words(
             units=("rad", "rad/s"),
             continuous="a frame must turn continuously",
@@ -195,18 +193,41 @@ def rates_alone(spins: Callable[[Array], Array]) -> ScannedFunction:
     """The body rates of U, which are integrated."""
 
     def judge(_times: Array, columns: Array) -> tuple[Array, Array]:
-        return np.ones(6), np.repeat([0.0, float(np.linalg.norm(columns[:, 3:], axis=1).max())], 3)
+        return np.ones(columns.shape[1]), np.repeat([0.0, float(np.linalg.norm(columns[:, 3:], axis=1).max())], 3)
 
-    return ScannedFunction(
-        curve=lambda times: (np.zeros((len(times), 3)), spins(times)),
-        judge=judge,
-        paired=np.zeros(3, dtype=bool),
-        angles=np.zeros(3, dtype=bool),
-        may_jump=np.zeros(3, dtype=bool),
-        subject="the function of the body rates of U",
-        columns=("nothing",) * 3,
-        quantities=("nothing",) * 3 + tuple(f"rate about {axis}" for axis in _AXES),
+    return _scanned(
+        lambda times: (np.zeros((len(times), 3)), spins(times)),
+        judge,
+        "the function of the body rates of U",
+        ["nothing"] * 3,
+        ["nothing"] * 3 + [f"rate about {axis}" for axis in _AXES],
         words=Words(units=("rad", "rad/s"), continuous="a frame must turn continuously"),
+    )
+
+
+def _scanned(
+    curve: Pair,
+    judge: Judge,
+    subject: str,
+    columns: Sequence[str],
+    quantities: Sequence[str],
+    *,
+    words: Words,
+    paired: bool | Mask = False,
+    may_jump: bool = False,
+) -> ScannedFunction:
+    """Return a function without angles; `paired` and `may_jump` hold for all columns."""
+    n = len(columns)
+    return ScannedFunction(
+        curve=curve,
+        judge=judge,
+        paired=np.full(n, paired),
+        angles=np.zeros(n, dtype=bool),
+        may_jump=np.full(n, may_jump),
+        subject=subject,
+        columns=tuple(columns),
+        quantities=tuple(quantities),
+        words=words,
     )
 
 

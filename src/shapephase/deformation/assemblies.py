@@ -35,6 +35,7 @@ _PART_WORDS = Words(
     values="places",
     returned="(places, velocities)",
 )
+_ROUNDED = 1e-9  # relative, of arguments: digits of files
 _SIZE_SAMPLES = 64  # times at which the size of the whole is taken
 _LEAST_ARM = 0.1  # of the distance at which a part alone would make the body's inertia: the least lever
 
@@ -99,10 +100,6 @@ class AssemblyDescription(UngaugedDescription):
         inertia, momentum = self.sample(times)
         turned = 0.5 * so3.apply(inertia, turning) + momentum
         return np.sum(turning * turned, axis=-1) + 0.5 * self.about_centre(times).vis_viva
-
-    @property
-    def scan(self) -> FunctionScan | None:
-        return self._scan
 
     @cached_property
     def _scan(self) -> FunctionScan | None:
@@ -179,11 +176,11 @@ def rigid_part(
     weight = positive_argument(mass, "mass", "a mass in kg")
     tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
     place = vector_argument(centre, "centre", unit="m")
-    if tensor.shape != (3, 3) or np.abs(tensor - tensor.T).max() > 1e-9 * np.abs(tensor).max():
+    if tensor.shape != (3, 3) or np.abs(tensor - tensor.T).max() > _ROUNDED * np.abs(tensor).max():
         raise ShapeError(f"inertia: one symmetric (3, 3) tensor [kg m^2] is needed, got {tensor.tolist()}")
     tensor = 0.5 * (tensor + tensor.T)
     moments = np.linalg.eigvalsh(tensor)
-    if moments[0] < -1e-9 * np.abs(moments).max():
+    if moments[0] < -_ROUNDED * np.abs(moments).max():
         raise UnphysicalInertiaError(f"inertia: principal moments {moments} kg m^2, one of them negative")
     if moments[2] > 0.0:
         check_triangle(tensor[None], None, on_unphysical_argument(on_unphysical))
@@ -301,7 +298,7 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
     if not lengths:
         raise TrajectoryError("an assembly without moving parts needs a duration [s]")
     for first, second in pairwise(lengths):
-        if abs(first - second) > 1e-9 * first:
+        if abs(first - second) > _ROUNDED * first:
             raise TrajectoryError(f"all parts must move for one time, got {lengths} s; stretch or extend the paths")
     length = lengths[0]
     inner = [path.breaks[1:-1] for path in paths]
@@ -326,9 +323,8 @@ def assembly(spacecraft: RigidPart, parts: Sequence[Part], duration: float | Non
 
 
 def _columns(path: ShapePath, count: int, whose: str) -> ShapePath:
-    if not isinstance(path, ShapePath) or path.n_shape != count:
-        came = f"one of {path.n_shape} columns" if isinstance(path, ShapePath) else repr(type(path).__name__)
-        raise TrajectoryError(f"{whose} needs a ShapePath of {count} columns [m], got {came}")
+    if path.n_shape != count:
+        raise TrajectoryError(f"{whose} needs a ShapePath of {count} columns [m], got one of {path.n_shape} columns")
     if np.abs(path.gap).max() <= CLOSED:
         return path
     # A path of joints that advances by 2 pi in every loop is a loop; one of metres is not.

@@ -28,7 +28,6 @@ from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, numbers, short_repr
 from ..errors import ShapeError, ShapePhaseError, SingularInertiaError
 from ..inertia_tensor import triangle_defect
-from ..integrator.interpolant import Interpolant
 from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler
 from ..letters import value_text
@@ -45,7 +44,6 @@ from .descriptions import (
     ParticlesAlong,
     PrescribedDescription,
     RigidDescription,
-    SampledDescription,
 )
 from .rotors import Rotor, RotorDescription, mapping_of_joints, rotors_argument, widened_path
 
@@ -94,17 +92,12 @@ class Deformation:
     __post_init__ = lock_arrays
     __repr__, _repr_html_ = card_text, card_html
 
-    @property
+    @cached_property
     def breaks(self) -> Array:
         """Times between which all is smooth, those that the scan found among them: (M,), first 0, last `duration` [s].
 
         Raises and warns as `scan`.
         """
-        return self._scanned_breaks
-
-    @cached_property
-    def _scanned_breaks(self) -> Array:
-        """The declared breaks and those found by the scan of a user's functions."""
         scan = self.scan
         if scan is None or not len(scan.found_breaks):
             return self.declared_breaks
@@ -216,7 +209,7 @@ class Deformation:
         Raises SingularInertiaError for particles that are on one line at some time; raises and warns as `scan`.
         """
         known = self.description
-        return Sampler(known.sample, known.smoothness(self._scanned_breaks), known.channels)
+        return Sampler(known.sample, known.smoothness(self.breaks), known.channels)
 
     def step_limits(self) -> StepLimits:
         """The longest steps of an integrator that evaluates the deformation itself, in any gauge."""
@@ -249,19 +242,12 @@ class Deformation:
 @made_by(Deformation="take one of them, family[0]")
 @dataclass(frozen=True, eq=False)
 class DeformationFamily(Sequence[Deformation]):
-    """The deformations of N bodies of a family along one path: a sequence of them, made by `articulated`.
+    """The deformations of N bodies of a family along one path, as a sequence. Made by `articulated`.
 
     Attributes
     ----------
     bodies : the family
     path : with columns in the order of the bodies' joints
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> family = cat.with_inertias(masses=np.outer([1.0, 2.0], [part.mass for part in cat.moving_parts]))
-    >>> print([float(member.inertia(0.0).trace().round(6)) for member in sp.articulated(family, loop)])
-    [0.045, 0.045]
     """
 
     bodies: BodyFamily
@@ -385,13 +371,9 @@ def deformation_along(body: Body, route: ShapePath, wheels: tuple[Rotor, ...] = 
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None
     description = RotorDescription(body, route, wheels) if wheels else ArticulatedDescription(body, route)
-    files = {"body": body.sha256, "path": route.sha256}
-    inputs = {name: digest for name, digest in files.items() if digest}
+    inputs = {name: given.sha256 for name, given in (("body", body), ("path", route)) if given.sha256}
     label = f"{body.name} along a path"
-    made_from: dict[str, Any] = {
-        "body": {"name": body.name, "sha256": body.sha256},
-        "joints": list(body.joint_names),
-    }
+    made_from: dict[str, Any] = {"body": {"name": body.name, "sha256": body.sha256}, "joints": list(body.joint_names)}
     if route.sha256 is not None:
         made_from["path"] = {"sha256": route.sha256}
     if route.record is not None:
@@ -553,24 +535,6 @@ def _sampled_positions(samples: tuple[ArrayLike, ArrayLike], masses: Array) -> S
         raise ShapeError(f"positions: samples (K, {len(masses)}, 3) are needed, got {points.shape}")
     centred = points - ((masses / masses.sum()) @ points)[:, None]
     return ShapePath.spline(samples[0], centred.reshape(len(points), -1))
-
-
-def sampled_deformation(
-    interpolant: Interpolant,
-    centre: Array,
-    breaks: Array,
-    closure: Array | None,
-    shape_gap: float,
-    label: str,
-    inputs: Mapping[str, str],
-    made_from: Mapping[str, Any],
-    stored: Array | None = None,
-) -> Deformation:
-    """A deformation known only by its interpolant, as kept in a file; `centre` and `stored` as `SampledDescription`."""
-    description = SampledDescription(interpolant, centre, stored)
-    return Deformation(
-        description, float(breaks[-1]), breaks, closure, shape_gap, label, inputs=inputs, made_from=made_from
-    )
 
 
 def _best_turn(masses: Array, start: Array, end: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,8 @@ from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import ShapePath
 from ._physical_validity import check_never_on_a_line, check_not_on_a_line, check_triangle
 from ._scanned_functions import inertia_and_momentum, positions_and_velocities
+
+_SLOPE_DEGREE = 8  # of the polynomials that `rate_of` differentiates
 
 
 class Description(Protocol):
@@ -95,6 +97,23 @@ class Description(Protocol):
         ...
 
 
+class UserFunctions:
+    """Immutable holder of a user's functions, which pickle has to find by their names."""
+
+    _holder = "a deformation"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """State to pickle. Raises LocalFunctionError for a lambda."""
+        for value in vars(self).values():
+            if callable(value):
+                check_picklable(value, self._holder)
+        return self.__dict__
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
+        """The holder itself, which is immutable."""
+        return self
+
+
 class UngaugedDescription:
     """The frame of a description that no gauge has turned, with its origin at the centre of mass; masses unknown."""
 
@@ -103,6 +122,10 @@ class UngaugedDescription:
 
     @property
     def scan(self) -> FunctionScan | None:
+        return self._scan
+
+    @cached_property
+    def _scan(self) -> FunctionScan | None:
         return None
 
     def depends_on(self) -> ScannedFunction:
@@ -207,7 +230,7 @@ class RigidDescription(UngaugedDescription):
 
 
 @dataclass(frozen=True, eq=False)
-class PrescribedDescription(UngaugedDescription):
+class PrescribedDescription(UserFunctions, UngaugedDescription):
     """Functions of time for the inertia and the internal momentum, smooth between declared breaks.
 
     `on_unphysical` "error" checks every tensor.
@@ -217,16 +240,6 @@ class PrescribedDescription(UngaugedDescription):
     momentum: Callable[[Array], ArrayLike] | None
     breaks: Array
     on_unphysical: str = "allow"
-
-    def __getstate__(self) -> dict[str, Any]:
-        """State to pickle. Raises LocalFunctionError for a lambda."""
-        for function in (self.inertia, self.momentum):
-            check_picklable(function, "a deformation")
-        return self.__dict__
-
-    def __deepcopy__(self, _: dict[int, Any]) -> PrescribedDescription:
-        """The description itself, which is immutable."""
-        return self
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         tensors = inertia_argument(_returned(self.inertia(times), "inertia", (len(times), 3, 3)), times)
@@ -238,10 +251,6 @@ class PrescribedDescription(UngaugedDescription):
 
     def inertia_rate(self, times: Array) -> Array:
         return rate_of(lambda t: self.sample(t)[0], times, np.union1d(self.breaks, self._scan.found_breaks))
-
-    @property
-    def scan(self) -> FunctionScan | None:
-        return self._scan
 
     @cached_property
     def _scan(self) -> FunctionScan:
@@ -255,7 +264,7 @@ class PrescribedDescription(UngaugedDescription):
 
 
 @dataclass(frozen=True, eq=False)
-class ParticleDescription(UngaugedDescription):
+class ParticleDescription(UserFunctions, UngaugedDescription):
     """Point masses that move as seen from a frame, smoothly between declared breaks; `oscillations` as `Smoothness`."""
 
     masses: Array
@@ -264,15 +273,6 @@ class ParticleDescription(UngaugedDescription):
     oscillations: float | None = None
 
     __post_init__ = lock_arrays
-
-    def __getstate__(self) -> dict[str, Any]:
-        """State to pickle. Raises LocalFunctionError for a lambda."""
-        check_picklable(self.positions, "a deformation")
-        return self.__dict__
-
-    def __deepcopy__(self, _: dict[int, Any]) -> ParticleDescription:
-        """The description itself, which is immutable."""
-        return self
 
     def as_given(self, times: Array) -> tuple[Array, Array]:
         """Positions and velocities (N, m, 3) as the function gives them."""
@@ -289,11 +289,11 @@ class ParticleDescription(UngaugedDescription):
     def moment(self, times: Array) -> Array:
         """Sum of m r r^T about the centre of mass: (N,) -> (N, 3, 3) [kg m^2]."""
         points, _ = self.centred(times)
-        return _moment(self.masses, points)
+        return np.einsum("m,nmi,nmj->nij", self.masses, points, points)
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         points, speeds = self.centred(times)
-        moment = _moment(self.masses, points)
+        moment = np.einsum("m,nmi,nmj->nij", self.masses, points, points)
         check_not_on_a_line(moment, times)
         momentum = np.einsum("m,nmi->ni", self.masses, np.cross(points, speeds))
         return inertia_of(moment), momentum
@@ -312,10 +312,6 @@ class ParticleDescription(UngaugedDescription):
         points, speeds = self.centred(times)
         total = np.cross(turning[:, :, None], points) + speeds
         return 0.5 * np.einsum("m,bnmi,bnmi->bn", self.masses, total, total)
-
-    @property
-    def scan(self) -> FunctionScan | None:
-        return self._scan
 
     @cached_property
     def _scan(self) -> FunctionScan | None:
@@ -397,19 +393,15 @@ def rate_of(function: Callable[[Array], Array], times: Array, breaks: Array) -> 
     left, right = breaks[piece], breaks[piece + 1]
     half = 0.01 * (right - left)
     middle = np.clip(times, left + half, right - half)
-    nodes = unit_nodes(8)
+    nodes = unit_nodes(_SLOPE_DEGREE)
     first, last = inside(left, right)
     points = np.clip(middle[:, None] + half[:, None] * nodes, first[:, None], last[:, None])
     values = function(points.ravel())
-    values = values.reshape(len(times), 9, -1)
+    values = values.reshape(len(times), len(nodes), -1)
     local = (times - middle) / half
-    derivative = np.polynomial.chebyshev.chebder(values_to_coefficients(8))
+    derivative = np.polynomial.chebyshev.chebder(values_to_coefficients(_SLOPE_DEGREE))
     weights = np.polynomial.chebyshev.chebval(local, derivative).T / half[:, None]
     return np.einsum("nk,nkc->nc", weights, values).reshape(len(times), *function(times[:1]).shape[1:])
-
-
-def _moment(masses: Array, points: Array) -> Array:
-    return np.einsum("m,nmi,nmj->nij", masses, points, points)
 
 
 def inertia_of(moment: Array) -> Array:

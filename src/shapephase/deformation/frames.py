@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_picklable, times_argument
+from ..arguments import times_argument
 from ..arrays import Array, finite_array
 from ..chebyshev import PiecewiseChebyshev
 from ..display import short_repr
@@ -30,11 +30,12 @@ from ..shape_space.scan.scanning import scanned
 from ._principal_frame import Frames, principal_frames
 from ._scanned_functions import rates_alone, turns_alone, turns_and_rates
 from .deformation import Deformation
-from .descriptions import Description
+from .descriptions import Description, UserFunctions
 
 _LINK = "link:"  # beginning of a gauge named after a link: "link:torso"
 LIFT_TOLERANCE = 1e-12  # [rad] tighter than any motion that is seen from these frames
 _ROUNDING = 8.0 * float(np.finfo(float).eps)  # of a coefficient of U
+_CHECKED = 7  # times of each piece at which a user's rates are compared
 _RATE_DOUBT = 1e-9  # of the fastest turn: uncertainty allowed to rates by differentiation
 
 
@@ -102,19 +103,12 @@ def _turns_of(u: Callable[[Array], Any], times: Array) -> tuple[Array, Array | N
 
 
 @dataclass(frozen=True, eq=False)
-class _GaugeFunction:
+class _GaugeFunction(UserFunctions):
     """Frames by a user's function."""
 
     function: Callable[[Array], Any]
 
-    def __getstate__(self) -> dict[str, Any]:
-        """State to pickle. Raises LocalFunctionError for a lambda."""
-        check_picklable(self.function, "a gauge")
-        return self.__dict__
-
-    def __deepcopy__(self, _: dict[int, Any]) -> Self:
-        """The frames themselves, which are immutable."""
-        return self
+    _holder = "a gauge"
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +168,8 @@ def _differentiated(u: Callable[[Array], Any], breaks: Array) -> GivenFrames:
     function = _scanned_turns(u)
     scan = scanned(function, breaks)
     edges = scan.resolved.edges
-    series = scan.resolved.coefficients[:, :, :9] / function.judge(breaks, np.zeros((1, 18)))[0][0]
+    count = len(function.columns)
+    series = scan.resolved.coefficients[:, :, :count] / function.judge(breaks, np.zeros((1, 2 * count)))[0][0]
     half = 0.5 * np.diff(edges)
     norms = np.linalg.norm(series, axis=-1)
     fastest = max(1.0 / breaks[-1], float(np.max(norms[:, 1] / half)))
@@ -224,9 +219,9 @@ def _spins_of(rates: Callable[[Array], ArrayLike], times: Array) -> Array:
 
 
 def _check_rates(frames: Frames, breaks: Array) -> None:
-    """Compare body rates with differences of U at seven times of each piece."""
-    width = np.repeat(np.diff(breaks), 7)
-    middle = (breaks[:-1, None] + np.diff(breaks)[:, None] * (np.arange(7) + 0.381) / 7.0).ravel()
+    """Compare body rates with differences of U at some times of each piece."""
+    width = np.repeat(np.diff(breaks), _CHECKED)
+    middle = (breaks[:-1, None] + np.diff(breaks)[:, None] * (np.arange(_CHECKED) + 0.381) / _CHECKED).ravel()
     at, rates = frames(middle)
     speed = np.linalg.norm(rates, axis=-1)
     # So short that a turn at this rate differs from its chord by less than a millionth.

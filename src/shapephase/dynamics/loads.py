@@ -16,7 +16,7 @@ from ..display import short_repr
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..refinement import halved, settled
-from .moving_body import BY_JOINTS, check_motion, drive, needed_body_and_path
+from .moving_body import BY_JOINTS, drive, needed_body_and_path
 
 _POINTS = 10  # Gauss points of a panel
 _LOOKS = 65  # places of a panel where peaks are searched: a smooth torque hides at most 1e-4 of itself between two
@@ -28,6 +28,8 @@ _NO_POWER = 1e-13  # of the largest power: below it the sign is rounding
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JointLoads:
     """Peaks and work of the joints over a whole motion; arrays are batch + (n,) where nothing else is stated.
+
+    Made by `joint_torques`.
 
     Attributes
     ----------
@@ -47,13 +49,6 @@ class JointLoads:
     Notes
     -----
     Equation :eq:`joint-work` of the documentation.
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
-    >>> loads = sp.joint_torques(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])).loads
-    >>> bool(np.isclose(loads.work.sum(), loads.energy_change))
-    True
     """
 
     joint_names: tuple[str, ...]
@@ -174,7 +169,6 @@ class _Panels:
 
 def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     """The loads over a whole motion, on its steps, which are halved until the work no longer changes."""
-    check_motion(motion)
     body, _ = needed_body_and_path(motion, BY_JOINTS)
     breaks = motion.breaks if isinstance(motion, ForcedMotion) else motion.deformation.breaks
     edges = np.union1d(motion.solution.times, breaks)

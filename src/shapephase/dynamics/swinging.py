@@ -38,7 +38,7 @@ _PLACES = (0.25, 0.5, 0.75)  # of a piece, where it is compared with the integra
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FreeHinges:
-    """The motion of a body some of whose joints swing freely.
+    """The motion of a body some of whose joints swing freely. Made by `free_hinges`.
 
     Attributes
     ----------
@@ -47,15 +47,6 @@ class FreeHinges:
     hinges : names of those that are free
     attitude_defect : how far the attitude of the motion is from the one integrated with the hinges [rad]
     error_estimate : of attitude and hinges, measured [rad or m]
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> rest = ("waist_yaw", "waist_roll")
-    >>> still = sp.ShapePath.waypoints([0.0, 0.5], np.zeros((2, 2)), joint_names=rest)
-    >>> found = sp.free_hinges(cat, still, {"waist_pitch": (0.3, 1.0)}, [0.0, 0.002, 0.01])
-    >>> bool(found.attitude_defect < 1e-9)
-    True
     """
 
     motion: Motion
@@ -161,11 +152,16 @@ class _Swing:
         omega, accelerations = self.accelerations(times, turned, states)
         return omega, np.concatenate([states[:, len(self.columns) :], accelerations], axis=1)
 
+    def joints(self, times: Array, states: Array) -> tuple[Array, Array]:
+        """Coordinates and rates of all joints, with those of the hinges from states: (N, n) each."""
+        (shapes, rates), count = self.route.curve(times), len(self.columns)
+        shapes[:, self.columns], rates[:, self.columns] = states[:, :count], states[:, count:]
+        return shapes, rates
+
     def accelerations(self, times: Array, turned: Array, states: Array) -> tuple[Array, Array]:
         """Angular velocities of the base (N, 3) and accelerations of the hinges (N, k)."""
         count = len(self.columns)
-        (shape, rate), acceleration = self.route.curve(times), self.route.acceleration(times)
-        shape[:, self.columns], rate[:, self.columns] = states[:, :count], states[:, count:]
+        (shape, rate), acceleration = self.joints(times, states), self.route.acceleration(times)
         inertia, matrix, inertia_rate, matrix_rate = self.body.sample_rates(shape, rate)
         inverse = inverse_inertia(inertia, times)
         pi = so3.apply(so3.transpose(turned), self.momentum)
@@ -205,11 +201,8 @@ def _path_of(swing: _Swing, found: DrivenAttitude, breaks: Array, tolerance: flo
         coefficients = _quintics(np.diff(knots), *starts, *ends)
         curve = PiecewisePolynomial(knots, coefficients)
         times = (knots[:-1, None] + np.diff(knots)[:, None] * np.array(_PLACES)).ravel()
-        shapes, rates = swing.route.curve(times)
-        states = found.states(times)
-        shapes[:, swing.columns], rates[:, swing.columns] = states[:, :count], states[:, count:]
-        off = np.abs(curve(times)[0] - shapes).max(initial=0.0)
-        off = max(off, np.abs(curve(times)[1] - rates).max(initial=0.0) / found.scales[count:].min() * _SHARE)
+        shapes, rates = (np.abs(a - b) for a, b in zip(curve(times), swing.joints(times, found.states(times))))
+        off = max(shapes.max(initial=0.0), rates.max(initial=0.0) / found.scales[count:].min() * _SHARE)
         if off <= _SHARE * tolerance:
             break
         if 2 * len(knots) > _MOST_PIECES:
@@ -223,10 +216,8 @@ def _path_of(swing: _Swing, found: DrivenAttitude, breaks: Array, tolerance: flo
 
 def _all_joints(swing: _Swing, found: DrivenAttitude, times: Array, knots: Array) -> tuple[Array, Array, Array]:
     """Coordinates, rates and accelerations at knots (N,), by those at times just on one side of them: (N, n) each."""
-    count = len(swing.columns)
-    (shapes, rates), accelerations = swing.route.curve(times), swing.route.acceleration(times)
     states = found.states(times)
-    shapes[:, swing.columns], rates[:, swing.columns] = states[:, :count], states[:, count:]
+    (shapes, rates), accelerations = swing.joints(times, states), swing.route.acceleration(times)
     accelerations[:, swing.columns] = swing.accelerations(times, found.attitude(times), states)[1]
     # What a fast joint moves in between is more than rounding.
     away = (knots - times)[:, None]

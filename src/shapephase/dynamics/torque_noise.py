@@ -15,6 +15,7 @@ from ..errors import ShapeError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_noise import path_errors, summed_errors
+from ..shape_space.shape_path import ShapePath
 from .loads import JointLoads
 from .moving_body import BY_JOINTS, drive, needed_body_and_path
 from .torques import JointTorques
@@ -26,22 +27,12 @@ _TIMES_OF_WORK = 201  # even times at which errors of the power are summed: bars
 
 @dataclass(frozen=True, eq=False)
 class TorqueErrors:
-    """Standard deviations of what the joints do at N times, to first order.
+    """Standard deviations of what the joints do at N times, to first order. Made by `torque_errors`.
 
     Attributes
     ----------
     times : (N,) [s]
     torque, rate, power : (N, n) [N m or N], [rad/s or m/s], [W]
-
-    Examples
-    --------
-    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 41)
-    >>> samples = sp.examples.kane_scher(0.3, 0.5).shape(times)
-    >>> path = sp.ShapePath.spline(times, samples, joint_names=cat.joint_names)
-    >>> motion = sp.reconstruct(sp.articulated(cat, path), [0.0, 0.0, 0.005])
-    >>> found = sp.torque_errors(sp.joint_torques(motion, [0.2, 0.6]), joints=1e-4)
-    >>> found.torque.shape
-    (2, 3)
     """
 
     times: Array
@@ -55,22 +46,13 @@ class TorqueErrors:
 
 @dataclass(frozen=True, eq=False)
 class LoadErrors:
-    """Standard deviations of peaks, each at its time, and of work.
+    """Standard deviations of peaks, each at its time, and of work. Made by `load_errors`.
 
     Attributes
     ----------
     peak_torque, peak_rate, peak_power : (n,) [N m or N], [rad/s or m/s], [W]
     work : (n,) net, of each joint [J]
     total_work : of all joints [J]
-
-    Examples
-    --------
-    >>> cat, times = sp.load_body("cat_two_halves"), np.linspace(0.0, 1.0, 41)
-    >>> samples = sp.examples.kane_scher(0.3, 0.5).shape(times)
-    >>> path = sp.ShapePath.spline(times, samples, joint_names=cat.joint_names)
-    >>> motion = sp.reconstruct(sp.articulated(cat, path), [0.0, 0.0, 0.005])
-    >>> sp.dynamics.load_errors(motion, sp.joint_torques(motion).loads, 1e-4).work.shape
-    (3,)
     """
 
     peak_torque: Array
@@ -138,7 +120,7 @@ def load_errors(motion: Motion | ForcedMotion, loads: JointLoads, joints: ArrayL
     True
     """
     check_object(loads, "JointLoads", "loads")
-    _check_single(motion)
+    path = _path_of(motion)
     count = len(loads.joint_names)
     own = np.arange(count)
     peak_times = np.concatenate([loads.peak_time, loads.rate_time, loads.power_time])
@@ -148,28 +130,32 @@ def load_errors(motion: Motion | ForcedMotion, loads: JointLoads, joints: ArrayL
     peak_errors = [
         values[at, own] for values, at in zip((errors.torque, errors.rate, errors.power), places, strict=True)
     ]
-    work, total = _work_errors(motion, joints)
-    return LoadErrors(
-        peak_torque=peak_errors[0], peak_rate=peak_errors[1], peak_power=peak_errors[2], work=work, total_work=total
-    )
+    # Errors of the work: sums of the power over even times, of each joint and of all together.
+    even = np.linspace(0.0, motion.duration, _TIMES_OF_WORK)
+    weights = np.full(len(even), even[1])
+    weights[[0, -1]] *= 0.5
+    slopes = weights[:, None, None, None] * _slopes(motion, path, even).power
+    both = np.concatenate([slopes, slopes.sum(axis=1, keepdims=True)], axis=1)
+    *work, total = summed_errors(path, even, both, joints)
+    return LoadErrors(*peak_errors, work=np.array(work), total_work=float(total))
 
 
-def _check_single(motion: Motion | ForcedMotion) -> None:
+def _path_of(motion: Motion | ForcedMotion) -> ShapePath:
+    """Path of a single motion of an articulated body."""
     if motion.batch:
         raise ShapeError(f"error bars are those of one motion, this is a batch of {motion.batch}")
+    return needed_body_and_path(motion, BY_JOINTS)[1]
 
 
 def _errors_at(motion: Motion | ForcedMotion, times: Array, joints: ArrayLike | None) -> TorqueErrors:
-    _check_single(motion)
-    _, path = needed_body_and_path(motion, BY_JOINTS)
-    errors, slopes = path_errors(path, times, joints), _slopes(motion, times)
+    path = _path_of(motion)
+    errors, slopes = path_errors(path, times, joints), _slopes(motion, path, times)
     return TorqueErrors(
         times=times, torque=errors.of(slopes.torque), rate=errors.of(slopes.rate), power=errors.of(slopes.power)
     )
 
 
-def _slopes(motion: Motion | ForcedMotion, times: Array) -> _Slopes:
-    _, path = needed_body_and_path(motion, BY_JOINTS)
+def _slopes(motion: Motion | ForcedMotion, path: ShapePath, times: Array) -> _Slopes:
     torques, rates = [], []
     for column in range(path.n_shape):
         for which, step in enumerate(_STEPS):
@@ -183,15 +169,3 @@ def _slopes(motion: Motion | ForcedMotion, times: Array) -> _Slopes:
     efforts = drive(motion, times)
     power = efforts.rate[..., None, None] * by_torque + efforts.torque[0][..., None, None] * by_rate
     return _Slopes(by_torque, by_rate, power)
-
-
-def _work_errors(motion: Motion | ForcedMotion, joints: ArrayLike | None) -> tuple[Array, float]:
-    """Errors of each joint's work, and of all together: sums of the power over even times."""
-    _, path = needed_body_and_path(motion, BY_JOINTS)
-    times = np.linspace(0.0, motion.duration, _TIMES_OF_WORK)
-    weights = np.full(len(times), times[1])
-    weights[[0, -1]] *= 0.5
-    slopes = weights[:, None, None, None] * _slopes(motion, times).power
-    both = np.concatenate([slopes, slopes.sum(axis=1, keepdims=True)], axis=1)
-    errors = summed_errors(path, times, both, joints)
-    return errors[:-1], float(errors[-1])

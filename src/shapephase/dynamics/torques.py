@@ -28,6 +28,8 @@ _UNITS = {"rad": "N_m", "m": "N"}  # of efforts, in names of columns
 class JointTorques:
     """Efforts of the joints at some times; results are batch + t.shape + (n,), joints in the order of the body's.
 
+    Made by `joint_torques`.
+
     Attributes
     ----------
     motion : which they drive
@@ -40,14 +42,6 @@ class JointTorques:
     base_wrench : batch + t.shape + (6,) force on the base and torque about its origin that the motion would need from
         outside, base axes [N], [N m]. A free body has none: what is left is rounding
     loads : over the whole motion: peaks, work, limits
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> found = sp.joint_torques(motion, [0.0, 0.25])
-    >>> found.torque.shape, bool(np.abs(found.base_wrench).max() < 1e-12)
-    ((2, 3), True)
     """
 
     motion: Motion | ForcedMotion = field(repr=False)

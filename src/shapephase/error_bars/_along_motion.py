@@ -11,7 +11,7 @@ Lambda = 1 at the end, makes one integral of every change: eta(T) = integral of 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -34,6 +34,18 @@ _STEPS = 4  # of the motion in one piece, at first
 # that the rule misses the ratio's seventh power, never more than 5e-8 of a derivative's norm.
 _LARGEST_FACTOR = 0.15
 _MOST_HALVINGS = 4  # of pieces with a larger ratio
+
+# Gauss nodes and weights on [0, 1], and the integrals of Lagrange's polynomials from 0 to each node.
+_PLACES, _SHARES = (
+    0.5 * (values + shift) for values, shift in zip(np.polynomial.legendre.leggauss(_NODES), (1.0, 0.0))
+)
+_POWERS = np.vander(_PLACES, _NODES, increasing=True)
+_INTEGRALS = (_POWERS * _PLACES[:, None] / np.arange(1.0, _NODES + 1.0)) @ np.linalg.inv(_POWERS)
+# From values at the nodes to the coefficients of the last two Legendre polynomials: (2, m).
+_ORDERS = np.arange(_NODES - 2, _NODES)
+_LAST = (
+    (2.0 * _ORDERS + 1.0) * np.polynomial.legendre.legvander(2.0 * _PLACES - 1.0, _NODES - 1)[:, _ORDERS]
+).T * _SHARES
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +90,8 @@ def along_motion(motion: Motion, path: ShapePath, breaks: Array | None = None) -
 
 
 def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
-    nodes, shares, _ = _rule()
     widths = np.diff(edges)
-    times = (edges[:-1, None] + widths[:, None] * nodes).ravel()
+    times = (edges[:-1, None] + widths[:, None] * _PLACES).ravel()
     stepped, start = one_rotation(motion), motion.initial_attitude
     shapes, rates = path.curve(times)
     inverse, drift = stepped.inverse_and_drift(times)
@@ -90,7 +101,7 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
     adjoint, at_start = _adjoint(by_turning.reshape(len(widths), _NODES, 3, 3), widths)
     return AlongMotion(
         times=times,
-        weights=(widths[:, None] * shares).ravel(),
+        weights=(widths[:, None] * _SHARES).ravel(),
         shapes=shapes,
         rates=rates,
         attitudes=attitudes,
@@ -110,7 +121,7 @@ def _factors(along: AlongMotion) -> Array:
     vectors = [*(matrices.reshape(count, 9) for matrices in turned), along.spins, along.lifted_spins]
     whole = np.concatenate([*vectors, np.cos(along.shapes), np.sin(along.shapes)], axis=1)
     at_nodes = whole.reshape(-1, _NODES, whole.shape[1])
-    squares = (_last_polynomials() @ at_nodes) ** 2
+    squares = (_LAST @ at_nodes) ** 2
     # Vectors by their length; cosine and sine by one.
     starts, joints = np.cumsum([0, *(rows.shape[1] for rows in vectors)]), along.shapes.shape[1]
     sizes = np.add.reduceat(at_nodes[..., : starts[-1]] ** 2, starts[:-1], axis=2).max(axis=1)[:, None]
@@ -119,15 +130,6 @@ def _factors(along: AlongMotion) -> Array:
     turning = squares[..., starts[-1] :]
     shares = np.maximum(shares, (turning[..., :joints] + turning[..., joints:]).max(axis=2, initial=0.0))
     return (shares ** (0.5 / np.arange(_NODES - 2, _NODES))).max(axis=1)
-
-
-@lru_cache(maxsize=1)
-def _last_polynomials() -> Array:
-    """Matrix from values at the nodes to the coefficients of the last two Legendre polynomials: (2, m)."""
-    nodes, shares, _ = _rule()
-    orders = np.arange(_NODES - 2, _NODES)
-    values = np.polynomial.legendre.legvander(2.0 * nodes - 1.0, _NODES - 1)[:, orders]
-    return np.asarray(((2.0 * orders + 1.0) * values).T * shares, dtype=np.float64)
 
 
 def one_rotation(motion: Motion) -> SteppedRotation:
@@ -144,9 +146,8 @@ def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
     """
     stepped = one_rotation(motion)
     edges = _pieces(stepped, np.union1d(motion.deformation.breaks, times))
-    nodes, shares, matrix = _rule()
     widths = np.diff(edges)
-    at = (edges[:-1, None] + widths[:, None] * nodes).ravel()
+    at = (edges[:-1, None] + widths[:, None] * _PLACES).ravel()
     inverse, _ = stepped.inverse_and_drift(at)
     attitudes = motion.initial_attitude @ stepped.rotation(at)[0]
     turning = attitudes @ inverse @ so3.transpose(attitudes)
@@ -155,9 +156,9 @@ def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
     # Within a piece: from its start, and by a unit of momentum.
     shapes = legendre(at, times, modes).reshape(len(widths), _NODES, 1, -1, 1)
     changes = (scaled[..., None, :] * shapes).reshape(len(widths), _NODES, 3, -1)
-    from_start, by_momentum = _within(slopes), _within(slopes, np.einsum("ij,pjab->piab", matrix, changes))
-    across = np.eye(3) + np.einsum("j,pjab->pab", shares, slopes @ from_start)
-    added = np.einsum("j,pjab->pab", shares, changes + slopes @ by_momentum)
+    from_start, by_momentum = _within(slopes), _within(slopes, np.einsum("ij,pjab->piab", _INTEGRALS, changes))
+    across = np.eye(3) + np.einsum("j,pjab->pab", _SHARES, slopes @ from_start)
+    added = np.einsum("j,pjab->pab", _SHARES, changes + slopes @ by_momentum)
     columns = 6 + 3 * modes
     at_edges, reached = np.empty((len(edges), 3, columns)), np.eye(3, columns)
     at_edges[0] = reached
@@ -193,11 +194,10 @@ def _adjoint(slopes: Array, widths: Array) -> tuple[Array, Array]:
 
     By Gauss collocation, whose end values are of order 2 m.
     """
-    _, shares, _ = _rule()
     count = len(slopes)
     scaled = widths[:, None, None, None] * slopes
     inner = _within(scaled)
-    across = np.eye(3) + np.einsum("j,pjab,pjbc->pac", shares, scaled, inner)
+    across = np.eye(3) + np.einsum("j,pjab,pjbc->pac", _SHARES, scaled, inner)
     onward = np.linalg.inv(across)
     at_left = np.empty((count, 3, 3))
     right = np.eye(3)
@@ -208,22 +208,11 @@ def _adjoint(slopes: Array, widths: Array) -> tuple[Array, Array]:
 
 def _within(scaled: Array, given: Array | None = None) -> Array:
     """X_i - sum_j a_ij scaled_j X_j = given_i at the nodes of each piece; None: one: (P, m, 3, c) -> (P, m, 3, c)."""
-    _, _, matrix = _rule()
     count, m = scaled.shape[:2]
     # Rows count nodes and components.
-    system = -np.einsum("ij,pjab->piajb", matrix, scaled).reshape(count, 3 * m, 3 * m) + np.eye(3 * m)
+    system = -np.einsum("ij,pjab->piajb", _INTEGRALS, scaled).reshape(count, 3 * m, 3 * m) + np.eye(3 * m)
     right = np.tile(np.eye(3), (m, 1)) if given is None else given.reshape(count, 3 * m, -1)
     return np.linalg.solve(system, right).reshape(count, m, 3, -1)
-
-
-@lru_cache(maxsize=1)
-def _rule() -> tuple[Array, Array, Array]:
-    """Gauss nodes and weights on [0, 1], and the integrals of Lagrange's polynomials from 0 to each node."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    powers = np.vander(0.5 * (nodes + 1.0), _NODES, increasing=True)
-    exponents = np.arange(1.0, _NODES + 1.0)
-    matrix = (powers * (0.5 * (nodes + 1.0))[:, None] / exponents) @ np.linalg.inv(powers)
-    return 0.5 * (nodes + 1.0), 0.5 * weights, matrix
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,7 +90,9 @@ def residual_noise(residuals: Array, slopes: Array) -> ResidualNoise:
     taken = np.einsum("abf,ba->f", _by_correlation(slopes), slopes.T @ slopes)
     left = np.maximum(moments[:, 0, 0] - (right * parameters).sum(axis=1), np.finfo(float).tiny)
     likelihood = -0.5 * (free * np.log(left) + np.linalg.slogdet(precisions)[1]) - volumes
-    weights = np.exp(likelihood - likelihood.max()) * _priors()
+    # One half for the exponential ones, white noise among them, and a quarter for each of the others.
+    kinds = len(_EXPONENTIAL), 2 * len(_LENGTHS)
+    weights = np.exp(likelihood - likelihood.max()) * np.repeat(0.5 / np.array(kinds), kinds)
     return ResidualNoise(
         weights=weights / weights.sum(),
         variances=np.maximum(left / free, (plain @ plain) / (3 * count - taken)),
@@ -119,11 +121,6 @@ def _correlations(count: int) -> Array:
     bells = np.exp(-((lags / _LENGTHS[:, None]) ** 2))
     smoothed = (1.0 - _OWN) * np.concatenate([means, bells]) + _OWN * (lags == 0)
     return np.concatenate([_EXPONENTIAL[:, None] ** lags, smoothed])
-
-
-def _priors() -> Array:
-    """One half for the exponential ones, white noise among them, and a quarter for each of the others."""
-    return np.repeat([0.5 / len(_EXPONENTIAL), 0.25 / len(_LENGTHS)], [len(_EXPONENTIAL), 2 * len(_LENGTHS)])
 
 
 def drift_modes(residuals: Array, slopes: Array, by_modes: Array) -> tuple[int, bool]:

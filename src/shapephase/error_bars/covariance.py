@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_executor, check_object, whole_argument
+from ..arguments import check_executor, whole_argument
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..deformation.deformation import articulated
@@ -131,8 +131,6 @@ def uncertainty(
     >>> print(f"{bars.dynamic_phase:.6f} rad")
     0.000813 rad
     """
-    if inertias is not None:
-        check_object(inertias, "InertiaErrors", "inertias")
     derived = derivatives(motion)
     inputs = inputs_of(motion, joints, inertias, momentum, attitude, start)
     covariances = [np.zeros((3, 3)) for _ in _ROTATIONS]
@@ -184,8 +182,6 @@ def sampled_uncertainty(
     >>> print(f"{bars.draws} draws, {bars.dynamic_phase:.4f} rad")
     10 draws, 0.0008 rad
     """
-    if inertias is not None:
-        check_object(inertias, "InertiaErrors", "inertias")
     check_executor(executor)
     draws, seed = whole_argument(draws, "draws", 2), whole_argument(seed, "seed", 0)
     body, path = described_by(motion)
@@ -327,21 +323,9 @@ def _uncertainty(
     draws: int,
     smoothing_bias: float = 0.0,
 ) -> Uncertainty:
-    final, total, holonomy, dynamical = covariances
-    return Uncertainty(
-        final_attitude=final,
-        total_rotation=total,
-        holonomy=holonomy,
-        dynamical_rotation=dynamical,
-        dynamic_phase=float(deviations[0]),
-        solid_angle=float(deviations[1]),
-        montgomery_phase=float(deviations[2]),
-        start=start,
-        total_angle=_bar(parts.total_rotation, total),
-        holonomy_angle=_bar(parts.holonomy, holonomy),
-        smoothing_bias=smoothing_bias,
-        draws=draws,
-    )
+    _, total, holonomy, _ = covariances
+    bars = _bar(parts.total_rotation, total), _bar(parts.holonomy, holonomy)
+    return Uncertainty(*covariances, *deviations.tolist(), start, *bars, smoothing_bias, draws)
 
 
 def _bar(rotation: Array, covariance: Array) -> float:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import made_by
+from ..arguments import check_object, made_by
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.family import BodyFamily
@@ -87,15 +87,20 @@ def inputs_of(
 ) -> Inputs:
     """The arguments of `uncertainty`, checked."""
     body, path = described_by(motion)
+    if inertias is not None:
+        check_object(inertias, "InertiaErrors", "inertias")
     if start is not None and not (momentum is None and attitude is None):
         raise ShapeError("start: it has the errors of momentum and attitude together; leave momentum and attitude out")
     samples = None
     if joints is not None:
-        if not isinstance(joints, str):
-            finite_array(joints, "joints")
+        if isinstance(joints, str):
+            # One amount of angles, of lengths, or both.
+            by_unit = amounts(joints, "joints")
+            given = np.array([by_unit[joint.unit] for joint in body_summary(body).joints])
+        else:
+            given = finite_array(joints, "joints")
         through = path_samples(path)
         numbers = through.count * path.n_shape
-        given = _by_joint(body, joints) if isinstance(joints, str) else finite_array(joints, "joints")
         if given.shape in ((), (path.n_shape,)):
             deviations = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
             if given.ndim == 0:
@@ -119,12 +124,6 @@ def inputs_of(
         together = _covariance(finite_array(start, "start"), "start", UNKNOWNS)
     single = _of_vector(momentum, "momentum"), _of_vector(attitude, "attitude")
     return Inputs(samples, links, *single, start=together, fit=fit)
-
-
-def _by_joint(body: Body, text: str) -> Array:
-    """Standard deviations (n,) from a text with one of angles, of lengths or of both."""
-    by_unit = amounts(text, "joints")
-    return np.array([by_unit[joint.unit] for joint in body_summary(body).joints])
 
 
 def _of_vector(given: ArrayLike | None, name: str) -> Array | None:

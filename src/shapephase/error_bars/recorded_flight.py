@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_flag, check_object
 from ..arrays import finite_array
 from ..body.body import Body
-from ..deformation.deformation import articulated
+from ..deformation.deformation import Deformation, articulated
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion, reconstruct
@@ -23,7 +23,7 @@ from .recorded_momentum import RecordedMomentum, momentum_from_recording, warn_o
 
 @dataclass(frozen=True, eq=False)
 class RecordedFlight:
-    """A recording as a motion.
+    """A recording as a motion. Made by `motion_from_recording`.
 
     Attributes
     ----------
@@ -31,15 +31,6 @@ class RecordedFlight:
     momentum_by : "fit" to the recorded attitudes of the base, "given", or "nothing": it is zero, as the base was not
         recorded, or has one attitude in every sample, and none is given
     fitted : the fit, where there is one
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005])
-    >>> sp.export_motion(motion, "turn.csv")
-    >>> flown = sp.motion_from_recording(cat, sp.read_recorded_motion("turn.csv", cat))
-    >>> print(flown.momentum_by, flown.motion.momentum.round(5) + 0.0)
-    fit [0.    0.    0.005]
     """
 
     motion: Motion
@@ -108,7 +99,7 @@ def motion_from_recording(
                 "the attitude at the start is fitted to the recorded base, with the momentum; leave it out "
                 "(--attitude), or give the momentum, too (--momentum)"
             )
-        fitted = _fit(body, recorded, tolerance, find_axes=find_axes)
+        fitted = _fit(deformation, recorded, tolerance, find_axes=find_axes)
         return RecordedFlight(fitted.motion, "fit", fitted)
     if find_axes:
         raise ShapeError(
@@ -122,11 +113,10 @@ def motion_from_recording(
     return RecordedFlight(moved, "nothing" if momentum is None else "given")
 
 
-def _fit(body: Body, recorded: RecordedMotion, tolerance: float, *, find_axes: bool) -> RecordedMomentum:
+def _fit(deformation: Deformation, recorded: RecordedMotion, tolerance: float, *, find_axes: bool) -> RecordedMomentum:
     flight, attitudes = recorded.flight, recorded.base_attitude
     assert attitudes is not None
     assumed = flight is None or not flight.requested
-    deformation = articulated(body, recorded.path)
     try:
         with quiet(category=TrajectoryWarning):
             fitted = momentum_from_recording(

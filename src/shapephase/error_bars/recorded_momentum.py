@@ -164,8 +164,11 @@ def momentum_from_recording(
     try:
         fit = _flight_fitted(deformation, at, recorded, tolerance, find_axes=find_axes)
     except AccuracyNotReached as error:
-        if _is_flight_with_w_first(deformation, at, recorded, tolerance, find_axes=find_axes):
-            raise TrajectoryError(f"the recorded base is no flight of this body; {W_FIRST}") from error
+        # Axes that are to be found leave the order of the quaternions open.
+        if not find_axes:
+            with suppress(AccuracyNotReached):
+                _flight_fitted(deformation, at, read_w_first(recorded), tolerance, find_axes=False)
+                raise TrajectoryError(f"the recorded base is no flight of this body; {W_FIRST}") from error
         raise
     result = _estimated(fit, at, noise, tolerance)
     if not result.conserved:
@@ -252,19 +255,6 @@ def _flight_fitted(
     return fit
 
 
-def _is_flight_with_w_first(
-    deformation: Deformation, times: Array, recorded: Array, tolerance: float, *, find_axes: bool
-) -> bool:
-    """True where a flight is near with quaternions read w first; False for axes to be found, which leave it open."""
-    if find_axes:
-        return False
-    try:
-        _flight_fitted(deformation, times, read_w_first(recorded), tolerance, find_axes=False)
-    except AccuracyNotReached:
-        return False
-    return True
-
-
 def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: float, axes: Array) -> _Fitted:
     """Fit to the first few attitudes, then to more and more, so that a wrong momentum never loses count of turns."""
     fit = _Least(deformation, times, recorded, tolerance)
@@ -276,14 +266,14 @@ def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: 
     return fit.settled(before.motion, axes)
 
 
-def _momenta(deformation: Deformation, times: Array, recorded: Array) -> tuple[Array, Array]:
-    """Momenta by the turns between neighbouring attitudes (N - 1, 3), and the middles of their times (N - 1,)."""
+def _momenta(deformation: Deformation, times: Array, recorded: Array) -> Array:
+    """Momenta by the turns between neighbouring attitudes: (N - 1, 3)."""
     middle = 0.5 * (times[1:] + times[:-1])
     turns = so3.log(so3.transpose(recorded[:-1]) @ recorded[1:])
     rates = turns / np.diff(times)[:, None]
     inertia, internal = deformation.description.sample(middle)
     seen = recorded[:-1] @ so3.exp(0.5 * turns)
-    return so3.apply(seen, so3.apply(inertia, rates) + internal), middle
+    return so3.apply(seen, so3.apply(inertia, rates) + internal)
 
 
 def _with_axes(deformation: Deformation, times: Array, recorded: Array, tolerance: float) -> _Fitted:
@@ -310,7 +300,7 @@ def _likely_axes(deformation: Deformation, times: Array, recorded: Array) -> lis
     from scipy.optimize import least_squares
 
     def wander(turn: Array, about: Array) -> Array:
-        momenta, _ = _momenta(deformation, times, recorded @ about @ so3.exp(turn))
+        momenta = _momenta(deformation, times, recorded @ about @ so3.exp(turn))
         return ((momenta - momenta.mean(axis=0)) / np.sqrt((momenta**2).sum(axis=1).mean())).ravel()
 
     candidates: list[tuple[float, Array]] = []
@@ -367,7 +357,7 @@ class _Least:
 
     def first_motion(self, axes: Array) -> Motion:
         """Motion with the mean of the momenta by neighbouring attitudes."""
-        momenta, _ = _momenta(self.deformation, self.times, self.recorded @ axes)
+        momenta = _momenta(self.deformation, self.times, self.recorded @ axes)
         return self._reconstructed(momenta.mean(axis=0), self.recorded[0] @ axes)
 
     def _slopes(self, motion: Motion) -> Array:

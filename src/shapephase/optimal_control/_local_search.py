@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from ..dynamics.torques import joint_torques
 from ..errors import ShapePhaseError
 from ._path_cost import path_cost
 from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
-from ._polish import GOAL_TOLERANCE, PolishedPath, panel_nodes, polish
+from ._polish import GAUSS_NODES, GOAL_TOLERANCE, PolishedPath, polish
 from ._spline_basis import SplineBasis
 from ._via_points import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
@@ -77,14 +78,12 @@ class LocalSearch:
 
     Attributes
     ----------
-    basis : spline of the path at first
-    program : program for this basis
+    program : program for the spline of the path at first
     halvings : how often pieces may be halved; never where the user gave their number
     settles : whether the solver may end where the cost of a long motion has settled
     """
 
     task: Reorientation
-    basis: SplineBasis
     program: CollocationProgram
     iterations: int
     halvings: int
@@ -93,11 +92,11 @@ class LocalSearch:
     @classmethod
     def of(cls, task: Reorientation, basis: SplineBasis, search: Search, *, settles: bool = False) -> LocalSearch:
         halvings = _HALVINGS if search.pieces is None else 0
-        return cls(task, basis, CollocationProgram(task, basis), int(search.iterations), halvings, settles)
+        return cls(task, CollocationProgram(task, basis), int(search.iterations), halvings, settles)
 
     def attempt(self, guess: Guess, callback: IterationCallback) -> Attempt:
         """Return the local optimum, its path corrected to reach the goal; on finer pieces where these do not."""
-        best, control = self._on(self.basis, self.program, guess, callback)
+        best, control = self._on(self.program, guess, callback)
         for _ in range(self.halvings):
             solved = best.report.status in GOOD_STATUS
             if not solved or best.reaches_goal:
@@ -106,37 +105,18 @@ class LocalSearch:
             onward = guess_of(self.task, finer, best.basis.matrix(PLACES) @ control)
             if onward is None:
                 break
-            program = CollocationProgram(self.task, finer)
-            following, control = self._on(finer, program, onward, callback)
+            following, control = self._on(CollocationProgram(self.task, finer), onward, callback)
             best = min(best, following, key=Attempt.rank)
             if best is not following:
                 break
         return best
 
-    def _on(
-        self,
-        basis: SplineBasis,
-        program: CollocationProgram,
-        guess: Guess,
-        callback: IterationCallback,
-    ) -> tuple[Attempt, Array]:
-        """Return the attempt on a basis, and the control points that the solver found."""
-        task, began = self.task, time.perf_counter()
-        solution, polished = self._optimum(basis, program, guess, callback)
-        return corrected_attempt(task, basis, solution, polished, began), solution.control
-
-    def _optimum(
-        self,
-        basis: SplineBasis,
-        program: CollocationProgram,
-        guess: Guess,
-        callback: IterationCallback,
-    ) -> tuple[NlpSolution, PolishedPath | None]:
-        """Return the solver's optimum, with the iterations of all rounds, and its path corrected.
+    def _on(self, program: CollocationProgram, guess: Guess, callback: IterationCallback) -> tuple[Attempt, Array]:
+        """Return the attempt of a program, with the iterations of all rounds, and the solver's control points.
 
         Where efforts exceed their limits between the nodes, they get less room there in a further round.
         """
-        task, room, iterations = self.task, None, 0
+        task, basis, began, room, iterations = self.task, program.basis, time.perf_counter(), None, 0
         control, duration, attitudes = guess.control, task.duration, guessed_attitudes(task, guess)
         options: dict[str, Any] = {
             "iterations": self.iterations,
@@ -144,32 +124,30 @@ class LocalSearch:
             "iteration_callback": callback,
             "settles": self.settles,
         }
-        rounds = 0
-        while True:
+        for rounds in range(_TIGHTENINGS + 1):
             solution = program.solve(control, duration, attitudes, **options)
             iterations += solution.iterations
-            solution = replace(solution, iterations=iterations)
-            polished = polished_path(task, basis, solution)
-            if not task.efforts_limited or polished is None or not solution.converged or rounds == _TIGHTENINGS:
-                return solution, polished
-            shares = effort_shares(task, basis, polished.motion)
+            attempt = corrected_attempt(task, basis, replace(solution, iterations=iterations), began)
+            if not task.efforts_limited or attempt.polished is None or not solution.converged:
+                break
+            shares = effort_shares(task, basis, attempt.polished.motion)
             again = guess_of_control(task, basis, solution.control)
             if shares.max() <= 1.0 + LIMIT_SLACK or again is None:
-                return solution, polished
+                break
             room = tightened(room, shares, STAGES, rounds)
             options |= {"room": room, "via_places": solution.via_places}
             control, duration, attitudes = solution.control, solution.duration, guessed_attitudes(task, again)
-            rounds += 1
+        return attempt, solution.control
 
 
-def corrected_attempt(
-    task: Reorientation, basis: SplineBasis, solution: NlpSolution, polished: PolishedPath | None, began: float
-) -> Attempt:
-    """Return the attempt of a solver's path and its correction, whose search began at a time [s]."""
-    cost = np.inf if polished is None else _cost(task, basis, polished)
-    reaches_goal = (
-        polished is not None and polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
-    )
+def corrected_attempt(task: Reorientation, basis: SplineBasis, solution: NlpSolution, began: float) -> Attempt:
+    """Correct a solver's path, the result of a search that began at a time [s], to reach the goal."""
+    polished, cost, reaches_goal = None, np.inf, False
+    with suppress(ShapePhaseError):  # where the path has no motion
+        polished = polish(task, basis, solution.control, solution.duration, solution.via_places)
+    if polished is not None:
+        cost = _cost(task, basis, polished)
+        reaches_goal = polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
     report = Start(
         status=solution.status,
         converged=solution.converged and reaches_goal,
@@ -184,24 +162,15 @@ def corrected_attempt(
     return Attempt(task=task, report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
 
 
-def polished_path(task: Reorientation, basis: SplineBasis, solution: NlpSolution) -> PolishedPath | None:
-    """Return the solver's path, corrected to reach the goal; None where it has no motion."""
-    try:
-        return polish(task, basis, solution.control, solution.duration, solution.via_places)
-    except ShapePhaseError:
-        return None
-
-
 def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
     """Cost of a corrected path, by quadrature."""
+    places, weights = basis.gauss(GAUSS_NODES)
     if task.cost == "effort":
-        places, weights = panel_nodes(basis)
         torque = joint_torques(polished.motion, places * polished.duration).torque
         return float(polished.duration * weights @ np.sum((torque / task.effort_measure) ** 2, axis=1))
     if task.cost == "time":
         return polished.duration
     if task.cost == "acceleration":
-        places, weights = panel_nodes(basis)
         bend = basis.matrix(places, 2) @ polished.control @ task.coupling.T
         return float(0.5 * weights @ np.sum(bend**2, axis=1)) / polished.duration**3
     return path_cost(task.body, polished.path, task.cost)

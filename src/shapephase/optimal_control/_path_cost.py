@@ -7,17 +7,17 @@ from itertools import pairwise
 import numpy as np
 
 from .. import so3
-from ..arguments import check_object
+from ..arguments import check_choice, check_object
+from ..arrays import Array
 from ..body.body import Body
-from ..errors import AccuracyNotReached, unknown_name
+from ..errors import AccuracyNotReached
 from ..shape_space.body_path import route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
 from ._spline_basis import gauss_tableau
 
 _NODES = 12  # Gauss nodes of a panel: exact for the rate cost of a cubic spline, ample for smooth paths
-_FIRST_PANELS = 2  # between two breaks, for the first value
-_PANELS = (4, 8, 16, 32, 64, 128)  # for the values that have to confirm it
+_HALVINGS = 6  # of two panels between two breaks, until the cost has converged
 _CONVERGED = 1e-10  # relative change between subdivisions: 100 roundings of the body's matrices
 
 
@@ -42,17 +42,17 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     """
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
-    if not isinstance(cost, str) or cost not in ("kinetic", "rate"):
-        raise unknown_name("cost of a path", cost, ("kinetic", "rate"))
+    check_choice(cost, "cost of a path", ("kinetic", "rate"))
     route = route_along(body, path)
-    before = _quadrature(body, route, cost, _FIRST_PANELS)
-    for panels in _PANELS:
+    before, panels = _quadrature(body, route, cost, 2), 2
+    for _ in range(_HALVINGS):
+        panels *= 2
         now = _quadrature(body, route, cost, panels)
         if abs(now - before) <= _CONVERGED * abs(now):
             return now
         before = now
     raise AccuracyNotReached(
-        f"the cost of the path of {body.name} does not converge on {_PANELS[-1]} panels between its breaks (last at "
+        f"the cost of the path of {body.name} does not converge on {panels} panels between its breaks (last at "
         f"{before:.9g}); declare the times of its jumps as breaks"
     )
 
@@ -62,10 +62,12 @@ def _quadrature(body: Body, route: ShapePath, cost: str, panels: int) -> float:
     inside, weights, _ = gauss_tableau(_NODES)
     ends = np.concatenate([np.linspace(a, b, panels + 1)[:-1] for a, b in pairwise(route.breaks)] + [route.breaks[-1:]])
     steps = np.diff(ends)
-    shapes, rates = route.curve((ends[:-1, None] + steps[:, None] * inside).ravel())
+    curve = route.curve((ends[:-1, None] + steps[:, None] * inside).ravel())
+    return float((steps[:, None] * weights).ravel() @ cost_density(body, cost, *curve))
+
+
+def cost_density(body: Body, cost: str, shapes: Array, rates: Array) -> Array:
+    """Integrand of the cost "kinetic" or "rate": (N, n), (N, n) -> (N,)."""
     if cost == "rate":
-        density = 0.5 * np.sum(rates**2, axis=1)
-    else:
-        turning = -so3.apply(mechanical_connection(body, shapes), rates)
-        density = body.kinetic_energy(shapes, rates, turning)
-    return float((steps[:, None] * weights).ravel() @ density)
+        return 0.5 * np.sum(rates**2, axis=1)
+    return body.kinetic_energy(shapes, rates, -so3.apply(mechanical_connection(body, shapes), rates))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,7 +23,7 @@ GOAL_TOLERANCE = 1e-8  # [rad], goal error that counts as reached: a hundred tim
 _CONVERGED = 5e-10  # [rad], goal error at which the next Newton step is lost in the reconstruction's error
 _STEPS = 8  # Newton steps at most: it converges quadratically
 _TOO_FAR = 1.0  # [rad], goal error from which on the linear model is no guide
-_NODES = 8  # Gauss nodes of a piece for the derivative of the end: order 16
+GAUSS_NODES = 8  # Gauss nodes of a piece for the derivative of the end: order 16
 _ACTIVE = 1e-6  # share of the range within which a limit is active: interior-point solutions end inside it
 _LEAST_RANGE = 1e-300  # [rad or m], of a fixed coordinate, to divide by
 _ROUNDS = 6  # corrections found anew because they would take rates beyond their limits
@@ -39,7 +39,8 @@ class PolishedPath:
     control : (k, m) control points
     duration : [s]
     path, motion : path of all joints, and its reconstruction
-    first_goal_error, goal_error : before the corrections, and after them [rad]
+    goal_error : angle between the end of `motion` and the goal [rad]
+    first_goal_error : before the corrections [rad]
     steps : corrections made
     via_places : (v,) where `path` passes the waypoints
     """
@@ -48,28 +49,10 @@ class PolishedPath:
     duration: float
     path: ShapePath
     motion: Motion
-    first_goal_error: float
     goal_error: float
+    first_goal_error: float
     steps: int
     via_places: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Iterate:
-    """Reconstructed path of a Newton step."""
-
-    control: Array
-    duration: float
-    path: ShapePath
-    motion: Motion
-    goal_error: float
-
-
-def panel_nodes(basis: SplineBasis) -> tuple[Array, Array]:
-    """Gauss nodes of all pieces of [0, 1] and their weights: (N,), (N,)."""
-    inside, weights, _ = gauss_tableau(_NODES)
-    places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
-    return places, np.tile(weights, basis.pieces) / basis.pieces
 
 
 def end_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, motion: Motion) -> Array:
@@ -83,7 +66,7 @@ def end_derivative(task: Reorientation, basis: SplineBasis, path: ShapePath, mot
     Source: theory.md B2 varied; for loops without momentum equal to `holonomy_derivative`.
     """
     body, momentum = task.body, task.momentum
-    places, weights = panel_nodes(basis)
+    places, weights = basis.gauss(GAUSS_NODES)
     duration = motion.duration
     times = np.minimum(places * duration, duration)
     shapes, rates = path.curve(times)
@@ -128,9 +111,8 @@ def polish(
     AccuracyNotReached, SingularInertiaError
         See `reconstruct`.
     """
-    first = now = best = _reconstructed(task, basis, control, duration)
-    steps_to_best = 0
     at = np.zeros(0) if via_places is None else via_places
+    first = now = best = _reconstructed(task, basis, control, duration, at)
     for step in range(1, _STEPS + 1):
         if now.goal_error <= _CONVERGED or now.goal_error > _TOO_FAR:
             break
@@ -141,33 +123,21 @@ def polish(
         missing = values - np.einsum("jkm,km->j", passed, now.control)
         rows, right = np.concatenate([slopes, passed]).reshape(-1, now.control.size), np.append(turn, missing)
         corrected = _corrected(task, basis, now.control, now.duration, rows, right)
-        now = _reconstructed(task, basis, *corrected)
+        now = replace(_reconstructed(task, basis, *corrected, at), first_goal_error=first.goal_error, steps=step)
         if now.goal_error < best.goal_error:
-            best, steps_to_best = now, step
-    return PolishedPath(
-        control=best.control,
-        duration=best.duration,
-        path=best.path,
-        motion=best.motion,
-        first_goal_error=first.goal_error,
-        goal_error=best.goal_error,
-        steps=steps_to_best,
-        via_places=at,
-    )
+            best = now
+    return best
 
 
-def _reconstructed(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> _Iterate:
-    """Return the path of control points, and its motion."""
+def _reconstructed(
+    task: Reorientation, basis: SplineBasis, control: Array, duration: float, via_places: Array
+) -> PolishedPath:
+    """Return the path of control points and its motion, before corrections."""
     path = basis.path(task.shapes(control), duration, task.body.joint_names)
     along = deformation_along(task.body, route_along(task.body, path))
     motion = reconstruct(along, task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
-    return _Iterate(
-        control=control,
-        duration=duration,
-        path=path,
-        motion=motion,
-        goal_error=task.goal_error(motion.final_attitude, control[-1]),
-    )
+    error = task.goal_error(motion.final_attitude, control[-1])
+    return PolishedPath(control, duration, path, motion, error, error, 0, via_places)
 
 
 def _corrected(
@@ -265,16 +235,6 @@ class _ActiveSet:
         return rows.reshape(len(where), self.bounding.shape[1] * self.active.shape[1])
 
 
-def movable_points(task: Reorientation, basis: SplineBasis) -> Mask:
-    """Mask (k, m) of control points that may move: not those of the ends."""
-    free = np.tile(task.movable, (basis.dimension, 1))
-    fixed = list(range(task.equal_points))
-    free[fixed] = False
-    if task.end is not None:
-        free[[basis.dimension - 1 - place for place in fixed]] = False
-    return free
-
-
 def end_conditions(task: Reorientation, basis: SplineBasis) -> Array:
     """Rows (j, k) whose product with the control points of each coordinate is zero, besides the fixed points."""
     return basis.end_conditions(
@@ -283,19 +243,23 @@ def end_conditions(task: Reorientation, basis: SplineBasis) -> Array:
 
 
 def _free(task: Reorientation, basis: SplineBasis, control: Array) -> Mask:
-    """Mask (k, m) of movable control points that are not at their limits."""
+    """Mask (k, m) of control points that may move: not those of the ends, nor those at their limits."""
+    free = np.tile(task.movable, (basis.dimension, 1))
+    free[: task.equal_points] = False
+    if task.end is not None:
+        free[-task.equal_points :] = False
     reach = _ACTIVE * np.maximum(task.upper - task.lower, _LEAST_RANGE)
-    return movable_points(task, basis) & (control > task.lower + reach) & (control < task.upper - reach)
+    return free & (control > task.lower + reach) & (control < task.upper - reach)
 
 
 def _transported(generator: Array, basis: SplineBasis, duration: float) -> Array:
     """P(t) with P(T) = 1, P' = -P K, by collocation: K at the nodes of all pieces (N, 3, 3) -> P there (N, 3, 3)."""
-    _, weights, integrals = gauss_tableau(_NODES)
-    step = duration / basis.pieces
-    field = step * generator.reshape(basis.pieces, _NODES, 3, 3)
-    system = np.einsum("ij,pjab->piajb", integrals, field).reshape(basis.pieces, 3 * _NODES, 3 * _NODES)
-    fields = np.linalg.solve(np.eye(3 * _NODES) - system, np.tile(np.eye(3), (_NODES, 1)))
-    inner = fields.reshape(basis.pieces, _NODES, 3, 3)
+    _, weights, integrals = gauss_tableau(GAUSS_NODES)
+    step, size = duration / basis.pieces, 3 * GAUSS_NODES
+    field = step * generator.reshape(basis.pieces, GAUSS_NODES, 3, 3)
+    system = np.einsum("ij,pjab->piajb", integrals, field).reshape(basis.pieces, size, size)
+    fields = np.linalg.solve(np.eye(size) - system, np.tile(np.eye(3), (GAUSS_NODES, 1)))
+    inner = fields.reshape(basis.pieces, GAUSS_NODES, 3, 3)
     whole = np.eye(3) + np.einsum("j,pjab,pjbc->pac", weights, field, inner)
     transported = np.empty_like(inner)
     to_end = np.eye(3)

@@ -68,9 +68,9 @@ class _ReachableTurns:
         if task.target is None:
             axis, direction = task.pointing_axes()
             pointed = so3.apply(self.attitudes @ self.links, axis)
-            gaps = _angle_from(direction, pointed)
+            gaps = so3.angle_between(direction, pointed)
             if self.axis is not None:
-                gaps = np.abs(_angle_from(self.axis, pointed) - _angle_from(self.axis, direction))
+                gaps = np.abs(so3.angle_between(self.axis, pointed) - so3.angle_between(self.axis, direction))
         else:
             apart = task.target @ np.swapaxes(self.attitudes, -1, -2)
             gaps = so3.angle(apart)
@@ -336,9 +336,7 @@ def _with_angles(task: Reorientation, moves: Integers, plane: _ReachableTurns) -
 
 def _drawn(task: Reorientation) -> Array:
     """Coordinates drawn within the limits (N, m)."""
-    reach = _RADIUS * _strokes(task)
-    lower, upper = np.maximum(task.lower, task.start - reach), np.minimum(task.upper, task.start + reach)
-    return np.random.default_rng(_SEED).uniform(lower, upper, (_SHAPES, task.dimension))
+    return np.random.default_rng(_SEED).uniform(*task.reach(_RADIUS * _strokes(task)), (_SHAPES, task.dimension))
 
 
 def _is_analytic(body: Body) -> bool:
@@ -359,11 +357,6 @@ def _link_attitudes(task: Reorientation, shapes: Array) -> Array:
     if task.link is None:
         return np.broadcast_to(np.eye(3), (len(shapes), 3, 3))
     return task.body.link_pose(shapes, task.link)[:, :3, :3]
-
-
-def _angle_from(axis: Array, vectors: Array) -> Array:
-    """Angle between an axis and vectors (..., 3) -> (...)."""
-    return np.arctan2(np.linalg.norm(np.cross(axis, vectors), axis=-1), vectors @ axis)
 
 
 def _more_joints(task: Reorientation) -> str:

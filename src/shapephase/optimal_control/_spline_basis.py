@@ -43,6 +43,12 @@ class SplineBasis:
         """Knots: the nodes without the second and the last but one, the ends fourfold."""
         return np.concatenate([np.zeros(_DEGREE + 1), self.nodes[2:-2], np.ones(_DEGREE + 1)])
 
+    def gauss(self, stages: int) -> tuple[Array, Array]:
+        """Gauss nodes of all pieces of [0, 1] and their weights: (N,), (N,)."""
+        inside, weights, _ = gauss_tableau(stages)
+        places = (self.nodes[:-1, None] + inside / self.pieces).ravel()
+        return places, np.tile(weights, self.pieces) / self.pieces
+
     def matrix(self, places: Array, order: int = 0) -> Array:
         """Values of the basis functions, or of a derivative by place, at places of [0, 1]: (N,) -> (N, k)."""
         from scipy.interpolate import BSpline
@@ -62,10 +68,9 @@ class SplineBasis:
     @cached_property
     def inverse_norm(self) -> Array:
         """Inverse of the Gram matrix of values at the control points and of rates along the path: (k, k)."""
-        inside, weights = np.polynomial.legendre.leggauss(_DEGREE)
-        places = (self.nodes[:-1, None] + 0.5 * (inside + 1.0) / self.pieces).ravel()
+        places, weights = self.gauss(_DEGREE)
         rates = self.sparse_matrix(places, 1)
-        weighted = rates.multiply(np.tile(0.5 * weights, self.pieces)[:, None] / self.pieces)
+        weighted = rates.multiply(weights[:, None])
         return np.linalg.inv((weighted.T @ rates).toarray() + np.eye(self.dimension))
 
     @cached_property

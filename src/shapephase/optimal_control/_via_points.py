@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import factorial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from .plan_options import Waypoint
 if TYPE_CHECKING:
     from .task import Reorientation
 
-_TOLERANCE = 1e-9  # [rad or m] of waypoints against couplings and limits: rounding of user input
+_TOLERANCE = 1e-9  # [rad or m] of postures against couplings and limits: rounding of degrees or of a file's digits
 _EVENNESS = 0.1  # weight of even spacing against nearness: decides where guesses rest or return
 
 
@@ -99,24 +100,35 @@ def _coordinates(
         named = dict(enumerate(shape.tolist()))
     known: dict[int, float] = {}
     for joint, value in named.items():
-        if not bounds[joint, 0] - _TOLERANCE <= value <= bounds[joint, 1] + _TOLERANCE:
-            raise TrajectoryError(
-                f"{name}: joint {body.joint_names[joint]} at {value:.6g} is beyond its limits "
-                f"{bounds[joint, 0]:.6g} ... {bounds[joint, 1]:.6g}"
-            )
+        check_within(body, joint, value, bounds, name)
         moves, column = coupling[joint].any(), int(np.argmax(coupling[joint] != 0.0))
         if moves and column not in known:
             known[column] = (value - offset[joint]) / coupling[joint, column]
         must = coupling[joint, column] * known[column] + offset[joint] if moves else offset[joint]
-        if abs(must - value) > _TOLERANCE:
-            raise TrajectoryError(
-                f"{name}: joint {body.joint_names[joint]} at {value:.6g} must be at {must:.6g}, where the joint that "
-                "it follows puts it, or where it is held fixed"
-            )
+        check_follows(body, joint, value, must, name)
     if not known:
         raise TrajectoryError(f"{name}: none of its joints moves")
     columns = np.array(sorted(known))
     return columns, np.array([known[column] for column in columns.tolist()])
+
+
+def check_within(body: Body, joint: int, value: float, bounds: Array, name: str) -> None:
+    """Raise TrajectoryError where a joint of a posture called `name` is beyond its bounds (n, 2)."""
+    low, high = bounds[joint]
+    if not low - _TOLERANCE <= value <= high + _TOLERANCE:
+        raise TrajectoryError(
+            f"{name}: joint {body.joint_names[joint]} at {value:.6g} is beyond its limits {low:.6g} ... {high:.6g}; "
+            "choose another shape, or joint_limits=False"
+        )
+
+
+def check_follows(body: Body, joint: int, value: float, must: float, name: str) -> None:
+    """Raise TrajectoryError where a joint of a posture called `name` is not where others or the start put it."""
+    if abs(must - value) > _TOLERANCE:
+        raise TrajectoryError(
+            f"{name}: joint {body.joint_names[joint]} at {value:.6g} must be at {must:.6g}, where the joint that it "
+            "follows puts it, or where it is held fixed"
+        )
 
 
 def nearest_places(task: Reorientation, curve: Array, places: Array) -> Array:
@@ -207,8 +219,8 @@ def _weights(basis: SplineBasis, place: Any) -> Any:
     begin = np.unique(basis.knots)[:-1]
     begun, ended = np.append(-np.inf, begin[1:]), np.append(begin[1:], np.inf)
     powers, weights = casadi.logic_and(place >= casadi.DM(begun), place < casadi.DM(ended)), 0.0
-    for order, factorial in enumerate((1.0, 1.0, 2.0, 6.0)):
-        coefficients = basis.matrix(begin, order) / factorial
+    for order in range(4):
+        coefficients = basis.matrix(begin, order) / factorial(order)
         weights = weights + casadi.sparsify(casadi.DM(coefficients.T)) @ powers
         powers = powers * (place - casadi.DM(begin))
     return weights

@@ -13,10 +13,10 @@ from ..arrays import Array
 from ._polish import end_conditions
 from ._spline_basis import SplineBasis, gauss_tableau
 from ._via_points import open_points, symbolic_via_rows
-from .nodes.limit_rows import EffortTerms, derivative_rows
+from .nodes.node_efforts import EffortTerms
 from .nodes.node_functions import node_arguments, node_functions, scipy_sparse, sparse_matrix
 from .solver_callback import BestIterate, IterationCallback, ipopt_callback
-from .symbolic import symbolic_body
+from .symbolic import symbolic_body, turned_back
 from .task import Reorientation
 
 STAGES = 3  # Gauss nodes of a piece, order six: 12 pieces of the cat are off by 1e-4 rad, which the polish removes
@@ -80,6 +80,7 @@ class CollocationProgram:
 
     Attributes
     ----------
+    basis : spline of the path
     places : places of the nodes
     program : x, p, f and g as CasADi's `nlpsol` takes them
     derivatives : Jacobian of g and Hessian of the Lagrangian, as functions that `nlpsol` takes
@@ -88,9 +89,10 @@ class CollocationProgram:
     def __init__(self, task: Reorientation, basis: SplineBasis) -> None:
         import casadi
 
-        self._task, self._basis = task, basis
-        inside, weights, integrals = gauss_tableau(STAGES)
-        self.places = (basis.nodes[:-1, None] + inside / basis.pieces).ravel()
+        self._task, self.basis = task, basis
+        self._shared, self._ones, self._n_ends = np.arange(basis.dimension), [0], basis.pieces + 1
+        _, weights, integrals = gauss_tableau(STAGES)
+        self.places, _ = basis.gauss(STAGES)
         count, step, width = len(self.places), 1.0 / basis.pieces, 2 * task.dimension + 5
         duration_place = task.dimension * basis.dimension
         core = duration_place + 1 + 4 * (count + basis.pieces + 1)
@@ -108,7 +110,7 @@ class CollocationProgram:
             task, unknown[duration_place - task.dimension : duration_place], unknown[core - 4 : core]
         )
         via, via_low, via_high = symbolic_via_rows(task, basis, unknown[:duration_place], unknown[self._open])
-        bends = derivative_rows(task, basis, unknown)
+        bends = _derivative_rows(task, basis, unknown)
         efforts = None
         if task.efforts_limited or task.cost == "effort":
             efforts = EffortTerms(task, basis, self.places, panels, unknown)
@@ -162,54 +164,44 @@ class CollocationProgram:
     def _linear_rows(self, step: float, weights: Array, integrals: Array) -> tuple[Any, Any, Array, Array]:
         """Rows of collocation and rate limits: linear part, matrix of the turning, lower and upper bounds."""
         sparse = scipy_sparse()
-        task, basis = self._task, self._basis
+        task, basis = self._task, self.basis
         pieces, count = basis.pieces, len(self.places)
         before, after = sparse.eye(pieces, pieces + 1), sparse.eye(pieces, pieces + 1, k=1)
         from_start = sparse.kron(before, np.ones((STAGES, 1)))
-        no_control = sparse.csr_matrix((4 * (count + pieces), task.dimension * basis.dimension + 1))
+
         quaternions = sparse.kron(
             sparse.block_array([[sparse.eye(count), -from_start], [None, after - before]]), sparse.eye(4)
         )
         limited = np.flatnonzero(np.isfinite(task.rate_limit))
         rates = sparse.kron(basis.rate_control, sparse.eye(task.dimension).tocsr()[limited])
-        rate_limits = np.tile(task.rate_limit[limited], basis.dimension - 1)[:, None]
-        no_quaternions = sparse.csr_matrix((rates.shape[0], quaternions.shape[1]))
+        rate_limits = sparse.csr_matrix(np.tile(task.rate_limit[limited], basis.dimension - 1)[:, None])
         conditions = sparse.kron(end_conditions(task, basis), sparse.eye(task.dimension)).tocsr()
-        linear = sparse.vstack(
+        no_places = sparse.csr_matrix((conditions.shape[0], self._open.stop - self._open.start))
+        linear = sparse.block_array(
             [
-                sparse.hstack([no_control, quaternions]),
-                sparse.hstack([rates, -rate_limits, no_quaternions]),
-                sparse.hstack([rates, rate_limits, no_quaternions]),
-                sparse.hstack([conditions, sparse.csr_matrix((conditions.shape[0], 1 + quaternions.shape[1]))]),
+                [None, None, quaternions, None],
+                [rates, -rate_limits, None, None],
+                [rates, rate_limits, None, None],
+                [conditions, None, None, no_places],
             ]
         )
-        turning = sparse.vstack(
-            [
-                sparse.kron(sparse.eye(pieces), step * integrals),
-                sparse.kron(sparse.eye(pieces), step * weights[None]),
-            ]
-        )
-        turning = sparse.vstack(
-            [
-                sparse.kron(turning, sparse.eye(4)),
-                sparse.csr_matrix((2 * rates.shape[0] + conditions.shape[0], 4 * count)),
-            ]
-        )
+        turning = sparse.vstack([sparse.kron(sparse.eye(pieces), step * rows) for rows in (integrals, weights[None])])
+        still = sparse.csr_matrix((2 * rates.shape[0] + conditions.shape[0], 4 * count))
+        turning = sparse.vstack([sparse.kron(turning, sparse.eye(4)), still])
         equal, zero = np.zeros(4 * (count + pieces)), np.zeros(rates.shape[0])
         unbounded = np.full(rates.shape[0], np.inf)
         met = np.zeros(conditions.shape[0])
         low, high = np.concatenate([equal, -unbounded, zero, met]), np.concatenate([equal, zero, unbounded, met])
-        no_places = sparse.csr_matrix((linear.shape[0], self._open.stop - self._open.start))
-        return sparse_matrix(sparse.hstack([linear, no_places])), sparse_matrix(turning), low, high
+        return sparse_matrix(linear), sparse_matrix(turning), low, high
 
     def _acceleration_cost(self, unknown: Any) -> Any:
         """Integral of half the squared second derivative: exact with two nodes of a piece or more."""
         import casadi
 
-        task, basis = self._task, self._basis
-        _, weights, _ = gauss_tableau(STAGES)
-        bend = basis.matrix(self.places, 2)
-        gram = bend.T @ (np.tile(weights, basis.pieces)[:, None] / basis.pieces * bend)
+        task, basis = self._task, self.basis
+        places, weights = basis.gauss(STAGES)
+        bend = basis.matrix(places, 2)
+        gram = bend.T @ (weights[:, None] * bend)
         control = casadi.reshape(unknown[: task.dimension * basis.dimension], task.dimension, basis.dimension)
         in_joints = casadi.DM(task.coupling) @ control
         return 0.5 * casadi.dot(in_joints @ casadi.DM(gram), in_joints) / unknown[task.dimension * basis.dimension] ** 3
@@ -236,22 +228,29 @@ class CollocationProgram:
         room : shares of their limits for efforts at the nodes and the ends of pieces, (places, l); None: 1
         """
         at = np.zeros(len(self._task.via)) if via_places is None else via_places
-        attitudes = [quaternions(self.places).ravel(), quaternions(self._basis.nodes).ravel()]
+        attitudes = [quaternions(self.places).ravel(), quaternions(self.basis.nodes).ravel()]
         guess = np.concatenate([control.ravel(), [duration], *attitudes, at[open_points(self._task)]])
+        still = np.concatenate([guess[: control.size + 1], np.zeros(len(guess) - control.size - 1)])
+        cost = float(self._cost_function(still))
+        return self._optimum(guess, cost, iteration_callback, iterations, tolerance, settles, room)
+
+    def _optimum(
+        self,
+        guess: Array,
+        cost: float,
+        iteration_callback: IterationCallback | None,
+        iterations: int,
+        tolerance: float = _TOLERANCE,
+        settles: bool = False,
+        room: Array | None = None,
+    ) -> NlpSolution:
+        """Return IPOPT's optimum from a guess of the unknowns, whose cost is the unit of costs unless it is 0."""
+        import casadi
+
         best = BestIterate(iteration_callback, self._goal_error)
         rows_low, rows_high = self._low.copy(), self._high.copy()
         if room is not None:
             rows_low[-room.size :], rows_high[-room.size :] = -room.ravel(), room.ravel()
-        # The local name keeps it alive: CasADi does not.
-        callback = ipopt_callback(best, len(guess), rows_low, rows_high)
-        solver = self._ipopt(callback, 1.0 / self._cost_scale(control, duration), iterations, tolerance, settles)
-        low, high = self._bounds()
-        result = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=rows_low, ubg=rows_high)
-        return self._solution(np.array(result["x"]).ravel(), float(result["f"]), solver.stats(), best)
-
-    def _ipopt(self, callback: Any, cost_factor: float, iterations: int, tolerance: float, settles: bool) -> Any:
-        import casadi
-
         settled = {
             "acceptable_tol": _SETTLED_TOLERANCE,
             "acceptable_constr_viol_tol": _SETTLED_TOLERANCE,
@@ -260,25 +259,25 @@ class CollocationProgram:
             "acceptable_obj_change_tol": _SETTLED_CHANGE,
             "acceptable_iter": _SETTLED_ITERATIONS,
         }
-
         options = {
             "print_level": 0,
             "sb": "yes",
             "max_iter": int(iterations),
             "tol": tolerance,
-            "obj_scaling_factor": cost_factor,
+            "obj_scaling_factor": 1.0 / cost if cost > 0.0 else 1.0,
             "nlp_scaling_method": "none",
             "bound_relax_factor": 0.0,
             "linear_solver": "mumps",
             "mu_strategy": "adaptive",
             **(settled if settles else {}),
         }
-        return casadi.nlpsol(
-            "plan",
-            "ipopt",
-            self.program,
-            {"ipopt": options, "print_time": False, "iteration_callback": callback, **self.derivatives},
-        )
+        # The local name keeps it alive: CasADi does not.
+        callback = ipopt_callback(best, len(guess), rows_low, rows_high)
+        given = {"ipopt": options, "print_time": False, "iteration_callback": callback, **self.derivatives}
+        solver = casadi.nlpsol("plan", "ipopt", self.program, given)
+        low, high = self._bounds()
+        result = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=rows_low, ubg=rows_high)
+        return self._solution(np.array(result["x"]).ravel(), float(result["f"]), solver.stats(), best)
 
     def _solution(self, values: Array, cost: float, stats: dict[str, Any], best: BestIterate) -> NlpSolution:
         """Return IPOPT's solution; where it was stopped, the best iterate instead of the last."""
@@ -295,9 +294,9 @@ class CollocationProgram:
             status = f"{status}, but degenerate"
         if status == _STOPPED:
             values, cost, primal = best.unknowns, best.cost, best.infeasibility
-        points = self._task.dimension * self._basis.dimension
+        points = (self._shared.max() + 1) * self._task.dimension
         return NlpSolution(
-            control=values[:points].reshape(self._basis.dimension, self._task.dimension),
+            control=values[:points].reshape(-1, self._task.dimension)[self._shared],
             duration=float(values[points]),
             attitude=self._last_attitude(values),
             cost=cost,
@@ -314,8 +313,8 @@ class CollocationProgram:
 
     def _goal_error(self, values: Array) -> float:
         """Goal error of unknowns [rad]."""
-        points = self._task.dimension * self._basis.dimension
-        return self._task.goal_error(self._last_attitude(values), values[points - self._task.dimension : points])
+        last = self._task.dimension * int(self._shared[-1])
+        return self._task.goal_error(self._last_attitude(values), values[last : last + self._task.dimension])
 
     def _last_attitude(self, values: Array) -> Array:
         return so3.matrix_from_quat(so3.normalised(values[self._open.start - 4 : self._open.start]))
@@ -326,28 +325,17 @@ class CollocationProgram:
         places[open_points(self._task)] = values[self._open]
         return places
 
-    def _cost_scale(self, control: Array, duration: float) -> float:
-        """Cost of a guess, or 1 where it is zero."""
-        rest = np.zeros(4 * (len(self.places) + self._basis.pieces + 1) + self._open.stop - self._open.start)
-        value = float(self._cost_function(np.concatenate([control.ravel(), [duration], rest])))
-        return value if value > 0.0 else 1.0
-
     def _bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the unknowns: limits, fixed ends, the duration unless it is to be found."""
-        task, basis = self._task, self._basis
-        bounds = []
+        task, bounds = self._task, []
         for limit, free in ((task.lower, -np.inf), (task.upper, np.inf)):
-            control = np.tile(limit, (basis.dimension, 1))
-            control[0] = task.start
+            control = np.tile(limit, (int(self._shared.max()) + 1, 1))
+            control[self._shared[: task.equal_points]] = task.start
             if task.end is not None:
-                control[-1] = task.end
-            equal = task.equal_points
-            control[:equal] = control[0]
-            if task.end is not None:
-                control[-equal:] = control[-1]
+                control[self._shared[-task.equal_points :]] = task.end
             duration = _SHORTEST * task.duration if task.cost == "time" and free < 0.0 else task.duration
-            inner, ends = np.full(4 * len(self.places), free), np.full((basis.pieces + 1, 4), free)
-            ends[0] = [0.0, 0.0, 0.0, 1.0]
+            inner, ends = np.full(4 * len(self.places), free), np.full((self._n_ends, 4), free)
+            ends[self._ones] = [0.0, 0.0, 0.0, 1.0]
             opened = np.full(self._open.stop - self._open.start, 0.0 if free < 0.0 else 1.0)
             bounds.append(np.concatenate([control.ravel(), [duration], inner, ends.ravel(), opened]))
         return bounds[0], bounds[1]
@@ -361,14 +349,24 @@ def final_conditions(task: Reorientation, coordinates: Any, quaternion: Any) -> 
         x, y, z, w = so3.quat_from_matrix(task.target)
         return casadi.DM([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]]) @ quaternion
     axis, direction = task.pointing_axes()
-    vector, scalar = quaternion[:3], quaternion[3]
     pointed = casadi.DM(axis)
     if task.link is not None:
         shape = casadi.DM(task.coupling) @ coordinates + casadi.DM(task.offset)
         pointed = symbolic_body(task.body).link_pose(task.link)(shape)[:3, :3] @ pointed
-    turned = (
-        pointed
-        + 2.0 * scalar * casadi.cross(vector, pointed)
-        + 2.0 * casadi.cross(vector, casadi.cross(vector, pointed))
-    )
+    # The conjugate quaternion turns into inertial axes.
+    turned = turned_back(casadi.vertcat(-quaternion[:3], quaternion[3]), pointed)
     return casadi.DM(np.vstack([task.constrained_directions(), direction])) @ turned
+
+
+def _derivative_rows(task: Reorientation, basis: SplineBasis, unknown: Any) -> Any:
+    """Second and third derivatives of the coordinates by time, at their control points, as shares of limits: (j,)."""
+    import casadi
+
+    sparse, place = scipy_sparse(), task.dimension * basis.dimension
+    rows = []
+    for order, limit in ((2, task.acceleration_limit), (3, task.jerk_limit)):
+        limited = np.flatnonzero(np.isfinite(limit))
+        chosen = sparse.csr_matrix(sparse.eye(task.dimension).tocsr()[limited] / limit[limited, None])
+        matrix = sparse_matrix(sparse.kron(basis.derivative_control(order), chosen))
+        rows.append(matrix @ unknown[:place] / unknown[place] ** order)
+    return casadi.vertcat(*rows)

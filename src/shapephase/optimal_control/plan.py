@@ -25,7 +25,7 @@ AGREEMENT = 1e-3  # relative difference of costs up to which starts have come to
 
 @dataclass(frozen=True)
 class Start:
-    """Result of one start of the search.
+    """Result of one start of the search. Made by `plan_reorientation`.
 
     Attributes
     ----------
@@ -38,12 +38,6 @@ class Start:
     seconds : time it took
     second_order : whether the projected Hessian of the Lagrangian is positive definite there, so that no neighbour is
         cheaper; None where unknown
-
-    Examples
-    --------
-    >>> start = sp.optimal_control.Start("Solve_Succeeded", True, 0.09, 1e-10, 1e-9, 1e-9, 25, 0.4)
-    >>> start.converged, start.iterations
-    (True, 25)
     """
 
     status: str
@@ -61,7 +55,7 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Motion of the joints that turns a body to a goal, and the search that found it.
+    """Motion of the joints that turns a body to a goal, and the search that found it. Made by `plan_reorientation`.
 
     Attributes
     ----------
@@ -91,14 +85,6 @@ class Plan:
     goal : the goal that `path` was to reach; of several, the cheapest
     status : "found"; "not found" for a `PlanNotFound.best`; "stopped" or "out of time" before the end of all starts
     waypoint_times : (v,) times at which `path` passes its waypoints [s]
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> goal, search = sp.so3.exp(np.array([1.0, 0.0, 0.0])), sp.optimal_control.Search(pieces=16)
-    >>> plan = sp.plan_reorientation(cat, goal, search=search)
-    >>> plan.cost_name, plan.goal_error < 1e-8
-    ('kinetic', True)
     """
 
     body: Body

@@ -90,13 +90,13 @@ class Goal:
                 raise ShapeError(
                     f"rotation: one rotation (3, 3), or several (k, 3, 3), are needed, got shape {rotation.shape}"
                 )
-            self._keep("rotation", rotation)
+            _keep(self, "rotation", rotation)
         if self.pointing is not None:
-            self._keep("pointing", _unit_pairs(self.pointing))
+            _keep(self, "pointing", _unit_pairs(self.pointing))
         if self.link is not None and (self.pointing is None or not isinstance(self.link, str)):
             raise ShapeError(f"link: the name of the one whose axis `pointing` has, got {value_text(self.link)}")
         if self.symmetry is not None:
-            self._keep("symmetry", _symmetry_argument(self.symmetry))
+            _keep(self, "symmetry", _symmetry_argument(self.symmetry))
             if self.winds or (self.pointing is not None and np.ndim(self.symmetry) == 1):
                 raise ShapeError("symmetry: an axis goes with rotation, rotations go with rotation or pointing")
         axis = finite_array(self.twist_axis, "twist_axis", (3,))
@@ -104,10 +104,7 @@ class Goal:
             raise ShapeError(
                 f"twist_axis: one vector (3,) that is not zero is needed, got {value_text(self.twist_axis)}"
             )
-        self._keep("twist_axis", axis)
-
-    def _keep(self, name: str, value: Array) -> None:
-        object.__setattr__(self, name, _read_only(value))
+        _keep(self, "twist_axis", axis)
 
     @property
     def winds(self) -> bool:
@@ -167,23 +164,17 @@ class Limits:
         if not isinstance(self.joint_limits, bool | np.bool_):
             raise ShapeError(f"joint_limits: True or False is needed, got {value_text(self.joint_limits)}")
         for name, (unit, stated) in LIMIT_UNITS.items():
-            self._check(name, unit, ("body",) if stated else ())
-
-    def _check(self, name: str, unit: str, words: tuple[str, ...]) -> None:
-        """Check limits of one kind, which may be one of some words."""
-        given = getattr(self, name)
-        if given is None:
-            return
-        if isinstance(given, str):
-            if given not in words:
+            given, words = getattr(self, name), ("body",) if stated else ()
+            if given is None or (isinstance(given, str) and given in words):
+                continue
+            if isinstance(given, str):
                 raise unknown_name(f"value of {name}", given, (*words, "a number, or one for each joint"))
-            return
-        limits = finite_array(given, name, unit=unit)
-        if limits.ndim > 1 or np.any(limits <= 0.0):
-            raise ShapeError(
-                f"{name}: one number above 0, or one for each of the joints, is needed, got {value_text(given)}"
-            )
-        object.__setattr__(self, name, _read_only(limits))
+            limits = finite_array(given, name, unit=unit)
+            if limits.ndim > 1 or np.any(limits <= 0.0):
+                raise ShapeError(
+                    f"{name}: one number above 0, or one for each of the joints, is needed, got {value_text(given)}"
+                )
+            _keep(self, name, limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,13 +210,12 @@ class Waypoint:
             kept = {name: finite_array(value, f"waypoint: {name}", ()).item() for name, value in self.shape.items()}
             object.__setattr__(self, "shape", kept)
         else:
-            shape = np.array(finite_array(self.shape, "waypoint"))
+            shape = finite_array(self.shape, "waypoint")
             if shape.ndim != 1 or not len(shape):
                 raise ShapeError(
                     f"waypoint: one coordinate for each joint, or names with coordinates, got {value_text(self.shape)}"
                 )
-            shape.flags.writeable = False
-            object.__setattr__(self, "shape", shape)
+            _keep(self, "shape", shape)
         if self.time is not None:
             object.__setattr__(self, "time", positive_argument(self.time, "time of a waypoint"))
 
@@ -306,10 +296,11 @@ def _check_count(value: Any, name: str, least: int, most: int | None = None) -> 
         raise ShapeError(f"{name}: a whole number, up to {most}, is needed, got {value_text(value)}")
 
 
-def _read_only(array: Array) -> Array:
+def _keep(options: object, name: str, array: Array) -> None:
+    """Store a copy of an array that cannot be changed."""
     kept = array.copy()
     kept.flags.writeable = False
-    return kept
+    object.__setattr__(options, name, kept)
 
 
 def _symmetry_argument(value: ArrayLike) -> Array:

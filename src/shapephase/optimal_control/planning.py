@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from typing import Any
@@ -16,16 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
 from ..arguments import check_executor, check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..errors import PlanNotFound
 from ..run_progress import ProgressCallback, check_progress
-from ..shape_space.connection import mechanical_connection
-from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes, polished_path
+from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes
+from ._path_cost import cost_density
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
-from ._polish import panel_nodes
+from ._polish import GAUSS_NODES
 from ._reachable_turns import check_reachable
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
@@ -188,13 +187,7 @@ def plan_reorientation(
     return plan
 
 
-@dataclass(frozen=True, eq=False)
-class _Job:
-    """Local search that is to be done."""
-
-    task: Reorientation
-    basis: SplineBasis
-    guess: Guess
+_Job = tuple[Reorientation, SplineBasis, Guess]  # a local search that is to be done
 
 
 def _searches(
@@ -236,19 +229,22 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonito
     for task in tasks:
         if first and monitor.stopped:
             break
-        basis = SplineBasis(int(search.pieces or _default_pieces(task)))
+        pieces = _PIECES if task.dimension <= _MANY_JOINTS else _PIECES_OF_MANY
+        if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate") and task.equal_points == 1:
+            pieces = _PIECES_OF_FEW
+        basis = SplineBasis(int(search.pieces or pieces))
         for jobs, starts in zip((first, spare), _starting_points(task, basis, search, monitor), strict=True):
-            jobs.extend(_Job(task, basis, guess) for guess in starts)
+            jobs.extend((task, basis, guess) for guess in starts)
     return first, spare
 
 
 def _searched_here(jobs: Sequence[_Job], search: Search, monitor: _SearchMonitor) -> Iterator[Attempt]:
     """Yield local searches, one after the other."""
     local = None
-    for number, job in enumerate(jobs):
-        if local is None or local.task is not job.task:
-            local = LocalSearch.of(job.task, job.basis, search)
-        yield local.attempt(job.guess, monitor.solver_callback("search", number + 1, len(jobs)))
+    for number, (task, basis, guess) in enumerate(jobs):
+        if local is None or local.task is not task:
+            local = LocalSearch.of(task, basis, search)
+        yield local.attempt(guess, monitor.solver_callback("search", number + 1, len(jobs)))
 
 
 def _searched_by_strokes(task: Reorientation, search: Search, monitor: _SearchMonitor) -> Iterator[Attempt]:
@@ -262,7 +258,7 @@ def _searched_by_strokes(task: Reorientation, search: Search, monitor: _SearchMo
     if strokes_suffice(task):
         began = time.perf_counter()
         solution = StrokeProgram(task, layout).solve_strokes(control, callback)
-        equal = corrected_attempt(task, layout.basis, solution, polished_path(task, layout.basis, solution), began)
+        equal = corrected_attempt(task, layout.basis, solution, began)
         yield equal
         if equal.report.converged or monitor.stopped:
             return
@@ -276,15 +272,15 @@ def _searched_by(
     executor: Executor, jobs: Sequence[_Job], search: Search, monitor: _SearchMonitor
 ) -> Iterator[Attempt]:
     """Yield local searches by an executor, in their order."""
-    recipes = {job.task: pickle.dumps((job.task, job.basis.pieces, search)) for job in jobs}
+    recipes = {task: pickle.dumps((task, basis.pieces, search)) for task, basis, _ in jobs}
     attempts = executor.map(
-        partial(_searched_elsewhere, monitor.end), [recipes[job.task] for job in jobs], [job.guess for job in jobs]
+        partial(_searched_elsewhere, monitor.end), [recipes[task] for task, *_ in jobs], [guess for *_, guess in jobs]
     )
-    for number, (job, attempt) in enumerate(zip(jobs, attempts, strict=True)):
+    for number, ((task, *_), attempt) in enumerate(zip(jobs, attempts, strict=True)):
         end = attempt.report
         report = monitor.solver_callback("search", number + 1, len(jobs))
         report(end.iterations, end.cost, end.infeasibility, end.goal_error)
-        yield replace(attempt, task=job.task)
+        yield replace(attempt, task=task)
 
 
 _KEPT = threading.local()  # the last program of a thread of an executor: it takes as long as some starts
@@ -335,12 +331,6 @@ class _SearchMonitor:
         """Report the end of a search that was not stopped."""
         if self._progress is not None and not self.stopped:
             self._progress(1.0, "done")
-
-
-def _default_pieces(task: Reorientation) -> int:
-    if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate") and task.equal_points == 1:
-        return _PIECES_OF_FEW
-    return _PIECES if task.dimension <= _MANY_JOINTS else _PIECES_OF_MANY
 
 
 def _starting_points(
@@ -427,15 +417,9 @@ def hamiltonian_spread(task: Reorientation, basis: SplineBasis, control: Array, 
     timed = any(point.place is not None for point in task.via)
     if task.cost not in ("kinetic", "rate") or task.momentum.any() or task.limits_beyond_rates or timed:
         return None
-    places, _ = panel_nodes(basis)
-    coordinates = basis.matrix(places) @ control
+    places, _ = basis.gauss(GAUSS_NODES)
     rates = basis.matrix(places, 1) @ control / duration
-    joints = rates @ task.coupling.T
-    if task.cost == "rate":
-        density = 0.5 * np.sum(joints**2, axis=1)
-    else:
-        shapes = task.shapes(coordinates)
-        density = task.body.kinetic_energy(shapes, joints, -so3.apply(mechanical_connection(task.body, shapes), joints))
+    density = cost_density(task.body, task.cost, task.shapes(basis.matrix(places) @ control), rates @ task.coupling.T)
     limited = np.any(np.abs(basis.rate_control @ control) > _AT_LIMIT * task.rate_limit * duration, axis=1)
     free = ~np.any(basis.rate_reaches & limited, axis=1)[_ENDS:-_ENDS]
     means = density.reshape(basis.pieces, -1).mean(axis=1)[_ENDS:-_ENDS][free]

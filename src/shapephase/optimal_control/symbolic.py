@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..arguments import check_object
+from ..arguments import check_choice, check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.functions import JointFunction
@@ -26,7 +26,7 @@ _building = Lock()
 
 @dataclass(frozen=True, eq=False)
 class SymbolicBody:
-    """Functions of a body's shape r (n,), each a `casadi.Function` of r alone.
+    """Functions of a body's shape r (n,), each a `casadi.Function` of r alone. Made by `symbolic_body`.
 
     Called with symbols of CasADi's kind SX a function gives its expression, with MX one call in the larger graph, with
     numbers a DM. All are in base axes. Can be pickled, and each function has CasADi's own `serialize`. For numbers of
@@ -48,15 +48,6 @@ class SymbolicBody:
     Notes
     -----
     Source: Cabrera 2006, section 2.3 and equation (4); theory.md A3, A6, A7.
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> functions = sp.optimal_control.symbolic_body(cat)
-    >>> print(np.array(functions.connection(np.zeros(3))).round(6))
-    [[0.  0.  0.5]
-     [0.5 0.  0. ]
-     [0.  0.5 0. ]]
     """
 
     name: str
@@ -91,8 +82,7 @@ class SymbolicBody:
         """
         import casadi
 
-        if quantity not in QUANTITIES:
-            raise unknown_name("quantity", quantity, QUANTITIES)
+        check_choice(quantity, "quantity", QUANTITIES)
         key = f"{quantity}_derivative"
         if key not in self._made:
             shape = casadi.SX.sym("shape", self.n_shape)
@@ -165,6 +155,22 @@ def solve_linear(matrix: Any, right: Any) -> Any:
     for row in reversed(range(dimension)):
         rows[row] = rows[row] - sum(lower[k, row] * rows[k] for k in range(row + 1, dimension))
     return casadi.vertcat(*rows)
+
+
+def quaternion_rate(quaternion: Any, omega: Any) -> Any:
+    """Rate of an attitude's quaternion xyzw at an angular velocity in base axes."""
+    import casadi
+
+    vector, scalar = quaternion[:3], quaternion[3]
+    return 0.5 * casadi.vertcat(scalar * omega + casadi.cross(vector, omega), -casadi.dot(vector, omega))
+
+
+def turned_back(quaternion: Any, vector: Any) -> Any:
+    """Inertial vector in base axes, R^T vector, for a unit quaternion."""
+    import casadi
+
+    axis, scalar = quaternion[:3], quaternion[3]
+    return vector - 2.0 * scalar * casadi.cross(axis, vector) + 2.0 * casadi.cross(axis, casadi.cross(axis, vector))
 
 
 def _symbolic(body: Body) -> SymbolicBody:

@@ -10,20 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_mapping, names_argument, positive_argument
+from ..arguments import check_choice, check_mapping, names_argument, positive_argument
 from ..arrays import Array, Mask, check_reach, finite_array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ._ball_chart import BallChart
-from ._via_points import ViaPoint, via_points
+from ._via_points import ViaPoint, check_follows, check_within, via_points
 from .plan_options import RATES_AT_ENDS, Goal, Limits, Waypoint, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "effort", "time")
 
 _FARTHEST = 1e3  # [rad or m] from the start, of joints without limits: keeps guesses and solver finite
-_COUPLING_TOLERANCE = 1e-9  # [rad or m] of an end posture: rounding of user input
-_LIMIT_TOLERANCE = 1e-9  # [rad or m] of an end posture: rounding of degrees or of a file's digits
+
 _MOST_NAMED = 8  # joints in an error
 _RIGHT_ANGLE_TOLERANCE = 1e-9  # cosine of momentum and twist axis: rounding of user input
 
@@ -104,6 +103,10 @@ class Reorientation:
     def movable(self) -> Mask:
         """Mask (m,) of coordinates that can leave their start."""
         return self.upper > self.lower
+
+    def reach(self, radius: float | Array) -> tuple[Array, Array]:
+        """Lower and upper limits of the coordinates, no farther from the start than a radius: (m,) each."""
+        return np.maximum(self.lower, self.start - radius), np.minimum(self.upper, self.start + radius)
 
     def turn_to_goal(self, attitude: Array | None = None, last: Array | None = None) -> Array:
         """Shortest rotation vector from an attitude at the end to the goal: (3,), inertial axes [rad].
@@ -186,10 +189,8 @@ def reorientation(
     ShapeError, TrajectoryError, UnknownNameError
         For arguments of the wrong shape, ends beyond the limits, or unknown names.
     """
-    if not isinstance(cost, str) or cost not in COSTS:
-        raise unknown_name("cost", cost, COSTS)
-    if rates_at_ends not in RATES_AT_ENDS:
-        raise unknown_name("value of rates_at_ends", rates_at_ends, RATES_AT_ENDS)
+    check_choice(cost, "cost", COSTS)
+    check_choice(rates_at_ends, "value of rates_at_ends", RATES_AT_ENDS)
     if not body.n_shape:
         raise ShapeError(f"{body.name} has no joints: nothing can turn it but its momentum")
     check_smooth(body.chain.follows, "plans need", kinks_only=True)
@@ -223,7 +224,9 @@ def reorientation(
     offset[fixed_joints] = first[fixed_joints]
     for shape, name in ((first, "start"), (last, "end")):
         if shape is not None:
-            _check_coupling(body, shape, coupling @ shape[leaders] + offset, name)
+            coupled = coupling @ shape[leaders] + offset
+            worst = int(np.argmax(np.abs(coupled - shape)))
+            check_follows(body, worst, shape[worst], coupled[worst], name)
     lower, upper = _coordinate_limits(coupling, factors, first[leaders], bounds)
     rate_limit, *further = (_coordinate_rates(coupling, factors, limits) for limits in (rates, *further))
     chart = BallChart.of(body, first, leaders)
@@ -319,7 +322,8 @@ def _end_postures(body: Body, bounds: Array, start: ArrayLike | None, end: Any) 
         last = first if end is None else _shape(body, end, "end")
     for shape, name in ((first, "start"), (last, "end")):
         if shape is not None:
-            _check_limits(body, shape, bounds, name)
+            for joint, value in enumerate(shape.tolist()):
+                check_within(body, joint, value, bounds, name)
     return first, last
 
 
@@ -329,16 +333,6 @@ def _shape(body: Body, value: ArrayLike, name: str) -> Array:
         raise ShapeError(f"{name}: one coordinate for each of the {body.n_shape} joints, got shape {shape.shape}")
     check_reach(shape, name)
     return shape
-
-
-def _check_limits(body: Body, shape: Array, bounds: Array, name: str) -> None:
-    beyond = np.flatnonzero((shape < bounds[:, 0] - _LIMIT_TOLERANCE) | (shape > bounds[:, 1] + _LIMIT_TOLERANCE))
-    if len(beyond):
-        joint = int(beyond[0])
-        raise TrajectoryError(
-            f"{name}: joint {body.joint_names[joint]} at {shape[joint]:.6g} is beyond its limits "
-            f"{bounds[joint, 0]:.6g} ... {bounds[joint, 1]:.6g}; choose another shape, or joint_limits=False"
-        )
 
 
 def _joint_limits(body: Body, given: ArrayLike | str | None, name: str, stated: Array) -> Array:
@@ -412,16 +406,6 @@ def _coupling(
     if not leaders:
         raise TrajectoryError("joints: at least one joint must move")
     return coupling, leaders, factors
-
-
-def _check_coupling(body: Body, shape: Array, coupled: Array, name: str) -> None:
-    gap = np.abs(coupled - shape)
-    worst = int(np.argmax(gap))
-    if gap[worst] > _COUPLING_TOLERANCE:
-        raise TrajectoryError(
-            f"{name}: joint {body.joint_names[worst]} at {shape[worst]:.6g} must be at {coupled[worst]:.6g}, where "
-            "the joint that it follows puts it, or where it is held fixed"
-        )
 
 
 def _coordinate_limits(coupling: Array, factors: Array, start: Array, bounds: Array) -> tuple[Array, Array]:

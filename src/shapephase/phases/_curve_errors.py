@@ -107,7 +107,7 @@ class CurveErrors:
     @property
     def between(self) -> Array:
         """Error of the rotation from the lift to the attitude, at the end: (B,) [rad]."""
-        error = _at_end(self._of_attitude - self._of_lift) + self._unseen + self._unseen_of_lift
+        error = _at_end(self._of_attitude - self._of_lift) + self._unseen + _unseen_of(self.motion.lift_with_errors)
         return np.minimum(error, self.motion.solution.error_estimate + self.motion.horizontal_lift.error_estimate)
 
     def of(self, arcs: CurveArcs, residual: Array, targets: Array) -> PhaseErrors:
@@ -138,7 +138,8 @@ class CurveErrors:
         errors += np.tensordot(_LEAST, largest, axes=1) * np.minimum(paths, 1.0)
         errors += _EPS * (_ROUNDING * (1.0 + closing) + _ROUNDING_OF_RADIANS * (summed + lengths))
         errors += curve.error[:, None] + residual
-        turned = _seen_so_far(sizes) + self._unseen_of_gauge[:, None]
+        so_far = sizes + _OF_LARGEST * np.maximum.accumulate(sizes, axis=-1)
+        turned = np.tensordot(_FACTORS, so_far, axes=1) + self._unseen_of_gauge[:, None]
         gap = turned[:, arcs.first] + turned[:, arcs.last] + _EPS * _ROUNDING
         # Near the point opposite the target any displacement turns the great circle round.
         near, whole = gap > np.arctan2(1.0, factor), 2.0 * np.pi
@@ -201,12 +202,8 @@ class CurveErrors:
         return hidden + stepped.rounding_error
 
     @cached_property
-    def _unseen_of_lift(self) -> Array:
-        return _unseen_of(self.motion.lift_with_errors)
-
-    @cached_property
     def _unseen_of_gauge(self) -> Array:
-        unseen = self._unseen if self.curve.lift is None else self._unseen + self._unseen_of_lift
+        unseen = self._unseen if self.curve.lift is None else self._unseen + _unseen_of(self.motion.lift_with_errors)
         if self.curve.frames is None and len(self.curve.edges) == self._stepped.quaternions.shape[1]:
             return unseen
         # What is between the ends of steps counts, too.
@@ -248,11 +245,6 @@ def _norms(vectors: Array) -> Array:
     return np.sqrt(np.einsum("...i,...i", vectors, vectors))
 
 
-def _seen_so_far(sizes: Array) -> Array:
-    """Error of a frame at each time, from the sizes of its turns: (2, B, N) -> (B, N) [rad]."""
-    return np.tensordot(_FACTORS, sizes + _OF_LARGEST * np.maximum.accumulate(sizes, axis=-1), axes=1)
-
-
 def _at_end(turns: Array) -> Array:
     """Error at the end from turns at all times: (2, B, N, 3) -> (B,) [rad]."""
     sizes = _norms(turns)
@@ -262,9 +254,10 @@ def _at_end(turns: Array) -> Array:
 def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> SplitErrors:
     """Errors of a split with its `residual` (B,)."""
     errors, batch, edges = CurveErrors(motion, curve), motion.batch, curve.edges
-    whole = errors.of(CurveArcs.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.corners[:, :1])
+    arc = CurveArcs.of(edges, edges[:1], edges[-1:])
+    whole = errors.of(arc, residual[:, None], curve.corners[:, :1])
     # What the momentum sweeps itself is joined to the reference; the closing is the rest.
-    swept = errors.of(CurveArcs.of(edges, edges[:1], edges[-1:]), residual[:, None], curve.references[:, None])
+    swept = errors.of(arc, residual[:, None], curve.references[:, None])
 
     def of(error: Array) -> Array:
         return (error.reshape(-1) * curve.has_phase).reshape(batch)[()]

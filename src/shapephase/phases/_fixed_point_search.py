@@ -7,7 +7,7 @@ import numpy as np
 from .. import so3
 from ..arrays import Array, Integers, Mask
 from ..sphere import fibonacci_directions
-from ._loop_map import MomentumLoop, tangent_basis
+from ._loop_map import TINY, MomentumLoop, tangent_basis
 
 _SMALLEST_CELL = 0.002  # [rad] narrower cells are not divided: Newton's method starts from them
 _MANY_SMALL_CELLS = 300  # more are thinned out: they line a curve of fixed points
@@ -112,7 +112,7 @@ def _distance_of_origin(triangles: Array) -> Array:
     """Distance of the origin from plane triangles: (F, 3, 2) -> (F,), zero inside."""
     start, end = triangles, triangles[:, [1, 2, 0]]
     side = end - start
-    length = np.maximum(np.sum(side * side, axis=-1), 1e-300)
+    length = np.maximum(np.sum(side * side, axis=-1), TINY)
     share = np.clip(-np.sum(start * side, axis=-1) / length, 0.0, 1.0)
     distance = np.linalg.norm(start + share[..., None] * side, axis=-1).min(axis=1)
     turning = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]

@@ -20,8 +20,11 @@ from ..integrator.many_rotations import GroupedRotations, RotationPart
 from ..integrator.sampling import Sampler
 from ..integrator.stepped import SteppedRotation
 
+UP = np.array([0.0, 0.0, 1.0])  # inertial direction of the momentum
 _ROWS_AT_ONCE = 2048  # directions run through the loop together: parts have own samples, whichever process runs them
 _SLOPES_AT_ONCE = 128  # directions with derivatives, some milliseconds each
+_LONGEST_STEP = 0.3  # [rad] of Newton's method
+TINY = float(np.finfo(float).tiny)  # keeps quotients defined
 
 _PartResult = TypeVar("_PartResult")
 
@@ -176,38 +179,22 @@ def closed_points(
         if not len(active):
             break
         ends, slopes, drift = loop.exactly(magnitude, points[active], tolerance)
-        by_magnitude[active] = so3.apply(tangent_basis(points[active]), drift)
-        slope[active], missing = in_tangent_planes(points[active], ends, slopes)
-        step = newton_step(slope[active], missing, 1e-7)
+        basis = tangent_basis(points[active])
+        by_magnitude[active] = so3.apply(basis, drift)
+        slope[active] = basis @ slopes @ so3.transpose(basis) - np.eye(2)
+        step = -solve_linear(slope[active], so3.apply(basis, ends - points[active]), 1e-7)
+        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(np.linalg.norm(step, axis=-1, keepdims=True), TINY))
         before, length[active] = length[active], np.linalg.norm(step, axis=-1)
         gap[active] = so3.angle_between(points[active], ends)
         settled = (gap[active] < 10.0 * tolerance) & (length[active] > 0.25 * before)
         hopeless = (length[active] > 0.1) & (left < iterations - 5)
         going = (length[active] > enough) & ~settled & ~hopeless & (left > 0)
         active = active[going]
-        points[active] = moved_along(points[active], step[going])
+        points[active] = so3.normalised(points[active] + np.einsum("ni,nic->nc", step[going], basis[going]))
     return ClosedPoints(points, gap, length, slope, by_magnitude)
-
-
-def in_tangent_planes(points: Array, ends: Array, slopes: Array) -> tuple[Array, Array]:
-    """The derivative of u(T) - u(0) (N, 2, 2), and u(T) - u(0) itself (N, 2)."""
-    basis = tangent_basis(points)
-    return basis @ slopes @ so3.transpose(basis) - np.eye(2), so3.apply(basis, ends - points)
-
-
-def newton_step(slope: Array, missing: Array, least: float) -> Array:
-    """The step that closes what is missing, no longer than 0.3: (N, 2)."""
-    step = -solve_linear(slope, missing, least)
-    length = np.linalg.norm(step, axis=-1, keepdims=True)
-    return step * np.minimum(1.0, 0.3 / np.maximum(length, 1e-300))
 
 
 def solve_linear(slope: Array, right: Array, least: float) -> Array:
     """slope^-1 right (N, 2); zero along directions with singular values below `least` of the largest."""
-    scale = np.maximum(np.linalg.norm(slope, axis=(-1, -2)), 1e-300)[:, None, None]
+    scale = np.maximum(np.linalg.norm(slope, axis=(-1, -2)), TINY)[:, None, None]
     return so3.apply(np.linalg.pinv(slope / scale, rcond=least) / scale, right)
-
-
-def moved_along(points: Array, step: Array) -> Array:
-    """Directions moved in their tangent planes: (N, 3), (N, 2) -> (N, 3)."""
-    return so3.normalised(points + np.einsum("ni,nic->nc", step, tangent_basis(points)))

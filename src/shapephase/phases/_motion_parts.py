@@ -9,7 +9,6 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from ..arrays import Array
 from ..integrator.many_rotations import assembled
 from ..reconstruction.reconstruction import Motion
 
@@ -39,8 +38,8 @@ def _known(value: Result) -> Result:
 def by_parts(motion: Motion, compute: Callable[[Motion], Result], shared: tuple[str, ...] = ()) -> Result:
     """Result of a function of a motion, computed for every part of it.
 
-    `compute` takes a motion of a batch (n,) to a dataclass whose arrays, also those of dataclasses in it, have that
-    axis in front, but for its `shared` fields.
+    `compute` takes a motion of a batch (n,) to an array, or a dataclass whose arrays, also those of dataclasses in it,
+    have that axis in front, but for its `shared` fields.
     """
     return _joined(motion, [(rows, compute(part)) for rows, part in motion.parts], shared)
 
@@ -48,7 +47,8 @@ def by_parts(motion: Motion, compute: Callable[[Motion], Result], shared: tuple[
 def _joined(motion: Motion, parts: list[Any], shared: tuple[str, ...] = ()) -> Any:
     first: Any = parts[0][1]
     if isinstance(first, np.ndarray):
-        return _whole(motion, parts)
+        whole = assembled(parts)
+        return whole.reshape(*motion.batch, *whole.shape[1:])
     if isinstance(first, Deferred):
         return Deferred(lambda: _joined(motion, [(rows, deferred.value) for rows, deferred in parts]))
     if not is_dataclass(first):
@@ -56,13 +56,3 @@ def _joined(motion: Motion, parts: list[Any], shared: tuple[str, ...] = ()) -> A
     names = [field.name for field in fields(first) if field.name not in shared]
     joined = {name: _joined(motion, [(rows, getattr(result, name)) for rows, result in parts]) for name in names}
     return type(first)(**vars(first) | joined)
-
-
-def array_by_parts(motion: Motion, compute: Callable[[Motion], Array]) -> Array:
-    """Apply a function with an array as result to the parts of a motion and join the rows."""
-    return _whole(motion, [(rows, compute(part)) for rows, part in motion.parts])
-
-
-def _whole(motion: Motion, parts: list[Any]) -> Array:
-    whole = assembled(parts)
-    return whole.reshape(*motion.batch, *whole.shape[1:])

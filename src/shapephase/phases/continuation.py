@@ -13,16 +13,15 @@ from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError
-from ._loop_map import MomentumLoop, closed_points, solve_linear, tangent_basis
+from ._loop_map import TINY, UP, MomentumLoop, closed_points, solve_linear, tangent_basis
 
-_UP = np.array([0.0, 0.0, 1.0])  # inertial direction of the momentum
 _LARGEST_STEP = 0.1  # [rad] of the direction from orbit to orbit, so that Newton's method stays on the branch
 _SMALLEST_STEP = 1e-6  # of the range: an orbit that needs shorter steps is lost, as at a fold
 
 
 @dataclass(frozen=True, eq=False)
 class OrbitBranch:
-    """A closed orbit followed through magnitudes of the momentum.
+    """A closed orbit followed through magnitudes of the momentum. Made by `continued_orbits`.
 
     Attributes
     ----------
@@ -33,15 +32,6 @@ class OrbitBranch:
     stopped : why the branch ends before the last requested magnitude; None when it does not
     fold : the magnitude at which it meets another orbit and both vanish, to about 1e-8 of the range followed
         [kg m^2/s]; None when it does not
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> seen = sp.horizontal_gauge(sp.articulated(cat, loop))
-    >>> start = sp.fixed_points(seen, 0.005).directions[0]
-    >>> branch = sp.continued_orbits(seen, [0.005, 0.006], start=start)
-    >>> print(np.linalg.norm(branch.directions, axis=-1).round(9))
-    [1. 1.]
     """
 
     magnitudes: Array
@@ -100,7 +90,7 @@ def continued_orbits(
     magnitudes = magnitudes_argument(magnitudes)
     loop = MomentumLoop.of(deformation, tolerance)
     first = 0.0 if start is None else float(magnitudes[0])
-    axis = _axis_at_rest(loop) if first == 0.0 else _UP
+    axis = _axis_at_rest(loop) if first == 0.0 else UP
     given = axis if start is None else direction_argument(start, "start")
     if given.shape != (3,):
         raise ShapeError(f"start: one direction (3,) is needed, got {given.shape}")
@@ -140,7 +130,7 @@ class _Orbit:
 
 def _axis_at_rest(loop: MomentumLoop) -> Array:
     """The axis about which the loop alone turns the frame."""
-    turn = so3.log(loop.run(0.0, _UP[None]).end[0])
+    turn = so3.log(loop.run(0.0, UP[None]).end[0])
     angle = float(np.linalg.norm(turn))
     if angle < 1e-7:
         raise TrajectoryError(
@@ -164,7 +154,7 @@ def _followed(loop: MomentumLoop, orbit: _Orbit, target: float, span: float) -> 
     passed, step = [orbit], abs(target - orbit.magnitude)
     while orbit.magnitude != target:
         left = target - orbit.magnitude
-        step = min(step, abs(left), _LARGEST_STEP / max(float(np.linalg.norm(orbit.drift)), 1e-300))
+        step = min(step, abs(left), _LARGEST_STEP / max(float(np.linalg.norm(orbit.drift)), TINY))
         magnitude = target if step == abs(left) else orbit.magnitude + float(np.copysign(step, left))
         moved = orbit.drift * (magnitude - orbit.magnitude)
         guess = so3.normalised(orbit.direction + moved)

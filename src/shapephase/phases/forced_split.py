@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,11 +21,9 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..refinement import halved, settled
 from .momentum_curve import Gauge
 
-# Share of the largest momentum below which it has no direction; relative error from which it has none.
-_NO_MOMENTUM = 1e-9
-_DOUBT = 1e-3
-# [sr], [rad] Below the error of any motion.
-_SETTLED = 1e-12
+_NO_MOMENTUM = 1e-9  # share of the largest momentum below which it has no direction
+_DOUBT = 1e-3  # relative error from which it has none
+_SETTLED = 1e-12  # [sr], [rad], below the error of any motion
 _ROUNDING = 1e-14  # [rad] of a direction, where the motion is as good as exact
 _HALVINGS = 10  # of all steps, for a momentum that is small for a short time only
 
@@ -136,6 +135,9 @@ def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
     read_off = float(so3.angle_about(turned, m))
     closure = np.eye(3) if deformation.closure is None else deformation.closure
     lift = horizontal_gauge(deformation).frame(motion.duration) @ deformation.frame(motion.duration).T
+    change = None
+    with suppress(GaugeError):  # where only the inertia is known
+        change = float(np.diff(deformation.kinetic_energy(ends, motion.angular_velocity(ends)))[0])
     total = attitudes[1] @ closure @ attitudes[0].T
     holonomy = attitudes[0] @ lift @ closure @ attitudes[0].T
     # The curve in the body is displaced by both errors, by which areas and read-off angle change about as much.
@@ -157,7 +159,7 @@ def forced_split(motion: ForcedMotion, gauge: Gauge) -> ForcedSplit:
         residual=float(np.abs(so3.wrap(phase - read_off))),
         error_estimate=(4.0 + length) * doubt + closing + _SETTLED,
         work=float(motion.work(motion.duration)),
-        energy_change=_energy_change(motion),
+        energy_change=change,
         is_loop=deformation.closure is not None,
     )
 
@@ -204,7 +206,9 @@ def _direction(vector: Array, change: Array, magnitude: Array) -> tuple[Array, A
 def _least_momentum(motion: ForcedMotion) -> tuple[float, float]:
     """The least size of the momentum, and when: [kg m^2/s], [s]."""
     ends = motion.solution.times
-    times = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(8) / 8.0).ravel(), ends[-1])
+    times = np.append(
+        (ends[:-1, None] + np.diff(ends)[:, None] * np.linspace(0.0, 1.0, 8, endpoint=False)).ravel(), ends[-1]
+    )
     sizes = np.linalg.norm(motion.momentum(times), axis=-1)
     place = int(np.argmin(sizes))
     left, right = times[max(place - 1, 0)], times[min(place + 1, len(times) - 1)]
@@ -216,12 +220,3 @@ def _least_momentum(motion: ForcedMotion) -> tuple[float, float]:
     )
     least = float(np.sqrt(minimum.fun))
     return (least, float(minimum.x)) if least < sizes[place] else (float(sizes[place]), float(times[place]))
-
-
-def _energy_change(motion: ForcedMotion) -> float | None:
-    ends = np.array([0.0, motion.duration])
-    try:
-        energies = motion.deformation.kinetic_energy(ends, motion.angular_velocity(ends))
-    except GaugeError:
-        return None
-    return float(energies[1] - energies[0])

@@ -37,9 +37,9 @@ def momentum_generator(momentum: ArrayLike, attitude: ArrayLike) -> Array:
 
     Examples
     --------
-    >>> from shapephase.phases import momentum_connection, momentum_generator
     >>> attitude = sp.so3.exp(np.array([0.3, -0.2, 0.5]))
-    >>> print(momentum_connection([0.0, 0.0, 2.0], attitude, momentum_generator([0.0, 0.0, 2.0], attitude)).round(12))
+    >>> along = sp.phases.momentum_generator([0.0, 0.0, 2.0], attitude)
+    >>> print(sp.phases.momentum_connection([0.0, 0.0, 2.0], attitude, along).round(12))
     1.0
     """
     return _direction(momentum, attitude)
@@ -60,8 +60,7 @@ def momentum_connection(momentum: ArrayLike, attitude: ArrayLike, angular_veloci
 
     Examples
     --------
-    >>> from shapephase.phases import momentum_connection
-    >>> print(momentum_connection([0.0, 0.0, 2.0], np.eye(3), [0.1, 0.2, 0.3]))
+    >>> print(sp.phases.momentum_connection([0.0, 0.0, 2.0], np.eye(3), [0.1, 0.2, 0.3]))
     0.3
     """
     direction = _direction(momentum, attitude)
@@ -86,8 +85,7 @@ def momentum_curvature(momentum: ArrayLike, attitude: ArrayLike, first: ArrayLik
 
     Examples
     --------
-    >>> from shapephase.phases import momentum_curvature
-    >>> print(momentum_curvature([0.0, 0.0, 2.0], np.eye(3), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+    >>> print(sp.phases.momentum_curvature([0.0, 0.0, 2.0], np.eye(3), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
     1.0
     """
     direction = _direction(momentum, attitude)

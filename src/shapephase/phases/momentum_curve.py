@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +30,10 @@ _MOST_HALVINGS = 3  # of steps whose integrals add more; each divides the added 
 _LONGEST_PIECE = 0.5  # [rad] longer pieces are halved: the area between arc and chord may hide whole turns
 _TINY = 1e-300  # keeps the decay of terms defined where all are zero
 
+# Weighted values at the nodes of a piece -> its Legendre terms, (8, 8).
+_NODES = sphere.gauss_nodes(np.zeros(1), np.ones(1))[0][0]
+_TERMS = np.polynomial.legendre.legvander(2.0 * _NODES - 1.0, len(_NODES) - 1) * (2.0 * np.arange(len(_NODES)) + 1.0)
+
 Gauge = str | Callable[[Array], ArrayLike | tuple[ArrayLike, ArrayLike]]
 
 
@@ -42,7 +45,7 @@ class Displacements(NamedTuple):
     along: Array  # the turn about the momentum [rad]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class CurvePieces:
     """Integrals along the curves of a batch of motions, piece by piece.
 
@@ -224,16 +227,7 @@ def _integrals_of(
         def still_curve(edges: Array) -> CurvePieces:
             still, nothing = np.zeros((len(start), len(edges) - 1)), np.zeros((len(start), len(edges), 3))
             corners = np.repeat(start[:, None], len(edges), axis=1)
-            return CurvePieces(
-                edges=edges,
-                dynamic=still,
-                slivers=still,
-                corners=corners,
-                error=still[:, 0],
-                slopes=nothing,
-                by_momentum=nothing,
-                body_directions=corners,
-            )
+            return CurvePieces(edges, still, still, corners, still[:, 0], nothing, nothing, corners)
 
         return still_curve
     curve = _curve(motion, lift, frames, start)
@@ -294,8 +288,7 @@ def _from_steps(solution: SteppedRotation, lift: Lift | None, edges: Array, goal
         # An error that does not fall is rounding.
         if np.all(integrals.error > 0.5 * last.error):
             break
-    fields = integrals._asdict()
-    return CurvePieces(edges=edges, body_directions=fields.pop("directions"), **fields)
+    return CurvePieces(edges, *integrals)
 
 
 def _joined(fine: CurveIntegrals) -> CurveIntegrals:
@@ -329,20 +322,11 @@ def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> CurvePieces:
     times = np.concatenate([part[0] for part in done])
     order = np.argsort(times)
     dynamic, slivers, missed, *starts = (
-        np.concatenate([part[k] for part in done], axis=1)[:, order] for k in range(1, 8)
+        np.concatenate([part[k] for part in done], axis=1)[:, order] for k in range(1, len(done[0]))
     )
     corners, *in_body = (np.concatenate(pair, axis=1) for pair in zip(starts, at_end, strict=True))
-    slopes, by_momentum, directions = in_body
-    return CurvePieces(
-        edges=np.append(times[order], edges[-1]),
-        dynamic=dynamic,
-        slivers=slivers,
-        corners=corners,
-        error=missed.sum(axis=1),
-        slopes=slopes,
-        by_momentum=by_momentum,
-        body_directions=directions,
-    )
+    edges = np.append(times[order], edges[-1])
+    return CurvePieces(edges, dynamic, slivers, corners, missed.sum(axis=1), *in_body)
 
 
 def _by_piece(
@@ -361,20 +345,12 @@ def _by_piece(
     start, moving = corners[:, np.searchsorted(ends, left), None], np.cross(direction, rate)
     length = (np.sqrt(np.einsum("...i,...i", moving, moving)) * weights).sum(axis=-1)
     weighted = np.stack([along, sphere.area_rate(start, direction, moving)]) * weights
-    early, late = (np.abs(weighted @ terms).max(axis=-1) for terms in _last_terms())
+    # The two terms before the last two, and the last two.
+    early, late = (np.abs(weighted @ terms).max(axis=-1) for terms in (_TERMS[:, -4:-2], _TERMS[:, -2:]))
     # The rule is exact to twice as many degrees as its nodes resolve: four times two more than the last terms.
     missed = late * np.minimum(late / (early + _TINY), 1.0) ** 4
     in_body = [part[:, : len(ends)] for part in in_body]
     return *weighted.sum(axis=-1), corners, missed.max(axis=0), length, tuple(in_body)
-
-
-@lru_cache(maxsize=1)
-def _last_terms() -> tuple[Array, Array]:
-    """Weighted values at the nodes -> the two Legendre terms before the last two, and the last two: (8, 2) each."""
-    nodes, _ = sphere.gauss_nodes(np.zeros(1), np.ones(1))
-    count = nodes.shape[1]
-    terms = np.polynomial.legendre.legvander(2.0 * nodes[0] - 1.0, count - 1) * (2.0 * np.arange(count) + 1.0)
-    return terms[:, -4:-2], terms[:, -2:]
 
 
 def _clear(

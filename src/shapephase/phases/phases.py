@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3, sphere
-from ..arguments import check_object, times_argument
+from ..arguments import check_choice, check_object, times_argument
 from ..arrays import Array, Integers, finite_array
 from ..display import short_repr
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.closing import areas_back, closed_curves
 from ..letters import value_text
@@ -23,7 +23,7 @@ from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import ProgressCallback, watched
 from ._curve_errors import arc_errors, running_errors, split_errors
-from ._motion_parts import Deferred, array_by_parts, by_parts
+from ._motion_parts import Deferred, by_parts
 from .error_estimates import ArcErrors, RunningErrors
 from .forced_split import ForcedSplit, forced_split
 from .momentum_curve import Gauge, momentum_curve
@@ -230,8 +230,7 @@ def running_phases(
     check_object(motion, "Motion", "motion")
     if len(motion.parts) > 1:
         return by_parts(motion, lambda part: running_phases(part, t, gauge, closing=closing), shared=("times",))
-    if not isinstance(closing, str) or closing not in CLOSINGS:
-        raise unknown_name("closing", closing, CLOSINGS)
+    check_choice(closing, "closing", CLOSINGS)
     to_start = closing == "start"
     times = times_argument(t, motion.duration)
     flat = times.ravel()
@@ -421,7 +420,7 @@ def parallel_transport(motion: Motion, t: ArrayLike, gauge: Gauge = "base") -> A
     """
     check_object(motion, "Motion", "motion")
     if len(motion.parts) > 1:
-        return array_by_parts(motion, lambda part: parallel_transport(part, t, gauge))
+        return by_parts(motion, lambda part: parallel_transport(part, t, gauge))
     times = times_argument(t, motion.duration)
     flat = times.ravel()
     curve = momentum_curve(motion, gauge, times=flat)

@@ -20,6 +20,7 @@ from ..integrator.interpolant import Interpolant
 from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 
+_TINY = float(np.finfo(float).tiny)  # keeps quotients defined where the curve rests
 _LONGEST = 0.05  # [rad] length of a piece of the curve: its cubic distinguishes two passages through it
 _BENT = 0.3  # [rad] turn of a piece: a cubic is then right to a hundredth of its length
 _TOO_SHORT = 1e-6  # [rad] shorter pieces are not divided for their bend: near a cusp the heading turns at once
@@ -166,7 +167,8 @@ def momentum_crossings(motion: Motion) -> Crossings:
     retraced = _retraced(curve, pieces, partner, near)
     first, second = _refined(curve, pieces, pairs)
     length = motion.duration
-    inside = ~((first < 1e-9 * length) & (second > (1.0 - 1e-9) * length))
+    near_end = 1e-9 * length
+    inside = ~((first < near_end) & (second > length - near_end))
     for begin, end in retraced:
         for time in (first, second):
             inside &= (time < begin) | (time > end)
@@ -328,7 +330,7 @@ def _seems_along(pieces: _Pieces, first: Integers, second: Integers, near: float
     point = pieces.point[second]
     for _ in range(4):
         place, slope = pieces.cubic(first, share)
-        speed = np.maximum(np.sum(slope * slope, axis=-1), 1e-300)
+        speed = np.maximum(np.sum(slope * slope, axis=-1), _TINY)
         # Before its start there is no curve.
         lowest = np.where(first == 0, 0.0, -0.1)
         share = np.clip(share + np.sum((point - place) * slope, axis=-1) / speed, lowest, 1.1)
@@ -350,7 +352,7 @@ def _on_curve(
     (point, rate), when = known, guesses
     for _ in range(2):
         here, slope = curve.at(when)
-        speed = np.maximum(np.sum(slope * slope, axis=-1), 1e-300)
+        speed = np.maximum(np.sum(slope * slope, axis=-1), _TINY)
         when = np.clip(when + np.sum((point - here) * slope, axis=-1) / speed, 0.0, times)
     here, slope = curve.at(when)
     apart = np.abs(times - when) > 0.5 * np.abs(times - guesses)
@@ -380,7 +382,7 @@ def _edge(curve: _Curve, inner: float, partner: float, outer: float, near: float
     for _ in range(50):
         middle = 0.5 * (known + outer)
         _, rates = curve.at(np.array([known, when]))
-        ratio = float(np.sum(rates[0] * rates[1]) / max(np.sum(rates[1] ** 2), 1e-300))
+        ratio = float(np.sum(rates[0] * rates[1]) / max(np.sum(rates[1] ** 2), _TINY))
         times = np.array([middle])
         nearest, on = _on_curve(curve, times, curve.at(times), np.array([when + ratio * (middle - known)]), near)
         if on[0]:
@@ -431,7 +433,7 @@ def _newton(
 ) -> tuple[Array, Array]:
     """One Newton step on here = there, from places and slopes of both."""
     normal = np.cross(heading, other)
-    square = np.maximum(np.sum(normal * normal, axis=-1), 1e-300)
+    square = np.maximum(np.sum(normal * normal, axis=-1), _TINY)
     apart = there - here
     step = (np.sum(np.cross(apart, slope) * normal, axis=-1) / square for slope in (other, heading))
     return tuple(np.clip(place + move, low, high) for place, move in zip(places, step, strict=True))

@@ -81,15 +81,18 @@ class RigidRotation:
         return np.array([top.attitude(t) for top in self.tops]).reshape(len(self.tops), len(t), 3, 3)
 
 
-def rigid_rotation(inertia: Array, momentum: Array, duration: float, tolerance: float) -> RigidRotation:
-    """Return the rotations of a rigid body from the body momenta at the start, (B, 3).
-
-    Raises
-    ------
-    AccuracyNotReached
-        If rounding alone, magnified near a separatrix or over many turns, may exceed the tolerance.
-    """
-    tops = tuple(EulerTop(inertia, row) for row in momentum)
+def _by_closed_form(
+    deformation: Deformation,
+    at_start: Array,
+    tolerance: float,
+    threads: int | None,  # noqa: ARG001
+) -> tuple[Solution, int]:
+    """Return closed forms. Raises AccuracyNotReached where rounding, magnified near a separatrix, may be too large."""
+    description, duration = deformation.description, deformation.duration
+    if not isinstance(description, RigidDescription):
+        others = [name for name in METHODS if name != "closed_form"]
+        raise unknown_name(f"method for what is not made by `rigid` ({deformation.label})", "closed_form", others)
+    tops = tuple(EulerTop(description.tensor, row) for row in at_start)
     turn = max((top.magnitude / top.moments[0] for top in tops), default=0.0) * duration
     estimates = np.array([_rounding(top, duration) for top in tops])
     if estimates.max(initial=0.0) > tolerance:
@@ -99,7 +102,7 @@ def rigid_rotation(inertia: Array, momentum: Array, duration: float, tolerance: 
             f"over {turn / (2.0 * np.pi):.3g} turns, magnified by {tops[worst].condition:.3g} (large next to the "
             "separatrix); loosen the tolerance or shorten the motion"
         )
-    return RigidRotation(tops, duration, turn, estimates)
+    return RigidRotation(tops, duration, turn, estimates), 1
 
 
 def _rounding(top: EulerTop, duration: float) -> float:
@@ -130,21 +133,9 @@ class Dop853Rotation:
         """(B,) [rad]."""
         return np.array([turn.attitude_errors[-1] for turn in self.turns])
 
-    @property
-    def evaluations(self) -> int:
-        """Number of evaluations of I and L_o in all runs."""
-        return sum(turn.evaluations for turn in self.turns)
-
     def rotation(self, t: Array) -> Array:
         """(N,) -> (B, N, 3, 3)."""
         return np.stack([turn.attitude(t) for turn in self.turns])
-
-
-def dop853_solution(deformation: Deformation, at_start: Array, tolerance: float) -> Dop853Rotation:
-    """Return the rotations from the body momenta at the start, (B, 3). Raises AccuracyNotReached."""
-    sample, breaks, limits = deformation.description.sample, deformation.breaks, deformation.step_limits()
-    turns = tuple(dop853_attitude(sample, breaks, start, tolerance, limits) for start in at_start)
-    return Dop853Rotation(turns, np.unique(np.concatenate([breaks, *(turn.times for turn in turns)])))
 
 
 def _by_interpolant(
@@ -155,27 +146,16 @@ def _by_interpolant(
     return solution, sampler.evaluations
 
 
-def _by_closed_form(
-    deformation: Deformation,
-    at_start: Array,
-    tolerance: float,
-    threads: int | None,  # noqa: ARG001
-) -> tuple[Solution, int]:
-    description = deformation.description
-    if not isinstance(description, RigidDescription):
-        others = [name for name in METHODS if name != "closed_form"]
-        raise unknown_name(f"method for what is not made by `rigid` ({deformation.label})", "closed_form", others)
-    return rigid_rotation(description.tensor, at_start, deformation.duration, tolerance), 1
-
-
 def _by_dop853(
     deformation: Deformation,
     at_start: Array,
     tolerance: float,
     threads: int | None,  # noqa: ARG001
 ) -> tuple[Solution, int]:
-    solution = dop853_solution(deformation, at_start, tolerance)
-    return solution, solution.evaluations
+    sample, breaks, limits = deformation.description.sample, deformation.breaks, deformation.step_limits()
+    turns = tuple(dop853_attitude(sample, breaks, start, tolerance, limits) for start in at_start)
+    times = np.unique(np.concatenate([breaks, *(turn.times for turn in turns)]))
+    return Dop853Rotation(turns, times), sum(turn.evaluations for turn in turns)
 
 
 Solver = Callable[[Deformation, Array, float, int | None], tuple[Solution, int]]

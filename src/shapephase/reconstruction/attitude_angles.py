@@ -53,7 +53,7 @@ def continued_angles(
     at_pole = max(_AT_POLE, uncertainty)
     own = _followed(quaternions_at, known, chart, at_pole)
     sampled = np.union1d(own, times)
-    curves = [_continuous(curve) for curve in quaternions_at(sampled)]
+    curves = [continuous(curve) for curve in quaternions_at(sampled)]
     angles = np.array([chart.numbers(curve, at_pole) for curve in curves]).reshape(len(curves), len(sampled), 3)
     return angles[:, np.searchsorted(sampled, times)]
 
@@ -77,7 +77,7 @@ def _followed(quaternions_at: Callable[[Array], Array], known: Array, chart: Cha
         quaternions = np.concatenate([quaternions, quaternions_at(middle)], axis=1)[:, order]
 
 
-def _continuous(quaternions: Array) -> Array:
+def continuous(quaternions: Array) -> Array:
     """Quaternions, each with the sign that is nearer to its predecessor: (N, 4) -> (N, 4)."""
     flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0)
     return quaternions * np.cumprod(np.append(1.0, flips))[:, None]
@@ -175,7 +175,7 @@ def euler_angles(attitudes: Array, sequence: str) -> Array:
     ----------
     sequence : as for `Motion.euler_angles`
     """
-    return EulerAngles(sequence).numbers(_continuous(so3.quat_from_matrix(attitudes)), _AT_POLE)
+    return EulerAngles(sequence).numbers(continuous(so3.quat_from_matrix(attitudes)), _AT_POLE)
 
 
 def euler_chart(sequence: str) -> EulerAngles:

@@ -91,8 +91,3 @@ class ExternalTorque:
                 f"torque: three finite numbers [N m] are needed, at t = {state.time:.9g} s it gave {value_text(given)}"
             )
         return given if self.axes == "body" else state.attitude.T @ given
-
-
-def torque_argument(torque: ExternalTorque | Callable[[TorqueState], ArrayLike]) -> ExternalTorque:
-    """Return an `ExternalTorque`; a function alone is one in base axes without breaks."""
-    return torque if isinstance(torque, ExternalTorque) else ExternalTorque(torque)

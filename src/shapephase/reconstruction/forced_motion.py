@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, initial_state_arguments, times_argument
+from ..arguments import check_choice, initial_state_arguments, times_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.driven_attitude import DrivenAttitude, driven_attitude
-from .external_torque import ExternalTorque, TorqueState, torque_argument
+from .attitude_angles import continuous
+from .external_torque import ExternalTorque, TorqueState
 from .motion_record import write_table
 
 METHODS = ("auto", "dop853")
@@ -157,10 +158,13 @@ class ForcedMotion:
         times : (N,) [s]; None: 201 even times
         """
         t = np.linspace(0.0, self.duration, _ROWS) if times is None else finite_array(times, "times", (None,), unit="s")
-        quaternions = self.quat_xyzw(t)
-        flips = np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=-1) < 0.0, -1.0, 1.0)
-        quaternions[1:] *= np.cumprod(flips)[:, None]
-        rows = [quaternions.T, self.angular_velocity(t).T, self.momentum(t).T, self.torque(t).T, self.work(t)[None]]
+        rows = [
+            continuous(self.quat_xyzw(t)).T,
+            self.angular_velocity(t).T,
+            self.momentum(t).T,
+            self.torque(t).T,
+            self.work(t)[None],
+        ]
         write_table(path, dict(zip(_COLUMNS, [t, *np.concatenate(rows)], strict=True)))
 
     def _card(self) -> Card:
@@ -184,10 +188,8 @@ def reconstruct_forced(
     method: str,
 ) -> ForcedMotion:
     """Return the motion under a torque, with the arguments and errors of `reconstruct`."""
-    check_object(deformation, "Deformation", "deformation")
-    if not isinstance(method, str) or method not in METHODS:
-        raise unknown_name("method with a torque", method, METHODS)
-    law = torque_argument(torque)
+    check_choice(method, "method with a torque", METHODS)
+    law = torque if isinstance(torque, ExternalTorque) else ExternalTorque(torque)
     spatial, start = initial_state_arguments(momentum, attitude)
     if spatial.ndim > 1 or start.ndim > 2:
         raise ShapeError("with a torque from outside one motion at a time is computed; give one momentum and attitude")

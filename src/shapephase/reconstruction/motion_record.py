@@ -5,16 +5,16 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import __version__, so3
 from ..arrays import Array
 from ..chebyshev import nodes_on, values_to_coefficients
-from ..deformation.deformation import Deformation, sampled_deformation
+from ..deformation.deformation import Deformation
+from ..deformation.descriptions import SampledDescription
 from ..errors import ResultFileError
 from ..files import no_such_file, npz_arrays, write_whole
 from ..integrator.interpolant import Interpolant
@@ -24,42 +24,22 @@ from ..integrator.stepped import SteppedRotation
 from ..provenance import provenance
 from ._stored_arrays import check_deformation, check_rotation, check_rows, check_start
 
+if TYPE_CHECKING:
+    from .reconstruction import Motion
+
 _FORMAT = "shapephase motion 3"
 _STEPS = (
-    "momentum",
-    "steps",
-    "quaternions",
-    "directions",
-    "turns",
-    "dynamics",
-    "sampling_error",
-    "stepping_error",
-    "rounding_error",
-    "amplification",
-)
+    "momentum", "steps", "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error",
+    "rounding_error", "amplification",
+)  # fmt: skip
 _SAMPLES = ("edges", "coefficients")
 _VECTOR_DEGREE = 24
 
 
-@dataclass(frozen=True, eq=False)
-class MotionRecord:
-    """Stored fields of a `reconstruction.Motion`.
-
-    When read, the deformation is made of the samples: it needs neither body nor path.
-    """
-
-    deformation: Deformation
-    momentum: Array
-    initial_attitude: Array
-    tolerance: float
-    method: str
-    evaluations: int
-    solution: SteppedRotation | GroupedRotations
-
-
-def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> None:
+def write_motion_record(motion: Motion, path: str | os.PathLike[str]) -> None:
     """Write a motion with versions and units."""
-    interpolant, deformation = record.solution.interpolant, record.deformation
+    solution, deformation = motion.stepped, motion.deformation
+    interpolant = solution.interpolant
     header = {
         "format": _FORMAT,
         "shapephase": __version__,
@@ -67,9 +47,9 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
         "deformation": deformation.label,
         "sha256": dict(deformation.inputs),
         "provenance": provenance(deformation.made_from),
-        "tolerance": record.tolerance,
-        "method": record.method,
-        "evaluations": record.evaluations,
+        "tolerance": motion.tolerance,
+        "method": motion.method,
+        "evaluations": motion.evaluations,
         "loops": interpolant.loops,
         "interpolant_evaluations": interpolant.evaluations,
         "shape_gap": deformation.shape_gap,
@@ -77,29 +57,31 @@ def write_motion_record(record: MotionRecord, path: str | os.PathLike[str]) -> N
     }
     arrays: dict[str, Any] = {
         "header": np.array(json.dumps(header)),
-        "spatial_momentum": record.momentum,
-        "initial_attitude": record.initial_attitude,
+        "spatial_momentum": motion.momentum,
+        "initial_attitude": motion.initial_attitude,
         "breaks": deformation.breaks,
         "centre": _vector_coefficients(deformation.centre_of_mass, interpolant),
         **_samples(interpolant),
     }
     if deformation.has_wheels:
         arrays["stored"] = _vector_coefficients(deformation.stored_momentum, interpolant)
-    if isinstance(record.solution, GroupedRotations):
-        header["parts"] = [part.rotation.interpolant.evaluations for part in record.solution.parts]
+    if isinstance(solution, GroupedRotations):
+        header["parts"] = [part.rotation.interpolant.evaluations for part in solution.parts]
         arrays["header"] = np.array(json.dumps(header))
-        for number, (rows, rotation) in enumerate(record.solution.parts):
+        for number, (rows, rotation) in enumerate(solution.parts):
             of_part = {"rows": rows, **_samples(rotation.interpolant), **_steps(rotation)}
             arrays.update({_of_part(number, name): value for name, value in of_part.items()})
     else:
-        arrays.update(_steps(record.solution))
+        arrays.update(_steps(solution))
     if deformation.closure is not None:
         arrays["closure"] = deformation.closure
     write_whole(path, lambda stream: np.savez(stream, **arrays))
 
 
-def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
-    """Read a file of `write_motion_record`.
+def read_motion_record(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Read the fields of a `Motion` from a file of `write_motion_record`.
+
+    Its deformation is made of the samples: it needs neither body nor path.
 
     Raises
     ------
@@ -133,8 +115,7 @@ def read_motion_record(path: str | os.PathLike[str]) -> MotionRecord:
 def write_table(path: str | os.PathLike[str], columns: Mapping[str, Array]) -> None:
     """Write columns of numbers as CSV, every digit kept."""
     rows = np.column_stack(list(columns.values())).tolist()
-    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows)]
-    text = "\n".join(lines) + "\n"
+    text = "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows), ""])
     write_whole(path, lambda stream: stream.write(text.encode()))
 
 
@@ -152,30 +133,30 @@ def _of_part(number: int, name: str) -> str:
     return f"part_{number}_{name}"
 
 
-def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> MotionRecord:
+def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:
     loops = int(header["loops"])
     check_deformation(arrays, loops)
     interpolant = _interpolant(arrays, loops, int(header["interpolant_evaluations"]))
-    deformation = sampled_deformation(
-        interpolant,
-        arrays["centre"],
-        arrays["breaks"],
+    breaks = arrays["breaks"]
+    deformation = Deformation(
+        SampledDescription(interpolant, arrays["centre"], arrays.get("stored")),
+        float(breaks[-1]),
+        breaks,
         arrays.get("closure"),
         _positive(header, "shape_gap"),
         str(header["deformation"]),
-        {str(name): str(digest) for name, digest in header["sha256"].items()},
-        _made_from(header),
-        arrays.get("stored"),
+        inputs={str(name): str(digest) for name, digest in header["sha256"].items()},
+        made_from=_made_from(header),
     )
-    return MotionRecord(
-        deformation,
-        arrays["spatial_momentum"],
-        so3.orthonormalised(arrays["initial_attitude"]),
-        _positive(header, "tolerance"),
-        str(header["method"]),
-        int(header["evaluations"]),
-        _solution(header, arrays, interpolant),
-    )
+    return {
+        "deformation": deformation,
+        "momentum": arrays["spatial_momentum"],
+        "initial_attitude": so3.orthonormalised(arrays["initial_attitude"]),
+        "tolerance": _positive(header, "tolerance"),
+        "method": str(header["method"]),
+        "evaluations": int(header["evaluations"]),
+        "solution": _solution(header, arrays, interpolant),
+    }
 
 
 def _positive(header: Mapping[str, Any], name: str) -> float:

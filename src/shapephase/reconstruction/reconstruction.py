@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import (
+    check_choice,
     check_file_name,
     check_object,
     initial_state_arguments,
@@ -24,7 +25,7 @@ from ..arguments import (
 from ..arrays import Array, Integers, common_batch, copied_when_read, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
 from ..display import short_repr
-from ..errors import ShapeError, WrongObjectError, unknown_name
+from ..errors import ShapeError, WrongObjectError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.families import VariantRotations, rotations_of_variants
 from ..integrator.integrate import stepped_rotation
@@ -35,7 +36,7 @@ from ..integrator.stepped import SteppedRotation
 from ..run_progress import ProgressCallback, watched
 from ._motion_views import MotionViews
 from ._solvers import METHODS, SOLVERS, Solution, check_pieces
-from .motion_record import MotionRecord, read_motion_record, write_motion_record
+from .motion_record import read_motion_record, write_motion_record
 
 if TYPE_CHECKING:
     from .external_torque import ExternalTorque, TorqueState
@@ -46,7 +47,7 @@ _FAMILY_METHODS = ("auto", "spectral")
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """Derivatives of the final attitude by the momentum and the initial attitude.
+    """Derivatives of the final attitude by the momentum and the initial attitude. Made by `Motion.sensitivity`.
 
     A change dmu of the momentum and a turn of the start to R(0) exp(hat(delta)) turn the end to R(T) exp(hat(e)) with
     e = by_momentum dmu + by_attitude delta: the derivative of the steps, not a difference.
@@ -55,12 +56,6 @@ class Sensitivity:
     ----------
     by_momentum : batch + (3, 3) [rad per kg m^2/s], from inertial axes to base axes
     by_attitude : batch + (3, 3), base axes at the start to base axes at the end
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
-    >>> print(f"{motion.sensitivity.by_momentum[2, 2]:.6f}")  # 2 s over 2.5 kg m^2
-    0.800000
     """
 
     by_momentum: Array
@@ -297,16 +292,7 @@ class Motion(MotionViews):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""
         check_file_name(path, "path")
-        record = MotionRecord(
-            deformation=self.deformation,
-            momentum=self.momentum,
-            initial_attitude=self.initial_attitude,
-            tolerance=self.tolerance,
-            method=self.method,
-            evaluations=self.evaluations,
-            solution=self.stepped,
-        )
-        write_motion_record(record, path)
+        write_motion_record(self, path)
 
     @cached_property
     def _flat_attitude(self) -> Array:
@@ -329,7 +315,7 @@ class Motion(MotionViews):
 @made_by(Motion="take one of its motions, family[0]")
 @dataclass(frozen=True, eq=False)
 class MotionFamily(Sequence[Motion]):
-    """Motions of N bodies of a family, a sequence made by `reconstruct`.
+    """Motions of N bodies of a family, as a sequence. Made by `reconstruct`.
 
     Attributes
     ----------
@@ -338,14 +324,6 @@ class MotionFamily(Sequence[Motion]):
     initial_attitude : (N, 3, 3) base axes to inertial axes
     tolerance : the one requested [rad]
     solution : S(t) of each, the attitude relative to the start
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> family = cat.with_inertias(masses=np.outer([1.0, 2.0], [part.mass for part in cat.moving_parts]))
-    >>> motions = sp.reconstruct(sp.articulated(family, loop), [0.0, 0.0, 0.0])
-    >>> [round(float(sp.so3.angle(motion.final_attitude)), 6) for motion in motions]
-    [1.139791, 1.139791]
     """
 
     deformations: DeformationFamily
@@ -528,8 +506,7 @@ def reconstruct(
     if not isinstance(deformation, Deformation) and isinstance(deformation, DeformationFamily):
         with watched(progress):
             return _family_motions(deformation, momentum, attitude, goal, method)
-    if not isinstance(method, str) or method not in SOLVERS:
-        raise unknown_name("method", method, METHODS)
+    check_choice(method, "method", METHODS)
     spatial, start = initial_state_arguments(momentum, attitude)
     at_start = spatial if attitude is None else so3.apply(so3.transpose(start), spatial)
     with watched(progress):
@@ -554,8 +531,7 @@ def _family_motions(
     method: str,
 ) -> MotionFamily:
     """Return the motions of a family of deformations; the tolerance has been checked."""
-    if not isinstance(method, str) or method not in _FAMILY_METHODS:
-        raise unknown_name("method for a family of bodies", method, _FAMILY_METHODS)
+    check_choice(method, "method for a family of bodies", _FAMILY_METHODS)
     count = len(deformations)
     spatial, start = initial_state_arguments(momentum, attitude)
     if spatial.shape[:-1] not in ((), (count,)):
@@ -594,7 +570,7 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
     0.0
     """
     check_file_name(path, "path")
-    return Motion(**vars(read_motion_record(path)))
+    return Motion(**read_motion_record(path))
 
 
 def momentum_from_rate(

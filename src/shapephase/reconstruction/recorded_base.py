@@ -25,19 +25,13 @@ _NEARER = 0.1  # of the difference, left over in the other order of quaternions,
 class BaseDifference:
     """Difference between a recorded base and a reconstructed one, both turned to agree at the first sample.
 
+    Made by `base_difference`.
+
     Attributes
     ----------
     times : (N,) [s]
     rotation : (N, 3, 3) from the reconstructed attitude to the recorded one, base axes
     angle : (N,) rotation angle [rad]
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> motion, times = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), [0.0, 0.5, 1.0]
-    >>> turned = sp.so3.exp(np.array([0.0, 0.0, 0.1])) @ motion.attitude(times)
-    >>> print(sp.base_difference(motion, times, turned).angle.round(9))  # both agree at the first sample
-    [0. 0. 0.]
     """
 
     times: Array

@@ -18,7 +18,7 @@ from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
 from ...shape_space.shape_path import ShapePath
 from ..symbolic import call_casadi
-from .hamiltonian import checked_metric, hamiltonian, initial_state, integrated, natural_scales
+from .hamiltonian import checked_metric, flow, hamiltonian
 
 _DEGREE = 12  # of the series of rates on a step of order 8: its error is that of the step
 
@@ -26,7 +26,7 @@ _DEGREE = 12  # of the series of rates on a step of order 8: its error is that o
 @made_by("optimal_control.extremal(...)")
 @dataclass(frozen=True, eq=False)
 class Extremal:
-    """A motion with zero momentum that solves Wong's equations, as a function of time.
+    """A motion with zero momentum that solves Wong's equations, as a function of time. Made by `extremal`.
 
     With g the metric of the cost, A the connection and F its curvature, l = R^T charge:
     d/dt (g r')_i = 1/2 r' dg/dr_i r' + l . F_ik r'_k, R' = R hat(-A r'), R(0) = 1. The charge is constant in inertial
@@ -41,13 +41,6 @@ class Extremal:
     energy : 1/2 r' g r', kept by the motion [J, or rad^2/s^2]
     energy_drift : largest relative change of the computed energy at the steps
     solution : SciPy's: times -> states (2 n + 4, N): shapes, their canonical momenta, quaternion xyzw
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> path = sp.optimal_control.extremal(cat, np.zeros(3), [1.0, 0.0, 0.0], np.zeros(3), 1.0)
-    >>> print(f"{path.energy_drift < 1e-8} {path.shape(0.0)}")
-    True [0. 0. 0.]
     """
 
     body: Body
@@ -166,22 +159,8 @@ def extremal(
     span, goal = positive_argument(duration), tolerance_argument(tolerance)
     equations = hamiltonian(body, metric)
     checked_metric(body, equations, start[None])
-    state = initial_state(equations, start, speed, moment)
-
-    def field(now: Array) -> Array:
-        return call_casadi(equations.field, 1, now, moment)[0][0]
-
-    momenta, _ = natural_scales(body, equations, start, speed, moment)
-    result = integrated(field, span, state, goal, np.concatenate([np.ones(body.n_shape), momenta, np.ones(4)]))
+    result = flow(body, equations, start, speed, moment, span, goal)
     energies = np.array([call_casadi(equations.energy, 1, row, moment)[0][0, 0] for row in result.y.T])
     energy = float(energies[0])
     drift = float(np.abs(energies - energy).max() / energy) if energy else 0.0
-    return Extremal(
-        body=body,
-        metric=metric,
-        duration=span,
-        charge=moment,
-        energy=energy,
-        energy_drift=drift,
-        solution=result.sol,
-    )
+    return Extremal(body, metric, span, moment, energy, drift, solution=result.sol)

@@ -12,14 +12,14 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ...arguments import check_object
+from ...arguments import check_choice, check_object
 from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_no_balls, check_smooth
 from ...display import short_repr
-from ...errors import AccuracyNotReached, SingularInertiaError, unknown_name
+from ...errors import AccuracyNotReached, SingularInertiaError
 from ...shape_space.connection import mechanical_connection
-from ..symbolic import call_casadi, solve_linear, symbolic_body
+from ..symbolic import call_casadi, quaternion_rate, solve_linear, symbolic_body
 
 _COSTS = ("kinetic", "rate")  # the integrals of a metric
 _LEAST_METRIC = 1e-12  # eigenvalue that still determines rates: the mass matrix is rounded to 1e-15
@@ -33,6 +33,8 @@ _building = Lock()
 class Hamiltonian:
     """Wong's equations of a body in Hamilton's form, as CasADi functions; g is the metric of the cost.
 
+    Made by `hamiltonian`.
+
     They derive from L(r, u, l) = 1/2 u g u + l . A u, the Lagrangian of a charge l in base axes: its derivatives are
     p' = dL/dr, p = dL/du and omega = -dL/dl. The state is (r, p, quaternion xyzw), l = R^T charge, and
     H = 1/2 (p - A^T l) g^-1 (p - A^T l).
@@ -43,13 +45,6 @@ class Hamiltonian:
     energy : state, charge -> H
     slopes : r, u, l -> gradient of L by all three, (2 n + 3,)
     metric : r -> g
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> equations = sp.optimal_control.hamiltonian(cat, "rate")
-    >>> print(np.array(equations.metric(np.zeros(3))).diagonal())  # the identity
-    [1. 1. 1.]
     """
 
     field: Any
@@ -82,8 +77,7 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
     [0.005   0.005   0.00125]
     """
     check_object(body, "Body", "body")
-    if not isinstance(metric, str) or metric not in _COSTS:
-        raise unknown_name("metric", metric, _COSTS)
+    check_choice(metric, "metric", _COSTS)
     check_smooth(body.chain.follows, "the equations of extremals need")
     check_no_balls(body.chain.follows, "the equations of extremals need")
     with _building:
@@ -91,6 +85,28 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
         if metric not in of_body:
             of_body[metric] = _hamiltonian(body, metric)
         return of_body[metric]
+
+
+def flow(
+    body: Body,
+    equations: Hamiltonian,
+    shape: Array,
+    rate: Array,
+    charge: Array,
+    duration: float,
+    accuracy: float,
+    most: int | None = None,
+) -> Any:
+    """SciPy's dense solution of the extremal from a shape, the base at the identity (see `integrated`)."""
+    momenta, _ = natural_scales(body, equations, shape, rate, charge)
+    return integrated(
+        lambda now: call_casadi(equations.field, 1, now, charge)[0][0],
+        duration,
+        initial_state(equations, shape, rate, charge),
+        accuracy,
+        np.concatenate([np.ones(body.n_shape), momenta, np.ones(4)]),
+        most,
+    )
 
 
 def initial_state(equations: Hamiltonian, shape: Array, rate: Array, charge: Array) -> Array:
@@ -179,8 +195,7 @@ def _hamiltonian(body: Body, cost: str) -> Hamiltonian:
     speed = solve_linear(metric(here), kinetic)
     known = slopes(here, speed, turned_back)
     omega = -known[2 * n :]
-    quaternion_rate = 0.5 * casadi.vertcat(scalar * omega + casadi.cross(vector, omega), -casadi.dot(vector, omega))
-    field = casadi.densify(casadi.cse(casadi.vertcat(speed, known[:n], quaternion_rate)))
+    field = casadi.densify(casadi.cse(casadi.vertcat(speed, known[:n], quaternion_rate(state[2 * n :], omega))))
     return Hamiltonian(
         field=casadi.Function("field", [state, charge], [field]),
         energy=casadi.Function("energy", [state, charge], [0.5 * kinetic.T @ speed]),

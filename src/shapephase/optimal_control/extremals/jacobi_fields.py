@@ -36,6 +36,8 @@ _BEYOND_END = 1.05  # durations that are examined by default, so that a conjugat
 class JacobiFields:
     """Jacobi fields of an extremal that vanish at its start: its derivative by initial rate and charge.
 
+    Made by `jacobi_fields`.
+
     Attributes
     ----------
     duration : [s]
@@ -43,14 +45,6 @@ class JacobiFields:
     momentum_scales, charge_scale : (n,) and a number: units of g rate and of the charge that the columns of `matrix`
         are per
     solution : times -> (2 n + 4 + (2 n + 3)(n + 3), N): the extremal, then the fields
-
-    Examples
-    --------
-    >>> cat = sp.load_body("cat_two_halves")
-    >>> rate, charge = np.array([1.0, 0.0, 0.0]), np.zeros(3)
-    >>> fields = sp.optimal_control.jacobi_fields(cat, "kinetic", np.zeros(3), rate, charge, 0.2, 1e-9)
-    >>> fields.matrix(np.array([0.1, 0.2])).shape
-    (2, 6, 6)
     """
 
     duration: float
@@ -77,17 +71,12 @@ class JacobiFields:
 
 @dataclass(frozen=True, eq=False)
 class ConjugateTime:
-    """A time at which neighbouring extremals from the same start meet again to first order.
+    """A time at which neighbouring extremals from the same start meet again to first order. Made by `conjugate_times`.
 
     Attributes
     ----------
     time : [s]
     multiplicity : number of independent Jacobi fields that vanish there
-
-    Examples
-    --------
-    >>> sp.optimal_control.ConjugateTime(time=0.8, multiplicity=1).time
-    0.8
     """
 
     time: float

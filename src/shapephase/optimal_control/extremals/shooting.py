@@ -15,9 +15,8 @@ from ...errors import AccuracyNotReached, ShapeError
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import horizontal_lift
 from ...shape_space.shape_path import ShapePath
-from ..symbolic import call_casadi
 from .extremal import Extremal, extremal
-from .hamiltonian import Hamiltonian, hamiltonian, initial_state, integrated, natural_scales
+from .hamiltonian import Hamiltonian, flow, hamiltonian
 from .jacobi_fields import inverse_scale, jacobi_fields
 from .wong_residual import wong_residual
 
@@ -31,7 +30,7 @@ _RELAXATION = 4.0  # divides the damping after a step that helps
 _TIGHTENING = 64.0  # multiplies it after one that does not: few trials to where the linear model holds
 _LAST_DAMPING = 1e5  # at which the steps are too short to go on
 _SYMMETRY = 10.0  # integration accuracies below which a relative singular value belongs to a symmetry
-_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0625)  # of a step, tried before the damping rises
+_SHARES = (0.5 ** np.arange(5)).tolist()  # of a step, tried before the damping rises
 _DECREASE = 0.1  # least relative decrease of the gap by a whole step, as in Armijo's rule
 _MOST_EVALUATIONS = 20_000  # of a trial, whose extremal then turns too fast to be a guide
 
@@ -68,29 +67,17 @@ class _BoundaryProblem:
     def gap(self, rate: Array, charge: Array, accuracy: float, most: int | None = None) -> Array:
         """Distance of the extremal's end from the goal, shape and rotation vector: (n + 3,)."""
         n = self.body.n_shape
-        state = initial_state(self.equations, self.start, rate, charge)
-        momenta, _ = natural_scales(self.body, self.equations, self.start, rate, charge)
-        scale = np.concatenate([np.ones(n), momenta, np.ones(4)])
-
-        def field(now: Array) -> Array:
-            return call_casadi(self.equations.field, 1, now, charge)[0][0]
-
-        last = integrated(field, self.duration, state, accuracy, scale, most).y[:, -1]
+        last = flow(self.body, self.equations, self.start, rate, charge, self.duration, accuracy, most).y[:, -1]
         attitude = so3.matrix_from_quat(so3.normalised(last[2 * n :]))
         return np.concatenate([last[:n] - self.end, so3.log(attitude @ self.turn.T)])
-
-    def slopes(self, rate: Array, charge: Array, accuracy: float) -> Array:
-        """Derivative of the gap by g rate and charge: (n + 3, n + 3)."""
-        fields = jacobi_fields(self.body, self.metric, self.start, rate, charge, self.duration, accuracy)
-        return fields.end()[2] / np.concatenate([fields.momentum_scales, np.full(3, fields.charge_scale)])
 
     def step(self, now: _Iterate, gap: Array, accuracy: float) -> _Iterate | None:
         """Return a rate and charge with a nearer end; None if there are none."""
         n = self.body.n_shape
-        matrix = self.slopes(now.rate, now.charge, accuracy)
-        momenta, charge_scale = natural_scales(self.body, self.equations, self.start, now.rate, now.charge)
-        scales = np.concatenate([momenta, np.full(3, charge_scale)])
-        scaled = matrix * scales
+        fields = jacobi_fields(self.body, self.metric, self.start, now.rate, now.charge, self.duration, accuracy)
+        scales = np.concatenate([fields.momentum_scales, np.full(3, fields.charge_scale)])
+        # Derivative of the gap by g rate and charge, per scale: (n + 3, n + 3).
+        scaled = fields.end()[2]
         weights = np.repeat([inverse_scale(scaled[:n]), inverse_scale(scaled[n:])], [n, 3])
         left, right = weights[:, None] * scaled, weights * gap
         across, values, along = np.linalg.svd(left)

@@ -22,10 +22,13 @@ from ..task import joint_coupling
 from .hamiltonian import Hamiltonian, checked_metric, hamiltonian
 
 _STAGES = 12  # Gauss nodes of a panel: exact to rounding on few panels of a smooth path
-_GAUSS = np.polynomial.legendre.leggauss(_STAGES)
-_NODES = _GAUSS[0]
-_WEIGHTS = _GAUSS[1]
-_PANELS = (2, 4, 8, 16, 32, 64)  # between two breaks, until the residual has converged
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(_STAGES)
+_SERIES = np.polynomial.legendre.legint(np.eye(_STAGES), lbnd=-1.0)  # integrals of the Legendre polynomials
+# Integral from -1 to each node of the polynomial through values at the nodes: (k, k).
+_INTEGRAL = np.polynomial.legendre.legval(_NODES, _SERIES).T @ np.linalg.inv(
+    np.polynomial.legendre.legvander(_NODES, _STAGES - 1)
+)
+_PANELS = (2 ** np.arange(1, 7)).tolist()  # between two breaks, until the residual has converged
 _CONVERGED = 1e-9  # change of a converged residual: the accuracy of the attitude along the path
 _CONVERGED_SHARE = 1e-3  # relative change, which suffices too: it is read as an order of magnitude
 _LEAST_FELT = 1e-9  # share of all charges' effect below which a combination is set to 0
@@ -36,7 +39,7 @@ _FOLLOWS = 1e-9  # [rad or m], deviation from them: rounding of user input
 
 @dataclass(frozen=True, eq=False)
 class WongFit:
-    """Extremal that fits a path best, and the path's residual in Wong's equations.
+    """Extremal that fits a path best, and the path's residual in Wong's equations. Made by `wong_residual`.
 
     Attributes
     ----------
@@ -44,12 +47,6 @@ class WongFit:
     rate : (n,) at the start of that extremal [rad/s or m/s]
     residual : root mean square, in the metric of the cost, of the defect of p = p(0) + integral of dL/dr, relative to
         that of the rate
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
-    >>> sp.optimal_control.wong_residual(cat, loop).charge.shape
-    (3,)
     """
 
     charge: Array
@@ -123,30 +120,15 @@ def wong_residual(
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _SampledEquations:
-    """Integrated equations at Gauss points, as columns: without charge, and by each component of the charge.
-
-    Attributes
-    ----------
-    missing : (N, n, 4) defect of p = p(0) + integral of dL/dr, in the metric of the cost, weighted
-    initial : (N, n, n) its derivative by p(0)
-    speed : norm of the rate in the same metric and weights
-    """
-
-    missing: Array
-    initial: Array
-    speed: float
-
-
-def _sampled(
+def _fit(
     body: Body,
     known: Hamiltonian,
     coupling: Array,
     route: ShapePath,
     attitude: Callable[[Array], Array],
     edges: Array,
-) -> _SampledEquations:
+) -> WongFit:
+    """Fit charge and initial momentum to the integrated equations at Gauss points, by least squares."""
     half = 0.5 * np.diff(edges)
     times = (edges[:-1, None] + half[:, None] * (_NODES + 1.0)).ravel()
     shapes, rates = route.curve(times)
@@ -156,6 +138,7 @@ def _sampled(
     )
     columns, by_shape = connection_slopes(body, shapes)
     back = so3.transpose(attitude(times))
+    # Columns: without charge, and by each component of the charge.
     momenta = np.concatenate([gradients[:, n : 2 * n, None], columns @ back], axis=2)
     forces = np.concatenate([gradients[:, :n, None], np.einsum("nija,nj->nia", by_shape, rates) @ back], axis=2)
     momenta, forces = coupling.T @ momenta, coupling.T @ forces
@@ -164,32 +147,17 @@ def _sampled(
     impulses = np.concatenate([np.zeros((1, before.shape[1])), before[:-1]])[:, None] + _INTEGRAL @ panels
     root = np.linalg.cholesky(coupling.T @ checked_metric(body, known, shapes, coupling) @ coupling)
     weights = np.sqrt((half[:, None] * _WEIGHTS).ravel())[:, None, None]
-    return _SampledEquations(
-        missing=np.asarray(weights * np.linalg.solve(root, momenta - impulses.reshape(momenta.shape)), float),
-        initial=np.asarray(weights * np.linalg.inv(root), float),
-        speed=float(np.linalg.norm(weights * np.linalg.solve(root, momenta[:, :, :1]))),
-    )
-
-
-def _fit(
-    body: Body,
-    known: Hamiltonian,
-    coupling: Array,
-    route: ShapePath,
-    attitude: Callable[[Array], Array],
-    edges: Array,
-) -> WongFit:
-    """Fit charge and initial momentum by least squares."""
-    sampled = _sampled(body, known, coupling, route, attitude, edges)
-    missing = sampled.missing.reshape(-1, 4)
+    # In the metric of the cost.
+    missing = (weights * np.linalg.solve(root, momenta - impulses.reshape(momenta.shape))).reshape(-1, 4)
+    speed = float(np.linalg.norm(weights * np.linalg.solve(root, momenta[:, :, :1])))
     # p(0) is eliminated first: the part of a charge that only shifts p(0) has no effect.
-    initial, triangle = np.linalg.qr(sampled.initial.reshape(-1, coupling.shape[1]))
+    initial, triangle = np.linalg.qr((weights * np.linalg.inv(root)).reshape(-1, coupling.shape[1]))
     left = missing - initial @ (initial.T @ missing)
     effects, values, axes = np.linalg.svd(left[:, 1:], full_matrices=False)
     kept = values > _LEAST_FELT * np.linalg.norm(missing[:, 1:])
     charge = -axes[kept].T @ ((effects[:, kept].T @ left[:, 0]) / values[kept])
     combined = np.append(1.0, charge)
-    residual = float(np.linalg.norm(left @ combined)) / sampled.speed if sampled.speed else 0.0
+    residual = float(np.linalg.norm(left @ combined)) / speed if speed else 0.0
     momentum = np.linalg.solve(triangle, initial.T @ (missing @ combined))
     here = route.shape(0.0)
     kinetic = momentum - coupling.T @ mechanical_connection(body, here).T @ charge
@@ -209,13 +177,3 @@ def _check_follows(body: Body, route: ShapePath, coupling: Array) -> None:
             f"joint {body.joint_names[worst]} of the path deviates by up to {deviation[worst]:.3g} from what joints "
             "and symmetric prescribe"
         )
-
-
-def _integral() -> Array:
-    """Integral from -1 to each node of the polynomial through values at the nodes: (k, k)."""
-    units = np.eye(len(_NODES))
-    sums = np.polynomial.legendre.legval(_NODES, np.polynomial.legendre.legint(units, lbnd=-1.0))
-    return sums.T @ np.linalg.inv(np.polynomial.legendre.legvander(_NODES, len(_NODES) - 1))
-
-
-_INTEGRAL = _integral()

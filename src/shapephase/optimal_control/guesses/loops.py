@@ -109,8 +109,7 @@ def _circles(task: Reorientation) -> list[list[Array]]:
     if angle == 0.0 or np.count_nonzero(task.movable) < 2:
         return []
     # At the start, which may be special, and half way to the middle of the limits.
-    lower, upper = np.maximum(task.lower, task.start - np.pi), np.minimum(task.upper, task.start + np.pi)
-    middle = 0.5 * (lower + upper)
+    middle = 0.5 * sum(task.reach(np.pi))
     for centre in (task.start, 0.5 * (task.start + middle)):
         plane = _plane(task, centre, turn / angle)
         if plane is None:
@@ -134,7 +133,7 @@ def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array,
     form = task.coupling.T @ (curvature(task.body, shape) @ axis) @ task.coupling
     metric = task.coupling.T @ symbolic_body(task.body).shape_metric(shape).full() @ task.coupling
     metric = metric[np.ix_(moves, moves)]
-    root = np.linalg.cholesky(metric + _RIDGE * np.trace(metric) / len(moves) * np.eye(len(moves)))
+    root = np.linalg.cholesky(ridged(metric, _RIDGE))
     inverse = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(1j * inverse @ form[np.ix_(moves, moves)] @ inverse.T)
     sigma = float(values[-1])
@@ -154,9 +153,8 @@ def _straight(task: Reorientation) -> list[Array]:
         moves = np.any(task.end != task.start) or task.via
         return [task.start + ramp * (task.end - task.start)] if moves else []
     connection = mechanical_connection(task.body, task.shapes(task.start)) @ task.coupling
-    metric = start_metric(task)
     turning = task.constrained_directions() @ (task.pointed_turn(task.start) - connection)
-    cheap = np.linalg.solve(metric + _RIDGE * np.trace(metric) / len(metric) * np.eye(len(metric)), turning.T)
+    cheap = np.linalg.solve(ridged(start_metric(task), _RIDGE), turning.T)
     missing = task.constrained_directions() @ task.turn_to_goal()
     direction = cheap @ np.linalg.lstsq(turning @ cheap, missing, rcond=_RANK)[0]
     return [task.start + factor * ramp * direction for factor in _STRAIGHT_FACTORS]
@@ -215,6 +213,11 @@ def guess_of_control(
 def start_metric(task: Reorientation) -> Array:
     """Kinetic metric of the coordinates at the start: (m, m)."""
     return task.coupling.T @ symbolic_body(task.body).shape_metric(task.shapes(task.start)).full() @ task.coupling
+
+
+def ridged(metric: Array, share: float) -> Array:
+    """Return a metric in which every motion has a length, at least a share of the mean eigenvalue."""
+    return metric + share * np.trace(metric) / len(metric) * np.eye(len(metric))
 
 
 def _different(tried: list[Guess]) -> list[Guess]:

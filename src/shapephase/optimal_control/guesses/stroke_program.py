@@ -14,17 +14,17 @@ from ...arrays import Array, Integers
 from ...shape_space.connection import mechanical_connection
 from .._polish import end_conditions
 from .._spline_basis import SplineBasis, gauss_tableau
-from ..collocation import CollocationProgram, NlpSolution, final_conditions
+from ..collocation import STAGES, CollocationProgram, NlpSolution, final_conditions
 from ..nodes.node_functions import node_functions
-from ..solver_callback import BestIterate, IterationCallback, ipopt_callback
+from ..solver_callback import IterationCallback
 from ..task import Reorientation
 
 _COSTS = ("kinetic", "rate", "time")
-_STAGES = 3  # Gauss nodes of a piece: Newton corrections of the whole motion remove their error
+
 PIECES_OF_WAY = 6  # between legs: enough for a spline to lead from one stroke to another
-_TOLERANCE = 1e-8  # accuracy of IPOPT, scaled
+
 _ITERATIONS = 200  # searches that reach an optimum take 30 to 90
-_SHORTEST = 1e-3  # share of the longest duration, for the cost "time"
+
 _DIGITS = 9  # decimals in which rates of equal strokes are compared: they agree up to rounding
 
 
@@ -96,41 +96,43 @@ class StrokeProgram(CollocationProgram):
         import casadi
         from scipy import sparse
 
-        self._task, self._basis, self._layout = task, layout.basis, layout
-        basis, m = layout.basis, task.dimension
+        self._task, self.basis, self._layout = task, layout.basis, layout
+        basis, m, self._shared = layout.basis, task.dimension, layout.shared
         pieces = np.concatenate([chain for chain, _ in layout.chains])
-        inside, weights, integrals = gauss_tableau(_STAGES)
+        inside, weights, integrals = gauss_tableau(STAGES)
         step = 1.0 / basis.pieces
         self.places = (basis.nodes[pieces, None] + inside * step).ravel()
         count, points = len(self.places), int(layout.shared.max()) + 1
         # The place of the first end of each chain, and the number of all ends: one more than pieces in each chain.
-        self._begins = np.cumsum([0, *(len(chain) + 1 for chain, _ in layout.chains)])
-        sizes = [points * m, 1, 4 * count, 4 * int(self._begins[-1])]
-        self._parts = np.cumsum([0, *sizes])
-        unknown = casadi.MX.sym("unknown", int(self._parts[-1]))
-        varied, duration, inner, outer = casadi.vertsplit(unknown, self._parts.tolist())
+        begins = np.cumsum([0, *(len(chain) + 1 for chain, _ in layout.chains)])
+        # Strokes, too, begin at 1.
+        self._ones, self._n_ends = [0, *begins[1:-1:2]], int(begins[-1])
+        parts = np.cumsum([0, points * m, 1, 4 * count, 4 * self._n_ends])
+        self._open = slice(int(parts[-1]), int(parts[-1]))  # there are no waypoints
+        unknown = casadi.MX.sym("unknown", int(parts[-1]))
+        varied, duration, inner, outer = casadi.vertsplit(unknown, parts.tolist())
         onto = sparse.csr_matrix((np.ones(basis.dimension), (np.arange(basis.dimension), layout.shared)))
         shapes, rates = (
             casadi.reshape(_in_coordinates(basis.sparse_matrix(self.places, order) @ onto, m) @ varied, m, count)
             for order in (0, 1)
         )
-        inner, outer = casadi.reshape(inner, 4, count), casadi.reshape(outer, 4, int(self._begins[-1]))
+        inner, outer = casadi.reshape(inner, 4, count), casadi.reshape(outer, 4, self._n_ends)
         at_node = casadi.vertcat(shapes, rates, inner, casadi.repmat(duration, 1, count))
         turning, density = node_functions(task).values.map(count)(at_node)
-        of_chains = [np.arange(first, last - 1) for first, last in pairwise(self._begins)]
+        of_chains = [np.arange(first, last - 1) for first, last in pairwise(begins)]
         before = np.concatenate(of_chains)
-        turned = casadi.reshape(turning, 4 * _STAGES, len(pieces))
+        turned = casadi.reshape(turning, 4 * STAGES, len(pieces))
         to_nodes = casadi.kron(casadi.DM(step * integrals), casadi.DM.eye(4)) @ turned
         to_end = casadi.kron(casadi.DM(step * weights[None]), casadi.DM.eye(4)) @ turned
         begin, end = outer[:, before.tolist()], outer[:, (before + 1).tolist()]
         rows = [
-            casadi.vec(casadi.reshape(inner, 4 * _STAGES, len(pieces)) - casadi.repmat(begin, _STAGES, 1) - to_nodes),
+            casadi.vec(casadi.reshape(inner, 4 * STAGES, len(pieces)) - casadi.repmat(begin, STAGES, 1) - to_nodes),
             casadi.vec(end - begin - to_end),
         ]
-        last = [outer[:, int(one) - 1] for one in self._begins[1:]]
+        last = [outer[:, int(begin) - 1] for begin in begins[1:]]
         for leg, (_, rounds) in enumerate(layout.strokes):
             onward = _product(last[2 * leg], _power(last[2 * leg + 1], rounds))
-            rows.append(outer[:, int(self._begins[2 * leg + 2])] - onward)
+            rows.append(outer[:, int(begins[2 * leg + 2])] - onward)
         conditions = _in_coordinates(sparse.csr_matrix(end_conditions(task, basis)) @ onto, m)
         end = int(layout.shared[-1]) * m
         rows += [conditions @ varied, final_conditions(task, varied[end : end + m], last[-1])]
@@ -152,37 +154,19 @@ class StrokeProgram(CollocationProgram):
         self._cost_function = casadi.Function("cost", [unknown], [cost])
         self.program = {"x": unknown, "f": cost, "g": casadi.vertcat(*rows)}
         self.derivatives = {}  # by CasADi: the program is small
-        # Without waypoints nothing follows the last quaternion of a plain program.
-        self._open = slice(m * basis.dimension + 5, m * basis.dimension + 5)
 
     def solve_strokes(self, control: Array, iteration_callback: IterationCallback | None = None) -> NlpSolution:
         """Return a local optimum from a guess of the control points (k, m)."""
         guess = self._guess(control)
-        best = BestIterate(iteration_callback, lambda values: self._goal_error(self._unfolded(values)))
-        callback = ipopt_callback(best, len(guess), self._low, self._high)
-        cost = float(self._cost_function(guess))
-        solver = self._ipopt(callback, 1.0 / cost if cost > 0.0 else 1.0, _ITERATIONS, _TOLERANCE, settles=False)
-        low, high = self._bounds()
-        found = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=self._low, ubg=self._high)
-        if len(best.unknowns):
-            best.unknowns = self._unfolded(best.unknowns)
-        values = self._unfolded(np.array(found["x"]).ravel())
-        return self._solution(values, float(found["f"]), solver.stats(), best)
-
-    def _unfolded(self, values: Array) -> Array:
-        """Return the unknowns of a plain program: all control points, T, and the last quaternion."""
-        points = values[: self._parts[1]].reshape(-1, self._task.dimension)
-        return np.concatenate(
-            [points[self._layout.shared].ravel(), values[self._parts[1] : self._parts[2]], values[-4:]]
-        )
+        return self._optimum(guess, float(self._cost_function(guess)), iteration_callback, _ITERATIONS)
 
     def _guess(self, control: Array) -> Array:
         """Return the unknowns, with the attitude by one step for each piece."""
-        task, layout, basis = self._task, self._layout, self._basis
+        task, layout, basis = self._task, self._layout, self.basis
         points = np.zeros((int(layout.shared.max()) + 1, task.dimension))
         points[layout.shared] = control
         control = points[layout.shared]
-        inside, _, _ = gauss_tableau(_STAGES)
+        inside, _, _ = gauss_tableau(STAGES)
         inner, outer, one = [], [], np.array([0.0, 0.0, 0.0, 1.0])
         reached = one
         for number, (chain, rounds) in enumerate(layout.chains):
@@ -199,22 +183,6 @@ class StrokeProgram(CollocationProgram):
             whole = so3.quat_from_rotation_vector(rounds * so3.log(so3.matrix_from_quat(now)))
             reached = so3.quat_product(reached, whole) if of_stroke else now
         return np.concatenate([points.ravel(), [task.duration], np.concatenate(inner).ravel(), np.array(outer).ravel()])
-
-    def _bounds(self) -> tuple[Array, Array]:
-        """Return the bounds of a plain program; strokes, too, begin at 1."""
-        task, shared, equal = self._task, self._layout.shared, self._task.equal_points
-        bounds = []
-        for limit, free in ((task.lower, -np.inf), (task.upper, np.inf)):
-            points = np.tile(limit, (int(shared.max()) + 1, 1))
-            points[shared[:equal]] = task.start
-            if task.end is not None:
-                points[shared[-equal:]] = task.end
-            duration = _SHORTEST * task.duration if task.cost == "time" and free < 0.0 else task.duration
-            ends = np.full((int(self._begins[-1]), 4), free)
-            ends[[0, *self._begins[1:-1:2]]] = [0.0, 0.0, 0.0, 1.0]
-            inner = np.full(int(self._parts[3] - self._parts[2]), free)
-            bounds.append(np.concatenate([points.ravel(), [duration], inner, ends.ravel()]))
-        return bounds[0], bounds[1]
 
 
 def _in_coordinates(matrix: Any, count: int) -> Any:

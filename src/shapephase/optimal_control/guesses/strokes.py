@@ -11,7 +11,7 @@ from ... import so3
 from ...arrays import Array
 from ...shape_space.connection import connection_slopes, curvature, mechanical_connection
 from ..task import Reorientation
-from .loops import start_metric
+from .loops import ridged, start_metric
 from .stroke_program import PIECES_OF_WAY, Layout
 
 _POINTS = 8  # control points of a stroke, a periodic cubic spline: a loop with two harmonics
@@ -161,14 +161,12 @@ def _metric(task: Reorientation) -> Array:
     if task.cost == "time":
         return np.diag(task.rate_limit**-2.0)
     metric = start_metric(task) if task.cost == "kinetic" else task.coupling.T @ task.coupling
-    return metric + _RIDGE * np.trace(metric) / len(metric) * np.eye(len(metric))
+    return ridged(metric, _RIDGE)
 
 
 def _reach(task: Reorientation) -> Array:
     """Bounds of strokes: (m, 2)."""
-    return np.stack(
-        [np.maximum(task.lower, task.start - _FARTHEST), np.minimum(task.upper, task.start + _FARTHEST)], axis=1
-    )
+    return np.stack(task.reach(_FARTHEST), axis=1)
 
 
 def _random_loop(task: Reorientation, reach: Array, rng: np.random.Generator) -> Array:

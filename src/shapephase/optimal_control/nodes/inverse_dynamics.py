@@ -39,9 +39,9 @@ from typing import Any
 import numpy as np
 
 from ...body.joint_chain import JointChain
-from ..symbolic import joint_frames, joint_screw
+from ..symbolic import joint_frames
 from .node_mechanics import carries
-from .spatial import Inertia, Twist
+from .spatial import Twist, gathered, links_of, passed_on, screws_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,56 +139,38 @@ class _MovingTree:
     def __init__(self, chain: JointChain, x: Any) -> None:
         import casadi
 
-        self._parents, joints = chain.parents, range(len(chain.parents))
-        count = len(joints)
+        self._chain, self._parents, count = chain, chain.parents, len(chain.parents)
         place, rate, bend, momentum = x[:count], x[count : 2 * count], x[2 * count : 3 * count], x[3 * count :]
         # There are no ball joints, which would be counted from a shape.
         frames = joint_frames(chain, place, place)
-        self._screws = [Twist(*joint_screw(chain, number, frames[number + 1])) for number in joints]
-        self._links = [
-            Inertia.of_link(float(mass), frame, centre, inertia)
-            for frame, mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True)
-        ]
-        self._bodies = self._gathered(self._links)
+        self._screws, self._links = screws_of(chain, frames), links_of(chain, frames)
+        self._bodies = gathered(chain, self._links)
         none = Twist(casadi.SX(3, 1), casadi.SX(3, 1))
         carried = [screw * rate[k] for k, screw in enumerate(self._screws)]
         lent = self._bodies[0].momentum(none)
         for body, twist in zip(self._bodies[1:], carried, strict=True):
             lent = lent + body.momentum(twist)
-        self._twists = self._passed_on(self._bodies[0].twist(Twist(momentum, none.linear) - lent), carried)
+        self._twists = passed_on(self._chain, self._bodies[0].twist(Twist(momentum, none.linear) - lent), carried)
         self._swept = [self._twists[parent].cross(screw) for parent, screw in zip(self._parents, self._screws)]
         steps = [screw * bend[k] + self._swept[k] * rate[k] for k, screw in enumerate(self._screws)]
-        still = self._passed_on(none, steps)
+        still = passed_on(self._chain, none, steps)
         self._link_momenta = [link.momentum(twist) for link, twist in zip(self._links, self._twists, strict=True)]
-        held = self._gathered(
+        held = gathered(
+            chain,
             [
                 link.momentum(rise) + twist.on_force(momentum)
                 for link, rise, twist, momentum in zip(
                     self._links, still, self._twists, self._link_momenta, strict=True
                 )
-            ]
+            ],
         )
         lift = none - self._bodies[0].twist(held[0])
         self._rises = [rise + lift for rise in still]
         self._forces = [force + body.momentum(lift) for force, body in zip(held, self._bodies, strict=True)]
-        self._momenta = self._gathered(self._link_momenta)
+        self._momenta = gathered(self._chain, self._link_momenta)
         self._link_changes = [link.moved(twist) for link, twist in zip(self._links, self._twists, strict=True)]
-        self._changes = self._gathered(self._link_changes)
+        self._changes = gathered(self._chain, self._link_changes)
         self.efforts = casadi.vertcat(*(screw.power(force) for screw, force in zip(self._screws, self._forces[1:])))
-
-    def _gathered(self, parts: list[Any]) -> list[Any]:
-        """Sum of a quantity over all frames that hang on each."""
-        sums = list(parts)
-        for number in reversed(range(len(self._parents))):
-            sums[self._parents[number]] = sums[self._parents[number]] + sums[number + 1]
-        return sums
-
-    def _passed_on(self, base: Twist, steps: list[Twist]) -> list[Twist]:
-        """Twist of each frame: the base's and the steps of all joints on the way."""
-        twists = [base]
-        for number, parent in enumerate(self._parents):
-            twists.append(twists[parent] + steps[number])
-        return twists
 
     def _coriolis(self, frame: int, twist: Twist) -> Twist:
         """Product K x for all that hangs on a frame."""
@@ -196,8 +178,6 @@ class _MovingTree:
 
     def rows(self) -> list[Any]:
         """Rows s, p, a, f, g, h, e, K^T s, one column a joint, then the inverse of I and K of the base."""
-        import casadi
-
         columns = []
         for k, (parent, s, p) in enumerate(zip(self._parents, self._screws, self._swept)):
             body = self._bodies[k + 1]
@@ -207,30 +187,26 @@ class _MovingTree:
             e = body.momentum(p) * 2.0 + self._coriolis(k + 1, s)
             b = self._changes[k + 1].momentum(s) - s.on_force(self._momenta[k + 1])
             columns.append((s, p, a, body.momentum(s), g, h, e, b))
-        units = [Twist.of_stacked(casadi.SX(column)) for column in casadi.horzsplit(casadi.DM.eye(6))]
-        inverse = [self._bodies[0].twist(unit) for unit in units]
-        coriolis = [self._coriolis(0, unit) for unit in units]
+        inverse = [self._bodies[0].twist(unit) for unit in _units()]
+        coriolis = [self._coriolis(0, unit) for unit in _units()]
         return [_side_by_side(column) for column in (*zip(*columns, strict=True), inverse, coriolis)]
 
     def second_rows(self, factors: Any) -> list[Any]:
         """Rows c, b x s, k, d, E s, one column a joint, then E of the base."""
-        import casadi
-
         lent = [screw * factors[k] for k, screw in enumerate(self._screws)]
         whole = self._bodies[0]
         total = self._bodies[1].momentum(lent[0])
         for body, twist in zip(self._bodies[2:], lent[1:], strict=True):
             total = total + body.momentum(twist)
-        loads = self._passed_on(whole.twist(total) * -1.0, lent)
-        shares = self._gathered([link.momentum(load) for link, load in zip(self._links, loads, strict=True)])
-        bare = self._gathered(
-            [
-                change.momentum(load) - load.on_force(momentum)
-                for change, load, momentum in zip(self._link_changes, loads, self._link_momenta, strict=True)
-            ]
-        )
+        loads = passed_on(self._chain, whole.twist(total) * -1.0, lent)
+        shares = gathered(self._chain, [link.momentum(load) for link, load in zip(self._links, loads, strict=True)])
+        bare = [
+            change.momentum(load) - load.on_force(momentum)
+            for change, load, momentum in zip(self._link_changes, loads, self._link_momenta, strict=True)
+        ]
+        bare = gathered(self._chain, bare)
         beta = whole.twist(bare[0]) * -1.0
-        changes = self._gathered([link.moved(load) for link, load in zip(self._links, loads, strict=True)])
+        changes = gathered(self._chain, [link.moved(load) for link, load in zip(self._links, loads, strict=True)])
         columns = []
         for k, (parent, s, p) in enumerate(zip(self._parents, self._screws, self._swept)):
             body, frame = self._bodies[k + 1], k + 1
@@ -240,9 +216,16 @@ class _MovingTree:
             d = d + self._changes[frame].momentum(c) - c.on_force(self._momenta[frame]) + body.momentum(bs)
             es = s.on_force(shares[frame]) - changes[frame].momentum(s)
             columns.append((c, bs, s.on_force(shares[frame]) + body.momentum(c), d, es))
-        units = [Twist.of_stacked(casadi.SX(column)) for column in casadi.horzsplit(casadi.DM.eye(6))]
-        of_base = [changes[0].momentum(unit) * -1.0 for unit in units]
+        of_base = [changes[0].momentum(unit) * -1.0 for unit in _units()]
         return [_side_by_side(column) for column in (*zip(*columns, strict=True), of_base)]
+
+
+def _units() -> list[Twist]:
+    """The six unit twists."""
+    import casadi
+
+    columns = [casadi.SX(column) for column in casadi.horzsplit(casadi.DM.eye(6))]
+    return [Twist(column[:3], column[3:]) for column in columns]
 
 
 def _side_by_side(twists: Any) -> Any:

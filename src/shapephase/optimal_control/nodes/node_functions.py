@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Array
 from ...body.body import Body
 from .._spline_basis import SplineBasis
-from ..symbolic import joint_coordinates, solve_linear
+from ..symbolic import joint_coordinates, quaternion_rate, solve_linear, turned_back
 from ..task import Reorientation
 from .node_mechanics import SIZE, node_mechanics
 
@@ -49,12 +49,12 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     import casadi
 
     m, chain = task.dimension, task.body.chain
-    mechanics, ends = node_mechanics(chain), _ends(task)
-    joints = _joints(task)
+    (mechanics, second_of_mechanics), ends = node_mechanics(chain), _ends(task)
+    joints, second_of_joints = _joints(task)
     y = casadi.MX.sym("y", 2 * m + 5)
-    place, rate, onward, back = joints.values(y[: 2 * m])
+    place, rate, onward, back = joints(y[: 2 * m])
     shape = casadi.DM(task.coupling) @ y[:m] + casadi.DM(task.offset)
-    numbers, by_place, by_rate = mechanics.values(place, rate, shape)
+    numbers, by_place, by_rate = mechanics(place, rate, shape)
     bare = casadi.DM(task.coupling) @ y[m : 2 * m]
     effort = 0.5 * casadi.dot(bare, bare)
     inputs = casadi.vertcat(numbers, effort, y[2 * m :])
@@ -64,19 +64,18 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     slopes = casadi.horzcat(by_place @ onward + by_rate @ back, by_rate @ onward)
     at_rate = casadi.horzcat(casadi.MX(1, m), (casadi.DM(task.coupling.T @ task.coupling) @ y[m : 2 * m]).T)
     through = casadi.diagcat(casadi.vertcat(slopes, at_rate), casadi.MX.eye(5))
-    by_inputs, _ = ends.jacobian(inputs)
-    jacobian = casadi.densify(by_inputs @ through)
+    jacobian = casadi.densify(ends.jacobian(inputs) @ through)
     multipliers, factor = casadi.MX.sym("multipliers", 4), casadi.MX.sym("factor")
     gradient, bend = ends.hessian(inputs, multipliers, factor)
-    places, mixed, rates = mechanics.second(place, rate, shape, gradient[:SIZE])
+    places, mixed, rates = second_of_mechanics(place, rate, shape, gradient[:SIZE])
     # Second derivatives by joints' coordinates and rates, chained to shape and its rate.
     lower = mixed @ onward + rates @ back
     corner = onward.T @ (places @ onward + mixed.T @ back) + back.T @ lower
     beside = onward.T @ lower
     square = onward.T @ rates @ onward + gradient[SIZE] * casadi.DM(task.coupling.T @ task.coupling)
     block = casadi.vertcat(casadi.horzcat(corner, beside.T), casadi.horzcat(beside, square))
-    if joints.bend is not None:
-        block = block + joints.bend(y[: 2 * m], by_place.T @ gradient[:SIZE], by_rate.T @ gradient[:SIZE])
+    if second_of_joints is not None:
+        block = block + second_of_joints(y[: 2 * m], by_place.T @ gradient[:SIZE], by_rate.T @ gradient[:SIZE])
     hessian = through.T @ bend @ through + casadi.diagcat(block, casadi.MX(5, 5))
     return NodeFunctions(
         values=casadi.Function("node", [y], [turning, density]),
@@ -85,22 +84,15 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Joints:
+def _joints(task: Reorientation) -> tuple[Any, Any]:
     """Coordinates and rates of all joints from the shape and its rate, (2 m,).
 
-    Attributes
-    ----------
+    Returns
+    -------
     values : (2 m,) -> coordinates (k,), rates (k,), derivatives of the first by the shape, of the second by the shape
     bend : (2 m,), factors of coordinates (k,) and of rates (k,) -> second derivatives (2 m, 2 m) of the weighted sum;
         None: they are zero
     """
-
-    values: Any
-    bend: Any
-
-
-def _joints(task: Reorientation) -> _Joints:
     import casadi
 
     m, chain = task.dimension, task.body.chain
@@ -116,30 +108,18 @@ def _joints(task: Reorientation) -> _Joints:
     parts = [casadi.substitute(part, about, shape) for part in (place, rates, onward, back)]
     values = casadi.Function("joints", [both], [casadi.densify(parts[0]), casadi.densify(parts[1]), *parts[2:]])
     if chain.follows.is_linear:
-        return _Joints(values=values, bend=None)
+        return values, None
     of_place, of_rate = (casadi.SX.sym(name, len(chain.parents)) for name in ("of_place", "of_rate"))
     bend, _ = casadi.hessian(casadi.dot(of_place, place) + casadi.dot(of_rate, rates), both)
     bend = casadi.substitute(bend, about, shape)
-    return _Joints(values=values, bend=casadi.Function("joints_bend", [both, of_place, of_rate], [bend]))
+    return values, casadi.Function("joints_bend", [both, of_place, of_rate], [bend])
 
 
-@dataclass(frozen=True, eq=False)
-class _Ends:
-    """Functions of the sixteen numbers, half the squared rate, quaternion and duration: (22,).
+def _ends(task: Reorientation) -> NodeFunctions:
+    """Functions of the sixteen numbers, half the squared rate, quaternion and duration, (22,), instead of y.
 
-    Attributes
-    ----------
-    values : dq/ds (4,), density
-    jacobian : derivatives of both, (4, 22) and (1, 22)
-    hessian : with multipliers (4,), factor -> gradient (22,) and second derivatives (22, 22) of the weighted sum
+    `hessian` returns the gradient of the weighted sum, (22,), before the second derivatives.
     """
-
-    values: Any
-    jacobian: Any
-    hessian: Any
-
-
-def _ends(task: Reorientation) -> _Ends:
     import casadi
 
     inputs, mass = casadi.SX.sym("inputs", SIZE + 6), float(task.body.chain.masses.sum())
@@ -153,12 +133,10 @@ def _ends(task: Reorientation) -> _Ends:
     inertia = about_origin - (casadi.dot(moment, moment) * casadi.SX.eye(3) - moment @ moment.T) / mass
     momentum = angular - casadi.cross(moment, linear) / mass
     solution = solve_linear(inertia, momentum)
-    turn, vector, scalar = -solution, q[:3], q[3]
+    turn = -solution
     if np.any(task.momentum):
-        mu = casadi.DM(task.momentum)
-        back = mu - 2.0 * scalar * casadi.cross(vector, mu) + 2.0 * casadi.cross(vector, casadi.cross(vector, mu))
-        turn = turn + duration * solve_linear(inertia, back)
-    turning = 0.5 * casadi.vertcat(scalar * turn + casadi.cross(vector, turn), -casadi.dot(vector, turn))
+        turn = turn + duration * solve_linear(inertia, turned_back(q, casadi.DM(task.momentum)))
+    turning = quaternion_rate(q, turn)
     density = casadi.SX(1, 1)
     if task.cost == "kinetic":
         density = 0.5 * (energy - casadi.dot(linear, linear) / mass - casadi.dot(momentum, solution)) / duration
@@ -168,11 +146,11 @@ def _ends(task: Reorientation) -> _Ends:
     multipliers, factor = casadi.SX.sym("multipliers", 4), casadi.SX.sym("factor")
     weighted = casadi.dot(multipliers, turning) + factor * density
     bend, gradient = casadi.hessian(weighted, inputs)
-    slopes = [casadi.densify(casadi.jacobian(part, inputs)) for part in (turning, density)]
+    slopes = casadi.densify(casadi.jacobian(turning, inputs))
     options = {"cse": True}
-    return _Ends(
+    return NodeFunctions(
         values=casadi.Function("ends", [inputs], [turning, density], options),
-        jacobian=casadi.Function("ends_jacobian", [inputs], slopes, options),
+        jacobian=casadi.Function("ends_jacobian", [inputs], [slopes], options),
         hessian=casadi.Function(
             "ends_hessian", [inputs, multipliers, factor], [casadi.densify(gradient), casadi.densify(bend)], options
         ),

@@ -23,37 +23,27 @@ where h', J' are the derivatives of first moment and inertia along s, and alpha,
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...arrays import Array
 from ...body.joint_chain import JointChain
-from ..symbolic import joint_frames, joint_screw
-from .spatial import Inertia, Twist
+from ..symbolic import joint_frames
+from .spatial import Twist, gathered, links_of, passed_on, screws_of
 
 SIZE = 16  # numbers in z
 _INERTIA_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-@dataclass(frozen=True, eq=False)
-class NodeMechanics:
+def node_mechanics(chain: JointChain) -> tuple[Any, Any]:
     """CasADi functions of coordinates and rates of all k joints of a tree, and the shape its ball joints are about.
 
-    Attributes
-    ----------
+    Returns
+    -------
     values : coordinates (k,), rates (k,), shape (n,) -> z (16,), its derivatives by both, (16, k) each
     second : coordinates, rates, shape, factors (16,) -> second derivatives of their product with z: by coordinates
         (k, k), by rates and coordinates (k, k), by rates (k, k)
-    """
-
-    values: Any
-    second: Any
-
-
-def node_mechanics(chain: JointChain) -> NodeMechanics:
-    """Return the functions of a tree, in symbols.
 
     Source: composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, section 6.2).
     """
@@ -75,8 +65,7 @@ def node_mechanics(chain: JointChain) -> NodeMechanics:
     mixed = (apart * (screws.T @ lent)) - (above * (turned.T @ forces)).T
     energies = above * (screws.T @ forces)
     rates = 2.0 * c[-1] * (energies + (apart * energies).T)
-    second = casadi.Function("mechanics_second", [q, u, r, c], [places, mixed, rates])
-    return NodeMechanics(values=values, second=second)
+    return values, casadi.Function("mechanics_second", [q, u, r, c], [places, mixed, rates])
 
 
 def carries(chain: JointChain) -> Array:
@@ -90,24 +79,13 @@ class _Tree:
     def __init__(self, chain: JointChain, place: Any, rate: Any, shape: Any) -> None:
         import casadi
 
-        frames = joint_frames(chain, place, shape)
-        joints = range(len(chain.parents))
-        self._screws = [Twist(*joint_screw(chain, number, frames[number + 1])) for number in joints]
-        none = casadi.SX(3, 1)
-        self._twists = [Twist(none, none)]
-        for number, parent in enumerate(chain.parents):
-            self._twists.append(self._twists[parent] + self._screws[number] * rate[number])
-        bodies = [
-            Inertia.of_link(float(mass), frame, centre, inertia)
-            for frame, mass, centre, inertia in zip(frames, chain.masses, chain.centres, chain.inertias, strict=True)
-        ]
-        momenta = [body.momentum(twist) for body, twist in zip(bodies, self._twists, strict=True)]
-        for number in reversed(joints):
-            parent = chain.parents[number]
-            bodies[parent] = bodies[parent] + bodies[number + 1]
-            momenta[parent] = momenta[parent] + momenta[number + 1]
-        self._bodies, self._momenta, self._rate = bodies, momenta, rate
-        self._forces = [bodies[number + 1].momentum(self._screws[number]) for number in joints]
+        frames, none = joint_frames(chain, place, shape), casadi.SX(3, 1)
+        self._screws, links, self._rate = screws_of(chain, frames), links_of(chain, frames), rate
+        steps = [screw * rate[number] for number, screw in enumerate(self._screws)]
+        self._twists = passed_on(chain, Twist(none, none), steps)
+        self._bodies = gathered(chain, links)
+        self._momenta = gathered(chain, [link.momentum(twist) for link, twist in zip(links, self._twists, strict=True)])
+        self._forces = [body.momentum(screw) for body, screw in zip(self._bodies[1:], self._screws, strict=True)]
 
     def values(self) -> tuple[Any, Any, Any]:
         """Return z and its derivatives by coordinates and rates."""

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...arrays import Array
-from ..symbolic import constant, solve_linear
+from ...body.joint_chain import JointChain
+from ..symbolic import constant, joint_screw, solve_linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,11 +16,6 @@ class Twist:
 
     angular: Any
     linear: Any
-
-    @classmethod
-    def of_stacked(cls, six: Any) -> Twist:
-        """Return the twist with a stacked angular and linear part."""
-        return cls(six[:3], six[3:])
 
     @property
     def stacked(self) -> Any:
@@ -112,3 +108,30 @@ class Inertia:
         )
         angular = solve_linear(about_centre, force.angular - casadi.cross(self.moment, force.linear) / self.mass)
         return Twist(angular, (force.linear - casadi.cross(angular, self.moment)) / self.mass)
+
+
+def screws_of(chain: JointChain, frames: list[tuple[Any, Any]]) -> list[Twist]:
+    """Screws of all joints of a tree, from the orientations and origins of its frames."""
+    return [Twist(*joint_screw(chain, number, frames[number + 1])) for number in range(len(chain.parents))]
+
+
+def links_of(chain: JointChain, frames: list[tuple[Any, Any]]) -> list[Inertia]:
+    """Inertias of the links of all frames of a tree."""
+    links = zip(chain.masses, frames, chain.centres, chain.inertias, strict=True)
+    return [Inertia.of_link(float(mass), *link) for mass, *link in links]
+
+
+def gathered(chain: JointChain, parts: list[Any]) -> list[Any]:
+    """Sums of a quantity over all frames that hang on each."""
+    sums = list(parts)
+    for number in reversed(range(len(chain.parents))):
+        sums[chain.parents[number]] = sums[chain.parents[number]] + sums[number + 1]
+    return sums
+
+
+def passed_on(chain: JointChain, base: Twist, steps: list[Twist]) -> list[Twist]:
+    """Twist of each frame: the base's and the steps of all joints on the way."""
+    twists = [base]
+    for number, parent in enumerate(chain.parents):
+        twists.append(twists[parent] + steps[number])
+    return twists
