@@ -17,6 +17,7 @@ os.environ.setdefault("MUJOCO_GL", "disable")  # nothing is drawn here
 import mujoco
 import numpy as np
 
+from ... import so3
 from ...arrays import Array
 from ..formats.xml_text import listed, quoted, xml_tree
 from ..virtual_base import way_words
@@ -250,6 +251,4 @@ def _only_tree(compiled: Compiled, notes: list[str]) -> int:
 
 def rotation(quaternion: Array) -> Array:
     """Rotation of a quaternion w x y z, made of length one: (3, 3)."""
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew)
+    return so3.matrix_from_quat(np.roll(quaternion / np.linalg.norm(quaternion), -1))

@@ -15,6 +15,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ... import so3
 from ...arrays import FARTHEST, Array
 from ..couplings.ball_joints import BallJoint, coordinate_names
 from ..couplings.coupling import Coupling, circular, with_followers
@@ -111,7 +112,7 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         anchor = model.jnt_pos[joint]
         # The coordinate does not begin at zero where the file has the body.
         by = 0.0 if ball else -_reference(model, joint)
-        place, turn = (place + by * (turn @ axis), turn) if sliding else (place, turn @ _about(axis, by))
+        place, turn = (place + by * (turn @ axis), turn) if sliding else (place, turn @ so3.exp(by * axis))
         lower, upper = model.jnt_range[joint].tolist()
         if lower > upper:
             raise UnusableModelError(
@@ -129,10 +130,6 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         after = -anchor if last else np.zeros(3)
         chain.add_joint(name, kind, parent, below, place, turn, axis, limits, after, line)
         parent, place, turn = below, np.zeros(3), np.eye(3)
-
-
-def _about(axis: Array, angle: float) -> Array:
-    return rotation(np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis]))
 
 
 # ---- Equalities and what else holds parts together ------------------------------------------------------------------

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ... import so3
 from ...arrays import Array
 from ...errors import ShapeError
 from ..couplings.coupling import Coupling, circular
@@ -363,7 +364,8 @@ class _Reading:
                 rule = Coupling(rule.start + float(function(np.zeros(())).value), ())
             if not rule.terms:
                 # Along the same axis, so that it does not matter which comes first.
-                pose = _after(pose, *_moved(axis.kind, direction, rule.start))
+                moved, still = rule.start * direction, np.zeros(3)
+                pose = _after(pose, *((np.eye(3), moved) if axis.kind == _SLIDE else (so3.exp(moved), still)))
             if name == axis.name and not rule.terms:
                 continue
             below = f"{child}__{name}"
@@ -393,15 +395,6 @@ def _sign(function: JointFunction) -> float:
     straight = not len(function.knots) and not function.coefficients[2:].any() and len(function.coefficients) > 1
     slope = float(function.coefficients[1, 0]) if straight else 0.0
     return slope if abs(slope) == 1.0 else 0.0
-
-
-def _moved(kind: str, axis: Array, by: float) -> tuple[Array, Array]:
-    """A fixed turn or slide."""
-    if kind == _SLIDE:
-        return np.eye(3), by * axis
-    x, y, z = np.sin(by) * axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.cos(by) * np.eye(3) + (1.0 - np.cos(by)) * np.outer(axis, axis) + skew, np.zeros(3)
 
 
 def _after(pose: tuple[Array, Array], turn: Array, place: Array) -> tuple[Array, Array]:

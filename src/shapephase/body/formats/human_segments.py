@@ -42,7 +42,7 @@ _TABLE = {
 }
 _TRUNK = ("upper_trunk", "middle_trunk", "lower_trunk")
 _SHOULDERS = 0.8556  # height over the hips, of the trunk's length: robots/astronaut.urdf, after Drillis and Contini
-_HEEL = 0.05 / 0.2581  # behind the ankle, of the foot's length (HeiMan)
+_HEEL = 0.05 / _TABLE["foot"].length  # behind the ankle, of the foot's length (HeiMan)
 _ALONG = 0.7  # cosine to the long axis above which the body's front-back axis is not a segment's
 # Names of the bones that carry a segment, without their side, the most specific first.
 _NAMES = {
@@ -54,15 +54,6 @@ _NAMES = {
     "hand": ("wrist", "hand"),
 }
 _SIDES = {"left": ("left", "l"), "right": ("right", "r")}
-# Usual names, behind the side.
-_CALLED = {
-    "thigh": "UpLeg",
-    "shank": "Leg",
-    "foot": "Foot",
-    "upper_arm": "Arm",
-    "forearm": "ForeArm",
-    "hand": "Hand",
-}
 _MAY_LACK = {"hand": "forearm"}  # segments that the bone above carries where a skeleton ends early
 _MOST_POSTURES = 2000  # frames that are compared: a person stands straight for longer than a frame
 _AS_STRAIGHT = 5e-3  # of the length from shoulders to feet: knees bent by 15 degrees shorten it so much
@@ -272,7 +263,7 @@ class _Layout:
                     return number
         if part in _MAY_LACK:
             return self._limb(side, _MAY_LACK[part])
-        raise self._unknown(f"{side} {part.replace('_', ' ')}", f"{side.title()}{_CALLED[part]}")
+        raise self._unknown(f"{side} {part.replace('_', ' ')}", f"{side.title()}{_NAMES[part][0].title()}")
 
     def _head(self) -> int:
         for word in ("head", "neck"):
