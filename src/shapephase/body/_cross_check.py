@@ -23,11 +23,7 @@ from .virtual_base import joint_coordinates
 
 
 def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
-    """Compare a body with the tree of links that its file has.
-
-    Raises ModelFileError if mass, links, joints, or inertia and momentum at a random shape and rate differ by more than
-    rounding, or if nothing in the file has mass.
-    """
+    """Compare a body with the tree of links that its file has."""
     if not body.mass > 0.0:
         first = next(iter(tree.links.values()))
         raise ModelFileError(
@@ -53,10 +49,7 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
 
 
 def check_against_engine(body: Body, tree: LinkTree, poses: list[dict[str, Any]], where: str) -> None:
-    """Compare a body with the engine that owns its format, at random shapes and rates.
-
-    Raises ModelFileError if mass, centre, inertia or momentum differ by more than rounding.
-    """
+    """Compare a body with the engine that owns its format, at random shapes and rates."""
     for pose in poses:
         shape, rate = (np.array([pose[of][name] for name in body.joint_names]) for of in ("shape", "rate"))
         *_, extent, motion = inertia_and_momentum(tree, pose["shape"], pose["rate"])

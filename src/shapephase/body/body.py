@@ -253,7 +253,7 @@ class Body(ShapeArguments):
         parts = tuple(part.links for part in self.moving_parts)
         given = {"masses": masses, "centres": centres, "inertias": inertias}
         changed = given_inertias(self.chain, parts, given, on_unphysical)
-        return self.with_frame_inertias(*changed) if changed.masses.ndim == 1 else BodyFamily(self, *changed)
+        return self.with_frame_inertias(*changed) if changed[0].ndim == 1 else BodyFamily(self, *changed)
 
     def with_frame_inertias(self, masses: Array, centres: Array, tensors: Array) -> Body:
         """The body with other inertias of all frames of its chain, in their axes, unchecked.

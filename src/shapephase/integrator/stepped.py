@@ -178,10 +178,6 @@ class SteppedRotation:
             sampling_error=0.0 * error,
         )
 
-    def inverse_and_drift(self, t: Array) -> tuple[Array, Array]:
-        """I^-1 and I^-1 L_o at times: (N,) -> (N, 3, 3), (N, 3)."""
-        return self.interpolant.inverse_and_drift(t)
-
 
 def _from_zero(of_steps: Array) -> Array:
     """Sums over the steps up to each of their ends: (B, K) -> (B, K + 1)."""

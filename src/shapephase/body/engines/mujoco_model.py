@@ -38,7 +38,7 @@ _NUMBERS = {
     *("mass", "density", "diaginertia", "fullinertia", "size", "fromto", "axis", "range", "ref", "polycoef"),
     *("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
 }
-_MEMORY = 64 * 2**20  # [bytes] of MuJoCo's work space: the squares of two thousand coordinates
+_MEMORY = 2**26  # [bytes] of MuJoCo's work space: the squares of two thousand coordinates
 _TAG_LINES = 3  # lines from an element's tag to its name
 
 
@@ -80,10 +80,7 @@ class Compiled:
 
 
 def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
-    """The model that MuJoCo compiles from a file, with or without shapes that are only drawn.
-
-    Raises UnusableModelError for what it does not accept.
-    """
+    """The model that MuJoCo compiles from a file, with or without shapes that are only drawn."""
     content = Path(path).read_bytes()
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise UnusableModelError("<mujoco>: MuJoCo reads no UTF-16; save the file as UTF-8")

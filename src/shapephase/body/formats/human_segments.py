@@ -98,8 +98,6 @@ def person_of(skeleton: Skeleton, mass: float, metre: float) -> Person:
 
     mass : of the person [kg]
     metre : length of a unit of the file [m]
-
-    Raises BvhFaultError if a bone is not found by its name, or has no length.
     """
     return _Layout(skeleton, mass, metre).person()
 
@@ -191,9 +189,12 @@ class _Layout:
             top -= length
             carrier = {"upper_trunk": way[-1], "lower_trunk": pelvis}.get(part, self._reaching(way, height))
             segments.append(self._segment(part, carrier, self.hips + height * self.up, self.up, length))
+        head = next((self.plain.index(word) for word in ("head", "neck") if word in self.plain), None)
+        if head is None:
+            raise self._unknown("head", "Head")
         row, length = _TABLE["head"], self.trunk * _TABLE["head"].length / whole
         centre = self.hips + (self.trunk + (1.0 - row.centre) * length) * self.up
-        return [*segments, self._segment("head", self._head(), centre, self.up, length)]
+        return [*segments, self._segment("head", head, centre, self.up, length)]
 
     def _reaching(self, way: list[int], height: float) -> int:
         """The last bone of the trunk whose joint is not above a height over the hips."""
@@ -264,12 +265,6 @@ class _Layout:
         if part in _MAY_LACK:
             return self._limb(side, _MAY_LACK[part])
         raise self._unknown(f"{side} {part.replace('_', ' ')}", f"{side.title()}{_NAMES[part][0].title()}")
-
-    def _head(self) -> int:
-        for word in ("head", "neck"):
-            if word in self.plain:
-                return self.plain.index(word)
-        raise self._unknown("head", "Head")
 
     def _unknown(self, what: str, name: str) -> BvhFaultError:
         names = listed([bone.name for bone in self.skeleton.bones], 40)
