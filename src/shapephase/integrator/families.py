@@ -32,16 +32,20 @@ class Variants(Protocol):
 
     def __len__(self) -> int:
         """How many they are."""
+        ...
 
     @property
     def model(self) -> Sampler:
         """Sampler of the deformation by which they are planned."""
+        ...
 
     def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
         """I^-1 and I^-1 L_o of some at times, and which are reliable: (V,), (S,) -> (V, S, 9), (V,)."""
+        ...
 
     def alone(self, row: int) -> Sampler:
         """Sampler of one of them."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,25 +19,31 @@ class LinkRows(Protocol):
     @property
     def parents(self) -> Any:
         """(k,) unsigned."""
+        ...
 
     @property
     def turning(self) -> Array:
         """(k,)."""
+        ...
 
     @property
     def leads(self) -> Array:
         """(k,)."""
+        ...
 
     @property
     def rows(self) -> Array:
         """(k + 1, 22)."""
+        ...
 
     @property
     def mass(self) -> float:
         """[kg]."""
+        ...
 
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
         """Coordinates and rates of all joints: (N, n), (N, n) -> (N, k), (N, k)."""
+        ...
 
 
 def tree_channels(tree: LinkRows, shapes: Array, rates: Array) -> Array | None:

@@ -326,7 +326,7 @@ def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float] | 
     ball = segment.isRotationAQuaternion()
     kinds = [("prismatic", "Trans", axis) for axis in segment.seqT().to_string()]
     kinds += [("revolute", "Rot", axis) for axis in segment.seqR().to_string() if not ball]
-    axes = [
+    axes: list[tuple[str, str, Array, list[float] | None]] = [
         (f"{name}_{word}{axis.upper()}", kind, _AXES[axis], limits)
         for (kind, word, axis), limits in zip(kinds, ranges, strict=not ball)
     ]
