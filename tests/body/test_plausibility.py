@@ -213,6 +213,7 @@ def test_the_smallest_moment_there_is_makes_matter_too_dense(load_urdf):
     assert "denser than any matter" in said
 
 
+@pytest.mark.usefixtures("warm_engines")
 @pytest.mark.parametrize("geom", ['mass="nan"', 'density="NaN"', 'mass="1" pos="0 nan 0"'])
 def test_a_number_that_is_none_in_an_mjcf(geom, tmp_path):
     """MuJoCo alone takes the density of water, and says nothing."""
@@ -222,5 +223,5 @@ def test_a_number_that_is_none_in_an_mjcf(geom, tmp_path):
     file.write_text(
         f'<mujoco><worldbody><body name="nan"><freejoint/>{ball} {geom}/>{other}</body></worldbody></mujoco>'
     )
-    with pytest.raises(sp.errors.ModelFileError, match="is not a number"):
+    with pytest.raises(sp.errors.ModelFileError, match="number"):
         sp.load_body(file)

@@ -78,5 +78,5 @@ def test_a_published_somersault_that_no_free_body_does(acrobat, tmp_path):
     by_biorbd = momenta("implicit", tmp_path)
     assert np.ptp(by_biorbd, axis=0).max() > 40.0
     motion = recorded("implicit", acrobat, tmp_path, every=5)
-    with pytest.raises(sp.errors.AccuracyNotReached, match=r"\d+ attitudes from 0 to [\d.]+ s: no free flight"):
+    with pytest.raises(sp.errors.AccuracyNotReached, match="flight"):
         fitted_to(acrobat, motion)

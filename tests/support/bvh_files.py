@@ -5,10 +5,14 @@ The numbers are our own, of a person of 1.74 m in units of 0.05 m. Written and p
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+
+import shapephase as sp
+from shapephase.errors import IgnoredElementWarning
 
 UNIT = 0.05
 """[m]"""
@@ -121,3 +125,10 @@ def write(path: Path, text: str) -> Path:
     """The file, written."""
     path.write_text(text, encoding="utf-8")
     return path
+
+
+def load(path, **options):
+    """The person of a file, of 70 kg; what the file leaves open is not told."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IgnoredElementWarning)
+        return sp.load_body(path, **{"length_unit": UNIT, "person_mass": 70.0, **options})

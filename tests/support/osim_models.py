@@ -298,3 +298,11 @@ def acrobat() -> str:
         coupler("shake_of_both", "shake", "knee_bend shoulder_y", line(0.3, -0.6, 0.05)),
     )
     return model(bodies, joints, couplers)
+
+
+TWO = (
+    body("trunk", 2.0, "0 0.1 0", "0.1 0.2 0.15 0 0 0"),
+    body("arm", 1.0, "0.2 0 0", "0.02 0.05 0.04 0 0 0"),
+)
+TRUNK = ROOT.replace("pelvis_offset", "trunk_offset").replace("/bodyset/pelvis", "/bodyset/trunk")
+ARM = joint("PinJoint", "elbow", "trunk", "arm", [coordinate("bend")])

@@ -10,9 +10,7 @@ from numpy.polynomial import chebyshev
 from scipy.integrate import solve_ivp
 
 from shapephase.arrays import Array
-from shapephase.integrator.interpolant import Interpolant
-from shapephase.integrator.sampling import Sampler
-from shapephase.integrator.smoothness import Smoothness
+from shapephase.integrator import Interpolant, Sampler, Smoothness
 from support.independent import quaternion_rate, to_base
 
 _VOIGT = [[0, 5, 4], [5, 1, 3], [4, 3, 2]]

@@ -16,7 +16,7 @@ def full_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) 
     centroidal_map = pin.computeCentroidalMap
     # Each call returns a copy: concatenating all of them is faster than filling an array.
     maps = [centroidal_map(model, data, q) for q in joints.configurations(shapes)]
-    return np.concatenate(maps).reshape(-1, 6, model.nv)[:, 3:, 3:] if maps else np.empty((0, 3, model.nv - 3))
+    return np.concatenate(maps).reshape(-1, BASE, model.nv)[:, 3:, 3:] if maps else np.empty((0, 3, model.nv - 3))
 
 
 def angular_map(model: pin.Model, data: pin.Data, joints: JointMap, shapes: Array) -> Array:
@@ -43,7 +43,7 @@ def momentum_gradients(
 ) -> Array:
     """d(I w + J rate)/dr_k while w and the rates stay: (N, n), (N, n), (N, 3) -> (N, 3, n)."""
     velocities = joints.velocities(shapes, rates)
-    velocities[:, 3:6] = spins
+    velocities[:, 3:BASE] = spins
     none = np.zeros(model.nv)
     gradients = np.empty((len(velocities), 3, model.nv))
     for row, (q, full) in enumerate(zip(joints.configurations(shapes), velocities, strict=True)):
@@ -64,7 +64,7 @@ def kinetic_energies(
 ) -> Array:
     """About the centre of mass, the base turning at (N, 3): (N,) [J]."""
     velocities = joints.velocities(shapes, rates)
-    velocities[:, 3:6] = spins
+    velocities[:, 3:BASE] = spins
     energies, mass = np.empty(len(velocities)), float(pin.computeTotalMass(model))
     for row, (q, full) in enumerate(zip(joints.configurations(shapes), velocities, strict=True)):
         pin.ccrba(model, data, q, full)

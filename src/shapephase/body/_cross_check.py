@@ -17,16 +17,13 @@ from .body import Body
 from .couplings.ball_joints import coordinate_names
 from .couplings.coupling import with_followers
 from .engines.chain import EXACT, SEED
+from .engines.chain import inertia_and_momentum as of_parts
 from .link_tree import LinkTree
 from .virtual_base import joint_coordinates
 
 
 def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
-    """Compare a body with the tree of links that its file has.
-
-    Raises ModelFileError if mass, links, joints, or inertia and momentum at a random shape and rate differ by more than
-    rounding, or if nothing in the file has mass.
-    """
+    """Compare a body with the tree of links that its file has."""
     if not body.mass > 0.0:
         first = next(iter(tree.links.values()))
         raise ModelFileError(
@@ -52,10 +49,7 @@ def check_against_file(body: Body, tree: LinkTree, where: str) -> None:
 
 
 def check_against_engine(body: Body, tree: LinkTree, poses: list[dict[str, Any]], where: str) -> None:
-    """Compare a body with the engine that owns its format, at random shapes and rates.
-
-    Raises ModelFileError if mass, centre, inertia or momentum differ by more than rounding.
-    """
+    """Compare a body with the engine that owns its format, at random shapes and rates."""
     for pose in poses:
         shape, rate = (np.array([pose[of][name] for name in body.joint_names]) for of in ("shape", "rate"))
         *_, extent, motion = inertia_and_momentum(tree, pose["shape"], pose["rate"])
@@ -94,12 +88,13 @@ def inertia_and_momentum(
     axes, places, afters = (array.reshape(-1, 3) for array in stacked[:3])
     axes = axes / np.sqrt((axes**2).sum(axis=-1, keepdims=True))
     turns = stacked[3].reshape(-1, 3, 3)
-    own = _about(axes, turning * angles)
+    own = so3.exp(axes * (turning * angles)[:, None])
     # How the child turns or slides, in the joint's axes.
     motions = axes * rates[:, None]
     for number, joint in enumerate(tree.joints):
         if joint.kind == "ball":
-            own[number], motions[number] = _ball_motion(*_four_numbers(joint.name, shape, rate))
+            four = np.array([[values[key] for key in coordinate_names(joint.name)] for values in (shape, rate)])
+            own[number], motions[number] = _ball_motion(*four)
     moved = turns @ own
     slides = places + (turns @ (axes * (leads * angles)[:, None])[..., None])[..., 0]
     slides += (moved @ afters[..., None])[..., 0]
@@ -121,24 +116,15 @@ def inertia_and_momentum(
     links = tree.links.values()
     masses = np.array([link.mass for link in links])
     offsets = (pose_turn @ np.array([link.centre for link in links])[..., None])[..., 0]
-    tensors = pose_turn @ np.array([link.inertia for link in links]) @ np.swapaxes(pose_turn, -1, -2)
+    own_tensors = np.array([link.inertia for link in links])
+    tensors = pose_turn @ own_tensors @ np.swapaxes(pose_turn, -1, -2)
     centres, speeds = pose_place + offsets, velocity + np.cross(omega, offsets)
     # The largest term of every sum, and with it the rounding, is that of the farthest part at the fastest rate.
     distances = np.sqrt((centres**2).sum(axis=-1))
     extent = float(masses @ distances**2 + np.abs(tensors).sum())
     motion = float(distances.max() * (masses @ np.sqrt((speeds**2).sum(axis=-1))))
     motion += extent * float(np.abs(motions).max(initial=0.0))
-    centres = centres - masses @ centres / masses.sum()
-    speeds = speeds - masses @ speeds / masses.sum()
-    squares = (centres**2).sum(axis=-1)[:, None, None] * np.eye(3) - centres[:, :, None] * centres[:, None, :]
-    inertia = (tensors + masses[:, None, None] * squares).sum(axis=0)
-    momentum = masses @ np.cross(centres, speeds) + (tensors @ omega[..., None])[..., 0].sum(axis=0)
-    return inertia, momentum, extent, motion
-
-
-def _four_numbers(name: str, shape: dict[str, float], rate: dict[str, float]) -> Array:
-    """The four numbers of a ball joint and their derivatives: (2, 4)."""
-    return np.array([[values[key] for key in coordinate_names(name)] for values in (shape, rate)])
+    return *of_parts(masses, own_tensors, centres, pose_turn, speeds, omega), extent, motion
 
 
 def _ball_motion(numbers: Array, derivatives: Array) -> tuple[Array, Array]:
@@ -154,15 +140,6 @@ def _ball_motion(numbers: Array, derivatives: Array) -> tuple[Array, Array]:
     turn = whole / square
     spin = (slope - 2.0 * float(numbers @ derivatives) * turn) @ turn.T / square
     return turn, 0.5 * np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]])
-
-
-def _about(axes: Array, angles: Array) -> Array:
-    """Rotations about unit axes: (N, 3), (N,) -> (N, 3, 3), cos + (1 - cos) a a^T + sin a x."""
-    cosine, sine = np.cos(angles)[:, None, None], np.sin(angles)[:, None]
-    x, y, z = np.moveaxis(axes * sine, -1, 0)
-    none = np.zeros_like(x)
-    skew = np.moveaxis(np.array([[none, -z, y], [z, none, -x], [-y, x, none]]), -1, 0)
-    return cosine * np.eye(3) + (1.0 - cosine) * axes[:, :, None] * axes[:, None, :] + skew
 
 
 def _compare(where: str, what: str, own: ArrayLike, expected: ArrayLike, off: float, source: str = "file") -> None:

@@ -26,10 +26,7 @@ _INSTEAD = {
 
 
 def model_of(tree: LinkTree, where: str) -> pin.Model:
-    """A model with a free-flyer from a checked tree: by Pinocchio's parser from a URDF's text, else joint by joint.
-
-    Raises ModelFileError if Pinocchio cannot build a model from it.
-    """
+    """A model with a free-flyer from a checked tree: by Pinocchio's parser from a URDF's text, else joint by joint."""
     root = _ROOT
     taken = {*tree.links, *(joint.name for joint in tree.joints)}
     while root in taken:
@@ -46,9 +43,6 @@ def checked_model(source: Any, on_unphysical: str) -> tuple[pin.Model, list[Link
     """A copy of a user's model, what each joint moves, its orientation (N, 3, 3) in the neutral shape, and doubts.
 
     A link named after the joint is added to whatever a joint moves without a link of its own, so that it has a pose.
-
-    Raises ModelFileError for another object, a root joint that is not a free-flyer, or a model without mass;
-    UnphysicalInertiaError like `inertia_warnings`.
     """
     if not isinstance(source, pin.Model):
         raise ModelFileError(f"a body is loaded from a path, a name or a pinocchio.Model, got {type(source).__name__}")

@@ -93,6 +93,7 @@ class Body(ShapeArguments):
     n_rates, rate_units, rate_columns : number of those, "rad" or "m" for each, and the coordinate of each; of a ball
         joint its first
     ball_joints : names of the ball joints
+    link_names : of all links, those fixed to others included
     mass : [kg]
     joint_limits : (n, 2) lower and upper [rad or m], infinite for continuous joints
     rate_limits : (n,) the largest rates that the file states [rad/s or m/s], infinite where it states none, or zero
@@ -135,41 +136,15 @@ class Body(ShapeArguments):
         self.joint_names, self.joint_units = self._joints.names, self._joints.units
         self.joint_limits, self.continuous = self._joints.limits, self._joints.continuous
         self.rate_limits, self.effort_limits = self._joints.rate_limits, self._joints.effort_limits
+        self.rate_names, self.rate_units = self._joints.rate_names, self._joints.rate_units
+        self.rate_columns, self.n_rates = self._joints.rate_columns, len(self.rate_names)
+        self.ball_joints = tuple(ball.name for ball in self.chain.follows.balls)
+        self.link_names = tuple(f.name for f in model.frames if f.type == pin.FrameType.BODY)
 
     @property
     def n_joints(self) -> int:
         """The number of independent joints, where a ball joint is one."""
         return self.n_shape - 3 * len(self.ball_joints)
-
-    @property
-    def ball_joints(self) -> tuple[str, ...]:
-        """The names of the ball joints."""
-        return tuple(ball.name for ball in self.chain.follows.balls)
-
-    @property
-    def rate_names(self) -> tuple[str, ...]:
-        """Names of the rates of the independent joints."""
-        return self._joints.rate_names
-
-    @property
-    def rate_units(self) -> tuple[str, ...]:
-        """Unit of the joint of each rate, "rad" or "m"."""
-        return self._joints.rate_units
-
-    @property
-    def rate_columns(self) -> tuple[int, ...]:
-        """The place in the shape of what each rate is of; of a ball joint that of its first number."""
-        return self._joints.rate_columns
-
-    @property
-    def n_rates(self) -> int:
-        """The number of rates: one less than of coordinates for each ball joint."""
-        return len(self.rate_names)
-
-    @property
-    def link_names(self) -> tuple[str, ...]:
-        """The names of all links, those fixed to others included."""
-        return tuple(f.name for f in self._model.frames if f.type == pin.FrameType.BODY)
 
     @property
     def moving_parts(self) -> tuple[MovingPart, ...]:
@@ -278,7 +253,7 @@ class Body(ShapeArguments):
         parts = tuple(part.links for part in self.moving_parts)
         given = {"masses": masses, "centres": centres, "inertias": inertias}
         changed = given_inertias(self.chain, parts, given, on_unphysical)
-        return self.with_frame_inertias(*changed) if changed.masses.ndim == 1 else BodyFamily(self, *changed)
+        return self.with_frame_inertias(*changed) if changed[0].ndim == 1 else BodyFamily(self, *changed)
 
     def with_frame_inertias(self, masses: Array, centres: Array, tensors: Array) -> Body:
         """The body with other inertias of all frames of its chain, in their axes, unchecked.

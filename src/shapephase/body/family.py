@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -115,19 +115,6 @@ _UNITS = {"masses": "kg", "centres": "m", "inertias": "kg m^2"}
 _ITEMS: dict[str, tuple[int, ...]] = {"masses": (), "centres": (3,), "inertias": (3, 3)}
 
 
-class Inertias(NamedTuple):
-    """Inertias of all frames of a chain, in their axes; the leading axis, if there is one, counts bodies.
-
-    masses : (..., k + 1) [kg]
-    centres : (..., k + 1, 3) [m]
-    tensors : (..., k + 1, 3, 3) about the centres [kg m^2]
-    """
-
-    masses: Array
-    centres: Array
-    tensors: Array
-
-
 Given = ArrayLike | Mapping[str, ArrayLike] | None
 
 
@@ -136,8 +123,11 @@ def given_inertias(
     parts: tuple[tuple[str, ...], ...],
     given: Mapping[str, Given],
     on_unphysical: str,
-) -> Inertias:
-    """A body's inertias with those that are given in the place of its own.
+) -> tuple[Array, Array, Array]:
+    """Masses, centres and tensors of a body's frames with those that are given in the place of its own.
+
+    (..., k + 1) [kg], (..., k + 1, 3) [m], (..., k + 1, 3, 3) about the centres [kg m^2], in axes of the frames; the
+    leading axis, if there is one, counts bodies.
 
     parts : names of the links of each moving part
     given : "masses", "centres" and "inertias", each as `Body.with_inertias` takes them
@@ -165,7 +155,7 @@ def given_inertias(
         raise UnphysicalInertiaError("; ".join(faults) + "; correct it, or pass on_unphysical='warn'")
     if faults and on_unphysical == "warn":
         warnings.warn("; ".join(faults), UnphysicalInertiaWarning, stacklevel=3)
-    return Inertias(masses, centres, tensors)
+    return masses, centres, tensors
 
 
 def _by_part(value: Any, name: str, parts: tuple[tuple[str, ...], ...]) -> dict[int, Array]:

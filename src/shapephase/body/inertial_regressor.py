@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from .joint_chain import FULL_FROM_SIX, JointChain
+from .joint_chain import FULL_FROM_SIX, VOIGT, JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 PARAMETERS = 10
@@ -22,7 +22,6 @@ moment (3) [kg m], inertia xx yy zz yz xz xy [kg m^2]."""
 OUTPUTS = 15
 """About the point that is that body's centre of mass: inertia xx yy zz yz xz xy, angular momentum (3), first moment of
 mass (3), its rate (3)."""
-_VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,10 +48,10 @@ class InertialRegressor:
         given = parameters(masses, centres, inertias, self.centres)
         count = len(self.matrices)
         sums = (given @ self.matrices.reshape(count * OUTPUTS, -1).T).reshape(len(masses), count, OUTPUTS)
-        moment, rate = sums[..., 9:12], sums[..., 12:]
+        six, momentum, moment, rate = np.split(sums, (6, 9, 12), axis=-1)
         whole = masses.sum(axis=-1)[:, None, None]
-        inertia = sums[..., :6][..., FULL_FROM_SIX].reshape(*sums.shape[:2], 3, 3)
-        return inertia - _of_point(moment) / whole[..., None], sums[..., 6:9] - np.cross(moment, rate) / whole
+        inertia = six[..., FULL_FROM_SIX].reshape(*sums.shape[:2], 3, 3)
+        return inertia - _of_point(moment) / whole[..., None], momentum - np.cross(moment, rate) / whole
 
 
 def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> InertialRegressor:
@@ -70,7 +69,7 @@ def inertial_regressor(chain: JointChain, shapes: Array, rates: Array) -> Inerti
     whole[..., 0] = np.concatenate(_of_masses(links), axis=-1)
     for axis in range(3):
         whole[..., 1 + axis] = np.concatenate(_of_first_moments(links, axis), axis=-1)
-    for entry, (i, j) in enumerate(_VOIGT):
+    for entry, (i, j) in enumerate(VOIGT):
         # A symmetric tensor with a one at (i, j), turned with the link.
         turned = links.turns[..., :, i, None] * links.turns[..., None, :, j]
         tensor = turned if i == j else turned + so3.transpose(turned)
@@ -100,7 +99,7 @@ def by_link_parameters(links: LinkMotions, rows: Array, spins: Array, *, moving:
         arms, near = cross(across, places), _seen(turns, across)
         sums[:, 0] = (arms * speeds).sum(axis=(0, 1))
         sums[:, 1:4] = _seen(turns, cross(speeds, across) + cross(arms, all_spins)).sum(axis=1).T
-        for entry, (i, j) in enumerate(_VOIGT):
+        for entry, (i, j) in enumerate(VOIGT):
             product = near[i] * turning[j]
             sums[:, 4 + entry] = (product if i == j else product + near[j] * turning[i]).sum(axis=0)
     return result.reshape(len(result), -1)
@@ -143,4 +142,4 @@ def _of_point(place: Array) -> Array:
 
 
 def _voigt(tensor: Array) -> Array:
-    return np.stack([tensor[..., i, j] for i, j in _VOIGT], axis=-1)
+    return np.stack([tensor[..., i, j] for i, j in VOIGT], axis=-1)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from .. import so3
 from ..arguments import check_object
 from ..arrays import Array
 from .body import Body
@@ -51,7 +52,7 @@ def floating_velocities(body: Body, shapes: Array, rates: Array, spins: Array) -
     configurations, velocities = joints.configurations(shapes), joints.velocities(shapes, rates)
     for row, (q, v) in enumerate(zip(configurations, velocities, strict=True)):
         pin.centerOfMass(model, data, q, v)
-        v[:3], v[3:BASE] = -data.vcom[0] - _cross(spins[row], data.com[0]), spins[row]
+        v[:3], v[3:BASE] = -data.vcom[0] - so3.cross(spins[row], data.com[0]), spins[row]
     return configurations, velocities
 
 
@@ -75,12 +76,7 @@ def floating_states(
     for row, (q, v, a) in enumerate(zip(configurations, velocities, slopes, strict=True)):
         pin.centerOfMass(model, data, q, v, a)
         centre, speed, w = data.com[0].copy(), data.vcom[0].copy(), spins[row]
-        v[:3], v[3:BASE] = -speed - _cross(w, centre), w
+        v[:3], v[3:BASE] = -speed - so3.cross(w, centre), w
         a[3:BASE] = spin_rates[row]
-        a[:3] = -data.acom[0] - _cross(spin_rates[row], centre) - _cross(w, speed)
+        a[:3] = -data.acom[0] - so3.cross(spin_rates[row], centre) - so3.cross(w, speed)
     return configurations, velocities, slopes
-
-
-def _cross(first: Array, second: Array) -> Array:
-    (a, b, c), (x, y, z) = first.tolist(), second.tolist()
-    return np.array([b * z - c * y, c * x - a * z, a * y - b * x])

@@ -15,10 +15,9 @@ from ._model_tree import moving_joints
 from .couplings.coordinate_map import CoordinateMap
 
 _BASE = 1  # Pinocchio's number of the free-flyer: joint 0 is the universe
-
-
-SIX_OF_FULL = [0, 4, 8, 5, 2, 1]  # xx yy zz yz xz xy among the nine entries of a tensor
-FULL_FROM_SIX = [0, 5, 4, 5, 1, 3, 4, 3, 2]  # the nine entries among these six
+VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # xx yy zz yz xz xy
+SIX_OF_FULL = [3 * i + j for i, j in VOIGT]  # these among the nine entries of a tensor
+FULL_FROM_SIX = [VOIGT.index((min(i, j), max(i, j))) for i in range(3) for j in range(3)]  # the nine among these
 NUMBERS = 22
 """In the row of a frame: its turn at rest in the parent's axes (9, row by row), its place there (3) [m]; then of what
 moves with it the mass [kg], the centre of mass (3) [m] and the inertia about that (xx yy zz yz xz xy) [kg m^2]."""
@@ -158,7 +157,9 @@ class JointChain:
         """The chain with other links; rows that were already made are carried over."""
         changed = replace(self, masses=masses, centres=centres, inertias=inertias)
         if "rows" in vars(self):
-            vars(changed)["rows"] = rows_with(self.rows, masses, centres, inertias)
+            rows = self.rows.rows.copy()
+            rows[:, GEOMETRY:] = inertial_numbers(self.rows.bases, masses, centres, inertias)
+            vars(changed)["rows"] = replace(self.rows, rows=rows, mass=float(masses.sum()))
         return changed
 
 
@@ -233,13 +234,6 @@ def link_rows(chain: JointChain) -> LinkRows:
         follows=chain.follows,
         bases=axes,
     )
-
-
-def rows_with(rows: LinkRows, masses: Array, centres: Array, inertias: Array) -> LinkRows:
-    """The rows of a chain with other inertias: its joints are the same."""
-    changed = rows.rows.copy()
-    changed[:, GEOMETRY:] = inertial_numbers(rows.bases, masses, centres, inertias)
-    return replace(rows, rows=changed, mass=float(masses.sum()))
 
 
 def inertial_numbers(bases: Any, masses: Array, centres: Array, inertias: Array) -> Array:

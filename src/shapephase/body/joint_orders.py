@@ -36,7 +36,7 @@ def joint_orders(tree: LinkTree, *, from_urdf: bool) -> tuple[JointOrder, ...]:
     moved = tuple(joint.child for joint in tree.joints if joint.kind != "fixed" and joint.child not in tree.frames)
     orders = [JointOrder(MUJOCO, _coordinates(tree.joints), (first, *moved))]
     if from_urdf:
-        orders = [_order(MUJOCO, first, _depth_first(first, below), merged=True)]
+        orders = [_order(MUJOCO, first, _below(first, below, lambda _: True), merged=True)]
     for word, key in ((ISAAC, None), (ISAAC_BY_NAME, lambda joint: joint.name)):
         for merged in (True, False):
             orders.append(_order(word, first, _breadth_first(first, below, key, merged=merged), merged=merged))
@@ -63,12 +63,14 @@ def _coordinates(joints: Iterable[Joint]) -> tuple[str, ...]:
     return tuple(coordinates)
 
 
-def _depth_first(first: str, below: dict[str, list[Joint]]) -> list[Joint]:
+def _below(link: str, below: dict[str, list[Joint]], go_on: Callable[[Joint], bool]) -> list[Joint]:
+    """The joints on a link, depth first; behind those that go on, the joints on what they move."""
     ordered: list[Joint] = []
-    waiting = below.get(first, [])[::-1]
+    waiting = below.get(link, [])[::-1]
     while waiting:
         ordered.append(waiting.pop())
-        waiting += below.get(ordered[-1].child, [])[::-1]
+        if go_on(ordered[-1]):
+            waiting += below.get(ordered[-1].child, [])[::-1]
     return ordered
 
 
@@ -81,23 +83,11 @@ def _breadth_first(
     while level:
         after: list[str] = []
         for link in level:
-            joints = _on(link, below) if merged else list(below.get(link, []))
+            joints = _below(link, below, lambda joint: merged and joint.kind == "fixed")
+            joints = [joint for joint in joints if joint.kind != "fixed" or not merged]
             if key is not None:
                 joints.sort(key=key)
             ordered += joints
             after += [joint.child for joint in joints]
         level = after
     return ordered
-
-
-def _on(link: str, below: dict[str, list[Joint]]) -> list[Joint]:
-    """The joints that move on a link and on what is fixed to it, as listed depth first."""
-    moving: list[Joint] = []
-    waiting = below.get(link, [])[::-1]
-    while waiting:
-        joint = waiting.pop()
-        if joint.kind == "fixed":
-            waiting += below.get(joint.child, [])[::-1]
-        else:
-            moving.append(joint)
-    return moving

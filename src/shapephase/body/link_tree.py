@@ -119,11 +119,7 @@ class JointOrder:
 
 
 def from_the_root(links: dict[str, Link], joints: Iterable[Joint], where: str) -> tuple[str, tuple[Joint, ...]]:
-    """The root link, and the joints sorted so that parents come before children.
-
-    Raises ModelFileError if there is not one root, a link has two parents or none of the tree, or there are too many or
-    too deep.
-    """
+    """The root link, and the joints sorted so that parents come before children."""
     joints = tuple(joints)
     moving = sum(joint.kind != "fixed" for joint in joints)
     for count, most, kind in ((len(links), MOST_LINKS, "links"), (moving, MOST_JOINTS, "moving joints")):
@@ -180,9 +176,6 @@ def inertia_warnings(links: Iterable[Link], on_unphysical: str, label: str = "li
     Negative moments; moments that break the triangle inequality by more than 0.1 %; a mass or a radius of gyration
     that suggests wrong units. What rounding leaves of an inertia, judged against the largest of the whole body, is
     no fault. `label` is how messages name a link.
-
-    Raises UnphysicalInertiaError for what is not finite, a negative mass, or (unless `on_unphysical` is "warn") a
-    negative moment.
     """
     if not isinstance(on_unphysical, str) or on_unphysical not in ("error", "warn"):
         raise unknown_name("value of on_unphysical", on_unphysical, ("error", "warn"))
@@ -236,9 +229,6 @@ def hollow_warnings(
 
     turns : (N, 3, 3) axes of the links to those of the base, in the neutral shape
     inertia : (3, 3) of the whole body there, base axes [kg m^2]
-
-    Raises UnphysicalInertiaError if one has more than 1 % of the body's inertia about any axis (unless `on_unphysical`
-    is "warn").
     """
     links = list(links)
     moments, axes = np.linalg.eigh(inertia)

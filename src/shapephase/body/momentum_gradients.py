@@ -14,6 +14,8 @@ from ..arrays import Array
 from .joint_chain import FULL_FROM_SIX, SIX_OF_FULL, JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
+_STOPS = (3, 6, 9)  # rows of `_link_sums` at which mass times velocity, angular momentum and inertia begin
+
 
 def by_shape_and_rate(
     chain: JointChain, links: LinkMotions, shapes: Array, rates: Array, spins: Array, rows: Array
@@ -68,7 +70,7 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     links = link_motions(chain, shapes, rates)
     link_sums = _link_sums(chain, links)
     sums, at = _carried(chain, link_sums), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
-    inertia, momentum = link_sums[9:].sum(axis=-1), link_sums[6:9].sum(axis=-1)
+    _, _, momentum, inertia = np.split(link_sums.sum(axis=-1), _STOPS)
     tensors = np.moveaxis(inertia[FULL_FROM_SIX], 0, -1).reshape(-1, 3, 3)
     spin = -np.linalg.solve(tensors, momentum.T[..., None])[..., 0].T[:, :, None]
     drift = sums.drift + cross(spin, sums.moment)
@@ -131,18 +133,14 @@ def _link_sums(chain: JointChain, links: LinkMotions) -> Array:
     own = components((links.turns @ chain.inertias @ so3.transpose(links.turns)).reshape(*places.shape[1:], 9))
     own = own[SIX_OF_FULL]
     moment = chain.masses * places
-    whole = np.empty((15, *places.shape[1:]))
-    whole[:3], whole[3:6] = moment, chain.masses * speeds
-    whole[6:9] = cross(moment, speeds) + _turned(own, spins)
-    squares = moment * places
-    whole[9:12] = own[:3] + squares.sum(axis=0) - squares
-    whole[12:] = own[3:] - moment[[1, 0, 0]] * places[[2, 2, 1]]
-    return whole
+    squares, angular = moment * places, cross(moment, speeds) + _turned(own, spins)
+    diagonal, products = own[:3] + squares.sum(axis=0) - squares, own[3:] - moment[[1, 0, 0]] * places[[2, 2, 1]]
+    return np.concatenate([moment, chain.masses * speeds, angular, diagonal, products])
 
 
 def _carried(chain: JointChain, each: Array) -> _Sums:
-    sums = each @ chain.hanging.T
-    return _Sums(moment=sums[:3], drift=sums[3:6], momentum=sums[6:9], inertia=sums[9:])
+    moment, drift, momentum, inertia = np.split(each @ chain.hanging.T, _STOPS)
+    return _Sums(moment=moment, drift=drift, momentum=momentum, inertia=inertia)
 
 
 def _joint_axes(chain: JointChain, links: LinkMotions, rates: Array) -> _Axes:

@@ -51,9 +51,6 @@ def free_base(
     first : the root
     joints : parents before children
     root : "free": a single joint, as arms that are bolted down have it, goes, too
-
-    Raises ModelFileError for a single joint without `root`, for joints that follow those of the base, or are followed
-    by them, and for floating and planar joints elsewhere.
     """
     below: dict[str, list[Joint]] = {}
     for joint in joints:

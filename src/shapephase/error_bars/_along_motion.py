@@ -94,7 +94,7 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
     times = (edges[:-1, None] + widths[:, None] * _PLACES).ravel()
     stepped, start = one_rotation(motion), motion.initial_attitude
     shapes, rates = path.curve(times)
-    inverse, drift = stepped.inverse_and_drift(times)
+    inverse, drift = stepped.interpolant.inverse_and_drift(times)
     attitudes = start @ stepped.rotation(times)[0]
     lifted = start @ motion.horizontal_lift.rotation(times)[0]
     by_turning = so3.hat(motion.momentum) @ attitudes @ inverse @ so3.transpose(attitudes)
@@ -148,7 +148,7 @@ def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
     edges = _pieces(stepped, np.union1d(motion.deformation.breaks, times))
     widths = np.diff(edges)
     at = (edges[:-1, None] + widths[:, None] * _PLACES).ravel()
-    inverse, _ = stepped.inverse_and_drift(at)
+    inverse, _ = stepped.interpolant.inverse_and_drift(at)
     attitudes = motion.initial_attitude @ stepped.rotation(at)[0]
     turning = attitudes @ inverse @ so3.transpose(attitudes)
     scaled = widths[:, None, None, None] * turning.reshape(len(widths), _NODES, 3, 3)

@@ -15,8 +15,9 @@ from ..inertia_tensor import inverse_inertia
 Evaluate = Callable[[Array], tuple[Array, Array]]  # times (N,) -> I (N, 3, 3), L_o (N, 3)
 Directly = Callable[[Array], Array | None]  # times (N,) -> the channels (N, 9) in one call, or None
 _AT_ONCE = 16_384  # times in one call of the body: some seconds, some hundred MB
-VOIGT = np.array([0, 4, 8, 5, 2, 1])  # entries xx yy zz yz xz xy of a matrix, row by row
-MATRIX = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  # the matrix, row by row, from these entries
+_SIX = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # xx yy zz yz xz xy
+VOIGT = np.array([3 * i + j for i, j in _SIX])  # these entries of a matrix, row by row
+MATRIX = np.array([_SIX.index((min(i, j), max(i, j))) for i in range(3) for j in range(3)])  # the matrix from these
 _WEIGHTS = np.sqrt(np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]))  # off-diagonal channels stand for two entries of I^-1
 
 

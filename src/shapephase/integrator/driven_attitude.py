@@ -38,8 +38,6 @@ _MOST_ROUNDS = 100  # in which something was passed over: so many narrow interva
 class DrivenAttitude:
     """Attitudes and other states in time.
 
-    Attributes
-    ----------
     run : the sharper of the two last runs
     scales : (k,) of the other states
     error_times : (M,) at which both were compared [s]
@@ -94,8 +92,6 @@ def driven_attitude(
     duration apart: where that is not the change over a step, steps are made shorter. Narrower things are found by
     limits only.
 
-    Parameters
-    ----------
     breaks : (M,) between which all is smooth [s]
     attitude : (3, 3) at the start
     states : (k,) at the start
@@ -103,10 +99,8 @@ def driven_attitude(
     tolerance : of the attitude, and of the other states in their scales [rad]
     limits : of steps, by what is known of the rates; None: nothing
 
-    Raises
-    ------
-    AccuracyNotReached
-        If the sharpest two runs disagree by more than the tolerance, or the rates change too often in short times.
+    Raises AccuracyNotReached if the sharpest two runs disagree by more than the tolerance, or the rates change too
+    often in short times.
     """
 
     def slopes(times: Array, values: Array) -> Array:

@@ -203,7 +203,9 @@ def rotation_of(samples: Samples, attempt: Attempt, momentum: Array, tolerance: 
         measured = committed[large] + MEASURED_ROUNDING * attempt.fine[large]
         measured += rounding_of_samples(samples, attempt.steps // 4, momentum[large])
         rounding[large] = np.minimum(rounding[large], measured)
-    rounding += rounding_of_times(samples, momentum)
+    # Times are rounded by eps times the duration, which no march shows.
+    inverse, drift = samples.rates
+    rounding += EPS * float(interpolant.edges[-1]) * (magnitudes_and_directions(momentum)[0] * inverse + drift)
     sampling = np.maximum(attempt.sampling, samples.between) + growth * samples.hidden
     return SteppedRotation(
         interpolant=interpolant,
@@ -239,13 +241,6 @@ def rounding_of_samples(samples: Samples, steps: Integers, momentum: Array) -> A
     same = stepped_quaternions(interpolant, series, steps, momentum)
     rounded = stepped_quaternions(interpolant, rounded_series(samples, _EXAGGERATED * ROUNDED_INERTIA), steps, momentum)
     return largest_angle(same, rounded) / _EXAGGERATED
-
-
-def rounding_of_times(samples: Samples, momentum: Array) -> Array:
-    """Attitude error because times are rounded by eps times the duration, which no march shows: (B,) [rad]."""
-    magnitudes, _ = magnitudes_and_directions(momentum)
-    inverse, drift = samples.rates
-    return EPS * float(samples.interpolant.edges[-1]) * (magnitudes * inverse + drift)
 
 
 def fresh_times(interpolant: Interpolant) -> tuple[Array, Integers]:

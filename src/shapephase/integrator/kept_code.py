@@ -94,8 +94,6 @@ def _fingerprint() -> str:
 class KeptFunction:
     """The files of one kernel; in the place of the cache of Numba's dispatcher, with the two methods called there.
 
-    Parameters
-    ----------
     name : of the kernel
     folder : None: nothing is kept
     """

@@ -28,8 +28,6 @@ _MOST_HALVINGS = 3  # of the steps of a lift
 class Lift:
     """Rotation of the frame by the shape alone, on the samples of a motion, whose steps end where some of its own end.
 
-    Attributes
-    ----------
     motion : the attitude by shape and momentum
     interpolant : the motion's own, or that without the drift by the momentum of wheels
     perturbed : the interpolant's series with their probable errors

@@ -18,8 +18,6 @@ from ..errors import AccuracyNotReached
 class StepLimits:
     """The longest steps, interval by interval.
 
-    Attributes
-    ----------
     edges : (P + 1,) ends of the intervals, first 0 [s]
     longest : (P,) a step is no longer within an interval, and reaches no farther into it [s]
     """
@@ -72,8 +70,6 @@ class StepLimits:
 class Run:
     """A unit quaternion and other numbers in time, by one dense output between two breaks each.
 
-    Attributes
-    ----------
     breaks : (M,) [s]
     pieces : dense outputs
     times : (K + 1,) ends of the steps [s]

@@ -89,9 +89,8 @@ class Kernel(Generic[_P, _R]):
             return compiled
 
 
-def kernel(function: Callable[_P, _R]) -> Kernel[_P, _R]:
-    """Make a kernel of a function; a decorator."""
-    return Kernel(function)
+kernel = Kernel
+"""Make a kernel of a function; a decorator."""
 
 
 def plain(array: Array) -> Array:
@@ -125,7 +124,8 @@ def is_used() -> bool:
 def fault() -> str:
     """Return why there can be no machine code in this process, empty where there can; imports Numba."""
     # A Numba that interprets would take the loops one operation after another.
-    return _import_fault() if _numba_compiles() else "NUMBA_DISABLE_JIT is set"
+    compiles = os.environ.get("NUMBA_DISABLE_JIT", "0").strip() in ("", "0")
+    return _import_fault() if compiles else "NUMBA_DISABLE_JIT is set"
 
 
 @contextmanager
@@ -189,10 +189,6 @@ def compile_steps() -> list[Path]:
     return sorted(file for file in folder.iterdir() if file.is_file())
 
 
-def _numba_compiles() -> bool:
-    return os.environ.get("NUMBA_DISABLE_JIT", "0").strip() in ("", "0")
-
-
 @lru_cache(maxsize=1)
 def _import_fault() -> str:
     """Import Numba; why that fails, warned of once, or an empty text."""
@@ -215,16 +211,12 @@ def _import_numba() -> None:
     context.refresh()
 
 
-def _compiler_locks() -> list[Any]:
-    """Locks of a thread that imports Numba or compiles: ours, and Numba's own once it is imported."""
-    numba = sys.modules.get("numba.core.compiler_lock")
-    return [_lock] if numba is None else [_lock, numba.global_compiler_lock]
-
-
 def _acquire_before_fork() -> None:
     """Wait until no other thread imports or compiles: a child would wait for that thread, which it does not have."""
     _lock.acquire()
-    _held_at_fork.append(_compiler_locks())
+    # Numba has a lock of its own once it is imported.
+    numba = sys.modules.get("numba.core.compiler_lock")
+    _held_at_fork.append([_lock] if numba is None else [_lock, numba.global_compiler_lock])
     for lock in _held_at_fork[-1][1:]:
         lock.acquire()
 

@@ -35,8 +35,6 @@ class RotationPart(NamedTuple):
 class GroupedRotations:
     """S(t) for a batch of momenta whose samples and steps differ; in the parts every row is once.
 
-    Attributes
-    ----------
     parts : ordered by the largest momentum, which comes last
     evaluations : how many times the deformation was evaluated
     """

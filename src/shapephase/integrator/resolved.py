@@ -17,8 +17,6 @@ _AT_REST = 1e-14  # [rad]: values without rates, like a given inertia, scatter b
 class ResolvedPath:
     """Shapes and rates as Chebyshev series on panels, right to rounding.
 
-    Attributes
-    ----------
     left, right : (P,) ends of the panels, which adjoin and ascend [s]
     coefficients : (P, DEGREE + 1, 2 n) of the shapes and of their rates
     noise : (P,) where the series cannot follow noise, the larger of shapes and rates times half the width; else 0 [rad]

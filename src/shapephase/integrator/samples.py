@@ -23,8 +23,6 @@ _AT_ONCE = 2048  # panels: some megabytes
 class Perturbed:
     """The interpolant with its last coefficients perturbed by the estimated truncation error.
 
-    Attributes
-    ----------
     coefficients : (P, n, 9)
     hidden : attitude error that the coefficients do not show, without amplification [rad]
     """
@@ -41,8 +39,6 @@ class Perturbed:
 class Panels:
     """Panels of one loop, which are sampled at Chebyshev points.
 
-    Attributes
-    ----------
     edges : (P + 1,) [s]
     degrees : (P,)
     """
@@ -55,8 +51,6 @@ class Panels:
 class Samples:
     """Samples of a deformation for momenta up to a magnitude.
 
-    Attributes
-    ----------
     interpolant : the series through the samples
     panels : those of the series
     change : (P,) relative errors of the last two terms of each series

@@ -119,8 +119,6 @@ def _parts(waiting: list[_Panels]) -> Iterator[list[_Panels]]:
 class _Panels:
     """Panels of one degree that are being sampled.
 
-    Attributes
-    ----------
     left, right : (P,) [s]
     values : (P, degree/2 + 1, 9) at every second node; None: unknown
     parents : (P,) the last terms of the panels that each is a half of, at the highest degree [rad/s]

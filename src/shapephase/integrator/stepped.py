@@ -71,18 +71,14 @@ class SteppedRotation:
         counts = self._steps_of_all_loops
         return read_only(np.repeat(np.arange(len(counts)), counts))
 
-    @property
+    @cached_property
     def times(self) -> Array:
         """The ends of the steps: (K + 1,) [s]."""
-        return read_only(self._times)
-
-    @cached_property
-    def _times(self) -> Array:
         edges, steps = self.interpolant.edges, self._steps_of_all_loops
         done = np.cumsum(steps)
         of_panels = np.array([edges[:-1], edges[1:] - edges[:-1], done - steps, steps])
         starts, widths, before, counts = np.repeat(of_panels, steps, axis=1)
-        return np.append(starts + widths * ((np.arange(done[-1]) - before) / counts), edges[-1])
+        return read_only(np.append(starts + widths * ((np.arange(done[-1]) - before) / counts), edges[-1]))
 
     @property
     def _steps_of_all_loops(self) -> Integers:
@@ -177,10 +173,6 @@ class SteppedRotation:
             stepping_error=error,
             sampling_error=0.0 * error,
         )
-
-    def inverse_and_drift(self, t: Array) -> tuple[Array, Array]:
-        """I^-1 and I^-1 L_o at times: (N,) -> (N, 3, 3), (N, 3)."""
-        return self.interpolant.inverse_and_drift(t)
 
 
 def _from_zero(of_steps: Array) -> Array:

@@ -152,8 +152,6 @@ def magnitudes_and_directions(momentum: Array) -> tuple[Array, Array]:
 class Attempt:
     """Steps of some momenta, and their distances from coarser ones and from those on perturbed series.
 
-    Attributes
-    ----------
     steps : (P,) on each panel of a loop, four times those requested
     quaternions, directions, turns, dynamics : those of `SteppedRotation`
     coarse, fine : (B,) largest angle between a fourth and half as many steps, and between these and all [rad]

@@ -50,10 +50,7 @@ class BallJoint(NamedTuple):
         return slice(self.column, self.column + len(COORDINATES))
 
     def quaternions(self, shapes: Array) -> Array:
-        """Unit quaternions: (N, n) -> (N, 4).
-
-        Raises ShapeError if the four numbers are all zero.
-        """
+        """Unit quaternions: (N, n) -> (N, 4)."""
         numbers = shapes[:, self.columns]
         lengths = np.sqrt((numbers * numbers).sum(axis=1))
         if not lengths.all():

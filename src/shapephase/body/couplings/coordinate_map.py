@@ -158,11 +158,7 @@ class CoordinateMap:
 def coordinate_map(
     joints: tuple[str, ...], couplings: Mapping[str, Coupling], balls: Collection[str] = ()
 ) -> CoordinateMap:
-    """The map of joints of which some follow others, and some are ball joints.
-
-    Raises ModelFileError if joints follow each other in a circle, or one that is not among them; if a ball joint takes
-    part.
-    """
+    """The map of joints of which some follow others, and some are ball joints."""
     for name, coupling in couplings.items():
         for ball in {name, *coupling.drivers} & set(balls):
             raise ModelFileError(

@@ -77,8 +77,10 @@ class JointFunction:
     def check_continuous(self) -> None:
         """Raise ShapeError where a piece does not go on where the one before ends."""
         jumps, _, _ = self._sides()
-        size = np.abs(self.coefficients[0]).max() + np.abs(self.coefficients[1:2]).max(initial=0.0) * _span(self.knots)
-        if len(jumps) and not np.abs(jumps).max() <= _GAP * size:
+        if not len(jumps):
+            return
+        size = np.abs(self.coefficients[0]).max() + np.abs(self.coefficients[1:2]).max(initial=0.0) * np.ptp(self.knots)
+        if not np.abs(jumps).max() <= _GAP * size:
             worst = int(np.argmax(np.abs(jumps)))
             raise ShapeError(f"the function jumps by {jumps[worst]:.6g} at {self.knots[worst]:.6g}; it must go on")
 
@@ -107,8 +109,7 @@ def polynomial(coefficients: Array, about: float = 0.0) -> JointFunction:
 
 def piecewise_linear(knots: Array, values: Array) -> JointFunction:
     """Straight between the points, and on beyond them."""
-    x, y = _points(knots, values, 2)
-    return hermite(x, y, None)
+    return hermite(knots, values, None)
 
 
 def cubic_spline(knots: Array, values: Array, ends: str) -> JointFunction:
@@ -119,15 +120,13 @@ def cubic_spline(knots: Array, values: Array, ends: str) -> JointFunction:
     """
     from scipy.interpolate import CubicSpline
 
-    x, y = _points(knots, values, 2)
-    if ends == "four points":
-        return hermite(x, y, _four_point_slopes(x, y))
-    return hermite(x, y, CubicSpline(x, y, bc_type=ends)(x, 1))
+    x, y = _points(knots, values)
+    return hermite(x, y, _four_point_slopes(x, y) if ends == "four points" else CubicSpline(x, y, bc_type=ends)(x, 1))
 
 
 def hermite(knots: Array, values: Array, slopes: Array | None) -> JointFunction:
     """Cubics with values and slopes at the knots, or without slopes straight lines; beyond them it goes on straight."""
-    x, y = _points(knots, values, 2)
+    x, y = _points(knots, values)
     widths, rise = np.diff(x), np.diff(y) / np.diff(x)
     if slopes is None:
         coefficients = np.zeros((2, len(x) + 1))
@@ -176,16 +175,12 @@ def _third_difference(x: Array, y: Array) -> float:
     return float((second[1] - second[0]) / (x[3] - x[0]))
 
 
-def _points(knots: Array, values: Array, least: int) -> tuple[Array, Array]:
+def _points(knots: Array, values: Array) -> tuple[Array, Array]:
     x = finite_array(knots, "knots", (None,))
-    if x.ndim != 1 or not least <= len(x) <= MOST_KNOTS:
-        raise ShapeError(f"knots: from {least} to {MOST_KNOTS} numbers are needed, got shape {x.shape}")
+    if x.ndim != 1 or not 2 <= len(x) <= MOST_KNOTS:
+        raise ShapeError(f"knots: from 2 to {MOST_KNOTS} numbers are needed, got shape {x.shape}")
     y = finite_array(values, "values", x.shape)
     late = np.flatnonzero(np.diff(x) <= 0.0)
     if len(late):
         raise ShapeError(f"knots must ascend: {x[late[0] + 1]:.9g} follows {x[late[0]]:.9g}")
     return x.copy(), y.copy()
-
-
-def _span(knots: Array) -> float:
-    return float(np.ptp(knots)) if len(knots) else 0.0

@@ -323,19 +323,14 @@ def _add_way(chain: Chain, way: list[Any]) -> None:
 def _axes(segment: Any, name: str) -> list[tuple[str, str, Array, list[float] | None]]:
     """Slides, then hinges or a ball joint, each moved by those before it."""
     ranges = [[interval.min(), interval.max()] for interval in segment.QRanges()]
-    kinds = [("prismatic", axis) for axis in segment.seqT().to_string()]
-    kinds += [("revolute", axis) for axis in segment.seqR().to_string()]
-    words = {"prismatic": "Trans", "revolute": "Rot"}
-    if segment.isRotationAQuaternion():
-        slides = [
-            (f"{name}_Trans{axis.upper()}", "prismatic", _AXES[axis], ranges[k])
-            for k, (_, axis) in enumerate(kinds[:-1])
-        ]
-        return [*slides, (f"{name}{_QUATERNION}", "ball", _AXES["x"], None)]
-    return [
-        (f"{name}_{words[kind]}{axis.upper()}", kind, _AXES[axis], limits)
-        for (kind, axis), limits in zip(kinds, ranges, strict=True)
+    ball = segment.isRotationAQuaternion()
+    kinds = [("prismatic", "Trans", axis) for axis in segment.seqT().to_string()]
+    kinds += [("revolute", "Rot", axis) for axis in segment.seqR().to_string() if not ball]
+    axes: list[tuple[str, str, Array, list[float] | None]] = [
+        (f"{name}_{word}{axis.upper()}", kind, _AXES[axis], limits)
+        for (kind, word, axis), limits in zip(kinds, ranges, strict=not ball)
     ]
+    return [*axes, (f"{name}{_QUATERNION}", "ball", _AXES["x"], None)] if ball else axes
 
 
 def _orthonormal(matrix: Array, name: str, line: int) -> tuple[Array, Array, float]:

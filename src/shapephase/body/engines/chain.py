@@ -24,7 +24,7 @@ _POSES = 3  # random shapes at which the engine's numbers are compared: a wrong 
 SEED = 20060518  # arbitrary, so that every loading compares at equal shapes
 _MOST_NAME = 256  # characters; names appear whole in messages and tables
 _STEP = 0.01  # [s] of differences of eighth order: their truncation is near rounding for rates of 1 rad/s
-_WEIGHTS = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)  # of f(k h) - f(-k h), k = 1 to 4 (Fornberg 1988)
+WEIGHTS = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)  # of f(k h) - f(-k h), k = 1 to 4 (Fornberg 1988)
 
 
 class UnusableModelError(Exception):
@@ -211,7 +211,7 @@ def rates_by_differences(
     poses : centres (N, 3) and orientations (N, 3, 3) at coordinates by name
     """
     speeds = slopes = np.zeros(())
-    for steps, weight in enumerate(_WEIGHTS, 1):
+    for steps, weight in enumerate(WEIGHTS, 1):
         for side in (1.0, -1.0):
             moved = {name: value + side * steps * _STEP * rate[name] for name, value in shape.items()}
             centres, turns = poses(moved)

@@ -28,8 +28,6 @@ def engine_tree(path: Path, name: str, options: Mapping[str, str]) -> tuple[Link
     """Links and joints of a file in an engine's format, and the engine's numbers at some shapes.
 
     options : arguments of the reader's `chain_of`
-
-    Raises MissingExtraError if the engine is not installed, ModelFileError if it refuses the file, crashes or hangs.
     """
     return _tree_of(_result(path, name, BODY, json.dumps(dict(options))), str(path))
 
@@ -38,8 +36,6 @@ def expanded(path: Path, packages: Sequence[str], arguments: Mapping[str, str]) 
     """The root element of the URDF that a xacro file expands to; its lines are those of the expanded text.
 
     arguments : values of the file's arguments, by name
-
-    Raises what `engine_tree` raises.
     """
     options = json.dumps({"packages": list(map(os.path.abspath, packages)), "xacro_args": dict(arguments)})
     return xml_tree(_result(path, XACRO, TEXT, options).encode(), f"{path} (expanded)")

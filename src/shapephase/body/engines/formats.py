@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from ..formats.bvh_text import is_bvh
 
-_HEAD = 65536  # bytes that are searched: comments of bioMod files fill some thousand
+_HEAD = 2**16  # bytes that are searched: comments of bioMod files fill some thousand
 
 MJCF = "mjcf"  # XML throughout, and drawn
 XACRO = "xacro"  # expanded to a URDF

@@ -16,17 +16,13 @@ from .chain import UnusableModelError
 
 _CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 _FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])  # of the tetrahedron that replaces a mesh
-_EDGES = ((0.01, 0.01, 0.01), (0.3, 0.2, 0.1))  # [m] two tetrahedra: masses that differ come from the mesh
+_EDGES = ((1.0, 1.0, 1.0), (3.0, 2.0, 1.0))  # [m] two tetrahedra: masses that differ come from the mesh
 _OF_MASS = ("body_mass", "body_inertia", "body_ipos", "body_iquat")
 _KINDS = {"meshes": "mesh", "textures": "texture", "hfields": "height field", "skins": "skin"}
 
 
 def compiled_without(written: mujoco.MjSpec) -> tuple[Any, frozenset[int], list[str]]:
-    """The model of a specification, numbers of geoms whose shape is not known, and notes on what is left out.
-
-    Raises UnusableModelError if a body has mass or inertia from a mesh that cannot be read; ValueError for what else
-    MuJoCo does not accept.
-    """
+    """The model of a specification, numbers of geoms whose shape is not known, and notes on what is left out."""
     left: dict[str, tuple[str, str]] = {}
     meshes: list[Any] = []
     while True:

@@ -74,14 +74,10 @@ def _shape(compiled: Compiled, geom: int) -> dict[str, Any]:
 
 
 def _mesh(model: Any, mesh: int) -> dict[str, str]:
-    vertices = _part(model.mesh_vert, model.mesh_vertadr[mesh], model.mesh_vertnum[mesh])
-    faces = _part(model.mesh_face, model.mesh_faceadr[mesh], model.mesh_facenum[mesh])
-    return {"vertices": _text(vertices, "<f4"), "faces": _text(faces, "<i4")}
+    def text(rows: Any, first: int, count: int, kind: str) -> str:
+        return b64encode(np.ascontiguousarray(rows[int(first) : int(first) + int(count)], kind).tobytes()).decode()
 
-
-def _part(rows: Any, first: int, count: int) -> Any:
-    return rows[int(first) : int(first) + int(count)]
-
-
-def _text(numbers: Any, kind: str) -> str:
-    return b64encode(np.ascontiguousarray(numbers, kind).tobytes()).decode()
+    return {
+        "vertices": text(model.mesh_vert, model.mesh_vertadr[mesh], model.mesh_vertnum[mesh], "<f4"),
+        "faces": text(model.mesh_face, model.mesh_faceadr[mesh], model.mesh_facenum[mesh], "<i4"),
+    }

@@ -17,6 +17,7 @@ os.environ.setdefault("MUJOCO_GL", "disable")  # nothing is drawn here
 import mujoco
 import numpy as np
 
+from ... import so3
 from ...arrays import Array
 from ..formats.xml_text import listed, quoted, xml_tree
 from ..virtual_base import way_words
@@ -37,7 +38,7 @@ _NUMBERS = {
     *("mass", "density", "diaginertia", "fullinertia", "size", "fromto", "axis", "range", "ref", "polycoef"),
     *("pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"),
 }
-_MEMORY = 64 * 2**20  # [bytes] of MuJoCo's work space: the squares of two thousand coordinates
+_MEMORY = 2**26  # [bytes] of MuJoCo's work space: the squares of two thousand coordinates
 _TAG_LINES = 3  # lines from an element's tag to its name
 
 
@@ -79,10 +80,7 @@ class Compiled:
 
 
 def compiled_model(path: str, *, drawn: bool = False) -> Compiled:
-    """The model that MuJoCo compiles from a file, with or without shapes that are only drawn.
-
-    Raises UnusableModelError for what it does not accept.
-    """
+    """The model that MuJoCo compiles from a file, with or without shapes that are only drawn."""
     content = Path(path).read_bytes()
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise UnusableModelError("<mujoco>: MuJoCo reads no UTF-16; save the file as UTF-8")
@@ -250,6 +248,4 @@ def _only_tree(compiled: Compiled, notes: list[str]) -> int:
 
 def rotation(quaternion: Array) -> Array:
     """Rotation of a quaternion w x y z, made of length one: (3, 3)."""
-    w, x, y, z = quaternion / np.linalg.norm(quaternion)
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + 2.0 * w * skew + 2.0 * skew @ skew)
+    return so3.matrix_from_quat(np.roll(quaternion / np.linalg.norm(quaternion), -1))

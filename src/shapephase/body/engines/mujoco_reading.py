@@ -15,6 +15,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from ... import so3
 from ...arrays import FARTHEST, Array
 from ..couplings.ball_joints import BallJoint, coordinate_names
 from ..couplings.coupling import Coupling, circular, with_followers
@@ -44,7 +45,8 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
     if len(bodies) > MOST_LINKS:
         raise UnusableModelError(f"<mujoco>: the body has {len(bodies)} links; up to {MOST_LINKS} are supported")
     own = set(bodies)
-    chain = Chain(_model_name(compiled.model) or Path(path).stem, notes=[*compiled.notes, *notes])
+    name = bytes(compiled.model.names).split(b"\0", 1)[0].decode(errors="replace")
+    chain = Chain(name or Path(path).stem, notes=[*compiled.notes, *notes])
     chain.couplings = _couplings(compiled, own, base)
     _check_carried(compiled, own)
     for body in bodies:
@@ -61,10 +63,6 @@ def chain_of(path: str, root: str | None = None, root_body: str | None = None) -
     if compiled.model.body_subtreemass[base] > 0.0:
         _add_poses(chain, compiled, bodies)
     return chain
-
-
-def _model_name(model: Any) -> str:
-    return bytes(model.names).split(b"\0", 1)[0].decode(errors="replace")
 
 
 # ---- Links and joints -----------------------------------------------------------------------------------------------
@@ -111,7 +109,7 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         anchor = model.jnt_pos[joint]
         # The coordinate does not begin at zero where the file has the body.
         by = 0.0 if ball else -_reference(model, joint)
-        place, turn = (place + by * (turn @ axis), turn) if sliding else (place, turn @ _about(axis, by))
+        place, turn = (place + by * (turn @ axis), turn) if sliding else (place, turn @ so3.exp(by * axis))
         lower, upper = model.jnt_range[joint].tolist()
         if lower > upper:
             raise UnusableModelError(
@@ -129,10 +127,6 @@ def _add_joints(chain: Chain, compiled: Compiled, body: int) -> None:
         after = -anchor if last else np.zeros(3)
         chain.add_joint(name, kind, parent, below, place, turn, axis, limits, after, line)
         parent, place, turn = below, np.zeros(3), np.eye(3)
-
-
-def _about(axis: Array, angle: float) -> Array:
-    return rotation(np.concatenate([[np.cos(0.5 * angle)], np.sin(0.5 * angle) * axis]))
 
 
 # ---- Equalities and what else holds parts together ------------------------------------------------------------------
@@ -212,8 +206,7 @@ def _check_carried(compiled: Compiled, own: set[int]) -> None:
 
 
 def _equality(model: Any, number: int) -> str:
-    kind = "weld" if int(model.eq_type[number]) == _WELD else "connect"
-    return f"{model.eq(number).name or number!r} ({kind})"
+    return f"{model.eq(number).name or number!r} ({'weld' if int(model.eq_type[number]) == _WELD else 'connect'})"
 
 
 def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, str]]:
@@ -224,21 +217,18 @@ def _ignored(compiled: Compiled, own: set[int]) -> list[str | tuple[str, str, st
         first_body, second_body = _held(model, number)
         pair = f"{compiled.names[first_body]!r} and {compiled.names[second_body]!r}"
         named = _equality(model, number)
-        if first_body in own and second_body in own:
-            notes.append(("equality", f"{named} of {pair}", "ignored, every joint moves on its own"))
-        elif first_body in own or second_body in own:
-            notes.append(("equality", f"{named} of {pair}", "ignored, the body is free"))
-    tendons = [tendon for tendon in range(model.ntendon) if _led_over(model, tendon) & own]
-    if tendons:
-        named = listed([repr(model.tendon(tendon).name or str(tendon)) for tendon in tendons])
-        notes.append(f"tendons are ignored, every joint moves on its own: {named}")
-    pairs = [
-        pair for pair in range(model.npair)
-        if {int(model.geom_bodyid[geom]) for geom in (model.pair_geom1[pair], model.pair_geom2[pair])} & own
-    ]  # fmt: skip
-    if pairs:
-        named = listed([repr(model.pair(pair).name or str(pair)) for pair in pairs])
-        notes.append(f"contacts are ignored: {named}")
+        if own & {first_body, second_body}:
+            free = "every joint moves on its own" if own >= {first_body, second_body} else "the body is free"
+            notes.append(("equality", f"{named} of {pair}", f"ignored, {free}"))
+    tendons = [model.tendon(tendon) for tendon in range(model.ntendon) if _led_over(model, tendon) & own]
+    ends = np.reshape([model.geom_bodyid[model.pair_geom1], model.geom_bodyid[model.pair_geom2]], (2, -1)).T.tolist()
+    pairs = [model.pair(pair) for pair, bodies in enumerate(ends) if own & set(bodies)]
+    for parts, what in (
+        (tendons, "tendons are ignored, every joint moves on its own"),
+        (pairs, "contacts are ignored"),
+    ):
+        if parts:
+            notes.append(f"{what}: {listed([repr(part.name or str(part.id)) for part in parts])}")
     return notes
 
 

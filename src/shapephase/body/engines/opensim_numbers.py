@@ -72,6 +72,6 @@ def vector_of(entries: Any, count: int = 3) -> Array:
     return np.array([entries.get(k) for k in range(count)])
 
 
-def numbers_of(entries: Any) -> list[float]:
-    """The entries of one of OpenSim's arrays."""
+def entries_of(entries: Any) -> list[Any]:
+    """The entries of one of OpenSim's arrays or sets."""
     return [entries.get(k) for k in range(entries.getSize())]

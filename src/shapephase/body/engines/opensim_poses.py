@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Array
 from .chain import Chain, inertia_and_momentum
-from .opensim_numbers import engine, loaded, pose_of, refused, tensor_of, value_and_slope, vector_of
+from .opensim_numbers import engine, entries_of, loaded, pose_of, refused, tensor_of, value_and_slope, vector_of
 
 
 def add_poses(
@@ -24,8 +24,7 @@ def add_poses(
     rules = _rules(bare)
     for components in (bare.updForceSet(), bare.updControllerSet(), bare.updConstraintSet(), bare.updProbeSet()):
         components.clearAndDestroy()
-    coordinate_set = bare.updCoordinateSet()
-    known = {coordinate_set.get(k).getName(): coordinate_set.get(k) for k in range(coordinate_set.getSize())}
+    known = {coordinate.getName(): coordinate for coordinate in entries_of(bare.updCoordinateSet())}
     for coordinate in known.values():
         coordinate.setDefaultLocked(False)
         coordinate.setDefaultClamped(False)
@@ -35,9 +34,9 @@ def add_poses(
         state = bare.initSystem()
     except RuntimeError as error:
         raise refused(error) from None
-    root, everything = bare.getBodySet().get(base), bare.getBodySet()
+    root = bare.getBodySet().get(base)
     # Part by part: not all bodies of the file need belong to the chain.
-    parts = [everything.get(k) for k in range(everything.getSize()) if everything.get(k).getName() in bodies]
+    parts = [part for part in entries_of(bare.getBodySet()) if part.getName() in bodies]
     masses, tensors = np.array([part.getMass() for part in parts]), np.array([tensor_of(part) for part in parts])
     for shape, rate in chain.random_shapes():
         for name, (value, speed) in _of_all(shape, rate, coordinates, rules).items():
@@ -60,12 +59,11 @@ def _moving(part: Any, state: Any) -> tuple[Array, Array, Array]:
 
 def _rules(model: Any) -> dict[str, tuple[Any, list[str]]]:
     """OpenSim's functions of the coordinates that follow others, copied, and the coordinates that each follows."""
-    rules, constraints = {}, model.getConstraintSet()
-    for k in range(constraints.getSize()):
-        coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraints.get(k))
+    rules = {}
+    for constraint in entries_of(model.getConstraintSet()):
+        coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraint)
         if coupler is not None and coupler.get_isEnforced():
-            names = coupler.getIndependentCoordinateNames()
-            drivers = [names.get(place) for place in range(names.getSize())]
+            drivers = entries_of(coupler.getIndependentCoordinateNames())
             rules[coupler.getDependentCoordinateName()] = (coupler.getFunction().clone(), drivers)
     return rules
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ... import so3
 from ...arrays import Array
 from ...errors import ShapeError
 from ..couplings.coupling import Coupling, circular
@@ -19,7 +20,7 @@ from ..couplings.functions import JointFunction, hermite, piecewise_linear, poly
 from ..formats.xml_text import listed, quoted
 from ..link_tree import Joint
 from .chain import Chain, UnusableModelError, check_name
-from .opensim_numbers import ends, engine, loaded, numbers_of, pose_of, tensor_of, value_and_slope, vector_of
+from .opensim_numbers import ends, engine, entries_of, loaded, pose_of, tensor_of, value_and_slope, vector_of
 from .opensim_poses import add_poses
 
 _CUBIC = 3
@@ -74,7 +75,7 @@ class _Reading:
     def __init__(self, path: str, text: str, root_body: str | None) -> None:
         self._path, self._text = path, text
         self._model = loaded(path)
-        self._joints = [self._model.getJointSet().get(k) for k in range(self._model.getNumJoints())]
+        self._joints = entries_of(self._model.getJointSet())
         self._chain = Chain(Path(path).stem)
         self._base = self._base_joint(root_body)
         self._bodies = self._tree()
@@ -84,7 +85,9 @@ class _Reading:
         """All of it, with what OpenSim computes at some shapes."""
         base = ends(self._base)[1]
         for body in sorted(self._bodies, key=lambda one: one.getName() != base):
-            self._add_body(body)
+            name, line = body.getName(), self._fault("", body.getName()).line
+            check_name(name, f"body {name!r}", line)
+            self._chain.add_link(name, body.getMass(), vector_of(body.getMassCenter()), tensor_of(body), line)
         axes = {joint.getName(): self._axes(joint) for joint in self._joints if joint is not self._base}
         carriers = self._carriers(axes)
         self._add_bare_coordinates(base, axes, carriers)
@@ -93,7 +96,7 @@ class _Reading:
                 self._add_joint(joint, axes[joint.getName()], carriers)
         for name, coordinate in self._coordinates.items():
             if coordinate.rule is not None and any(name == joint.name for joint in self._chain.joints):
-                self._couple(name, coordinate.rule)
+                self._chain.couplings[name] = self._unlocked(coordinate.rule)
         self._chain.base_angles = self._base_angles()
         if self._chain.base_angles is None:
             self._chain.base_joints = self._way()
@@ -148,7 +151,7 @@ class _Reading:
 
     def _tree(self) -> list[Any]:
         """The bodies that hang on the base; those of other trees and their joints are left out."""
-        bodies = [self._model.getBodySet().get(k) for k in range(self._model.getNumBodies())]
+        bodies = entries_of(self._model.getBodySet())
         reached = self._below(ends(self._base)[1])
         if len(reached) < len(bodies):
             self._chain.notes.append(f"{len(bodies) - len(reached)} bodies that hang elsewhere are left out")
@@ -222,9 +225,7 @@ class _Reading:
     def _couplers(self) -> dict[str, Coupling]:
         """Couplings of coordinates that follow others."""
         couplers = {}
-        constraints = self._model.getConstraintSet()
-        for k in range(constraints.getSize()):
-            constraint = constraints.get(k)
+        for constraint in entries_of(self._model.getConstraintSet()):
             if not constraint.get_isEnforced():
                 continue
             coupler = engine().CoordinateCouplerConstraint.safeDownCast(constraint)
@@ -233,8 +234,7 @@ class _Reading:
                 text = "ignored, its joints are free to move"
                 self._chain.notes.append((kind, repr(constraint.getName()), text))
                 continue
-            names = coupler.getIndependentCoordinateNames()
-            drivers = [names.get(place) for place in range(names.getSize())]
+            drivers = entries_of(coupler.getIndependentCoordinateNames())
             couplers[coupler.getDependentCoordinateName()] = self._rule(
                 coupler.getFunction(), drivers, coupler.getName()
             )
@@ -292,7 +292,7 @@ class _Reading:
         if kind == "Constant":
             return Coupling(engine().Constant.safeDownCast(function).getValue(), ())
         if kind == "LinearFunction":
-            numbers = numbers_of(engine().LinearFunction.safeDownCast(function).getCoefficients())
+            numbers = entries_of(engine().LinearFunction.safeDownCast(function).getCoefficients())
             if len(numbers) != len(drivers) + 1:
                 raise self._fault(f"{owner!r}: {len(numbers)} coefficients for {len(drivers)} coordinates", owner)
             slopes = zip(drivers, numbers, strict=False)
@@ -343,12 +343,6 @@ class _Reading:
             if name in followed and name not in carriers and coordinate.locked is None:
                 self._step(base, f"{base}__{name}", (np.eye(3), np.zeros(3)), name, coordinate.kind, _UNITS[2])
 
-    def _add_body(self, body: Any) -> None:
-        name = body.getName()
-        line = self._fault("", name).line
-        check_name(name, f"body {name!r}", line)
-        self._chain.add_link(name, body.getMass(), vector_of(body.getMassCenter()), tensor_of(body), line)
-
     def _add_joint(self, joint: Any, axes: list[_Axis], carriers: dict[str, str]) -> None:
         """Steps from the parent to the child: fixed frames, and joints of one axis between them."""
         above, child = ends(joint)
@@ -363,13 +357,14 @@ class _Reading:
                 rule = Coupling(rule.start + float(function(np.zeros(())).value), ())
             if not rule.terms:
                 # Along the same axis, so that it does not matter which comes first.
-                pose = _after(pose, *_moved(axis.kind, direction, rule.start))
+                moved, still = rule.start * direction, np.zeros(3)
+                pose = _after(pose, *((np.eye(3), moved) if axis.kind == _SLIDE else (so3.exp(moved), still)))
             if name == axis.name and not rule.terms:
                 continue
             below = f"{child}__{name}"
             self._step(above, below, pose, name, axis.kind, sign * direction)
             if rule.terms:
-                self._couple(name, rule)
+                self._chain.couplings[name] = self._unlocked(rule)
             above, pose = below, (np.eye(3), np.zeros(3))
         turn, place = pose_of(joint.getChildFrame().findTransformInBaseFrame())
         turn, place = _after(pose, turn.T, -turn.T @ place)
@@ -381,9 +376,6 @@ class _Reading:
         limits = (-np.inf, np.inf) if known is None else known.limits
         self._chain.add_joints(above, below, pose[1], pose[0], [(name, kind, axis, list(limits))])
 
-    def _couple(self, name: str, rule: Coupling) -> None:
-        self._chain.couplings[name] = self._unlocked(rule)
-
 
 _SAME = polynomial(np.array([0.0, 1.0]))
 
@@ -393,15 +385,6 @@ def _sign(function: JointFunction) -> float:
     straight = not len(function.knots) and not function.coefficients[2:].any() and len(function.coefficients) > 1
     slope = float(function.coefficients[1, 0]) if straight else 0.0
     return slope if abs(slope) == 1.0 else 0.0
-
-
-def _moved(kind: str, axis: Array, by: float) -> tuple[Array, Array]:
-    """A fixed turn or slide."""
-    if kind == _SLIDE:
-        return np.eye(3), by * axis
-    x, y, z = np.sin(by) * axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.cos(by) * np.eye(3) + (1.0 - np.cos(by)) * np.outer(axis, axis) + skew, np.zeros(3)
 
 
 def _after(pose: tuple[Array, Array], turn: Array, place: Array) -> tuple[Array, Array]:

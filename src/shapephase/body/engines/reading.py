@@ -20,7 +20,7 @@ SHAPES = "shapes"  # request for what can be drawn
 NO_MEMORY = 3  # exit code: out of memory
 MISSING = 4  # exit code: the engine is not installed
 REFUSED = 5  # exit code: the file is unusable, for the reason on standard output
-MEMORY = 1024 * 2**20  # [bytes] beyond the imports; the largest public models take a tenth
+MEMORY = 2**30  # [bytes] beyond the imports; the largest public models take a tenth
 
 
 def read_in_this_process() -> None:

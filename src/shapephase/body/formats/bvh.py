@@ -31,8 +31,6 @@ def bvh_tree(
 
     length_unit : length of a unit of the file [m]; needed
     person_mass : [kg]; None: 70 kg, with a note
-
-    Raises ModelFileError for faults of the file, for bones that are not known by their names, without `length_unit`.
     """
     try:
         skeleton = bvh_skeleton(content)
@@ -43,22 +41,20 @@ def bvh_tree(
         check_lengths(skeleton, person.moving[1:])
     except BvhFaultError as error:
         raise ModelFileError(f"{where}:{error.line}: {error}") from None
-    return _tree(skeleton, person, name, where, length_unit, _notes(skeleton, person, where, person_mass))
+    return _tree(skeleton, person, name, where, length_unit, person_mass)
 
 
 def mvnx_tree(content: bytes, name: str, where: str, person_mass: float | None = None) -> LinkTree:
     """Links and joints of the person in an inertial suit; a link's axes are those of its segment.
 
     person_mass : [kg]; None: 70 kg, with a note
-
-    Raises ModelFileError for faults of the file, and for segments that are not those of a person.
     """
     try:
         skeleton = suit_skeleton(read_suit(content, motion=False))
         person = person_of(skeleton, _MASS if person_mass is None else person_mass, 1.0)
     except BvhFaultError as error:
         raise ModelFileError(f"{where}:{error.line}: {error}") from None
-    return _tree(skeleton, person, name, where, 1.0, _notes(skeleton, person, where, person_mass))
+    return _tree(skeleton, person, name, where, 1.0, person_mass)
 
 
 def _notes(skeleton: Skeleton, person: Person, where: str, person_mass: float | None) -> list[str]:
@@ -83,9 +79,9 @@ def _unit_question(height: float) -> str:
     )
 
 
-def _tree(skeleton: Skeleton, person: Person, name: str, where: str, metre: float, notes: list[str]) -> LinkTree:
-    bones, links, joints = skeleton.bones, {}, []
-    frames: set[str] = set()
+def _tree(skeleton: Skeleton, person: Person, name: str, where: str, metre: float, mass: float | None) -> LinkTree:
+    bones, links, joints, frames = skeleton.bones, {}, [], set[str]()
+    notes = _notes(skeleton, person, where, mass)
     below = [number for number in range(len(bones)) if person.base in skeleton.above(number)]
     for number in below:
         bone, at = bones[number], f"{where}:{bones[number].line}"

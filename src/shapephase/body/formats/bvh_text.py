@@ -151,10 +151,7 @@ def is_bvh(content: bytes) -> bool:
 
 
 def bvh_skeleton(content: bytes) -> Skeleton:
-    """Read a file.
-
-    Raises BvhFaultError for another format, or other counts than the file states.
-    """
+    """Read a file."""
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -87,7 +87,7 @@ def foreign_kind(content: bytes) -> str | None:
             return kind
     if re.match(rb"<(!doctype\s+)?html", head.lstrip(), re.IGNORECASE):
         return _ROOTS["html"]
-    if len(content) >= 84 and len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
+    if len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
         return f"an STL file: {_MESH}"
     if _TABLE.match(head):
         return f"a table: {_MOTION}"

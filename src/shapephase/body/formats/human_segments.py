@@ -42,7 +42,7 @@ _TABLE = {
 }
 _TRUNK = ("upper_trunk", "middle_trunk", "lower_trunk")
 _SHOULDERS = 0.8556  # height over the hips, of the trunk's length: robots/astronaut.urdf, after Drillis and Contini
-_HEEL = 0.05 / 0.2581  # behind the ankle, of the foot's length (HeiMan)
+_HEEL = 0.05 / _TABLE["foot"].length  # behind the ankle, of the foot's length (HeiMan)
 _ALONG = 0.7  # cosine to the long axis above which the body's front-back axis is not a segment's
 # Names of the bones that carry a segment, without their side, the most specific first.
 _NAMES = {
@@ -54,15 +54,6 @@ _NAMES = {
     "hand": ("wrist", "hand"),
 }
 _SIDES = {"left": ("left", "l"), "right": ("right", "r")}
-# Usual names, behind the side.
-_CALLED = {
-    "thigh": "UpLeg",
-    "shank": "Leg",
-    "foot": "Foot",
-    "upper_arm": "Arm",
-    "forearm": "ForeArm",
-    "hand": "Hand",
-}
 _MAY_LACK = {"hand": "forearm"}  # segments that the bone above carries where a skeleton ends early
 _MOST_POSTURES = 2000  # frames that are compared: a person stands straight for longer than a frame
 _AS_STRAIGHT = 5e-3  # of the length from shoulders to feet: knees bent by 15 degrees shorten it so much
@@ -107,8 +98,6 @@ def person_of(skeleton: Skeleton, mass: float, metre: float) -> Person:
 
     mass : of the person [kg]
     metre : length of a unit of the file [m]
-
-    Raises BvhFaultError if a bone is not found by its name, or has no length.
     """
     return _Layout(skeleton, mass, metre).person()
 
@@ -200,9 +189,12 @@ class _Layout:
             top -= length
             carrier = {"upper_trunk": way[-1], "lower_trunk": pelvis}.get(part, self._reaching(way, height))
             segments.append(self._segment(part, carrier, self.hips + height * self.up, self.up, length))
+        head = next((self.plain.index(word) for word in ("head", "neck") if word in self.plain), None)
+        if head is None:
+            raise self._unknown("head", "Head")
         row, length = _TABLE["head"], self.trunk * _TABLE["head"].length / whole
         centre = self.hips + (self.trunk + (1.0 - row.centre) * length) * self.up
-        return [*segments, self._segment("head", self._head(), centre, self.up, length)]
+        return [*segments, self._segment("head", head, centre, self.up, length)]
 
     def _reaching(self, way: list[int], height: float) -> int:
         """The last bone of the trunk whose joint is not above a height over the hips."""
@@ -272,13 +264,7 @@ class _Layout:
                     return number
         if part in _MAY_LACK:
             return self._limb(side, _MAY_LACK[part])
-        raise self._unknown(f"{side} {part.replace('_', ' ')}", f"{side.title()}{_CALLED[part]}")
-
-    def _head(self) -> int:
-        for word in ("head", "neck"):
-            if word in self.plain:
-                return self.plain.index(word)
-        raise self._unknown("head", "Head")
+        raise self._unknown(f"{side} {part.replace('_', ' ')}", f"{side.title()}{_NAMES[part][0].title()}")
 
     def _unknown(self, what: str, name: str) -> BvhFaultError:
         names = listed([bone.name for bone in self.skeleton.bones], 40)

@@ -31,10 +31,6 @@ _TIPS = {"Head": "pTopOfHead", "RightHand": "pRightTopOfHand", "LeftHand": "pLef
 _CHANNELS = ("Xposition", "Yposition", "Zposition", "Zrotation", "Xrotation", "Yrotation")
 
 
-class MvnxFaultError(BvhFaultError):
-    """A fault of a file, with its line."""
-
-
 @dataclass(frozen=True, eq=False)
 class Poses:
     """Poses of k segments at N times.
@@ -86,8 +82,6 @@ def read_suit(content: bytes, *, motion: bool = True) -> Suit:
     """Read a file.
 
     motion : False: what stands before the motion is enough, if it has a calibration pose
-
-    Raises MvnxFaultError for another format, or other counts than the file states.
     """
     return _Reader(motion=motion).read(content)
 
@@ -107,7 +101,7 @@ class _Reader:
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
-        self.parser.CharacterDataHandler = self._characters
+        self.parser.CharacterDataHandler = self.text.append
         self.parser.EntityDeclHandler = self._entity
 
     def read(self, content: bytes) -> Suit:
@@ -116,7 +110,7 @@ class _Reader:
         except _MotionBeginsError:
             pass
         except expat.ExpatError as error:
-            raise MvnxFaultError(
+            raise BvhFaultError(
                 f"no well-formed XML ({expat.ErrorString(error.code)}); is the file cut off? Export it again",
                 error.lineno,
             ) from None
@@ -135,8 +129,8 @@ class _Reader:
             stands=stands,
         )
 
-    def fault(self, message: str) -> MvnxFaultError:
-        return MvnxFaultError(message, max(self.parser.CurrentLineNumber, 1))
+    def fault(self, message: str) -> BvhFaultError:
+        return BvhFaultError(message, max(self.parser.CurrentLineNumber, 1))
 
     def _entity(self, *_: object) -> None:
         raise self.fault("entities are not expanded; export the file again, without a document type")
@@ -165,9 +159,6 @@ class _Reader:
                 raise _MotionBeginsError
             line = self.parser.CurrentLineNumber
             self.frames.append(_Frame(kind, line, attributes.get("time"), attributes.get("index")))
-
-    def _characters(self, text: str) -> None:
-        self.text.append(text)
 
     def _end(self, tag: str) -> None:
         name, _, parent = tag.rpartition(":")[2], self.path.pop(), (self.path or [""])[-1]
@@ -204,12 +195,12 @@ class _Reader:
         for number, frame in enumerate(frames):
             for what in ("orientation", "position"):
                 if what not in frame.numbers:
-                    raise MvnxFaultError(f"no <{what}> in a frame; export the file again, with it", frame.line)
+                    raise BvhFaultError(f"no <{what}> in a frame; export the file again, with it", frame.line)
             turns[number], origins[number] = frame.numbers["orientation"], frame.numbers["position"]
         off = np.abs(np.linalg.norm(turns, axis=-1) - 1.0)
         if off.max(initial=0.0) > _OFF_UNIT:
             number, segment = np.unravel_index(int(np.argmax(off)), off.shape)
-            raise MvnxFaultError(
+            raise BvhFaultError(
                 f"the quaternion of {self.segments[segment]} is {off[number, segment]:.2g} off length 1; export the "
                 "file again",
                 frames[number].line,
@@ -220,17 +211,12 @@ class _Reader:
     def _times(self, frames: list[_Frame]) -> Array:
         """By the frames' numbers, as times are whole milliseconds; by these where frames do not keep the rate."""
         rate = self.rate
-        regular = rate is not None and 0.0 < rate < np.inf
-        clock = [frame.time for frame in frames]
-        known = [float("nan") if time is None else 1e-3 * self._number(time, "time") for time in clock]
-        index = [None if frame.index is None else self._number(frame.index, "index") for frame in frames]
-        numbers = np.array([k if number is None else number for k, number in enumerate(index)], dtype=np.float64)
-        times = np.array(known)
-        if not regular:
+        numbers = np.array([k if f.index is None else self._number(f.index, "index") for k, f in enumerate(frames)])
+        times = np.array([1e-3 * self._number("nan" if f.time is None else f.time, "time") for f in frames])
+        if rate is None or not 0.0 < rate < np.inf:
             if np.isnan(times).any():
                 raise self.fault("frames without time, and no frameRate; export the file again")
             return times
-        assert rate is not None
         by_rate = (numbers - numbers[:1]) / rate
         if np.isnan(times).any():
             return by_rate
@@ -255,13 +241,11 @@ def suit_skeleton(suit: Suit) -> Skeleton:
     """Bones of a suit's segments with the frame in which they are laid out: its T-pose, else all of its motion.
 
     A segment's axes are those of its bone.
-
-    Raises MvnxFaultError if joints are missing, or not a tree.
     """
     # A prop in a hand is a segment without joints.
     roots = sorted({parent for parent, _ in suit.joints.values()} - suit.joints.keys())
     if len(roots) != 1:
-        raise MvnxFaultError(
+        raise BvhFaultError(
             f"joints have {len(roots)} roots among the {len(suit.segments)} segments, and those of a body have one; "
             "export the file again, with <joints> and points, or load another body",
             1,

@@ -59,21 +59,12 @@ _OF_OTHERS = {
 _NO_OFFSET = np.zeros(3)  # [m] of an <origin> without xyz
 
 
-@dataclass(frozen=True)
-class Mimic:
-    """A joint that follows another: angle = multiplier * (angle of `leader`) + offset."""
-
-    leader: str
-    multiplier: float
-    offset: float
-
-
 @dataclass
 class _Reading:
     """Results collected on the way through the file."""
 
     text: dict[tuple[str, str], str] = field(default_factory=dict)  # by kind of element and name
-    mimics: dict[str, tuple[Node, Mimic]] = field(default_factory=dict)
+    mimics: dict[str, tuple[Node, Coupling]] = field(default_factory=dict)
     notes: list[tuple[str, str, str, str]] = field(default_factory=list)  # as `grouped` takes them
 
 
@@ -81,8 +72,6 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
     """Check a URDF from its root element.
 
     free : "free": a single joint between a root without mass and the rest goes, too
-
-    Raises ModelFileError if it is not a URDF, needs xacro, or a link or joint is faulty.
     """
     if root.tag != "robot":
         raise root.fault(f"expected <robot>: this is {foreign_root(root.tag)}")
@@ -102,9 +91,7 @@ def urdf_tree(root: Node, free: str | None = None) -> LinkTree:
         links[_WORLD] = _link(_WORLD, Node("link", {}, root.file, root.line), reading)
     first, ordered = from_the_root(links, joints.values(), root.file)
     _check_mimics(reading.mimics, joints)
-    couplings = {
-        key: Coupling.linear(rule.leader, rule.multiplier, rule.offset) for key, (_, rule) in reading.mimics.items()
-    }
+    couplings = {key: rule for key, (_, rule) in reading.mimics.items()}
     if (key := circular(couplings)) is not None:
         raise _mimic_fault(reading.mimics[key][0], "mimic joints follow each other in a circle")
     base = free_base(first, links, ordered, couplings, free)
@@ -131,7 +118,8 @@ def rpy_matrix(rpy: Array) -> Array:
 
 def macro_of(root: Node) -> Node | None:
     """The first macro or expression of xacro: by its prefix, whatever the address, or by its address."""
-    bound = (name[6:] for name, address in root.attributes.items() if name[:6] == "xmlns:" and address[-6:] == "/xacro")
+    spaces = (name for name, address in root.attributes.items() if address.endswith("/xacro"))
+    bound = (name.removeprefix("xmlns:") for name in spaces if name.startswith("xmlns:"))
     prefixes = tuple(f"{prefix}:" for prefix in ("xacro", *bound))
     for top in (root, *root.children):
         read = top is root or top.tag in _ROBOT_PARTS
@@ -327,18 +315,19 @@ def _mimic(name: str, kind: str, node: Node, reading: _Reading) -> None:
         raise element.fault(f"a {kind} joint follows no other: it has no single number; remove the <mimic>")
     element.check_attributes("joint", "multiplier", "offset")
     multiplier, offset = (element.number(k, default=d) for k, d in (("multiplier", "1"), ("offset", "0")))
-    reading.mimics[name] = (element, Mimic(element.name("joint"), multiplier, offset))
+    reading.mimics[name] = (element, Coupling.linear(element.name("joint"), multiplier, offset))
 
 
-def _check_mimics(mimics: dict[str, tuple[Node, Mimic]], joints: dict[str, Joint]) -> None:
+def _check_mimics(mimics: dict[str, tuple[Node, Coupling]], joints: dict[str, Joint]) -> None:
     """Raise ModelFileError unless every leader exists and is of the follower's kind."""
     for name, (element, rule) in mimics.items():
-        leader = joints.get(rule.leader)
+        (driver,) = rule.drivers
+        leader = joints.get(driver)
         if leader is None:
-            raise _mimic_fault(element, f"mimics joint {rule.leader!r}, which does not exist")
+            raise _mimic_fault(element, f"mimics joint {driver!r}, which does not exist")
         kinds = joints[name].kind, leader.kind
         if kinds[1] in ("fixed", "ball") or (kinds[0] == "prismatic") != (kinds[1] == "prismatic"):
-            raise _mimic_fault(element, f"is {kinds[0]} and mimics joint {rule.leader!r}, which is {kinds[1]}")
+            raise _mimic_fault(element, f"is {kinds[0]} and mimics joint {driver!r}, which is {kinds[1]}")
 
 
 def _mimic_fault(element: Node, message: str) -> ModelFileError:

@@ -122,10 +122,7 @@ class Node:
 
 
 def read_file(path: str | os.PathLike[str]) -> bytes:
-    """The bytes of a body's file, read once.
-
-    Raises InputFileNotFoundError without a readable file at `path`.
-    """
+    """The bytes of a body's file, read once."""
     where = Path(path)
     if "\0" in str(where):
         raise InputFileNotFoundError(f"{str(where)!r}: a path has no zero bytes; give its name as it is on disk")
@@ -173,10 +170,7 @@ def xml_text(content: bytes, where: str) -> str:
 
 
 def xml_tree(content: bytes, where: str) -> Node:
-    """The root element of an XML file; `where` names the file in messages.
-
-    Raises ModelFileError if it is not well-formed XML, has a document type, or is in another encoding than it states.
-    """
+    """The root element of an XML file; `where` names the file in messages."""
     text = xml_text(content, where)
     builder = _Builder(where, above=text[: len(text) - len(text.lstrip())].count("\n"))
     try:

@@ -19,10 +19,7 @@ def is_casadi_function(value: object) -> bool:
 
 
 class CasadiPositions:
-    """Places of `particles` particles, shape (n) -> (m, 3), or (m, 2) in the plane z = 0.
-
-    Raises ShapeError if the function has other arguments or results.
-    """
+    """Places of `particles` particles, shape (n) -> (m, 3), or (m, 2) in the plane z = 0."""
 
     def __init__(self, function: Any, n_shape: int, particles: int) -> None:
         sizes = [tuple(function.size_in(k)) for k in range(function.n_in())]

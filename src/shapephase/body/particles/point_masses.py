@@ -15,12 +15,12 @@ from ...arrays import Array, finite_array, lock_arrays
 from ...display import short_repr
 from ...errors import ShapeError, WrongObjectError, unknown_name
 from ...letters import value_text
+from ..engines.chain import WEIGHTS
 from ..shape_arguments import ShapeArguments
 from ._casadi_positions import CasadiPositions, is_casadi_function
 
 _Places = Callable[[Array], tuple[ArrayLike, ArrayLike]]
 _STEP = 0.02  # of differences for second derivatives: errors of 1e-13 where places swing once in a radian
-_DIFFERENCES = (4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0)  # of f(k h) - f(-k h), k = 1 to 4 (Fornberg 1988)
 _BROAD_STEP = 1e-4  # of differences that are compared with given derivatives
 _NOT_DERIVATIVES = 1e-5  # of the places' size: a thousand times what these differences leave of true derivatives
 
@@ -162,10 +162,10 @@ class ParticleBody(ShapeArguments):
             bends = self.places.bends(rows)
         else:
             count = self.n_shape
-            moved = _STEP * np.arange(1, len(_DIFFERENCES) + 1)[:, None, None] * np.eye(count)
+            moved = _STEP * np.arange(1, len(WEIGHTS) + 1)[:, None, None] * np.eye(count)
             at = rows[:, None, None, None] + np.stack([moved, -moved], axis=0)
             slopes = self.places(at.reshape(-1, count))[1].reshape(*at.shape[:-1], count, len(self.masses), 3)
-            bends = np.einsum("d,ndk...->nk...", np.array(_DIFFERENCES) / _STEP, slopes[:, 0] - slopes[:, 1])
+            bends = np.einsum("d,ndk...->nk...", np.array(WEIGHTS) / _STEP, slopes[:, 0] - slopes[:, 1])
         bends = 0.5 * (bends + np.swapaxes(bends, 1, 2))
         return bends - ((self.masses / self.mass) @ bends)[..., None, :]
 

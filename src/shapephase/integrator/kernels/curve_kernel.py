@@ -84,14 +84,9 @@ def within_steps(channels, magnitudes, directions, starts, attitudes, along):
     for row in range(len(magnitudes)):
         slopes = np.empty((STAGES, 4))
         for place in range(len(channels)):
-            q = starts[row, place]
+            q, end = starts[row, place], attitudes[row, place]
             x, y, z, w, phase = step(channels[place], magnitudes[row], directions[row], slopes, q[0], q[1], q[2], q[3])
-            attitudes[row, place, 0], attitudes[row, place, 1], attitudes[row, place, 2], attitudes[row, place, 3] = (
-                x,
-                y,
-                z,
-                w,
-            )
+            end[0], end[1], end[2], end[3] = x, y, z, w
             along[row, place] = phase
 
 

@@ -15,13 +15,14 @@ import numpy as np
 from ..machine_code import inline, kernel
 
 LANES = 8
-FRAME = 24  # rows of a frame
-TOTAL = 15  # rows of the sums: mass times place (3), mass times velocity (3), inertia (6), momentum (3)
+TURN, PLACE, SPIN, SPEED, CENTRE, DRIFT, FRAME = 0, *range(9, 25, 3)  # first rows of R, p, w, v, x, u; all rows
+# First rows of the sums of mass times place, mass times velocity, inertia (6) and momentum; all rows.
+MOMENT, FLOW, INERTIA, MOMENTUM, TOTAL = 0, 3, 6, 12, 15
 NUMBERS = 22  # of a frame in the body, in the order of `shapephase.body.joint_chain`
+MASS = 12  # place of the mass among them, behind turn and place; then the centre of mass and the inertia
 _CONDITION = (
     1e10  # product of the traces of I and I^-1, up to 9 cond(I): slower code judges tensors above by eigenvalues
 )
-
 MOST_ANGLE = 1e5  # [rad]: up to here the products with the first two parts of pi/2 are exact
 _QUARTERS = 2.0 / math.pi
 _HALF_PI_1, _HALF_PI_2, _HALF_PI_3 = 1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21
@@ -49,96 +50,129 @@ def cos_sin(x):
 
 
 @inline
+def three(rows, first, stride, i):
+    """Lane i of three rows from `first` on."""
+    at = first * LANES + i
+    return rows[at], rows[at + stride * LANES], rows[at + 2 * stride * LANES]
+
+
+@inline
+def put(rows, first, i, vector):
+    """Write lane i of three rows."""
+    at = first * LANES + i
+    rows[at], rows[at + LANES], rows[at + 2 * LANES] = vector
+
+
+@inline
+def dot(a, b):
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inline
+def cross(a, b):
+    """Cross product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inline
+def plus(a, b):
+    """Sum of two vectors."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@inline
+def add(rows, first, i, vector):
+    """Add to lane i of three rows."""
+    put(rows, first, i, plus(three(rows, first, 1, i), vector))
+
+
+@inline
+def minus(a, b):
+    """Difference of two vectors."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@inline
+def scaled(factor, a):
+    """Vector times a number."""
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@inline
+def times(tensor, a):
+    """Symmetric tensor, xx yy zz and yz xz xy, times a vector."""
+    (xx, yy, zz), (yz, xz, xy) = tensor
+    return dot((xx, xy, xz), a), dot((xy, yy, yz), a), dot((xz, yz, zz), a)
+
+
+@inline
+def _numbers(body, first):
+    """Three numbers of a frame in the body."""
+    return body[first], body[first + 1], body[first + 2]
+
+
+@inline
+def _move_row(columns, offset, before, after, row, i, c, s, slid):
+    """A row of R after a joint; what it has of the joint's axis, and of the step to the new origin."""
+    r = three(before, row, 1, i)
+    x, y, z = dot(r, columns[0]), dot(r, columns[1]), dot(r, columns[2])
+    put(after, row, i, (x * c + y * s, y * c - x * s, z))
+    return z, dot(r, offset) + z * slid
+
+
+@inline
 def _move_frame(body, before, after, turning, lead, cosine, sine, shape, rate, lanes):
     """The frame after a joint from the frame before it."""
-    m0, m1, m2, m3, m4, m5, m6, m7, m8 = body[0], body[1], body[2], body[3], body[4], body[5], body[6], body[7], body[8]
-    o0, o1, o2 = body[9], body[10], body[11]
+    m, offset = (_numbers(body, 0), _numbers(body, 3), _numbers(body, 6)), _numbers(body, PLACE)
+    columns = (m[0][0], m[1][0], m[2][0]), (m[0][1], m[1][1], m[2][1]), (m[0][2], m[1][2], m[2][2])
     for i in range(lanes):
         c, s, slid = cosine[i], sine[i], lead * shape[i]
-        r0, r1, r2 = before[i], before[LANES + i], before[2 * LANES + i]
-        x, y, zx = r0 * m0 + r1 * m3 + r2 * m6, r0 * m1 + r1 * m4 + r2 * m7, r0 * m2 + r1 * m5 + r2 * m8
-        ax = r0 * o0 + r1 * o1 + r2 * o2 + zx * slid
-        after[i], after[LANES + i], after[2 * LANES + i] = x * c + y * s, y * c - x * s, zx
-        r0, r1, r2 = before[3 * LANES + i], before[4 * LANES + i], before[5 * LANES + i]
-        x, y, zy = r0 * m0 + r1 * m3 + r2 * m6, r0 * m1 + r1 * m4 + r2 * m7, r0 * m2 + r1 * m5 + r2 * m8
-        ay = r0 * o0 + r1 * o1 + r2 * o2 + zy * slid
-        after[3 * LANES + i], after[4 * LANES + i], after[5 * LANES + i] = x * c + y * s, y * c - x * s, zy
-        r0, r1, r2 = before[6 * LANES + i], before[7 * LANES + i], before[8 * LANES + i]
-        x, y, zz = r0 * m0 + r1 * m3 + r2 * m6, r0 * m1 + r1 * m4 + r2 * m7, r0 * m2 + r1 * m5 + r2 * m8
-        az = r0 * o0 + r1 * o1 + r2 * o2 + zz * slid
-        after[6 * LANES + i], after[7 * LANES + i], after[8 * LANES + i] = x * c + y * s, y * c - x * s, zz
-        spin, slide = turning * rate[i], lead * rate[i]
-        w0, w1, w2 = before[12 * LANES + i], before[13 * LANES + i], before[14 * LANES + i]
-        after[9 * LANES + i] = before[9 * LANES + i] + ax
-        after[10 * LANES + i] = before[10 * LANES + i] + ay
-        after[11 * LANES + i] = before[11 * LANES + i] + az
-        after[12 * LANES + i] = w0 + zx * spin
-        after[13 * LANES + i] = w1 + zy * spin
-        after[14 * LANES + i] = w2 + zz * spin
+        zx, ax = _move_row(columns, offset, before, after, 0, i, c, s, slid)
+        zy, ay = _move_row(columns, offset, before, after, 3, i, c, s, slid)
+        zz, az = _move_row(columns, offset, before, after, 6, i, c, s, slid)
+        axis, step, spin = (zx, zy, zz), (ax, ay, az), three(before, SPIN, 1, i)
+        put(after, PLACE, i, plus(three(before, PLACE, 1, i), step))
+        put(after, SPIN, i, plus(spin, scaled(turning * rate[i], axis)))
         # From origin to origin, so that nothing far away is taken off again.
-        after[15 * LANES + i] = before[15 * LANES + i] + ((w1 * az - w2 * ay) + zx * slide)
-        after[16 * LANES + i] = before[16 * LANES + i] + ((w2 * ax - w0 * az) + zy * slide)
-        after[17 * LANES + i] = before[17 * LANES + i] + ((w0 * ay - w1 * ax) + zz * slide)
+        slide = plus(cross(spin, step), scaled(lead * rate[i], axis))
+        put(after, SPEED, i, plus(three(before, SPEED, 1, i), slide))
 
 
 @inline
 def add_link(body, frame, total, lanes):
     """Place and velocity of a link's centre of mass, and what it adds to the sums whatever the centre of the whole."""
-    mass, c0, c1, c2 = body[12], body[13], body[14], body[15]
-    j0, j1, j2, j3, j4, j5 = body[16], body[17], body[18], body[19], body[20], body[21]
+    mass, centre = body[MASS], _numbers(body, MASS + 1)
+    (j0, j1, j2), (j3, j4, j5) = _numbers(body, MASS + 4), _numbers(body, NUMBERS - 3)
+    first, second, third = (j0, j5, j4), (j5, j1, j3), (j4, j3, j2)
     for i in range(lanes):
-        r0, r1, r2 = frame[i], frame[LANES + i], frame[2 * LANES + i]
-        r3, r4, r5 = frame[3 * LANES + i], frame[4 * LANES + i], frame[5 * LANES + i]
-        r6, r7, r8 = frame[6 * LANES + i], frame[7 * LANES + i], frame[8 * LANES + i]
-        w0, w1, w2 = frame[12 * LANES + i], frame[13 * LANES + i], frame[14 * LANES + i]
-        d0, d1, d2 = r0 * c0 + r1 * c1 + r2 * c2, r3 * c0 + r4 * c1 + r5 * c2, r6 * c0 + r7 * c1 + r8 * c2
-        x, y, z = frame[9 * LANES + i] + d0, frame[10 * LANES + i] + d1, frame[11 * LANES + i] + d2
-        u = frame[15 * LANES + i] + (w1 * d2 - w2 * d1)
-        v = frame[16 * LANES + i] + (w2 * d0 - w0 * d2)
-        w = frame[17 * LANES + i] + (w0 * d1 - w1 * d0)
-        frame[18 * LANES + i], frame[19 * LANES + i], frame[20 * LANES + i] = x, y, z
-        frame[21 * LANES + i], frame[22 * LANES + i], frame[23 * LANES + i] = u, v, w
-        total[i] += mass * x
-        total[LANES + i] += mass * y
-        total[2 * LANES + i] += mass * z
-        total[3 * LANES + i] += mass * u
-        total[4 * LANES + i] += mass * v
-        total[5 * LANES + i] += mass * w
-        a0, a1, a2 = r0 * j0 + r1 * j5 + r2 * j4, r0 * j5 + r1 * j1 + r2 * j3, r0 * j4 + r1 * j3 + r2 * j2
-        a3, a4, a5 = r3 * j0 + r4 * j5 + r5 * j4, r3 * j5 + r4 * j1 + r5 * j3, r3 * j4 + r4 * j3 + r5 * j2
-        a6, a7, a8 = r6 * j0 + r7 * j5 + r8 * j4, r6 * j5 + r7 * j1 + r8 * j3, r6 * j4 + r7 * j3 + r8 * j2
-        xx, yy, zz = a0 * r0 + a1 * r1 + a2 * r2, a3 * r3 + a4 * r4 + a5 * r5, a6 * r6 + a7 * r7 + a8 * r8
-        yz, xz, xy = a3 * r6 + a4 * r7 + a5 * r8, a0 * r6 + a1 * r7 + a2 * r8, a0 * r3 + a1 * r4 + a2 * r5
-        total[6 * LANES + i] += xx
-        total[7 * LANES + i] += yy
-        total[8 * LANES + i] += zz
-        total[9 * LANES + i] += yz
-        total[10 * LANES + i] += xz
-        total[11 * LANES + i] += xy
-        total[12 * LANES + i] += xx * w0 + xy * w1 + xz * w2
-        total[13 * LANES + i] += xy * w0 + yy * w1 + yz * w2
-        total[14 * LANES + i] += xz * w0 + yz * w1 + zz * w2
+        r, s, t = three(frame, 0, 1, i), three(frame, 3, 1, i), three(frame, 6, 1, i)
+        w, d = three(frame, SPIN, 1, i), (dot(r, centre), dot(s, centre), dot(t, centre))
+        x, y, z = plus(three(frame, PLACE, 1, i), d)
+        u, v, q = plus(three(frame, SPEED, 1, i), cross(w, d))
+        put(frame, CENTRE, i, (x, y, z))
+        put(frame, DRIFT, i, (u, v, q))
+        add(total, MOMENT, i, (mass * x, mass * y, mass * z))
+        add(total, FLOW, i, (mass * u, mass * v, mass * q))
+        a = dot(r, first), dot(r, second), dot(r, third)
+        b = dot(s, first), dot(s, second), dot(s, third)
+        c = dot(t, first), dot(t, second), dot(t, third)
+        xx, yy, zz, yz, xz, xy = dot(a, r), dot(b, s), dot(c, t), dot(b, t), dot(a, t), dot(a, s)
+        add(total, INERTIA, i, (xx, yy, zz))
+        add(total, INERTIA + 3, i, (yz, xz, xy))
+        add(total, MOMENTUM, i, times(((xx, yy, zz), (yz, xz, xy)), w))
 
 
 @inline
 def add_point(mass, frame, centre, total, lanes):
     """Terms of the sums by a link's mass as a point, seen from the centre of mass of the whole, which moves."""
     for i in range(lanes):
-        x, y = frame[18 * LANES + i] - centre[i], frame[19 * LANES + i] - centre[LANES + i]
-        z = frame[20 * LANES + i] - centre[2 * LANES + i]
-        u = mass * (frame[21 * LANES + i] - centre[3 * LANES + i])
-        v = mass * (frame[22 * LANES + i] - centre[4 * LANES + i])
-        w = mass * (frame[23 * LANES + i] - centre[5 * LANES + i])
+        x, y, z = minus(three(frame, CENTRE, 1, i), three(centre, MOMENT, 1, i))
+        speed = scaled(mass, minus(three(frame, DRIFT, 1, i), three(centre, FLOW, 1, i)))
         mx, my, mz = mass * x, mass * y, mass * z
-        total[6 * LANES + i] += my * y + mz * z
-        total[7 * LANES + i] += mx * x + mz * z
-        total[8 * LANES + i] += mx * x + my * y
-        total[9 * LANES + i] -= my * z
-        total[10 * LANES + i] -= mx * z
-        total[11 * LANES + i] -= mx * y
-        total[12 * LANES + i] += y * w - z * v
-        total[13 * LANES + i] += z * u - x * w
-        total[14 * LANES + i] += x * v - y * u
+        add(total, INERTIA, i, (my * y + mz * z, mx * x + mz * z, mx * x + my * y))
+        add(total, INERTIA + 3, i, (-(my * z), -(mx * z), -(mx * y)))
+        add(total, MOMENTUM, i, cross((x, y, z), speed))
 
 
 @inline
@@ -157,13 +191,13 @@ def _inverse(xx, yy, zz, yz, xz, xy):
 @inline
 def _write(total, lane, inverted, out):
     """Write a row of results; return whether it is reliable."""
-    xx, yy, zz = total[6 * LANES + lane], total[7 * LANES + lane], total[8 * LANES + lane]
-    yz, xz, xy = total[9 * LANES + lane], total[10 * LANES + lane], total[11 * LANES + lane]
-    u, v, w = total[12 * LANES + lane], total[13 * LANES + lane], total[14 * LANES + lane]
+    xx, yy, zz = three(total, INERTIA, 1, lane)
+    yz, xz, xy = three(total, INERTIA + 3, 1, lane)
+    u, v, w = three(total, MOMENTUM, 1, lane)
     fine = True
     if inverted:
         xx, yy, zz, yz, xz, xy, condition = _inverse(xx, yy, zz, yz, xz, xy)
-        u, v, w = xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w
+        u, v, w = times(((xx, yy, zz), (yz, xz, xy)), (u, v, w))
         fine = condition > 0.0 and condition < _CONDITION
     out[0], out[1], out[2], out[3], out[4], out[5], out[6], out[7], out[8] = xx, yy, zz, yz, xz, xy, u, v, w
     return fine and math.isfinite(xx + yy + zz + u + v + w)
@@ -179,7 +213,7 @@ def place_frames(parents, turning, leads, body, shapes, rates, first, frames, sh
     last = len(shapes) - 1
     for j in range(FRAME):
         for i in range(LANES):
-            frames[0, j * LANES + i] = 1.0 if j == 0 or j == 4 or j == 8 else 0.0
+            frames[0, j * LANES + i] = 1.0 if j < PLACE and j % 4 == 0 else 0.0
     for joint in range(len(parents)):
         near = True
         for i in range(LANES):
@@ -213,7 +247,7 @@ def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted,
     reliable: (V,) to be filled: whether all rows of a tree are reliable
     """
     joints, count = len(parents), len(shapes)
-    frames, total, centre = np.empty((joints + 1, FRAME * LANES)), np.empty(TOTAL * LANES), np.empty(6 * LANES)
+    frames, total, centre = np.empty((joints + 1, FRAME * LANES)), np.empty(TOTAL * LANES), np.empty(INERTIA * LANES)
     rate, cosine, sine, shape = np.empty((joints, LANES)), np.empty(LANES), np.empty(LANES), np.empty(LANES)
     for tree in range(len(rows)):
         reliable[tree] = True
@@ -224,10 +258,10 @@ def sample_trees(parents, turning, leads, rows, masses, shapes, rates, inverted,
                 total[j] = 0.0
             for frame in range(joints + 1):
                 add_link(rows[tree, frame], frames[frame], total, lanes)
-            for j in range(6 * LANES):
+            for j in range(INERTIA * LANES):
                 centre[j] = total[j] / masses[tree]
             for frame in range(joints + 1):
-                add_point(rows[tree, frame, 12], frames[frame], centre, total, lanes)
+                add_point(rows[tree, frame, MASS], frames[frame], centre, total, lanes)
             for i in range(LANES):
                 if first + i < count:
                     fine = _write(total, i, inverted, values[tree, first + i])
