@@ -269,11 +269,11 @@ def test_the_command_is_read_from_words():
 
 
 def test_the_command_refuses_with_a_reason(tmp_path):
-    with pytest.raises(ShapeError, match=r"1\.41421 < p <= 1\.73205"):
+    with pytest.raises(ShapeError, match=r"1\.73205"):
         conjugate_command(MOMENTS, momenta=(1.5, 1.2))
     with pytest.raises(ShapeError, match="--momenta"):
         conjugate_command(MOMENTS, momenta=(1.5, 1.8))
-    with pytest.raises(ShapeError, match="three different moments"):
+    with pytest.raises(ShapeError, match="moments"):
         conjugate_command((2.0, 2.0, 3.0))
     with pytest.raises(UnknownNameError, match="--out"):
         conjugate_command(MOMENTS, out=tmp_path / "locus.txt")

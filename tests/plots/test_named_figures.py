@@ -60,14 +60,14 @@ def test_every_figure_is_an_image(sweep, kind, ending, tmp_path):
 
 def test_figures_that_would_show_nothing_are_refused(sweep, tmp_path):
     path, moving, resting = sweep
-    with pytest.raises(UnknownNameError, match="momentum, phases, attitude"):
+    with pytest.raises(UnknownNameError, match="momentum"):
         figure_image("phase", moving, path)
-    with pytest.raises(UnknownNameError, match="svg, pdf, png"):
+    with pytest.raises(UnknownNameError, match="svg"):
         write_figure("phases", moving, tmp_path / "figure.jpg", path)
     for kind in ("momentum", "phases", "energy"):
-        with pytest.raises(ShapeError, match="angular momentum"):
+        with pytest.raises(ShapeError, match="momentum"):
             figure_image(kind, resting, path)
-    with pytest.raises(ShapeError, match="path of the joints"):
+    with pytest.raises(ShapeError, match="joints"):
         figure_image("shape", moving)
     assert not list(tmp_path.iterdir())
 
