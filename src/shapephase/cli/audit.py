@@ -8,12 +8,11 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..errors import ShapeError
 from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyArgument, BodyOptions, ColumnOptions, PrintOptions, option
-from .outcome import Outcome, check_writable
+from .outcome import FIGURE_ENDINGS, ExitCode, Outcome, check_writable
 from .progress import steps
-from .terminal import say_written
-
-_ENDINGS = (".svg", ".pdf", ".png")
+from .terminal import write_file
 
 Trajectories = Annotated[
     str,
@@ -76,20 +75,19 @@ def audit_command(
         example `--html audit.html`.
     """
     from ..auditing.figures import write_audit_figure
+    from ..auditing.page import audit_page
     from ..auditing.reading import read_trajectory
     from ..auditing.trajectory_audit import audit
-    from ..errors import ShapeError
     from .motion import body_argument, column_names, flight_words
-    from .outcome import ExitCode
 
-    aside = check_writable(figure, "--figure", *_ENDINGS)
+    aside = check_writable(figure, "--figure", *FIGURE_ENDINGS)
     aside = check_writable(html, "--html", ".html") or aside
     if not trajectories:
         raise ShapeError("audit: one trajectory or more is needed after the body")
-    if len(reading.step) not in (0, 1, len(trajectories)):
+    given = reading.step or (None,)
+    if len(given) not in (1, len(trajectories)):
         raise ShapeError(f"--step: one for each of {len(trajectories)} trajectories is needed, got {len(reading.step)}")
     loaded = body_argument(body, floating)
-    given = reading.step or (None,)
     each = given if len(given) == len(trajectories) else given * len(trajectories)
     names = column_names(reading.names) or None
     with steps(2) as work:
@@ -100,13 +98,7 @@ def audit_command(
         ]
         work.begin("auditing")
         found = audit(loaded, runs, tolerance=tolerance, flight=flight_words(flight) or "auto", every=every)
-        if figure is not None:
-            write_audit_figure(found, figure)
-            say_written(figure)
-        if html is not None:
-            from ..auditing.page import audit_page
-
-            audit_page(loaded, runs, found).write(html)
-            say_written(html)
+        write_file(figure, lambda file: write_audit_figure(found, file))
+        write_file(html, lambda file: audit_page(loaded, runs, found).write(file))
     code = ExitCode.DONE if found.right else ExitCode.WRONG
     return Outcome(found.table(), found.record, code=code, aside=aside, made_from={})

@@ -28,18 +28,14 @@ _DIGITS = 15  # of a second: a turn at 100 rad/s within the last one is below ro
 class AttitudeMessage:
     """A message that was written.
 
+    Made by `write_aem`.
+
     Attributes
     ----------
     file : that holds it
     records : attitudes at even times
     error : stated, of the attitude between them by polynomials of `degree` [rad]
     degree : of the polynomials of each part of the quaternion, through the records nearest to a time
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
-    >>> sp.exports.write_aem(motion, "spin.aem").degree
-    7
     """
 
     file: Path

@@ -61,6 +61,8 @@ CK_{instrument}_SPK         = -{clock}
 class SpiceKernels:
     """Kernels that were written.
 
+    Made by `write_spice_ck`.
+
     Attributes
     ----------
     attitude, clock : files, the C-kernel and the text kernel with clock and frame, to be loaded by `furnsh`
@@ -68,13 +70,6 @@ class SpiceKernels:
     error : stated, of the attitude at any time between [rad]
     instrument, clock_id : SPICE's identifiers
     frame : name of the base's frame
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
-    >>> written = sp.exports.write_spice_ck(motion, "spin.bc")
-    >>> written.frame, written.instrument, written.clock.name
-    ('SHAPEPHASE_BASE', -999001, 'spin.tsc')
     """
 
     attitude: Path

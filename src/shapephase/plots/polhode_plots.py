@@ -53,10 +53,6 @@ def plot_polhodes(
     energies : (N,) of the curves for |Pi| = 1 [1/(kg m^2)]; None: four about each stable axis
     view : elevation and azimuth of the eye [degrees], for flat axes
 
-    Raises
-    ------
-    MissingExtraError, ShapeError
-
     Notes
     -----
     Source: Marsden and Ratiu, figure 15.3.1.
@@ -118,7 +114,6 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
 
     Raises
     ------
-    MissingExtraError
     ShapeError
         If the number of periods is not above 0, or the top has no momentum.
 
