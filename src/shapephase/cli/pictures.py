@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from .options import (
     BODY_DEFAULTS,
     PRINT_DEFAULTS,
@@ -154,12 +154,12 @@ def plot_command(
         What is drawn: momentum, phases, attitude, shape, torques, inertia, internal_momentum or energy; for example
         `phases`.
     """
+    from ..arguments import check_choice
     from ..plots.named_figures import FIGURES, write_figure
     from . import motion as motions
     from .texts.recording_text import recording_data
 
-    if kind not in FIGURES:
-        raise unknown_name("kind of figure", kind, FIGURES)
+    check_choice(kind, "kind of figure", FIGURES)
     check_writable(out, "--out", *FIGURE_ENDINGS)
     if FIGURES[kind].with_momentum and motions.is_without_momentum(motion, start):
         raise _no_momentum(kind)

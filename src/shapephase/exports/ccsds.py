@@ -9,7 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from .. import __version__
-from ..arguments import check_choice, check_file_name, check_text
+from ..arguments import check_choice, check_file_name, check_text, positive_argument
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import UnknownNameError
@@ -17,7 +17,7 @@ from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._attitude_records import WINDOW, error_argument, even_times
+from ._attitude_records import WINDOW, even_times
 from ._whole_motion import base_attitude, continued_quaternions
 
 TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")  # of the epochs of a message
@@ -74,16 +74,10 @@ def write_aem(
 
     Raises
     ------
-    ShapeError
-        If the motion is a batch.
-    TrajectoryError
-        For an error that is not above 0.
     AccuracyNotReached
         If millions of records were needed: the polynomials do not take kinks well.
     UnknownNameError
         For another time system, an invalid epoch.
-    OutputFileError
-        If it cannot be written.
 
     Notes
     -----
@@ -98,7 +92,7 @@ def write_aem(
     """
     check_file_name(path, "path")
     check_choice(time_system, "time system", TIME_SYSTEMS)
-    begin, goal = _epoch(epoch), error_argument(error)
+    begin, goal = _epoch(epoch), positive_argument(error, "error", "an angle in rad")
     times = even_times(motion, goal)
     quaternions = continued_quaternions(base_attitude(motion, times))
     epochs = _epochs(begin, times)

@@ -92,10 +92,6 @@ def mujoco_arrays(
 
     Raises
     ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it.
-    WrongObjectError
-        If the body has no joints along a path.
     UnknownNameError
         If the model has no free joint, or lacks joints of the body, or has others.
 
@@ -148,10 +144,8 @@ def pinocchio_arrays(
 
     Raises
     ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it; if joints follow others with kinks, which have no `a`.
-    WrongObjectError
-        If the body has no joints along a path.
+    ShapeError
+        If joints follow others with kinks, which have no `a`.
     UnknownNameError
         If the model has no free-flyer, or lacks joints of the body, or has others.
 

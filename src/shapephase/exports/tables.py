@@ -54,8 +54,6 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 
     Raises
     ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it.
     MissingExtraError
         Without xarray.
 
@@ -106,14 +104,8 @@ def export_motion(
 
     Raises
     ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it.
-    UnknownNameError
-        For another ending.
     MissingExtraError
         Without xarray, pyarrow or h5py, for the formats that need them.
-    OutputFileError
-        If it cannot be written.
 
     Examples
     --------

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object
+from ..arguments import check_choice, check_object
 from ..arrays import Array, Integers
 from ..bounds.energy import energy_along
 from ..deformation.deformation import Deformation
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from ..phases.momentum_curve import Gauge
 from ..phases.phases import RunningPhases, running_phases
 from ..phases.split_text import CLOSED_GAP
@@ -116,8 +116,7 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
     True
     """
     style.check_motion_axes(ax, motion)
-    if not isinstance(kind, str) or kind not in ATTITUDES:
-        raise unknown_name("kind of attitude", kind, ATTITUDES)
+    check_choice(kind, "kind of attitude", ATTITUDES)
     t = style.motion_times(motion, times)
     if kind == "quaternion":
         values = motion.quat_xyzw(t)
@@ -161,8 +160,7 @@ def plot_inertia(
     """
     check_object(deformation, "Deformation", "deformation")
     style.check_flat_axes(ax)
-    if not isinstance(kind, str) or kind not in INERTIAS:
-        raise unknown_name("kind of inertia", kind, INERTIAS)
+    check_choice(kind, "kind of inertia", INERTIAS)
     t = style.even_times(deformation, times)
     inertia = deformation.inertia(t)
     if kind == "principal":

@@ -50,12 +50,11 @@ def rigid_command(
     time
         When the ellipsoid and the cones are shown, in s; for example `--time 1.5`.
     """
-    from ...errors import unknown_name
+    from ...arguments import check_choice
     from ...plots.named_figures import RIGID_FIGURES, write_rigid_figure
     from ...plots.pages.poinsot_page import rolling_ellipsoid, rolling_facts
 
-    if figure not in RIGID_FIGURES:
-        raise unknown_name("kind of figure", figure, RIGID_FIGURES)
+    check_choice(figure, "kind of figure", RIGID_FIGURES)
     if not math.isfinite(time):
         raise ShapeError(f"--time: a number is needed, got {time}")
     aside = check_writable(out, "--out", *FIGURE_ENDINGS)

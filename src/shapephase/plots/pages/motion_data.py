@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ... import so3
+from ...arguments import check_choice
 from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import CurvedJoint
 from ...body.drawing.visual import Visual
 from ...body.link_motions import link_motions
-from ...errors import unknown_name
 from ...shape_space.interpolation import ball_columns, neighbours_signs
 from .._moving_scene import MovingNode, MovingScene
 
@@ -175,8 +175,7 @@ def up_axis(up: str | None, body: Body | None) -> Array:
         For an unknown axis.
     """
     if up is not None:
-        if not isinstance(up, str) or up not in AXES:
-            raise unknown_name("axis", up, AXES)
+        check_choice(up, "axis", AXES)
         return np.array(AXES[up])
     y_up = body is not None and body.n_shape > 0 and _mirrored(body, 2) and not _mirrored(body, 1)
     return np.array(AXES["y" if y_up else "z"])
