@@ -31,7 +31,7 @@ def ran(*arguments):
 
 def test_a_plan_is_found_written_and_read_again(tmp_path):
     out = tmp_path / "plan.csv"
-    words = ("--turn", "60 about x", "--duration", 0.8, "--pieces", 20)
+    words = ("--turn", "60 about x", "--duration", 0.8, "--pieces", 8)
     done = ran("cat_two_halves", *words, "--out", out, "--json")
     assert done.returncode == 0
     assert re.fullmatch(rf"wrote {re.escape(str(out))} \([0-9.]+ kB\)\n", done.stderr)
