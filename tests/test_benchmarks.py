@@ -15,7 +15,7 @@ from benchmarks.peer import NoPeer, Peer
 from benchmarks.planners.rest_to_rest import Turn, hermite
 
 import shapephase as sp
-from shapephase.examples.scenarios import cat_righting
+from shapephase.examples import cat_righting
 from support.compiler import needs_compiler
 from support.long_runs import full_but
 

@@ -19,7 +19,7 @@ import shapephase as sp
 from shapephase import plots, so3
 from shapephase.display import Card, card_html, card_text, short_repr
 from shapephase.errors import ShapeError, UnknownNameError
-from shapephase.examples.scenarios import cat_righting, kane_scher
+from shapephase.examples import cat_righting, kane_scher
 from shapephase.reconstruction.attitude_angles import euler_angles
 from support.places import ROOT
 

@@ -21,7 +21,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
 from shapephase.errors import LocalFunctionError, ShapePhaseError, WrongObjectError
-from shapephase.examples.scenarios import cat_righting, kane_scher
+from shapephase.examples import cat_righting, kane_scher
 from shapephase.reconstruction.reconstruction import load_motion
 
 KINDS = ("Body", "ShapePath", "Deformation", "Motion", "PhaseSplit")

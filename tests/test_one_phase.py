@@ -214,7 +214,7 @@ def test_the_split_of_a_batch_is_a_table_of_spreads():
 @pytest.mark.full
 @pytest.mark.parametrize("number", range(COUNT))
 def test_the_report_has_the_numbers_of_the_table(number, tmp_path):
-    from shapephase.plots.report_page import report
+    from shapephase.plots import report
 
     motion, gauge = motion_of(number), gauge_of(number)
     split = sp.split(motion, gauge)

@@ -15,26 +15,26 @@ from shapephase import so3
 from shapephase.bounds.energy import energy_along
 from shapephase.bounds.regimes import regime_certificate
 from shapephase.errors import AccuracyNotReached, ShapeError, TrajectoryError, UnknownNameError, UnphysicalInertiaError
-from shapephase.examples._closed_form_motions import Scale, expansion, pulsation
-from shapephase.examples.example_deformations import (
+from shapephase.examples import (
     EXAMPLES,
+    Scale,
+    adiabatic_precession,
+    antenna_deployment,
     astronaut,
     axial_as_printed,
     axial_stretch,
     cat,
     dipole_antenna,
+    expansion,
+    first_loop,
     furniture,
     homothety,
     named_example,
+    orbit_of_area,
     printed_antenna,
+    pulsation,
     regime_crossing,
     rigid_body,
-)
-from shapephase.examples.scenarios import antenna_deployment
-from shapephase.examples.slow_deformation import (
-    adiabatic_precession,
-    first_loop,
-    orbit_of_area,
     slow_antenna,
     slow_phase_slope,
 )

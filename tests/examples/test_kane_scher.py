@@ -66,7 +66,7 @@ def paper_path(alpha: float, beta: float, duration: float = 1.0) -> sp.ShapePath
 
 
 def library_path(alpha: float, beta: float, duration: float = 1.0) -> sp.ShapePath:
-    from shapephase.examples.scenarios import kane_scher
+    from shapephase.examples import kane_scher
 
     return kane_scher(alpha, beta, duration=duration)
 

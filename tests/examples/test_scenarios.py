@@ -10,7 +10,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.body.catalog import robots_folder
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
-from shapephase.examples.scenarios import (
+from shapephase.examples import (
     CLOSED_ORBITS,
     MOTIONS,
     cat_righting,

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError, UnknownNameError
-from shapephase.plots.explorer import explore
+from shapephase.plots import explore
 from shapephase.plots.pages.plane_series import least_perturbation_turns, plane_series
 from shapephase.shape_space.connection import holonomy, mechanical_connection
 from support.browser import opened

@@ -14,8 +14,7 @@ from scipy.interpolate import CubicSpline
 from shapephase import so3
 from shapephase.cli.rigid_body.conjugate import conjugate_command
 from shapephase.errors import InputFileNotFoundError, ShapeError, UnknownNameError
-from shapephase.plots.geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
-from shapephase.plots.plot_style import column_axes
+from shapephase.plots import column_axes, plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from shapephase.rigid_body.geodesics._conjugate_locus import conjugate_locus
 from shapephase.rigid_body.geodesics._ellipsoid import astroid, ellipsoid, meridian_length
 from shapephase.rigid_body.geodesics.axisymmetric_cut import axisymmetric_metric

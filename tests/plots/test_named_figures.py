@@ -18,10 +18,11 @@ from shapephase import so3
 from shapephase.cli import progress
 from shapephase.cli.main import main
 from shapephase.errors import ShapeError, UnknownNameError
-from shapephase.examples.scenarios import cat_righting, satellite_sweep
-from shapephase.plots.named_figures import FIGURES, figure_image, write_figure
+from shapephase.examples import cat_righting, satellite_sweep
+from shapephase.plots import FIGURES, report, write_figure
+from shapephase.plots.named_figures import figure_image
 from shapephase.plots.pages.report_data import continued_rotation_vectors
-from shapephase.plots.report_page import figure_rows, report
+from shapephase.plots.report_page import figure_rows
 from support.bodies import random_loop
 from support.browser import furred, opened, seen
 from support.long_runs import full_but

@@ -17,7 +17,7 @@ from shapephase.bounds.energy import energy_along
 from shapephase.bounds.regimes import regime_certificate
 from shapephase.deformation.gauge import named_gauge
 from shapephase.errors import GaugeError, MissingExtraError, ShapeError, UnknownNameError
-from shapephase.examples.scenarios import MOTIONS, astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
+from shapephase.examples import MOTIONS, astronaut_leg_swing, cat_righting, closed_orbit, satellite_sweep
 from shapephase.plots._joint_styles import other_side
 from shapephase.plots._sphere_area import enclosed_cells, outlines
 from shapephase.plots.motion_plots import _pieces

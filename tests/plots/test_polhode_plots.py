@@ -10,12 +10,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from shapephase.errors import MissingExtraError, ShapeError, SingularInertiaError
-from shapephase.plots.polhode_plots import (
-    herpolhode_times,
-    plot_heavy_top_stability,
-    plot_herpolhode,
-    plot_polhodes,
-)
+from shapephase.plots import plot_heavy_top_stability, plot_herpolhode, plot_polhodes
+from shapephase.plots.polhode_plots import herpolhode_times
 from shapephase.rigid_body.euler_top import EulerTop
 from shapephase.rigid_body.lagrange_top import LagrangeTop, upright_potential
 from shapephase.rigid_body.poinsot import Poinsot

@@ -7,8 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from shapephase.errors import ShapeError
-from shapephase.plots.plot_style import column_axes
-from shapephase.plots.rolling_plots import plot_cones, plot_rolling_ellipsoid
+from shapephase.plots import column_axes, plot_cones, plot_rolling_ellipsoid
 from shapephase.rigid_body.euler_top import EulerTop
 from shapephase.rigid_body.poinsot import Poinsot
 

@@ -12,7 +12,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.errors import MissingExtraError, OutputFileError, ShapeError, UnknownNameError
-from shapephase.examples.scenarios import cat_righting
+from shapephase.examples import cat_righting
 from shapephase.plots import view
 from shapephase.plots.pages import video
 from support.browser import furred

@@ -17,11 +17,9 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
 from shapephase.errors import RunStopped, ShapeError, UnknownNameError, VisualWarning
-from shapephase.examples.scenarios import cat_righting
-from shapephase.plots import report, viewer
-from shapephase.plots._moving_scene import moving_scene
+from shapephase.examples import cat_righting
+from shapephase.plots import moving_scene, report, view, viewer
 from shapephase.plots.pages.motion_data import up_axis
-from shapephase.plots.viewer import view
 from support.bodies import link, random_loop, urdf
 from support.browser import furred, opened, seen, wait_for
 from support.coupled_bodies import KNOTS, LEG, TURN, couplings
