@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
 from ..errors import ShapeError
-from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyArgument, BodyOptions, ColumnOptions, PrintOptions, option
+from .options import (
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    TRAJECTORY_DEFAULTS,
+    BodyArgument,
+    BodyOptions,
+    PrintOptions,
+    TrajectoryOptions,
+)
 from .outcome import FIGURE_ENDINGS, ExitCode, Outcome, check_writable
 from .progress import steps
 from .terminal import write_file
@@ -24,21 +31,6 @@ Trajectories = Annotated[
 ]
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class TrajectoryOptions(ColumnOptions):
-    """How a trajectory is read; each is an argument of `read_trajectory`."""
-
-    step: Annotated[tuple[float, ...], option(several=True)] = ()
-    """Step of the integrator of each trajectory, in s; default: that between its samples. For example `--step 0.001
-    0.002`."""
-    timestep: Annotated[float | None, option()] = None
-    """Time between samples, in s, for files without times; for example `--timestep 0.01`."""
-
-
-AS_IT_IS = TrajectoryOptions()
-
-
 def audit_command(
     body: BodyArgument,
     /,
@@ -46,7 +38,7 @@ def audit_command(
     floating: BodyOptions = BODY_DEFAULTS,
     tolerance: Annotated[float | None, Parameter(show_default=False)] = None,
     flight: Annotated[tuple[str, ...], Parameter(negative_iterable="", consume_multiple=True)] = ("auto",),
-    reading: TrajectoryOptions = AS_IT_IS,
+    reading: TrajectoryOptions = TRAJECTORY_DEFAULTS,
     every: Annotated[int | None, Parameter(show_default=False)] = None,
     figure: Path | None = None,
     html: Annotated[Path | None, Parameter(show_default=False)] = None,

@@ -260,6 +260,18 @@ class RecordingOptions(ColumnOptions):
 
 @Parameter(name="*")
 @dataclass(frozen=True)
+class TrajectoryOptions(ColumnOptions):
+    """How a trajectory is read; each is an argument of `read_trajectory`."""
+
+    step: Annotated[tuple[float, ...], option(several=True)] = ()
+    """Step of the integrator of each trajectory, in s; default: that between its samples. For example `--step 0.001
+    0.002`."""
+    timestep: Annotated[float | None, option()] = None
+    """Time between samples, in s, for files without times; for example `--timestep 0.01`."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
 class ErrorOptions:
     """Uncertainties of the inputs, for error bars; each is one standard deviation."""
 
@@ -285,3 +297,4 @@ BODY_DEFAULTS = BodyOptions()
 ERROR_DEFAULTS = ErrorOptions()
 START_DEFAULTS = StartOptions()
 RECORDING_DEFAULTS = RecordingOptions()
+TRAJECTORY_DEFAULTS = TrajectoryOptions()
