@@ -927,6 +927,7 @@ def test_no_figure_is_registered_anywhere():
     code = (
         "import sys, shapephase as sp, numpy as np\n"
         "from shapephase import plots\n"
+        "assert plots.plot_polhodes and plots.view\n"
         "assert not [m for m in sys.modules if m.startswith('matplotlib')]\n"
         "motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 1.0), [0.1, 0.2, 1.0])\n"
         "plots.plot_momentum_curve(plots.column_axes(), motion).figure.draw_without_rendering()\n"

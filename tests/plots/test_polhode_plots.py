@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 
 import numpy as np
@@ -289,12 +288,6 @@ def test_without_matplotlib_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.axes", None)
     with pytest.raises(MissingExtraError, match=r"shapephase\[plot\]"):
         plot_polhodes(ax, MOMENTS)
-
-
-def test_importing_the_module_does_not_import_matplotlib():
-    code = "import sys, shapephase.plots.polhode_plots; print([m for m in sys.modules if m.startswith('matplotlib')])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
-    assert done.stdout.strip() == "[]"
 
 
 def test_the_start_of_a_steady_top_is_not_hidden_by_the_equilibrium_that_it_is():

@@ -144,8 +144,8 @@ class BodyOptions:
     xacro: Annotated[tuple[str, ...], rare(several=True)] = ()
     """For xacro: values of its arguments, NAME:=VALUE; for example `--xacro payload:=true`."""
     on_unphysical: Annotated[str | None, rare()] = None
-    """For links with impossible inertias: error, or warn to use them as they are; for example `--on-unphysical
-    warn`."""
+    """For links with impossible inertias: error, or warn to use them as they are; for example
+    `--on-unphysical warn`."""
     length_unit: Annotated[float | None, rare()] = None
     """For BVH, which states none: the unit of length, in m; for example `--length-unit 0.01` for centimetres."""
     person_mass: Annotated[float | None, rare()] = None
@@ -201,8 +201,8 @@ class ColumnOptions:
     ignore_extra: Annotated[bool, rare(negative="")] = False
     """Ignore columns that match no joint; for example `--ignore-extra`."""
     resample: Annotated[float | None, rare()] = None
-    """Resample evenly at this rate, in 1/s; uneven samples are resampled before --lowpass. For example `--resample
-    100`."""
+    """Resample evenly at this rate, in 1/s; uneven samples are resampled before --lowpass. For example
+    `--resample 100`."""
     fill: Annotated[str | None, rare()] = None
     """Fill gaps (empty cells, NaN) of up to this length by splines, in s or with a unit; gaps at the ends are cut off.
     Default: a gap is an error. For example `--fill 0.1s` or `--fill 100ms`."""
@@ -242,11 +242,11 @@ class RecordingOptions(ColumnOptions):
     """Topic of a ROS bag, sheet of a workbook, or structure of a .mat file, where there are several; for example
     `--topic /joint_states`."""
     rest: Annotated[tuple[str, ...], rare(several=True)] = ()
-    """Values of joints without a column: JOINT=VALUE, in rad or m or with a unit; for example `--rest neck=0.1
-    left_elbow=30deg`."""
+    """Values of joints without a column: JOINT=VALUE, in rad or m or with a unit; for example
+    `--rest neck=0.1 left_elbow=30deg`."""
     smooth_penalty: Annotated[float | None, rare()] = None
-    """Penalty of --smooth, in s^5; default: for each joint the likeliest for its noise. For example `--smooth-penalty
-    1e-9`."""
+    """Penalty of --smooth, in s^5; default: for each joint the likeliest for its noise. For example
+    `--smooth-penalty 1e-9`."""
     close: Annotated[str | None, rare()] = None
     """Close a cycle whose ends differ by at most this, in rad or m or with units; for example `--close 3deg` or
     `--close 3deg,5mm`."""
@@ -264,8 +264,8 @@ class TrajectoryOptions(ColumnOptions):
     """How a trajectory is read; each is an argument of `read_trajectory`."""
 
     step: Annotated[tuple[float, ...], option(several=True)] = ()
-    """Step of the integrator of each trajectory, in s; default: that between its samples. For example `--step 0.001
-    0.002`."""
+    """Step of the integrator of each trajectory, in s; default: that between its samples. For example
+    `--step 0.001 0.002`."""
     timestep: Annotated[float | None, option()] = None
     """Time between samples, in s, for files without times; for example `--timestep 0.01`."""
 

@@ -28,11 +28,11 @@ class JointOptions:
 
     from_: Annotated[tuple[str, ...], option(name="--from", several=True)] = ()
     """Posture at the start: JOINT=VALUE with blanks or commas between them, in rad or m or with a unit, or the first
-    row of a motion file; default: zero, or as near as the limits permit. For example `--from waist_pitch=30deg
-    waist_yaw=0.1`."""
+    row of a motion file; default: zero, or as near as the limits permit. For example
+    `--from waist_pitch=30deg waist_yaw=0.1`."""
     to: Annotated[tuple[str, ...], option(several=True)] = ()
-    """Posture at the end, as --from (last row of a file), or free; default: that of the start. For example `--to
-    free`."""
+    """Posture at the end, as --from (last row of a file), or free; default: that of the start. For example
+    `--to free`."""
     via: Annotated[tuple[str, ...], option(negative_iterable="")] = ()
     """Posture passed without stopping: JOINT=VALUE with commas between them, with or without @ and a time in s; or
     FILE@TIME. Repeat for more, in this order. For example `--via waist_pitch=60deg@0.4`."""

@@ -38,8 +38,8 @@ class SearchOptions:
     seed: Annotated[int, rare()] = 0
     """Seed of the random guesses; for example `--seed 7`."""
     pieces: Annotated[int | None, rare()] = None
-    """Pieces of the motion's spline, six or more; default: 20 to 160, by the number of joints. For example `--pieces
-    12`."""
+    """Pieces of the motion's spline, six or more; default: 20 to 160, by the number of joints. For example
+    `--pieces 12`."""
     iterations: Annotated[int, rare()] = 300
     """Most iterations of the solver for each start; for example `--iterations 1000`."""
 
