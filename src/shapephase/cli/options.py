@@ -37,7 +37,8 @@ RARE = Group("More options", sort_key=1, help_formatter=_print_rare)
 def option(text: str | None = None, *, several: bool = False, **more: Any) -> Parameter:
     """Return an option with its help, by default the text below it; of `several` values up to the next option."""
     more |= {"negative_iterable": "", "consume_multiple": True} if several else {}
-    return Parameter(show_default=False, **more | ({} if text is None else {"help": text}))
+    more |= {} if text is None else {"help": text}
+    return Parameter(show_default=False, **more)
 
 
 def rare(text: str | None = None, **more: Any) -> Parameter:

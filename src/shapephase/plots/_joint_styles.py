@@ -98,16 +98,16 @@ def plot_joints(
     """
     handles: list[Any] = []
     texts: list[str] = []
-    named = joints[:MAX_NAMED]
+    rows: list[int] = joints.tolist()
+    named, others = rows[:MAX_NAMED], rows[MAX_NAMED:]
     for k, look in zip(named, joint_styles([names[k] for k in named]), strict=True):
         handles += places[units[k]].plot(times, values[:, k], **look)
         texts.append(plain_text(names[k]) + ("" if len(places) == 1 else f" [{shown_units[units[k]]}]"))
     ncols = 1 if max(map(len, texts), default=0) > _MAX_BESIDE else 2
-    for k in joints[MAX_NAMED:]:
+    for k in others:
         line = places[units[k]].plot(times, values[:, k], color=GREY, linewidth=0.6, zorder=1.5)
         handles += line if len(handles) == MAX_NAMED else []
-    others = len(joints) - MAX_NAMED
-    texts += ["1 other" if others == 1 else f"{others} others"] if others > 0 else []
+    texts += [f"{len(others)} other{'s' * (len(others) > 1)}"] if others else []
     return {"handles": handles, "labels": texts, "ncols": ncols}
 
 
