@@ -70,7 +70,6 @@ def view(
     >>> page.html[:15].lower()
     '<!doctype html>'
     """
-    check_object(motion, "Motion", "motion")
     check_keywords(fall, view)
     scene, data = scene_and_data(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, fall=fall)
     return page_from(
@@ -95,6 +94,7 @@ def scene_and_data(
     fall: Mapping[str, ArrayLike],
 ) -> tuple[MovingScene, dict[str, Any]]:
     """Return a motion as a scene, and as the data of a page; arguments, errors and warnings as `view`."""
+    check_object(motion, "Motion", "motion")
     check_flag(ghost, "ghost")
     rate = playing_speed(motion.duration, speed)
     up_axis(up, None)
