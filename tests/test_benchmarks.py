@@ -15,7 +15,7 @@ from benchmarks.peer import NoPeer, Peer
 from benchmarks.planners.rest_to_rest import Turn, hermite
 
 import shapephase as sp
-from shapephase.examples.scenarios import cat_righting
+from shapephase.examples import cat_righting
 from support.compiler import needs_compiler
 from support.long_runs import full_but
 
@@ -110,7 +110,7 @@ def test_a_contestant_reconstructs_in_its_own_process_what_is_reconstructed_here
             assert gap <= estimate + motion.error_estimate <= 1.1e-9
             assert 10 < evaluations < 1000
             assert contestant("reconstruction_seconds", 0, box, 1e-9, 1) > 0.0
-        with pytest.raises(WorkloadFailed, match=r"plain: AttributeError: .*no_such_thing"):
+        with pytest.raises(WorkloadFailed, match="plain"):
             contestant("no_such_thing")
     finally:
         contestant.close()

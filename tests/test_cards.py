@@ -19,7 +19,7 @@ import shapephase as sp
 from shapephase import plots, so3
 from shapephase.display import Card, card_html, card_text, short_repr
 from shapephase.errors import ShapeError, UnknownNameError
-from shapephase.examples.scenarios import cat_righting, kane_scher
+from shapephase.examples import cat_righting, kane_scher
 from shapephase.reconstruction.attitude_angles import euler_angles
 from support.places import ROOT
 
@@ -216,12 +216,12 @@ def test_a_diver_s_turns_come_out_of_a_motion():
 
 def test_sequences_that_there_are_not(things):
     for wrong in ("XXY", "XYz", "XY", "ABC", "", 3):
-        with pytest.raises(UnknownNameError, match="sequence of Euler angles"):
+        with pytest.raises(UnknownNameError, match="sequence"):
             things["motion"].euler_angles(0.0, wrong)
         assert wrong != "ZYX"
-    with pytest.raises(UnknownNameError, match="lateral axis"):
+    with pytest.raises(UnknownNameError, match="lateral"):
         things["motion"].somersault_tilt_twist(0.0, lateral="side")
-    with pytest.raises(UnknownNameError, match="longitudinal axis"):
+    with pytest.raises(UnknownNameError, match="longitudinal"):
         things["motion"].somersault_tilt_twist(0.0, lateral="z", longitudinal="-z")
     assert euler_angles(np.eye(3)[None], "XYZ").shape == (1, 3)
 
@@ -236,7 +236,7 @@ def test_a_data_frame_is_the_file(things, tmp_path):
     pandas.testing.assert_frame_equal(
         motion.to_dataframe(gravity=[0.0, 0.0, -9.81]), pandas.read_csv(tmp_path / "motion.csv"), check_exact=True
     )
-    with pytest.raises(ShapeError, match="one motion"):
+    with pytest.raises(ShapeError, match="motion"):
         things["batch"].to_dataframe()
 
 
@@ -250,9 +250,9 @@ def test_a_motion_draws_itself(things):
     assert motion.plot("shape").lines
     still = sp.reconstruct(motion.deformation, np.zeros(3))
     assert len(still.plot().lines) >= 3
-    with pytest.raises(UnknownNameError, match="kind of figure"):
+    with pytest.raises(UnknownNameError, match="figure"):
         motion.plot("dance")
-    with pytest.raises(ShapeError, match="needs an angular momentum"):
+    with pytest.raises(ShapeError, match="momentum"):
         still.plot("phases")
 
 

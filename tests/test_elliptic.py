@@ -313,7 +313,7 @@ def test_bad_parameters_are_refused(m1):
         lambda: elliptic.incomplete_e(1.0, m1),
         lambda: elliptic.incomplete_pi(-1.0, 1.0, m1),
     ):
-        with pytest.raises(ShapeError, match=r"^m1: "):
+        with pytest.raises(ShapeError, match="m1"):
             call()
 
 

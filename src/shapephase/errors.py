@@ -12,10 +12,8 @@ from pickle import PicklingError
 
 from .letters import value_text
 
-# Characters of a name up to which an error repeats all of it: no name that is meant has more.
-_LONGEST_NAME = 1000
-# And how many of a longer one.
-_LONGEST_SHOWN = 80
+_LONGEST_NAME = 1000  # characters up to which an error repeats a name: no name that is meant has more
+_LONGEST_SHOWN = 80  # of a longer one
 
 
 class ShapePhaseError(Exception):
@@ -198,11 +196,6 @@ class NoisyPathError(TrajectoryError):
 
     Remedy: smooth the data, with `read_shape_path(..., smooth=)` or a spline through fewer samples. A function that is
     merely rough is an `AccuracyNotReached`.
-
-    Examples
-    --------
-    >>> issubclass(sp.errors.NoisyPathError, sp.errors.TrajectoryError)
-    True
     """
 
 
@@ -226,11 +219,6 @@ class AccuracyNotReached(ShapePhaseError, ArithmeticError):
 
     Causes: a motion that is rough between its breaks, errors that grow along a long unstable motion, a tolerance near
     rounding. Remedy: declare the times of kinks as breaks, loosen the tolerance, or shorten the motion.
-
-    Examples
-    --------
-    >>> issubclass(sp.errors.AccuracyNotReached, sp.ShapePhaseError)
-    True
     """
 
 
@@ -281,13 +269,7 @@ class LieAlgebraError(ShapePhaseError, ValueError):
 
 
 class MissingExtraError(ShapePhaseError, ImportError):
-    """An optional dependency is not installed. Remedy: the message names the extra to install.
-
-    Examples
-    --------
-    >>> issubclass(sp.errors.MissingExtraError, ImportError)
-    True
-    """
+    """An optional dependency is not installed. Remedy: the message names the extra to install."""
 
 
 class RunStopped(ShapePhaseError):
@@ -353,11 +335,6 @@ class SchedulerLostError(ShapePhaseError, ConnectionError):
     """The scheduler of a cluster cannot be reached, or is gone; what was stored is kept.
 
     Remedy: start it again, and run the study with `resume=True`.
-
-    Examples
-    --------
-    >>> issubclass(sp.errors.SchedulerLostError, ConnectionError)
-    True
     """
 
 
@@ -366,11 +343,6 @@ class CompilerError(ShapePhaseError, RuntimeError):
 
     Causes: a Numba that does not go with this NumPy, no folder that only this user may write to. Remedy: another
     version of Numba, another folder in $XDG_CACHE_HOME; or none: everything works without compiled steps, slowly.
-
-    Examples
-    --------
-    >>> issubclass(sp.errors.CompilerError, sp.ShapePhaseError)
-    True
     """
 
 
@@ -446,85 +418,31 @@ class UnphysicalInertiaWarning(UserWarning):
 
 
 class ImplausibleBodyWarning(UserWarning):
-    """Numbers of a body that hardly any real one has: other units, or a slip in its file.
-
-    Examples
-    --------
-    >>> import warnings
-    >>> warnings.simplefilter("error", sp.ImplausibleBodyWarning)  # a slip in a file is a fault
-    >>> sp.ImplausibleBodyWarning.__name__
-    'ImplausibleBodyWarning'
-    """
+    """Numbers of a body that hardly any real one has: other units, or a slip in its file."""
 
 
 class IgnoredElementWarning(UserWarning):
-    """An element of a file that has no meaning for a free-floating body; the message names it.
-
-    Examples
-    --------
-    >>> import warnings
-    >>> warnings.simplefilter("error", sp.IgnoredElementWarning)  # nothing in a file may be left out
-    >>> sp.IgnoredElementWarning.__name__
-    'IgnoredElementWarning'
-    """
+    """An element of a file that has no meaning for a free-floating body; the message names it."""
 
 
 class VisualWarning(UserWarning):
-    """A part of a body is not drawn as in its file: a mesh, a faulty element, or a changed file.
-
-    Examples
-    --------
-    >>> import warnings
-    >>> warnings.simplefilter("error", sp.errors.VisualWarning)  # a faulty picture is a fault
-    >>> sp.errors.VisualWarning.__name__
-    'VisualWarning'
-    """
+    """A part of a body is not drawn as in its file: a mesh, a faulty element, or a changed file."""
 
 
 class CompiledCodeWarning(UserWarning):
-    """Compiled steps cannot be kept, or not be used; the interpreted ones give the same results, slowly.
-
-    Examples
-    --------
-    >>> import warnings
-    >>> warnings.simplefilter("ignore", sp.CompiledCodeWarning)  # results are the same without
-    >>> sp.CompiledCodeWarning.__name__
-    'CompiledCodeWarning'
-    """
+    """Compiled steps cannot be kept, or not be used; the interpreted ones give the same results, slowly."""
 
 
 class TrajectoryWarning(UserWarning):
-    """Something in a recorded motion that can be read but is probably not meant: limits, gaps, whole turns.
-
-    Examples
-    --------
-    >>> import warnings
-    >>> warnings.simplefilter("error", sp.TrajectoryWarning)  # what is probably not meant is a fault
-    >>> sp.TrajectoryWarning.__name__
-    'TrajectoryWarning'
-    """
+    """Something in a recorded motion that can be read but is probably not meant: limits, gaps, whole turns."""
 
 
 class UndeclaredBreakWarning(TrajectoryWarning):
-    """A function of time has kinks that were not declared as breaks; they were located, and are named.
-
-    Examples
-    --------
-    >>> issubclass(sp.errors.UndeclaredBreakWarning, sp.TrajectoryWarning)
-    True
-    """
+    """A function of time has kinks that were not declared as breaks; they were located, and are named."""
 
 
 class UnstatedLimitWarning(UserWarning):
-    """A body's file states no limit of a joint's rate, so that a plan may move it at any rate.
-
-    Examples
-    --------
-    >>> import warnings
-    >>> warnings.simplefilter("ignore", sp.errors.UnstatedLimitWarning)  # any rate will do
-    >>> sp.errors.UnstatedLimitWarning.__name__
-    'UnstatedLimitWarning'
-    """
+    """A body's file states no limit of a joint's rate, so that a plan may move it at any rate."""
 
 
 def unknown_name(

@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 from .arrays import Array
 from .errors import SingularInertiaError
 
-_WELL_CONDITIONED = (
-    1e-3  # of trace^3: with a larger determinant the adjugate magnifies rounding some hundredfold at most
-)
+_WELL_CONDITIONED = 1e-3  # of trace^3: with a larger determinant the adjugate magnifies rounding hundredfold at most
 _SINGULAR = 1e-12  # least ratio of the smallest to the largest moment: below it the inverse has no correct digits left
 
 

@@ -125,15 +125,7 @@ def curve_area(curve: Curve, edges: Array, tolerance: float = 1e-13) -> Array:
         slivers = (area_rate(corners[..., :-1, None, :], direction, rate) * weights).sum(axis=(-1, -2))
         return slivers + polygon_area(corners)
 
-    def change(last: Array, new: Array) -> float:
-        return float(np.max(np.abs(wrapped(new - last))))
-
-    enclosed = settled(map(area, halved(edges, _HALVINGS)), change, tolerance)
-    if enclosed is None:
-        raise AccuracyNotReached(
-            "the solid angle of a curve does not settle; give more edges, the times of its kinks among them"
-        )
-    return enclosed
+    return _settled("the solid angle of", area, edges, lambda last, new: np.abs(wrapped(new - last)), tolerance)
 
 
 def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
@@ -179,15 +171,25 @@ def transport(curve: Curve, edges: Array, tolerance: float = 1e-12) -> Array:
             whole = turns[..., step, :, :] @ whole
         return whole
 
-    def change(last: Array, new: Array) -> float:
-        return float(np.max(so3.angle(new @ so3.transpose(last))))
+    def change(last: Array, new: Array) -> Array:
+        return so3.angle(new @ so3.transpose(last))
 
-    transported = settled(map(rotation, halved(edges, _HALVINGS)), change, tolerance)
-    if transported is None:
-        raise AccuracyNotReached(
-            "the transport along a curve does not settle; give more edges, the times of its kinks among them"
-        )
-    return transported
+    return _settled("the transport along", rotation, edges, change, tolerance)
+
+
+def _settled(
+    what: str,
+    result: Callable[[Array], Array],
+    edges: Array,
+    change: Callable[[Array, Array], Array],
+    tolerance: float,
+) -> Array:
+    """The first result of ever shorter steps that changes by at most a tolerance. Raises AccuracyNotReached."""
+    steps = map(result, halved(edges, _HALVINGS))
+    found = settled(steps, lambda last, new: float(np.max(change(last, new))), tolerance)
+    if found is None:
+        raise AccuracyNotReached(f"{what} a curve does not settle; give more edges, the times of its kinks among them")
+    return found
 
 
 def wrapped(area: Array) -> Array:

@@ -500,23 +500,27 @@ def options_of(text):
     return {re.match(r"\S+", row)[0]: row for row in rows if re.match(r"--[a-z]|[A-Z]", row)}
 
 
-@pytest.fixture(scope="module")
-def wide_pages():
+def pages(option, columns):
     """The pages of help, in a process of their own: the width of a page is decided once in each."""
     source = f"""
 import contextlib, io, json
 from shapephase.cli.main import main
 pages = {{}}
-for name in {ALL_COMMANDS!r}:
+for name in {("", *ALL_COMMANDS)!r}:
     with contextlib.redirect_stdout(io.StringIO()) as page:
-        main([*name.split(), "--help-all"])
+        main([*name.split(), {option!r}])
     pages[name] = page.getvalue()
 print(json.dumps(pages))
 """
-    wide = {**os.environ, "COLUMNS": "400"}
+    wide = {**os.environ, "COLUMNS": str(columns)}
     done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, env=wide, timeout=300)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def wide_pages():
+    return pages("--help-all", 400)
 
 
 @pytest.mark.parametrize("name", ALL_COMMANDS)
@@ -535,8 +539,7 @@ def test_every_option_has_a_sentence_and_an_example(name, wide_pages):
 
 def test_help_is_short_and_all_options_are_in_help_all(wide_pages):
     """On a terminal of 80 columns; what `--help` does not list it counts."""
-    for name in ("", *ALL_COMMANDS):
-        page = ran(*name.split(), "--help", env={**os.environ, "COLUMNS": "80"}).stdout
+    for name, page in pages("--help", 80).items():
         assert page.count("\n") < 80, name
         counted = re.search(r"^(\d+) more options: --help-all$", page, re.MULTILINE)
         if name:

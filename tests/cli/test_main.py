@@ -13,7 +13,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.body.catalog import robots_folder
 from shapephase.cli.main import main
-from shapephase.examples.scenarios import cat_righting
+from shapephase.examples import cat_righting
 
 CAT = ["split", "cat", "cat_righting"]
 

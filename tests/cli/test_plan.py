@@ -31,7 +31,7 @@ def ran(*arguments):
 
 def test_a_plan_is_found_written_and_read_again(tmp_path):
     out = tmp_path / "plan.csv"
-    words = ("--turn", "60 about x", "--duration", 0.8, "--pieces", 20)
+    words = ("--turn", "60 about x", "--duration", 0.8, "--pieces", 8)
     done = ran("cat_two_halves", *words, "--out", out, "--json")
     assert done.returncode == 0
     assert re.fullmatch(rf"wrote {re.escape(str(out))} \([0-9.]+ kB\)\n", done.stderr)
@@ -166,14 +166,15 @@ def test_a_time_limit_ends_the_search_with_the_best_so_far(tmp_path, capsys):
 
 @pytest.mark.usefixtures("few_guesses")
 def test_postures_on_the_way(tmp_path, capsys):
-    """One by its joints, one of the motion file of another plan at its time; each is where the file has it."""
+    """One by its joints, one of a motion file at its time; each is where the file has it."""
     first, second = tmp_path / "first.csv", tmp_path / "second.csv"
-    _, one, body = planned("cat_two_halves", "--turn", "40 about x", capsys=capsys, out=first)
+    body, knots = sp.load_body("cat_two_halves"), [[0.0, 0.0, 0.0], [0.1, -0.2, 0.1], [0.0, 0.2, 0.1]]
+    sp.write_shape_path(sp.ShapePath.spline([0.0, 0.5, 1.0], knots, joint_names=body.joint_names), first)
     via = ("--via", "waist_roll=20deg", "--via", f"{first}@0.6", "--duration", 2)
     data, other, _ = planned("cat_two_halves", "--turn", "10 about z", *via, capsys=capsys, out=second)
     early, late = data["waypoint_times_s"]
     assert 0.0 < early < late == 0.6
-    assert np.abs(other[30] - one[60]).max() < 1e-8
+    assert np.abs(other[30] - sp.read_shape_path(first, body).shape(0.6)).max() < 1e-8
     passed = sp.read_shape_path(second, body).shape(early)
     assert abs(passed[body.joint_index("waist_roll")] - np.radians(20.0)) < 1e-7
     with pytest.raises(SystemExit) as ended:

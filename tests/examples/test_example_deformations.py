@@ -15,26 +15,26 @@ from shapephase import so3
 from shapephase.bounds.energy import energy_along
 from shapephase.bounds.regimes import regime_certificate
 from shapephase.errors import AccuracyNotReached, ShapeError, TrajectoryError, UnknownNameError, UnphysicalInertiaError
-from shapephase.examples._closed_form_motions import Scale, expansion, pulsation
-from shapephase.examples.example_deformations import (
+from shapephase.examples import (
     EXAMPLES,
+    Scale,
+    adiabatic_precession,
+    antenna_deployment,
     astronaut,
     axial_as_printed,
     axial_stretch,
     cat,
     dipole_antenna,
+    expansion,
+    first_loop,
     furniture,
     homothety,
     named_example,
+    orbit_of_area,
     printed_antenna,
+    pulsation,
     regime_crossing,
     rigid_body,
-)
-from shapephase.examples.scenarios import antenna_deployment
-from shapephase.examples.slow_deformation import (
-    adiabatic_precession,
-    first_loop,
-    orbit_of_area,
     slow_antenna,
     slow_phase_slope,
 )
@@ -156,7 +156,7 @@ def test_the_clock_by_quadrature_f1():
     times = np.linspace(0.0, 6.0, 12).reshape(3, 4)
     np.testing.assert_allclose(example.known.clock(times), known.clock(times), rtol=0, atol=1e-12)
     assert example.phase is None
-    with pytest.raises(AccuracyNotReached, match="give the clock"):
+    with pytest.raises(AccuracyNotReached, match="clock"):
         homothety(Scale(lambda t: 2.0 + np.sign(np.sin(1e4 * t)) * np.cos(t)), duration=3.0).known.attitude([2.0])
 
 
@@ -164,7 +164,7 @@ def test_a_body_that_expands_for_ever_turns_by_a_finite_angle_f1():
     example = homothety(expansion(0.5), duration=1e5)
     last = example.rigid.attitude(2.0)
     assert so3.angle(example.known.attitude(1e5).T @ last) < 2.0 * 3.2 / (0.5 * 1e5 * 0.5)
-    with pytest.raises(TrajectoryError, match="give a duration"):
+    with pytest.raises(TrajectoryError, match="duration"):
         homothety(expansion(0.5))
 
 

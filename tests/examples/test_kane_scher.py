@@ -66,7 +66,7 @@ def paper_path(alpha: float, beta: float, duration: float = 1.0) -> sp.ShapePath
 
 
 def library_path(alpha: float, beta: float, duration: float = 1.0) -> sp.ShapePath:
-    from shapephase.examples.scenarios import kane_scher
+    from shapephase.examples import kane_scher
 
     return kane_scher(alpha, beta, duration=duration)
 
@@ -161,9 +161,9 @@ def test_bends_beyond_a_quarter_turn_turn_as_the_paper_s_equation_says(alpha: fl
 
 
 def test_other_cones_and_bodies_are_refused():
-    with pytest.raises(TrajectoryError, match="beta < pi - alpha"):
+    with pytest.raises(TrajectoryError, match="alpha"):
         kane_scher(0.5, np.pi - 0.4, body="cat_untwisted")
-    with pytest.raises(TrajectoryError, match="beta < pi/2"):
+    with pytest.raises(TrajectoryError, match="beta"):
         kane_scher(0.5, 0.5 * np.pi)
     with pytest.raises(UnknownNameError, match="cat_untwisted"):
         kane_scher(0.1, 0.5, body="dog")

@@ -10,7 +10,7 @@ import shapephase as sp
 from shapephase import so3
 from shapephase.body.catalog import robots_folder
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
-from shapephase.examples.scenarios import (
+from shapephase.examples import (
     CLOSED_ORBITS,
     MOTIONS,
     cat_righting,
@@ -216,7 +216,7 @@ def test_bends_that_no_waist_has_are_refused(alpha, beta):
 
 
 def test_a_lean_that_is_no_number_is_refused():
-    with pytest.raises(ShapeError, match="alpha: a finite number is needed, got nan"):
+    with pytest.raises(ShapeError, match="alpha"):
         kane_scher(np.nan, 1.0)
 
 
@@ -227,7 +227,7 @@ def test_durations_must_be_times(duration):
 
 
 def test_unknown_motions_are_named():
-    with pytest.raises(UnknownNameError, match="Did you mean 'cat_righting'"):
+    with pytest.raises(UnknownNameError, match="cat_righting"):
         named_motion("cat_right")
 
 
@@ -299,5 +299,5 @@ def test_closed_orbits_have_nothing_but_phase_and_holonomy(name):
 def test_closed_orbits_are_known_by_name():
     with pytest.raises(UnknownNameError, match="astronaut"):
         closed_orbit("dog")
-    with pytest.raises(UnknownNameError, match="horizontal, base"):
+    with pytest.raises(UnknownNameError, match="horizontal"):
         closed_orbit("cat", "principal")

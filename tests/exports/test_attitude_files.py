@@ -79,7 +79,7 @@ def test_spice_has_attitude_and_rates_at_the_records(spice, satellite, tmp_path)
 @pytest.mark.full
 def test_times_of_spice_far_from_j2000_are_too_coarse_for_a_fast_body(spice, cat, tmp_path):
     """A digit of a time in 2026 is 1.2e-7 s."""
-    with pytest.raises(AccuracyNotReached, match=r"1\.2e-07 s"):
+    with pytest.raises(AccuracyNotReached, match=r"1\.2e-07"):
         sp.exports.write_spice_ck(cat, tmp_path / "attitude.bc", error=1e-8, epoch=8.5e8)
     written = sp.exports.write_spice_ck(cat, tmp_path / "attitude.bc", error=1e-4, epoch=8.5e8)
     for file in (written.clock, written.attitude):

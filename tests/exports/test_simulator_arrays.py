@@ -140,12 +140,12 @@ def test_a_torque_from_outside_is_what_the_base_needs():
 
 def test_models_of_other_bodies_are_refused():
     motion = motion_of("cat")
-    with pytest.raises(UnknownNameError, match="lacks joints of cat"):
+    with pytest.raises(UnknownNameError, match="joints"):
         sp.exports.mujoco_arrays(motion, model=mujoco_model("satellite"))
-    with pytest.raises(UnknownNameError, match="one free joint"):
+    with pytest.raises(UnknownNameError, match="joint"):
         sp.exports.pinocchio_arrays(motion, model=pin.Model())
-    with pytest.raises(WrongObjectError, match="this export needs a body with joints"):
+    with pytest.raises(WrongObjectError, match="export"):
         sp.exports.pinocchio_arrays(sp.reconstruct(sp.rigid(np.eye(3), 1.0), [0.0, 0.0, 1.0]))
     batch = sp.reconstruct(motion.deformation, np.zeros((2, 3)))
-    with pytest.raises(ShapeError, match="a batch"):
+    with pytest.raises(ShapeError, match="batch"):
         sp.exports.mujoco_arrays(batch)

@@ -137,15 +137,15 @@ def test_a_body_without_joints_has_its_base(tmp_path, ending):
 def test_what_cannot_be_written_is_refused(motion, tmp_path, monkeypatch):
     with pytest.raises(UnknownNameError, match=r"\.parquet"):
         sp.export_motion(motion, tmp_path / "motion.docx")
-    with pytest.raises(ShapeError, match="a batch"):
+    with pytest.raises(ShapeError, match="batch"):
         sp.reconstruct(motion.deformation, np.zeros((2, 3))).to_xarray()
-    with pytest.raises(ShapeError, match="one row"):
+    with pytest.raises(ShapeError, match="row"):
         sp.export_motion(motion, tmp_path / "motion.csv", [[0.0, 1.0]])
     import sys
 
     for ending, package in ((".nc", "xarray"), (".parquet", "pyarrow"), (".h5", "h5py")):
         with monkeypatch.context() as without:
             without.setitem(sys.modules, package, None)
-            with pytest.raises(MissingExtraError, match="pip install"):
+            with pytest.raises(MissingExtraError, match="pip"):
                 sp.export_motion(motion, tmp_path / f"motion{ending}")
     assert list(tmp_path.iterdir()) == []

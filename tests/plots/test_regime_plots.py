@@ -10,9 +10,8 @@ import shapephase as sp
 from shapephase.bounds.all_bounds import bounds
 from shapephase.bounds.regimes import crown_region
 from shapephase.errors import ShapeError
-from shapephase.examples.example_deformations import printed_antenna
-from shapephase.plots.plot_style import column_axes
-from shapephase.plots.regime_plots import plot_bounds, plot_crown
+from shapephase.examples import printed_antenna
+from shapephase.plots import column_axes, plot_bounds, plot_crown
 
 
 @pytest.fixture(scope="module")

@@ -117,7 +117,7 @@ def test_every_byte_of_a_chunk_is_guarded_for_other_programs_too(stores, tmp_pat
         store = room.open_study(place)
         assert store.damaged_chunks().tolist() == [1]
         assert store.counts() == {"missing": 3, "done": 8, "raised": 0, "timed_out": 0, "died": 0}
-        with pytest.raises(StudyStoreError, match=r"chunk 1 \(cases 3 to 5\).*--resume"):
+        with pytest.raises(StudyStoreError, match="chunk 1"):
             store.values("turn")
 
 

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from ..errors import ShapeError
 from .options import (
     BODY_DEFAULTS,
     PRINT_DEFAULTS,
+    TRAJECTORY_DEFAULTS,
     BodyArgument,
     BodyOptions,
-    Calibration,
-    FillOption,
-    LengthTolerance,
-    LowPassOption,
     PrintOptions,
-    ResampleOption,
+    TrajectoryOptions,
 )
-from .outcome import Outcome, check_writable
+from .outcome import FIGURE_ENDINGS, ExitCode, Outcome, check_writable
 from .progress import steps
-from .terminal import say_written
-
-_ENDINGS = (".svg", ".pdf", ".png")
+from .terminal import write_file
 
 Trajectories = Annotated[
     str,
@@ -36,98 +31,6 @@ Trajectories = Annotated[
 ]
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class TrajectoryOptions:
-    """How a trajectory is read; each is an argument of `read_trajectory`."""
-
-    step: Annotated[
-        tuple[float, ...],
-        Parameter(
-            show_default=False,
-            negative_iterable="",
-            consume_multiple=True,
-            help="Step of the integrator of each trajectory, in s; without it that between its samples. For example "
-            "`--step 0.001 0.002`.",
-        ),
-    ] = ()
-    timestep: Annotated[
-        float | None,
-        Parameter(
-            show_default=False,
-            help="Time between samples, in s, for files without times; for example `--timestep 0.01`.",
-        ),
-    ] = None
-    names: Annotated[
-        tuple[str, ...],
-        Parameter(
-            show_default=False,
-            negative_iterable="",
-            consume_multiple=True,
-            help="Which column of a recording is which joint: COLUMN=JOINT, COLUMN= to leave it out, or a file of such "
-            "lines; for example `--names LKnee=left_knee`.",
-        ),
-    ] = ()
-    degrees: Annotated[
-        bool | None,
-        Parameter(
-            negative="--radians",
-            show_default=False,
-            help="Turning joints of a recording are in degrees, or in radians; without it, as the file says. For "
-            "example `--degrees`.",
-        ),
-    ] = None
-    joint_order: Annotated[
-        str | None,
-        Parameter(
-            show_default=False,
-            help="Order of the joints in MuJoCo's qpos or Isaac's joint_pos without names: mujoco, isaac, "
-            "isaac-by-name or body, without unit; without it by the places of bodies in the file, else mujoco. For "
-            "example `--joint-order isaac`.",
-        ),
-    ] = None
-    rest_missing: Annotated[
-        bool,
-        Parameter(
-            negative="",
-            show_default=False,
-            help="Joints without a column rest at zero, or at their limit next to it; for example `--rest-missing`.",
-        ),
-    ] = False
-    ignore_extra: Annotated[
-        bool,
-        Parameter(
-            negative="",
-            show_default=False,
-            help="Columns that are no joints of the body are left out; for example `--ignore-extra`.",
-        ),
-    ] = False
-    fill: FillOption = None
-    lowpass: LowPassOption = None
-    resample: ResampleOption = None
-    base_order: Annotated[
-        str | None,
-        Parameter(
-            show_default=False,
-            help="The axes of the base's recorded angles in the order in which they turn, without unit; without it zxy "
-            "for OpenSim's, zyx for roll, pitch and yaw. For example `--base-order yxz`.",
-        ),
-    ] = None
-    base_axes: Annotated[
-        str | None,
-        Parameter(
-            show_default=False,
-            help="Where the x, y and z axis of the body's base point to in the axes whose attitude was recorded, "
-            "without unit; without it x,-z,y for OpenSim's pelvis, else x,y,z. For example `--base-axes x,y,z`.",
-        ),
-    ] = None
-    calibration: Calibration = None
-    length_tolerance: LengthTolerance = None
-
-
-AS_IT_IS = TrajectoryOptions()
-
-
 def audit_command(
     body: BodyArgument,
     /,
@@ -135,7 +38,7 @@ def audit_command(
     floating: BodyOptions = BODY_DEFAULTS,
     tolerance: Annotated[float | None, Parameter(show_default=False)] = None,
     flight: Annotated[tuple[str, ...], Parameter(negative_iterable="", consume_multiple=True)] = ("auto",),
-    reading: TrajectoryOptions = AS_IT_IS,
+    reading: TrajectoryOptions = TRAJECTORY_DEFAULTS,
     every: Annotated[int | None, Parameter(show_default=False)] = None,
     figure: Path | None = None,
     html: Annotated[Path | None, Parameter(show_default=False)] = None,
@@ -164,53 +67,30 @@ def audit_command(
         example `--html audit.html`.
     """
     from ..auditing.figures import write_audit_figure
+    from ..auditing.page import audit_page
     from ..auditing.reading import read_trajectory
     from ..auditing.trajectory_audit import audit
-    from ..errors import ShapeError
     from .motion import body_argument, column_names, flight_words
-    from .outcome import ExitCode
 
-    aside = check_writable(figure, "--figure", *_ENDINGS)
+    aside = check_writable(figure, "--figure", *FIGURE_ENDINGS)
     aside = check_writable(html, "--html", ".html") or aside
     if not trajectories:
         raise ShapeError("audit: one trajectory or more is needed after the body")
-    if len(reading.step) not in (0, 1, len(trajectories)):
+    given = reading.step or (None,)
+    if len(given) not in (1, len(trajectories)):
         raise ShapeError(f"--step: one for each of {len(trajectories)} trajectories is needed, got {len(reading.step)}")
     loaded = body_argument(body, floating)
-    given = reading.step or (None,)
     each = given if len(given) == len(trajectories) else given * len(trajectories)
+    names = column_names(reading.names) or None
     with steps(2) as work:
         work.begin("reading")
         runs = [
-            read_trajectory(
-                file,
-                loaded,
-                step=step,
-                names=column_names(reading.names) or None,
-                degrees=reading.degrees,
-                timestep=reading.timestep,
-                joint_order=reading.joint_order,
-                rest_missing=reading.rest_missing,
-                ignore_extra=reading.ignore_extra,
-                fill=reading.fill,
-                lowpass=reading.lowpass,
-                resample=reading.resample,
-                base_order=reading.base_order,
-                base_axes=reading.base_axes,
-                calibration=reading.calibration,
-                length_tolerance=reading.length_tolerance,
-            )
+            read_trajectory(file, loaded, **vars(reading) | {"step": step, "names": names})
             for file, step in zip(trajectories, each, strict=True)
         ]
         work.begin("auditing")
         found = audit(loaded, runs, tolerance=tolerance, flight=flight_words(flight) or "auto", every=every)
-        if figure is not None:
-            write_audit_figure(found, figure)
-            say_written(figure)
-        if html is not None:
-            from ..auditing.page import audit_page
-
-            audit_page(loaded, runs, found).write(html)
-            say_written(html)
+        write_file(figure, lambda file: write_audit_figure(found, file))
+        write_file(html, lambda file: audit_page(loaded, runs, found).write(file))
     code = ExitCode.DONE if found.right else ExitCode.WRONG
     return Outcome(found.table(), found.record, code=code, aside=aside, made_from={})

@@ -23,6 +23,7 @@ from ..integrator.machine_code import as_command
 from ..provenance import command_line, provenance
 from .audit import audit_command
 from .check import check_command
+from .ctrl_c import forget, was_pressed
 from .installation import compile_command, doctor_command, robots_command
 from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
@@ -33,7 +34,6 @@ from .reach import reach_command
 from .rigid_body.conjugate import conjugate_command
 from .rigid_body.rigid import rigid_command
 from .split import split_command
-from .start import forget, was_pressed
 from .sweep import plot_study_command, sweep_app
 from .terminal import Verbosity, abandon, one_line, put, say, verbosity, verbosity_from
 from .torques import torques_command
@@ -185,8 +185,10 @@ def _usage_message(error: CycloptsError) -> str:
         option = error.token.keyword or error.token.value
         words = [f"Unknown option: {option}. Use {_RENAMED[option]}."] if option in _RENAMED else words
     elif error.argument is not None:
-        page = f"{error.argument.parameter.help} {getattr(error.target, '__doc__', '')}"
-        example = re.search(rf"example\s+`({re.escape(option)} [^`]*)`", page)
+        described = {
+            own.name: own.parameter.help for own in apps[-1].assemble_argument_collection(parse_docstring=True)
+        }
+        example = re.search(rf"example\s+`({re.escape(option)}\s[^`]*)`", str(described.get(option)))
         words += [f"For example `{' '.join(example[1].split())}`."] if example else []
     elif not chain:
         words.append("The command comes first, as in `shapephase split cat cat_righting`.")

@@ -34,13 +34,14 @@ def _print_rare(console: Console, options: ConsoleOptions, panel: HelpPanel) -> 
 RARE = Group("More options", sort_key=1, help_formatter=_print_rare)
 
 
-def option(text: str, *, several: bool = False, **more: Any) -> Parameter:
-    """Return an option with its help; of several values, which are all words up to the next option."""
+def option(text: str | None = None, *, several: bool = False, **more: Any) -> Parameter:
+    """Return an option with its help, by default the text below it; of `several` values up to the next option."""
     more |= {"negative_iterable": "", "consume_multiple": True} if several else {}
-    return Parameter(help=text, show_default=False, **more)
+    more |= {} if text is None else {"help": text}
+    return Parameter(show_default=False, **more)
 
 
-def rare(text: str, **more: Any) -> Parameter:
+def rare(text: str | None = None, **more: Any) -> Parameter:
     """Return an option that only `--help-all` shows."""
     return option(text, group=RARE, **more)
 
@@ -63,14 +64,6 @@ MotionArgument = Annotated[
 Moments = Annotated[
     tuple[float, float, float],
     Parameter(help="The three principal moments, in kg m^2; for example `1 2 3`."),
-]
-Momentum = Annotated[
-    tuple[float, float, float] | None,
-    option(
-        "Angular momentum about the centre of mass, inertial axes, in kg m^2/s; default: fitted to a recorded base, "
-        "else zero. For example `--momentum 0 0 0.02`.",
-        negative_iterable="",
-    ),
 ]
 GivenMomentum = Annotated[
     tuple[float, float, float],
@@ -120,102 +113,6 @@ UpAxis = Annotated[
         allow_leading_hyphen=True,  # "-z" is an axis
     ),
 ]
-Names = Annotated[
-    tuple[str, ...],
-    option(
-        "Which column is which joint: COLUMN=JOINT, COLUMN= to ignore a column, or a file of such lines (or of JSON); "
-        "for example `--names LKnee=left_knee frame=` or `--names lab.txt`.",
-        several=True,
-    ),
-]
-Degrees = Annotated[
-    bool | None,
-    option(
-        "Turning joints are in degrees, or in radians; default: as the file states. For example `--degrees`.",
-        negative="--radians",
-    ),
-]
-SampleStep = Annotated[
-    float | None,
-    rare("Time between samples, in s, for a file without times; for example `--step 0.01`."),
-]
-JointOrder = Annotated[
-    str | None,
-    rare(
-        "Order of unnamed joints in MuJoCo's qpos or Isaac's joint_pos: mujoco, isaac, isaac-by-name or body; default: "
-        "by the poses of bodies in the file, else mujoco. For example `--joint-order isaac`.",
-    ),
-]
-RestMissing = Annotated[
-    bool,
-    rare(
-        "Keep joints without a column at zero, or at their limit next to it; for example `--rest-missing`.",
-        negative="",
-    ),
-]
-IgnoreExtra = Annotated[
-    bool,
-    rare("Ignore columns that match no joint; for example `--ignore-extra`.", negative=""),
-]
-FlightTimes = Annotated[
-    tuple[str, ...],
-    option(
-        "Keep one flight, and fit the momentum to the recorded base: auto (longest fall of the centre of mass), auto:2 "
-        "(second in time), all, or its first and last time, in s or the unit of the file; default: auto where the base "
-        "is recorded and --momentum is not given. For example `--flight 12.5 13.9`.",
-        several=True,
-    ),
-]
-FillOption = Annotated[
-    str | None,
-    rare(
-        "Fill gaps (empty cells, NaN) of up to this length by splines, in s or with a unit; gaps at the ends are cut "
-        "off. Default: a gap is an error. For example `--fill 0.1s` or `--fill 100ms`.",
-    ),
-]
-ResampleOption = Annotated[
-    float | None,
-    rare(
-        "Resample evenly at this rate, in 1/s; uneven samples are resampled before --lowpass. For example "
-        "`--resample 100`.",
-    ),
-]
-LowPassOption = Annotated[
-    float | None,
-    option(
-        "Low-pass filter instead of --smooth: cut-off in 1/s of a second-order Butterworth filter, forwards and "
-        "backwards (-3 dB by both passes); for example `--lowpass 6`."
-    ),
-]
-BaseOrder = Annotated[
-    str | None,
-    rare(
-        "Order in which the recorded angles of the base turn about their axes; default: zxy for OpenSim's tilt, list "
-        "and rotation, zyx for roll, pitch and yaw. For example `--base-order yxz`.",
-    ),
-]
-BaseAxes = Annotated[
-    str | None,
-    rare(
-        "Directions of the base's x, y and z axes in the axes whose attitude was recorded, or estimate, with "
-        "--flight; default: x,-z,y for OpenSim's pelvis, else x,y,z. For example `--base-axes x,y,z`.",
-    ),
-]
-Calibration = Annotated[
-    str | None,
-    rare(
-        "How recorded segments lie in the body's links: a time of the zero pose, in s or the unit of the file, the "
-        "name of such a pose in the file, or links if segments have the axes of the links; default: as the file "
-        "states. For example `--calibration 0.5`.",
-    ),
-]
-LengthTolerance = Annotated[
-    float | None,
-    rare(
-        "Largest relative difference between recorded segment lengths and the body's, as a fraction; default: 0.1. "
-        "For example `--length-tolerance 0.2`.",
-    ),
-]
 
 
 @Parameter(name="*")
@@ -223,13 +120,12 @@ LengthTolerance = Annotated[
 class PrintOptions:
     """What is printed. `main` reads these from the command line; the commands ignore them."""
 
-    json: Annotated[
-        bool, option("Print JSON instead of a table, errors too; for example `--json | jq`.", negative="")
-    ] = False
-    quiet: Annotated[bool, option("Print only errors on standard error.", name=("--quiet", "-q"), negative="")] = False
-    verbose: Annotated[bool, option("Print each step on standard error.", name=("--verbose", "-v"), negative="")] = (
-        False
-    )
+    json: Annotated[bool, option(negative="")] = False
+    """Print JSON instead of a table, errors too; for example `--json | jq`."""
+    quiet: Annotated[bool, option(name=("--quiet", "-q"), negative="")] = False
+    """Print only errors on standard error."""
+    verbose: Annotated[bool, option(name=("--verbose", "-v"), negative="")] = False
+    """Print each step on standard error."""
 
 
 @Parameter(name="*")
@@ -237,52 +133,24 @@ class PrintOptions:
 class BodyOptions:
     """How the body's file is read; each field is an argument of `load_body`."""
 
-    root: Annotated[
-        str | None,
-        rare(
-            "For URDF, xacro, MJCF: free removes all joints between the world, or a massless root, and the body; "
-            "default: a single such joint is an error, several are the free base. For example `--root free`.",
-        ),
-    ] = None
-    root_body: Annotated[
-        str | None,
-        rare(
-            "For MJCF, OpenSim, bioMod: the body that floats, with everything attached to it; needed where the file "
-            "has several. For example `--root-body torso`.",
-        ),
-    ] = None
-    packages: Annotated[
-        tuple[str, ...],
-        rare(
-            "For URDF, xacro: folders that are searched for the packages it names, before those around the file. For "
-            "example `--packages ~/ros/src`.",
-            several=True,
-        ),
-    ] = ()
-    xacro: Annotated[
-        tuple[str, ...],
-        rare(
-            "For xacro: values of its arguments, NAME:=VALUE; for example `--xacro payload:=true`.",
-            several=True,
-        ),
-    ] = ()
-    on_unphysical: Annotated[
-        str | None,
-        rare(
-            "For links with impossible inertias: error, or warn to use them as they are; for example "
-            "`--on-unphysical warn`.",
-        ),
-    ] = None
-    length_unit: Annotated[
-        float | None,
-        rare(
-            "For BVH, which states none: the unit of length, in m; for example `--length-unit 0.01` for centimetres.",
-        ),
-    ] = None
-    person_mass: Annotated[
-        float | None,
-        rare("For BVH: mass of the person, in kg; default: 70. For example `--person-mass 62`."),
-    ] = None
+    root: Annotated[str | None, rare()] = None
+    """For URDF, xacro, MJCF: free removes all joints between the world, or a massless root, and the body; default: a
+    single such joint is an error, several are the free base. For example `--root free`."""
+    root_body: Annotated[str | None, rare()] = None
+    """For MJCF, OpenSim, bioMod: the body that floats, with everything attached to it; needed where the file has
+    several. For example `--root-body torso`."""
+    packages: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """For URDF, xacro: folders that are searched for the packages it names, before those around the file. For example
+    `--packages ~/ros/src`."""
+    xacro: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """For xacro: values of its arguments, NAME:=VALUE; for example `--xacro payload:=true`."""
+    on_unphysical: Annotated[str | None, rare()] = None
+    """For links with impossible inertias: error, or warn to use them as they are; for example
+    `--on-unphysical warn`."""
+    length_unit: Annotated[float | None, rare()] = None
+    """For BVH, which states none: the unit of length, in m; for example `--length-unit 0.01` for centimetres."""
+    person_mass: Annotated[float | None, rare()] = None
+    """For BVH: mass of the person, in kg; default: 70. For example `--person-mass 62`."""
 
     @property
     def loading(self) -> dict[str, Any]:
@@ -305,93 +173,102 @@ def _xacro_argument(word: str) -> tuple[str, str]:
 class StartOptions:
     """Momentum of the body, and its attitude at the start."""
 
-    momentum: Momentum = None
-    attitude: Annotated[
-        tuple[float, float, float, float] | None,
-        rare(
-            "Attitude of the base at the start, a quaternion x y z w; default: as recorded, or as a motion of the "
-            "library begins, else 0 0 0 1. For example `--attitude 1 0 0 0`.",
-            negative_iterable="",
-        ),
-    ] = None
+    momentum: Annotated[tuple[float, float, float] | None, option(negative_iterable="")] = None
+    """Angular momentum about the centre of mass, inertial axes, in kg m^2/s; default: fitted to a recorded base, else
+    zero. For example `--momentum 0 0 0.02`."""
+    attitude: Annotated[tuple[float, float, float, float] | None, rare(negative_iterable="")] = None
+    """Attitude of the base at the start, a quaternion x y z w; default: as recorded, or as a motion of the library
+    begins, else 0 0 0 1. For example `--attitude 1 0 0 0`."""
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class RecordingOptions:
+class ColumnOptions:
+    """How columns of recorded samples become joints and a base: options of `RecordingOptions` and of `audit`."""
+
+    names: Annotated[tuple[str, ...], option(several=True)] = ()
+    """Which column is which joint: COLUMN=JOINT, COLUMN= to ignore a column, or a file of such lines (or of JSON); for
+    example `--names LKnee=left_knee frame=` or `--names lab.txt`."""
+    degrees: Annotated[bool | None, option(negative="--radians")] = None
+    """Turning joints are in degrees, or in radians; default: as the file states. For example `--degrees`."""
+    lowpass: Annotated[float | None, option()] = None
+    """Low-pass filter instead of --smooth: cut-off in 1/s of a second-order Butterworth filter, forwards and backwards
+    (-3 dB by both passes); for example `--lowpass 6`."""
+    joint_order: Annotated[str | None, rare()] = None
+    """Order of unnamed joints in MuJoCo's qpos or Isaac's joint_pos: mujoco, isaac, isaac-by-name or body; default: by
+    the poses of bodies in the file, else mujoco. For example `--joint-order isaac`."""
+    rest_missing: Annotated[bool, rare(negative="")] = False
+    """Keep joints without a column at zero, or at their limit next to it; for example `--rest-missing`."""
+    ignore_extra: Annotated[bool, rare(negative="")] = False
+    """Ignore columns that match no joint; for example `--ignore-extra`."""
+    resample: Annotated[float | None, rare()] = None
+    """Resample evenly at this rate, in 1/s; uneven samples are resampled before --lowpass. For example
+    `--resample 100`."""
+    fill: Annotated[str | None, rare()] = None
+    """Fill gaps (empty cells, NaN) of up to this length by splines, in s or with a unit; gaps at the ends are cut off.
+    Default: a gap is an error. For example `--fill 0.1s` or `--fill 100ms`."""
+    base_order: Annotated[str | None, rare()] = None
+    """Order in which the recorded angles of the base turn about their axes; default: zxy for OpenSim's tilt, list and
+    rotation, zyx for roll, pitch and yaw. For example `--base-order yxz`."""
+    base_axes: Annotated[str | None, rare()] = None
+    """Directions of the base's x, y and z axes in the axes whose attitude was recorded, or estimate, with --flight;
+    default: x,-z,y for OpenSim's pelvis, else x,y,z. For example `--base-axes x,y,z`."""
+    calibration: Annotated[str | None, rare()] = None
+    """How recorded segments lie in the body's links: a time of the zero pose, in s or the unit of the file, the name of
+    such a pose in the file, or links if segments have the axes of the links; default: as the file states. For example
+    `--calibration 0.5`."""
+    length_tolerance: Annotated[float | None, rare()] = None
+    """Largest relative difference between recorded segment lengths and the body's, as a fraction; default: 0.1. For
+    example `--length-tolerance 0.2`."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class RecordingOptions(ColumnOptions):
     """How a file of recorded samples is read; each field is an argument of `read_recorded_motion`."""
 
-    flight: FlightTimes = ()
-    smooth: Annotated[
-        str | None,
-        option(
-            "Smooth for this noise of the samples, rms, in rad or m or with units; default: the path passes through "
-            "all samples. For example `--smooth 0.3deg` or `--smooth 0.3deg,1mm`."
-        ),
-    ] = None
-    lowpass: LowPassOption = None
-    names: Names = ()
-    degrees: Degrees = None
+    flight: Annotated[tuple[str, ...], option(several=True)] = ()
+    """Keep one flight, and fit the momentum to the recorded base: auto (longest fall of the centre of mass), auto:2
+    (second in time), all, or its first and last time, in s or the unit of the file; default: auto where the base is
+    recorded and --momentum is not given. For example `--flight 12.5 13.9`."""
+    smooth: Annotated[str | None, option()] = None
+    """Smooth for this noise of the samples, rms, in rad or m or with units; default: the path passes through all
+    samples. For example `--smooth 0.3deg` or `--smooth 0.3deg,1mm`."""
     up: UpAxis = None
-    time_unit: Annotated[
-        str | None,
-        rare(
-            "Unit of the times: s, ms, us, ns or min; default: as the file states. For example `--time-unit ms`.",
-        ),
-    ] = None
-    step: SampleStep = None
-    topic: Annotated[
-        str | None,
-        rare(
-            "Topic of a ROS bag, sheet of a workbook, or structure of a .mat file, where there are several; for "
-            "example `--topic /joint_states`.",
-        ),
-    ] = None
-    joint_order: JointOrder = None
-    rest: Annotated[
-        tuple[str, ...],
-        rare(
-            "Values of joints without a column: JOINT=VALUE, in rad or m or with a unit; for example "
-            "`--rest neck=0.1 left_elbow=30deg`.",
-            several=True,
-        ),
-    ] = ()
-    rest_missing: RestMissing = False
-    ignore_extra: IgnoreExtra = False
-    resample: ResampleOption = None
-    fill: FillOption = None
-    smooth_penalty: Annotated[
-        float | None,
-        rare(
-            "Penalty of --smooth, in s^5; default: for each joint the likeliest for its noise. For example "
-            "`--smooth-penalty 1e-9`.",
-        ),
-    ] = None
-    close: Annotated[
-        str | None,
-        rare(
-            "Close a cycle whose ends differ by at most this, in rad or m or with units; for example `--close 3deg` or "
-            "`--close 3deg,5mm`.",
-        ),
-    ] = None
-    close_by: Annotated[
-        str | None,
-        rare(
-            "How it is closed: drift (the gap is subtracted evenly in time), smooth (a periodic smoother, with "
-            "--smooth) or geodesic (the shortest way back is appended); for example `--close-by geodesic`.",
-        ),
-    ] = None
-    base_order: BaseOrder = None
-    base_axes: BaseAxes = None
-    gravity: Annotated[
-        float | None,
-        rare(
-            "Acceleration of the fall in flight, in m/s^2; default: 9.81. Another fall is an error: a unit of length "
-            "or the frame rate is wrong. For example `--gravity 3.7`.",
-        ),
-    ] = None
-    calibration: Calibration = None
-    length_tolerance: LengthTolerance = None
+    time_unit: Annotated[str | None, rare()] = None
+    """Unit of the times: s, ms, us, ns or min; default: as the file states. For example `--time-unit ms`."""
+    step: Annotated[float | None, rare()] = None
+    """Time between samples, in s, for a file without times; for example `--step 0.01`."""
+    topic: Annotated[str | None, rare()] = None
+    """Topic of a ROS bag, sheet of a workbook, or structure of a .mat file, where there are several; for example
+    `--topic /joint_states`."""
+    rest: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """Values of joints without a column: JOINT=VALUE, in rad or m or with a unit; for example
+    `--rest neck=0.1 left_elbow=30deg`."""
+    smooth_penalty: Annotated[float | None, rare()] = None
+    """Penalty of --smooth, in s^5; default: for each joint the likeliest for its noise. For example
+    `--smooth-penalty 1e-9`."""
+    close: Annotated[str | None, rare()] = None
+    """Close a cycle whose ends differ by at most this, in rad or m or with units; for example `--close 3deg` or
+    `--close 3deg,5mm`."""
+    close_by: Annotated[str | None, rare()] = None
+    """How it is closed: drift (the gap is subtracted evenly in time), smooth (a periodic smoother, with --smooth) or
+    geodesic (the shortest way back is appended); for example `--close-by geodesic`."""
+    gravity: Annotated[float | None, rare()] = None
+    """Acceleration of the fall in flight, in m/s^2; default: 9.81. Another fall is an error: a unit of length or the
+    frame rate is wrong. For example `--gravity 3.7`."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class TrajectoryOptions(ColumnOptions):
+    """How a trajectory is read; each is an argument of `read_trajectory`."""
+
+    step: Annotated[tuple[float, ...], option(several=True)] = ()
+    """Step of the integrator of each trajectory, in s; default: that between its samples. For example
+    `--step 0.001 0.002`."""
+    timestep: Annotated[float | None, option()] = None
+    """Time between samples, in s, for files without times; for example `--timestep 0.01`."""
 
 
 @Parameter(name="*")
@@ -399,44 +276,20 @@ class RecordingOptions:
 class ErrorOptions:
     """Uncertainties of the inputs, for error bars; each is one standard deviation."""
 
-    joint_noise: Annotated[
-        str | None,
-        option(
-            "Print error bars for this noise of the samples, one standard deviation, in rad or m or with units; "
-            "default: that of --smooth. For example `--joint-noise 0.3deg` or `--joint-noise 0.3deg,1mm`."
-        ),
-    ] = None
-    mass_error: Annotated[
-        float | None,
-        rare("Standard deviation of each link's mass, as a fraction of it; for example `--mass-error 0.05`."),
-    ] = None
-    centre_error: Annotated[
-        float | None,
-        rare(
-            "Standard deviation of each link's centre of mass along each axis, as a fraction of the link's radius of "
-            "gyration; for example `--centre-error 0.1`.",
-        ),
-    ] = None
-    inertia_error: Annotated[
-        float | None,
-        rare(
-            "Standard deviation of each link's rotational inertia, as a fraction of it; for example "
-            "`--inertia-error 0.05`.",
-        ),
-    ] = None
-    momentum_error: Annotated[
-        float | None,
-        rare(
-            "Standard deviation of each component of the momentum, in kg m^2/s; for example `--momentum-error 0.001`.",
-        ),
-    ] = None
-    attitude_error: Annotated[
-        float | None,
-        rare(
-            "Standard deviation of the attitude at the start about each axis, in rad; for example "
-            "`--attitude-error 0.01`.",
-        ),
-    ] = None
+    joint_noise: Annotated[str | None, option()] = None
+    """Print error bars for this noise of the samples, one standard deviation, in rad or m or with units; default: that
+    of --smooth. For example `--joint-noise 0.3deg` or `--joint-noise 0.3deg,1mm`."""
+    mass_error: Annotated[float | None, rare()] = None
+    """Standard deviation of each link's mass, as a fraction of it; for example `--mass-error 0.05`."""
+    centre_error: Annotated[float | None, rare()] = None
+    """Standard deviation of each link's centre of mass along each axis, as a fraction of the link's radius of gyration;
+    for example `--centre-error 0.1`."""
+    inertia_error: Annotated[float | None, rare()] = None
+    """Standard deviation of each link's rotational inertia, as a fraction of it; for example `--inertia-error 0.05`."""
+    momentum_error: Annotated[float | None, rare()] = None
+    """Standard deviation of each component of the momentum, in kg m^2/s; for example `--momentum-error 0.001`."""
+    attitude_error: Annotated[float | None, rare()] = None
+    """Standard deviation of the attitude at the start about each axis, in rad; for example `--attitude-error 0.01`."""
 
 
 # Defaults of the commands: a dataclass in a signature needs one instance.
@@ -445,3 +298,4 @@ BODY_DEFAULTS = BodyOptions()
 ERROR_DEFAULTS = ErrorOptions()
 START_DEFAULTS = StartOptions()
 RECORDING_DEFAULTS = RecordingOptions()
+TRAJECTORY_DEFAULTS = TrajectoryOptions()

@@ -21,6 +21,8 @@ from ..errors import (
 )
 from ..files import output_target
 
+FIGURE_ENDINGS = (".svg", ".pdf", ".png")
+FIGURE_HEIGHT = 2.8  # [in] of a figure one column wide
 _STANDARD_OUTPUT = 1
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from .options import (
     BODY_DEFAULTS,
     PRINT_DEFAULTS,
@@ -27,9 +27,9 @@ from .options import (
     UpAxis,
     option,
 )
-from .outcome import Outcome, check_writable
+from .outcome import FIGURE_ENDINGS, Outcome, check_writable
 from .progress import steps
-from .terminal import say_written
+from .terminal import write_file
 
 if TYPE_CHECKING:
     from ..plots.page import Page
@@ -117,8 +117,7 @@ def check_page_files(html: Path | None, video: Path | None) -> bool:
     """Check that a page and its film can be written; return whether one of them takes standard output."""
     from ..plots.pages.video import FILM_SIZE, VIDEO_ENDINGS, check_video
 
-    aside = check_writable(html, "--html", ".html")
-    aside = check_writable(video, "--video", *VIDEO_ENDINGS) or aside
+    aside = any([check_writable(html, "--html", ".html"), check_writable(video, "--video", *VIDEO_ENDINGS)])
     if video is not None:
         check_video(video, FILM_SIZE)
     return aside
@@ -129,15 +128,9 @@ def deliver(page: Page, html: Path | None, video: Path | None) -> tuple[list[str
     if html is None and video is None:
         shown = str(page.show())
         return [f"in the browser: {shown}"], {"html": shown}
-    files = {"html": html, "video": video}
-    if html is not None:
-        page.write(html)
-    if video is not None:
-        page.film(video)
-    written = {name: file for name, file in files.items() if file is not None}
-    for file in written.values():
-        say_written(file)
-    return [], {name: str(file) for name, file in written.items()}
+    write_file(html, page.write)
+    write_file(video, page.film)
+    return [], {name: str(file) for name, file in (("html", html), ("video", video)) if file is not None}
 
 
 def plot_command(
@@ -161,13 +154,13 @@ def plot_command(
         What is drawn: momentum, phases, attitude, shape, torques, inertia, internal_momentum or energy; for example
         `phases`.
     """
+    from ..arguments import check_choice
     from ..plots.named_figures import FIGURES, write_figure
     from . import motion as motions
     from .texts.recording_text import recording_data
 
-    if kind not in FIGURES:
-        raise unknown_name("kind of figure", kind, FIGURES)
-    check_writable(out, "--out", ".svg", ".pdf", ".png")
+    check_choice(kind, "kind of figure", FIGURES)
+    check_writable(out, "--out", *FIGURE_ENDINGS)
     if FIGURES[kind].with_momentum and motions.is_without_momentum(motion, start):
         raise _no_momentum(kind)
     with steps(2) as work:
@@ -176,8 +169,7 @@ def plot_command(
         if FIGURES[kind].with_momentum and not flown.motion.momentum.any():
             raise _no_momentum(kind)
         work.begin(f"drawing {kind.replace('_', ' ')}")
-        write_figure(kind, flown.motion, out, flown.path, gauge)
-        say_written(out)
+        write_file(out, lambda file: write_figure(kind, flown.motion, file, flown.path, gauge))
     data = {"figure": str(out)} | recording_data(flown.recorded)
     return Outcome(_heading(flown, motion), data, made_from=flown.motion.deformation.made_from)
 

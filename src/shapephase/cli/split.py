@@ -26,7 +26,7 @@ from .options import (
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
-from .terminal import say_written
+from .terminal import write_file
 
 _ROWS = 201  # of the table of phases, as many as of samples
 
@@ -75,10 +75,9 @@ def split_command(
     from .texts.recording_text import fit_data, fit_lines, recording_data, recording_lines
     from .texts.result_text import gap_text, recorded_base_text, split_data, split_heading
 
-    aside = check_writable(out, "--out", ".npz")
-    aside = check_writable(samples, "--samples", *ENDINGS) or aside
-    aside = check_writable(phases, "--phases", ".csv") or aside
-    aside = check_writable(html, "--html", ".html") or aside
+    files = {"--out": (out, ".npz"), "--samples": (samples, *ENDINGS), "--phases": (phases, ".csv")}
+    files["--html"] = html, ".html"
+    aside = True in [check_writable(file, option, *endings) for option, (file, *endings) in files.items()]
     if html is not None:
         from ..plots.pages.motion_data import up_axis
 
@@ -93,33 +92,26 @@ def split_command(
             lines, data = recorded_base_text(flown.motion, flown.recorded)
         else:
             lines, data = fit_lines(flown.fitted, bars), fit_data(flown.fitted)
-        if out is not None:
-            flown.motion.save(out)
-            say_written(out)
-        if samples is not None:
-            export_motion(flown.motion, samples)
-            say_written(samples)
-        if phases is not None:
-            times = np.linspace(0.0, flown.motion.duration, _ROWS)
-            running_phases(flown.motion, times, gauge).write_csv(phases)
-            say_written(phases)
+        times = np.linspace(0.0, flown.motion.duration, _ROWS)
+        write_file(out, flown.motion.save)
+        write_file(samples, lambda file: export_motion(flown.motion, file))
+        write_file(phases, lambda file: running_phases(flown.motion, times, gauge).write_csv(file))
         if html is not None:
             work.begin("making the report")
             from ..plots.report_page import report
 
-            title = f"{flown.body.name} along {Path(motion).name}"
-            report(
+            page = report(
                 flown.motion,
                 result,
                 shape_path=flown.path,
-                title=title,
+                title=f"{flown.body.name} along {Path(motion).name}",
                 up=recording.up or flown.up,
                 error_bars=error_bar_lines(result, bars, flown.recorded, errors),
                 recording=[*lines, *recording_lines(flown.body, flown.recorded)],
                 noise=joint_noise(flown.body, errors),
                 progress=work.watch,
-            ).write(html)
-            say_written(html)
+            )
+            write_file(html, page.write)
     turns = turn_counts(flown.motion, result)
     gap = path_gap(flown.body, in_joint_order(flown.body, flown.path))
     open_by = "" if result.is_loop else f"{gap_text(flown.body, gap)} from its start"

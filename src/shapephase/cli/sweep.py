@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import App, Parameter
 
 from ..errors import ShapeError
-from ..files import write_whole
-from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyOptions, FigureFile, PrintOptions
-from .outcome import ExitCode, Outcome, check_writable
+from .options import BODY_DEFAULTS, PRINT_DEFAULTS, BodyOptions, FigureFile, PrintOptions, option
+from .outcome import FIGURE_ENDINGS, FIGURE_HEIGHT, ExitCode, Outcome, check_writable
 from .progress import steps
-from .terminal import Verbosity, say, say_written
+from .terminal import Verbosity, say, write_file
 
 if TYPE_CHECKING:
     from ..study.store import StudyStore
 
 sweep_app = App(name="sweep", help_format="markdown")
 _MOST = 20  # complaints shown
-_HEIGHT = 2.8  # in, of a figure of a study
 
 
 @sweep_app.default
@@ -35,17 +33,15 @@ def sweep_command(
     ],
     scheduler: Annotated[
         str | None,
-        Parameter(
-            show_default=False,
-            help="Compute on the cluster of this Dask scheduler; without it on this machine. For example "
+        option(
+            "Compute on the cluster of this Dask scheduler; without it on this machine. For example "
             "`--scheduler tcp://10.0.0.1:8786`.",
         ),
     ] = None,
     workers: Annotated[
         int | None,
-        Parameter(
-            show_default=False,
-            help="Processes of this machine, without unit; else one for each processor. For example `--workers 4`.",
+        option(
+            "Processes of this machine, without unit; else one for each processor. For example `--workers 4`.",
         ),
     ] = None,
     resume: Annotated[
@@ -53,9 +49,8 @@ def sweep_command(
     ] = False,
     retry: Annotated[
         Literal["failed"] | None,
-        Parameter(
-            show_default=False,
-            help="Go on with a store that is there, and compute cases that failed again; for example `--retry failed`.",
+        option(
+            "Go on with a store that is there, and compute cases that failed again; for example `--retry failed`.",
         ),
     ] = None,
     floating: BodyOptions = BODY_DEFAULTS,
@@ -79,8 +74,7 @@ def sweep_command(
     expect_much()
     if workers is not None and (scheduler is not None or workers < 1):
         raise ShapeError(f"--workers: a whole number above 0, and no --scheduler beside it, is needed, got {workers}")
-    read = read_study(study)
-    read = replace(read, **floating.loading)
+    read = replace(read_study(study), **floating.loading)
     try:
         with steps(1) as work, nullcontext() if scheduler is None else connected(scheduler) as client:
             work.begin(f"computing {read.cases} cases")
@@ -136,8 +130,7 @@ def export_command(
     from ..study.store import open_study
 
     check_writable(out, "--out", ".nc", ".parquet", ".csv")
-    export_study(open_study(store), out)
-    say_written(out)
+    write_file(out, lambda file: export_study(open_study(store), file))
     return Outcome("", {"file": str(out)})
 
 
@@ -149,17 +142,15 @@ def plot_study_command(
     out: FigureFile,
     kind: Annotated[
         str | None,
-        Parameter(
-            show_default=False,
-            help="What is drawn, a histogram, quantiles along a grid, or a map over two, without unit; else what the "
+        option(
+            "What is drawn, a histogram, quantiles along a grid, or a map over two, without unit; else what the "
             "study's grids permit. For example `--kind quantiles`.",
         ),
     ] = None,
     along: Annotated[
         list[str] | None,
-        Parameter(
-            show_default=False,
-            help="A grid that is an axis of the figure, without unit, once or twice; else the first. For example "
+        option(
+            "A grid that is an axis of the figure, without unit, once or twice; else the first. For example "
             "`--along momentum_z`.",
         ),
     ] = None,
@@ -174,15 +165,13 @@ def plot_study_command(
     output
         What is drawn, an output of the study, or an entry such as `final_attitude_0_1`; for example `turn`.
     """
-    from ..plots.plot_style import axes_image, column_axes
+    from ..plots.plot_style import column_axes, write_axes
     from ..study.figures import plot_study
     from ..study.store import open_study
 
-    check_writable(out, "--out", ".svg", ".pdf", ".png")
-    ax = plot_study(column_axes(_HEIGHT), open_study(store), output, kind=kind, along=along or ())
-    image = axes_image(ax, out.suffix.removeprefix(".").lower())
-    write_whole(out, lambda stream: stream.write(image))
-    say_written(out)
+    check_writable(out, "--out", *FIGURE_ENDINGS)
+    ax = plot_study(column_axes(FIGURE_HEIGHT), open_study(store), output, kind=kind, along=along or ())
+    write_file(out, lambda file: write_axes(ax, file))
     return Outcome("", {"figure": str(out)})
 
 

@@ -8,7 +8,7 @@ import logging
 import os
 import sys
 import unicodedata
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TextIO
@@ -67,6 +67,13 @@ def say(line: str, least: Verbosity = Verbosity.NORMAL) -> None:
         raise
     except (OSError, ValueError):
         return  # no stream is left to report it
+
+
+def write_file(path: Path | None, write: Callable[[Path], object]) -> None:
+    """Write a file, where one is wanted, and report it with its size."""
+    if path is not None:
+        write(path)
+        say_written(path)
 
 
 def say_written(path: Path) -> None:

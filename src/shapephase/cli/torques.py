@@ -21,7 +21,7 @@ from .options import (
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
-from .terminal import say_written
+from .terminal import write_file
 
 
 def torques_command(
@@ -57,9 +57,7 @@ def torques_command(
         flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
         work.begin("inverse dynamics")
         found = joint_torques(flown.motion)
-        if out is not None:
-            found.write_csv(out)
-            say_written(out)
+        write_file(out, found.write_csv)
         work.begin("error bars")
         bars, of_bars = load_bars(flown.motion, found.loads, flown.recorded)
     text = torque_lines(found.loads, flown.motion, flown.body, motion, bars) + ([of_bars] if of_bars else [])

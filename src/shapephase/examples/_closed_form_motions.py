@@ -31,11 +31,7 @@ _CHECK_START = 1e-9  # of the duration, for the start of a given clock
 class KnownMotion(Protocol):
     """A motion in closed form; times (...).
 
-    Examples
-    --------
-    >>> example = sp.examples.homothety()
-    >>> print(np.linalg.norm(example.known.body_momentum([0.0, 1.0]), axis=-1).round(9))
-    [3.1 3.1]
+    Made by `homothety`.
     """
 
     def attitude(self, t: ArrayLike, /) -> Array:
@@ -51,6 +47,8 @@ class KnownMotion(Protocol):
 class Example:
     """A deformation, a momentum, and known facts about the motion that results.
 
+    Made by `homothety`.
+
     Attributes
     ----------
     deformation : of the body
@@ -59,13 +57,6 @@ class Example:
     phase : theta_M of the whole duration in the base gauge, modulo 2 pi, if Pi is back at its start by then [rad]
     turn : the angle of the total rotation, if known [rad]
     rigid : the rigid body with the inertia of the start, if the example is compared with it
-
-    Examples
-    --------
-    >>> example = sp.examples.rigid_body()
-    >>> motion = sp.reconstruct(example.deformation, example.momentum)
-    >>> print(f"{sp.split(motion, 'base').montgomery_angle:.9f}, known {sp.so3.wrap(example.phase):.9f}")
-    -2.110538109, known -2.110538109
     """
 
     deformation: Deformation
@@ -82,17 +73,12 @@ class Example:
 class TimeReparametrisedRigid:
     """A rigid body's motion in a time of its own: R(t) = R_RB(tau(t)), Pi(t) = Pi_RB(tau(t)).
 
+    Made by `homothety`.
+
     Attributes
     ----------
     top : the rigid body
     clock : tau, times (...) -> (...) [s]
-
-    Examples
-    --------
-    >>> top = sp.EulerTop.principal([1.0, 1.5, 2.0], [0.6, 0.5, 3.0])
-    >>> slow = sp.examples.TimeReparametrisedRigid(top, lambda t: 0.5 * t)
-    >>> print(np.abs(slow.body_momentum(2.0) - top.body_momentum(1.0)).max().round(12))
-    0.0
     """
 
     top: EulerTop
@@ -113,18 +99,14 @@ class TimeReparametrisedRigid:
 class AxialMotion:
     """A body with moments (A(t), B(t), B(t)): R(t) = exp(b(t) hat(mu)) exp(Pi_1 (a(t) - b(t)) hat(e_1)).
 
+    Made by `axial_stretch`.
+
     a and b are the integrals of 1/A and 1/B from 0 to t, mu the momentum and Pi_1 its constant part along the axis.
 
     Attributes
     ----------
     momentum : (3,) [kg m^2/s]
     axial, transverse : a and b, times (...) -> (...) [1/(kg m^2/s)]
-
-    Examples
-    --------
-    >>> example = sp.examples.axial_stretch()
-    >>> print(np.linalg.norm(example.known.body_momentum([0.0, 2.0]), axis=-1).round(6))
-    [3.162278 3.162278]
     """
 
     momentum: Array
@@ -154,16 +136,12 @@ class AxialMotion:
 class Scale:
     """A factor a(t) by which all distances in a body grow, and the time tau = int a^-2 dt of its rotation.
 
+    Made by `pulsation`.
+
     Attributes
     ----------
     factor : times (...) -> (...), above 0
     clock : times (...) -> (...) [s]; None: by quadrature
-
-    Examples
-    --------
-    >>> scale = sp.examples.expansion(0.02)
-    >>> float(scale.factor(np.array(10.0)))
-    1.2
     """
 
     factor: Callable[[Array], ArrayLike]
@@ -213,16 +191,12 @@ def expansion(rate: float = 0.02) -> Scale:
 class SteadyTurn:
     """Steady rotation about the momentum: R(t) = exp(t hat(omega)), Pi constant.
 
+    Made by `furniture`.
+
     Attributes
     ----------
     momentum : (3,) [kg m^2/s]
     angular_velocity : (3,), along the momentum [rad/s]
-
-    Examples
-    --------
-    >>> turn = sp.examples.SteadyTurn(np.array([0.0, 0.0, 2.0]), np.array([0.0, 0.0, 0.5]))
-    >>> print(f"{sp.so3.angle(turn.attitude(1.0)):.9f}")
-    0.500000000
     """
 
     momentum: Array

@@ -18,12 +18,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_flag, check_object, moments_argument, number_argument
+from ..arguments import check_choice, check_flag, check_object, moments_argument, number_argument
 from ..arrays import Array
 from ..body.loading import load_body
 from ..deformation.assemblies import assembly, moving_mass, rigid_part
 from ..deformation.deformation import articulated, prescribed, rigid
-from ..errors import ShapeError, TrajectoryError, unknown_name
+from ..errors import ShapeError, TrajectoryError
 from ..letters import value_text
 from ..rigid_body.euler_top import EulerTop
 from ..shape_space.shape_path import ShapePath
@@ -445,8 +445,7 @@ def named_example(name: str) -> Example:
     >>> print(f"{example.phase:.6f} rad")
     16.739018 rad
     """
-    if not isinstance(name, str) or name not in EXAMPLES:
-        raise unknown_name("example", name, EXAMPLES)
+    check_choice(name, "example", EXAMPLES)
     return EXAMPLES[name]()
 
 

@@ -14,7 +14,7 @@ from ..body.loading import load_body
 from ..deformation.deformation import articulated
 from ..deformation.gauge import horizontal_gauge
 from ..display import short_repr
-from ..errors import TrajectoryError, unknown_name
+from ..errors import TrajectoryError
 from ..phases.return_map import closed_orbits
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import Curve, Swings
@@ -87,7 +87,7 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0, *, body: str = 
     """
     alpha = number_argument(alpha, "alpha", "rad")
     beta = number_argument(beta, "beta", "rad")
-    duration = number_argument(duration, "duration", "s")
+    period = positive_argument(duration)
     check_choice(body, "body that bends", ("cat_two_halves", "cat_untwisted"))
     joints, limit, words = _WAIST, 0.5 * np.pi, "pi/2"
     if body == "cat_untwisted":
@@ -96,8 +96,7 @@ def kane_scher(alpha: float, beta: float, duration: float = 1.0, *, body: str = 
         raise TrajectoryError(
             f"0 <= alpha < beta < {words} [rad] is needed, got alpha = {alpha:.9g}, beta = {beta:.9g}"
         )
-    curve = _KaneScher(float(alpha), float(beta), float(duration), angles=len(joints))
-    return _loop(curve, duration, joints)
+    return _loop(_KaneScher(alpha, beta, period, angles=len(joints)), period, joints)
 
 
 def cat_righting(duration: float = 2.0) -> ShapePath:
@@ -118,9 +117,7 @@ def cat_righting(duration: float = 2.0) -> ShapePath:
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
     180.000000 degrees
     """
-    duration = number_argument(duration, "duration", "s")
-    names = load_body("cat").joint_names
-    return _loop(_CatRighting(float(duration), names), duration, names)
+    return _cat_loop(duration)
 
 
 def cat_righting_twist(duration: float = 1.5) -> ShapePath:
@@ -137,10 +134,7 @@ def cat_righting_twist(duration: float = 1.5) -> ShapePath:
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
     180.000000 degrees
     """
-    duration = number_argument(duration, "duration", "s")
-    names = load_body("cat").joint_names
-    curve = _CatRighting(float(duration), names, largest_bend=1.590080737531, tail_share=0.751770426503, twist=0.5)
-    return _loop(curve, duration, names)
+    return _cat_loop(duration, largest_bend=1.590080737531, tail_share=0.751770426503, twist=0.5)
 
 
 def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
@@ -155,7 +149,6 @@ def astronaut_arm_circles(duration: float = 2.0) -> ShapePath:
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
     11.825049 degrees
     """
-    duration = number_argument(duration, "duration", "s")
     abduction = (0.75, 0.0, -0.75)
     return _one_harmonic(
         "astronaut",
@@ -181,7 +174,6 @@ def astronaut_leg_swing(duration: float = 4.0) -> ShapePath:
     >>> print(f"{np.degrees(sp.so3.angle(turn)):.6f} degrees")
     12.352775 degrees
     """
-    duration = number_argument(duration, "duration", "s")
     return _one_harmonic(
         "astronaut",
         duration,
@@ -222,7 +214,6 @@ def satellite_sweep(duration: float = 60.0) -> ShapePath:
     >>> print(np.abs(path.shape(0.0) - path.shape(path.duration)).max().round(9))  # a loop
     0.0
     """
-    duration = number_argument(duration, "duration", "s")
     return _one_harmonic(
         "satellite",
         duration,
@@ -354,8 +345,7 @@ def named_motion(name: str) -> ShapePath:
     >>> sp.examples.named_motion("cat_righting").duration
     2.0
     """
-    if not isinstance(name, str) or name not in MOTIONS:
-        raise unknown_name("motion", name, MOTIONS)
+    check_choice(name, "motion", MOTIONS)
     return MOTIONS[name].path()
 
 
@@ -382,10 +372,8 @@ def closed_orbit(name: str, gauge: str = "horizontal") -> Motion:
     >>> print(f"{sp.split(motion).momentum_gap:.6f}")
     0.000000
     """
-    if not isinstance(name, str) or name not in CLOSED_ORBITS:
-        raise unknown_name("closed orbit", name, CLOSED_ORBITS)
-    if not isinstance(gauge, str) or gauge not in ("horizontal", "base"):
-        raise unknown_name("gauge of a closed orbit", gauge, ("horizontal", "base"))
+    check_choice(name, "closed orbit", CLOSED_ORBITS)
+    check_choice(gauge, "gauge of a closed orbit", ("horizontal", "base"))
     motion, magnitude = CLOSED_ORBITS[name]
     deformation = articulated(load_body(MOTIONS[motion].body), named_motion(motion))
     gauged = horizontal_gauge(deformation) if gauge == "horizontal" else deformation
@@ -437,7 +425,11 @@ class _CatRighting:
         bend, bend_rate = np.sin(np.pi * s), np.pi * s_rate * np.cos(np.pi * s)
         ny, nz = np.cos(2.0 * np.pi * s), -np.sin(2.0 * np.pi * s)
         ny_rate, nz_rate = 2.0 * np.pi * s_rate * nz, -2.0 * np.pi * s_rate * ny
-        waist, waist_rate = self._waist(bend, bend_rate, (ny, nz), (ny_rate, nz_rate))
+        angle, turning = self.largest_bend * bend, self.largest_bend * bend_rate
+        cosine, sine = np.cos(angle), np.sin(angle)
+        axis = np.stack([cosine, nz * sine, -ny * sine], axis=-1)
+        tilting = nz_rate * sine + nz * cosine * turning, -ny_rate * sine - ny * cosine * turning
+        waist, waist_rate = _untwisted(axis, np.stack([-sine * turning, *tilting], axis=-1))
         waist[:, 2] += self.twist * bend * nz
         waist_rate[:, 2] += self.twist * (bend_rate * nz + bend * nz_rate)
         pitch, pitch_rate = bend * ny, bend_rate * ny + bend * ny_rate
@@ -459,24 +451,6 @@ class _CatRighting:
             place = self.joint_names.index(joint)
             shapes[:, place], rates[:, place] = factor * value, factor * rate
         return shapes, rates
-
-    def _waist(
-        self, bend: Array, bend_rate: Array, normal: tuple[Array, Array], normal_rate: tuple[Array, Array]
-    ) -> tuple[Array, Array]:
-        """The three waist angles and their rates, (N, 3), from the bend and its direction."""
-        (ny, nz), (ny_rate, nz_rate) = normal, normal_rate
-        gamma, gamma_rate = self.largest_bend * bend, self.largest_bend * bend_rate
-        cosine, sine = np.cos(gamma), np.sin(gamma)
-        axis = np.stack([cosine, nz * sine, -ny * sine], axis=-1)
-        axis_rate = np.stack(
-            [
-                -sine * gamma_rate,
-                nz_rate * sine + nz * cosine * gamma_rate,
-                -ny_rate * sine - ny * cosine * gamma_rate,
-            ],
-            axis=-1,
-        )
-        return _untwisted(axis, axis_rate)
 
 
 # Squares of tiny numbers are zero, also where NumPy is set to raise.
@@ -517,9 +491,14 @@ def _bent(axis: Array, axis_rate: Array) -> tuple[Array, Array]:
     return np.stack([pitch, yaw], axis=-1), np.stack([pitch_rate, yaw_rate], axis=-1)
 
 
-def _loop(curve: Curve, duration: float, names: tuple[str, ...]) -> ShapePath:
-    period = positive_argument(duration)
+def _loop(curve: Curve, period: float, names: tuple[str, ...]) -> ShapePath:
     return ShapePath(curve, period, np.array([0.0, period]), len(names), names)
+
+
+def _cat_loop(duration: float, **bends: float) -> ShapePath:
+    """Path of the cat that rights itself, with the numbers of `_CatRighting`."""
+    period, names = positive_argument(duration), load_body("cat").joint_names
+    return _loop(_CatRighting(period, names, **bends), period, names)
 
 
 def _one_harmonic(name: str, duration: float, joints: Mapping[str, tuple[float, ...]]) -> ShapePath:

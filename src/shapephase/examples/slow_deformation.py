@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from scipy.optimize import root_scalar
 
 from .. import so3
-from ..arguments import check_object, moments_argument, number_argument
+from ..arguments import check_choice, check_object, moments_argument, number_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
-from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, unknown_name
+from ..errors import AccuracyNotReached, ShapeError, TrajectoryError
 from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body import separatrix_solid_angle
@@ -80,8 +80,7 @@ def slow_antenna(
     >>> print(f"{example.rigid.montgomery_phase:.6f} rad")  # of the body as it was at the start
     11.187497 rad
     """
-    if not isinstance(law, str) or law not in _LAWS:
-        raise unknown_name("law", law, _LAWS)
+    check_choice(law, "law", _LAWS)
     slow, start = positive(rate, "rate", "1/s"), moments_argument(moments)
     top = orbit_about_third(start, momentum)
     increase = positive(expansion, "expansion", "1") * start[2] * np.array([0.0, 0.0, 1.0])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from .. import so3
-from ..arguments import positive_argument
 from ..arrays import Array
 from ..errors import AccuracyNotReached
 from ..reconstruction.forced_motion import ForcedMotion
@@ -19,11 +18,6 @@ _PLACES = np.array([0.25, 0.5, 0.75])
 _PARTS = 4  # records of the first guess for a piece of the motion's own solution
 _EVEN = 257  # records of the first guess for a motion with a torque, whose steps are unknown
 WINDOW = 8  # records that polynomials go through: degree 7, two records at least on both sides but at the ends
-
-
-def error_argument(error: float) -> float:
-    """A user's largest error between records [rad]. Raises TrajectoryError."""
-    return positive_argument(error, "error", "an angle in rad")
 
 
 def slerp_times(motion: Motion | ForcedMotion, error: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +14,7 @@ from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.inverse_dynamics import floating_states, floating_velocities
 from ..dynamics.moving_body import body_and_path, check_motion, moving_body, needed_body_and_path
-from ..errors import ShapeError
+from ..errors import ShapeError, UnknownNameError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
@@ -101,6 +102,12 @@ def checked_times(motion: Motion | ForcedMotion, times: ArrayLike | None) -> Arr
     if given.ndim != 1:
         raise ShapeError(f"times: (N,) in one row are needed, got shape {given.shape}")
     return times_argument(given, motion.duration)
+
+
+def check_ending(file: Path, kind: str, *endings: str) -> None:
+    """Raise UnknownNameError where a file's name ends otherwise."""
+    if file.suffix.lower() not in endings:
+        raise UnknownNameError(f"{file}: the name of {kind} ends in {' or '.join(endings)}")
 
 
 def whole_motion(motion: Motion | ForcedMotion, times: Array, fall: Fall) -> WholeMotion:

@@ -14,12 +14,12 @@ from .. import so3
 from ..arguments import check_choice, check_file_name, check_keywords, positive_argument
 from ..arrays import Array
 from ..body.joint_chain import JointChain
-from ..errors import ShapeError, UnknownNameError
+from ..errors import ShapeError
 from ..files import write_whole
 from ..reconstruction.attitude_angles import euler_angles
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import Fall, WholeMotion, checked_times, whole_motion
+from ._whole_motion import Fall, WholeMotion, check_ending, checked_times, whole_motion
 
 # Places first, then angles about z, x and y, one after the other: all readers take this order.
 _PLACES = "Xposition Yposition Zposition"
@@ -60,15 +60,9 @@ def write_bvh(
     Raises
     ------
     ShapeError
-        If the motion is a batch; for more than a million frames.
-    TrajectoryError
-        For a rate or a scale that is not above 0.
-    WrongObjectError
-        If the body has no joints along a path.
+        For more than a million frames.
     UnknownNameError
-        For another ending, another axis.
-    OutputFileError
-        If it cannot be written.
+        For another axis.
 
     Examples
     --------
@@ -83,8 +77,7 @@ def write_bvh(
     check_choice(up, "axis", tuple(_UPWARD))
     where, often = Path(path), positive_argument(rate, "rate", "a number of frames in a second")
     longer = positive_argument(scale, "scale", "a number of units in a metre")
-    if where.suffix.lower() != ".bvh":
-        raise UnknownNameError(f"{where}: the name of a BVH file ends in .bvh")
+    check_ending(where, "a BVH file", ".bvh")
     checked_times(motion, [0.0])
     frames = int(np.floor(motion.duration * often * (1.0 + np.finfo(float).eps))) + 1
     if frames > _MOST_FRAMES:

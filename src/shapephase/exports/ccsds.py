@@ -9,7 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from .. import __version__
-from ..arguments import check_choice, check_file_name, check_text
+from ..arguments import check_choice, check_file_name, check_text, positive_argument
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import UnknownNameError
@@ -17,7 +17,7 @@ from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._attitude_records import WINDOW, error_argument, even_times
+from ._attitude_records import WINDOW, even_times
 from ._whole_motion import base_attitude, continued_quaternions
 
 TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")  # of the epochs of a message
@@ -28,18 +28,14 @@ _DIGITS = 15  # of a second: a turn at 100 rad/s within the last one is below ro
 class AttitudeMessage:
     """A message that was written.
 
+    Made by `write_aem`.
+
     Attributes
     ----------
     file : that holds it
     records : attitudes at even times
     error : stated, of the attitude between them by polynomials of `degree` [rad]
     degree : of the polynomials of each part of the quaternion, through the records nearest to a time
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
-    >>> sp.exports.write_aem(motion, "spin.aem").degree
-    7
     """
 
     file: Path
@@ -78,16 +74,10 @@ def write_aem(
 
     Raises
     ------
-    ShapeError
-        If the motion is a batch.
-    TrajectoryError
-        For an error that is not above 0.
     AccuracyNotReached
         If millions of records were needed: the polynomials do not take kinks well.
     UnknownNameError
         For another time system, an invalid epoch.
-    OutputFileError
-        If it cannot be written.
 
     Notes
     -----
@@ -102,7 +92,7 @@ def write_aem(
     """
     check_file_name(path, "path")
     check_choice(time_system, "time system", TIME_SYSTEMS)
-    begin, goal = _epoch(epoch), error_argument(error)
+    begin, goal = _epoch(epoch), positive_argument(error, "error", "an angle in rad")
     times = even_times(motion, goal)
     quaternions = continued_quaternions(base_attitude(motion, times))
     epochs = _epochs(begin, times)

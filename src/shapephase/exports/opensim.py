@@ -13,19 +13,18 @@ from ..arguments import check_file_name, check_keywords
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_no_balls
-from ..errors import ShapeError, UnknownNameError
+from ..errors import ShapeError
 from ..files import write_whole
 from ..reconstruction.attitude_angles import euler_angles
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._whole_motion import Fall, checked_times, whole_motion
+from ._whole_motion import Fall, check_ending, checked_times, whole_motion
 
 # Coordinates of the pelvis in OpenSim's models of walking: angles about z, x and y, one after the other; places.
 _ANGLES = (("pelvis_tilt", "pelvis_list", "pelvis_rotation"), "zxy")
 _PLACES = ("pelvis_tx", "pelvis_ty", "pelvis_tz")
 # From a base with x forward, y left, z up to a pelvis with x forward, y up, z right.
 _TO_PELVIS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-_ENDINGS = (".mot", ".sto")
 
 
 def write_opensim_motion(
@@ -50,17 +49,6 @@ def write_opensim_motion(
         forward, y left, z up to OpenSim's x forward, y up, z right, as `read_recorded_motion` takes it
     fall : start, velocity, gravity as in `Motion.base_position`
 
-    Raises
-    ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it.
-    WrongObjectError
-        If the body has no joints along a path.
-    UnknownNameError
-        For another ending.
-    OutputFileError
-        If it cannot be written.
-
     Examples
     --------
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
@@ -72,13 +60,12 @@ def write_opensim_motion(
     check_file_name(path, "path")
     check_keywords(fall, write_opensim_motion)
     where = Path(path)
-    if where.suffix.lower() not in _ENDINGS:
-        raise UnknownNameError(f"{where}: the name of OpenSim's motions ends in {' or '.join(_ENDINGS)}")
+    check_ending(where, "OpenSim's motions", ".mot", ".sto")
     whole = whole_motion(motion, checked_times(motion, times), Fall.of(**fall))
     check_no_balls(whole.body.chain.follows, "motions of OpenSim need")
     angles, order = whole.body.base_angles or _ANGLES
     turned = whole.attitude @ so3.transpose(_axes(whole.body, base_axes))
-    names = ["time", *angles, *_places(whole.body), *whole.body.joint_names]
+    names = ["time", *angles, *(whole.body.base_slides or _PLACES), *whole.body.joint_names]
     columns = [whole.times[:, None], euler_angles(turned, order.upper()), whole.position, whole.shapes]
     rows = np.hstack(columns).tolist()
     lines = [
@@ -103,7 +90,3 @@ def _axes(body: Body, given: ArrayLike | None) -> Array:
     if rotation.shape != (3, 3):
         raise ShapeError(f"base_axes: one rotation (3, 3) is needed, got shape {rotation.shape}")
     return rotation
-
-
-def _places(body: Body) -> tuple[str, ...]:
-    return body.base_slides or _PLACES

@@ -29,19 +29,14 @@ _MUJOCO_FREE = 0  # MuJoCo's number of free joints among the kinds
 class MujocoArrays:
     """A motion as MuJoCo has it.
 
+    Made by `mujoco_arrays`.
+
     Attributes
     ----------
     time : (N,) [s]
     qpos : (N, nq) position of the base, its quaternion w x y z, the joints [m], [rad or m]
     qvel : (N, nv) velocity of the base origin in inertial axes, angular velocity in base axes, rates of the joints
     joint_names : of all joints, in the order of the columns
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
-    >>> found = sp.exports.mujoco_arrays(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]))
-    >>> found.qpos.shape, found.qvel.shape, found.joint_names
-    ((201, 10), (201, 9), ('waist_pitch', 'waist_yaw', 'waist_roll'))
     """
 
     time: Array
@@ -57,6 +52,8 @@ class MujocoArrays:
 class PinocchioArrays:
     """A motion as Pinocchio has it, of a model whose base is a free-flyer.
 
+    Made by `pinocchio_arrays`.
+
     Attributes
     ----------
     time : (N,) [s]
@@ -64,13 +61,6 @@ class PinocchioArrays:
     v : (N, nv) linear and angular velocity of the base in base axes, rates of the joints
     a : (N, nv) the derivatives of these numbers; where a path's acceleration jumps, those that follow
     joint_names : of all joints, in the order of the columns
-
-    Examples
-    --------
-    >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
-    >>> found = sp.exports.pinocchio_arrays(sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]), [0.0, 0.5])
-    >>> found.q.shape, found.v.shape, found.a.shape
-    ((2, 10), (2, 9), (2, 9))
     """
 
     time: Array
@@ -102,10 +92,6 @@ def mujoco_arrays(
 
     Raises
     ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it.
-    WrongObjectError
-        If the body has no joints along a path.
     UnknownNameError
         If the model has no free joint, or lacks joints of the body, or has others.
 
@@ -158,10 +144,8 @@ def pinocchio_arrays(
 
     Raises
     ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it; if joints follow others with kinks, which have no `a`.
-    WrongObjectError
-        If the body has no joints along a path.
+    ShapeError
+        If joints follow others with kinks, which have no `a`.
     UnknownNameError
         If the model has no free-flyer, or lacks joints of the body, or has others.
 

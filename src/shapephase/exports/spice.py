@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import so3
-from ..arguments import check_file_name, check_text, number_argument, whole_argument
+from ..arguments import check_file_name, check_text, number_argument, positive_argument, whole_argument
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, MissingExtraError, OutputFileError, UnknownNameError
@@ -21,8 +21,8 @@ from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._attitude_records import error_argument, slerp_times
-from ._whole_motion import base_attitude, base_rate, continued_quaternions
+from ._attitude_records import slerp_times
+from ._whole_motion import base_attitude, base_rate, check_ending, continued_quaternions
 
 _TICKS = 10**9  # of the clock in a second
 _LONGEST = 10**6  # [s] that the clock counts
@@ -61,6 +61,8 @@ CK_{instrument}_SPK         = -{clock}
 class SpiceKernels:
     """Kernels that were written.
 
+    Made by `write_spice_ck`.
+
     Attributes
     ----------
     attitude, clock : files, the C-kernel and the text kernel with clock and frame, to be loaded by `furnsh`
@@ -68,13 +70,6 @@ class SpiceKernels:
     error : stated, of the attitude at any time between [rad]
     instrument, clock_id : SPICE's identifiers
     frame : name of the base's frame
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 5.0])
-    >>> written = sp.exports.write_spice_ck(motion, "spin.bc")
-    >>> written.frame, written.instrument, written.clock.name
-    ('SHAPEPHASE_BASE', -999001, 'spin.tsc')
     """
 
     attitude: Path
@@ -116,18 +111,12 @@ def write_spice_ck(
 
     Raises
     ------
-    ShapeError
-        If the motion is a batch.
-    TrajectoryError
-        For an error that is not above 0.
     AccuracyNotReached
         If times of SPICE at this epoch are too coarse for the error, or millions of records were needed.
     MissingExtraError
         Without spiceypy.
     UnknownNameError
-        For another ending, another reference, an instrument that is not below -1000.
-    OutputFileError
-        If it cannot be written.
+        For another reference, an instrument that is not below -1000.
 
     Examples
     --------
@@ -136,9 +125,12 @@ def write_spice_ck(
     1e-09
     """
     check_file_name(path, "path")
-    where, goal, start = Path(path), error_argument(error), number_argument(epoch, "epoch", "s")
-    if where.suffix.lower() != ".bc":
-        raise UnknownNameError(f"{where}: the name of a C-kernel ends in .bc")
+    where, goal, start = (
+        Path(path),
+        positive_argument(error, "error", "an angle in rad"),
+        number_argument(epoch, "epoch", "s"),
+    )
+    check_ending(where, "a C-kernel", ".bc")
     check_text(reference, "reference", "SPICE's name of inertial axes")
     whole = -instrument if isinstance(instrument, int | np.integer) else instrument
     number = -whole_argument(whole, "minus instrument", _OF_A_CLOCK)

@@ -54,8 +54,6 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 
     Raises
     ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it.
     MissingExtraError
         Without xarray.
 
@@ -67,23 +65,7 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     [2. 2.] rad/s
     """
     check_keywords(fall, motion_dataset)
-    xarray = _extra("xarray", "a data set needs xarray", "study")
-    samples = _samples(motion, times, fall)
-    labels = {"quaternion": _QUATERNION, "axis": _AXES, "joint": samples.joint_names}
-    variables = {
-        name: (("time", dimension), values, {"units": unit} if unit else {})
-        for name, (values, dimension, unit) in samples.items()
-        if dimension
-    }
-    coordinates: dict[str, Any] = {"time": ("time", samples["time"][0], {"units": "s"})}
-    coordinates |= {
-        name: list(entries)
-        for name, entries in labels.items()
-        if any(name == variable[0][1] for variable in variables.values())
-    }
-    if "joint" in coordinates:
-        coordinates["joint_unit"] = ("joint", list(samples.joint_units))
-    return xarray.Dataset(variables, coordinates, samples.attributes)
+    return _dataset(_samples(motion, times, fall))
 
 
 def export_motion(
@@ -106,14 +88,8 @@ def export_motion(
 
     Raises
     ------
-    ShapeError, TrajectoryError
-        If the motion is a batch, for times outside of it.
-    UnknownNameError
-        For another ending.
     MissingExtraError
         Without xarray, pyarrow or h5py, for the formats that need them.
-    OutputFileError
-        If it cannot be written.
 
     Examples
     --------
@@ -128,7 +104,7 @@ def export_motion(
     where = Path(path)
     if where.suffix.lower() not in ENDINGS:
         raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)
-    content = _WRITERS[where.suffix.lower()](motion, times, fall)
+    content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall))
     write_whole(where, lambda stream: stream.write(content))
 
 
@@ -169,6 +145,25 @@ def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[
     return samples
 
 
+def _dataset(samples: _Samples) -> Any:
+    xarray = _extra("xarray", "a data set needs xarray", "study")
+    labels = {"quaternion": _QUATERNION, "axis": _AXES, "joint": samples.joint_names}
+    variables = {
+        name: (("time", dimension), values, {"units": unit} if unit else {})
+        for name, (values, dimension, unit) in samples.items()
+        if dimension
+    }
+    coordinates: dict[str, Any] = {"time": ("time", samples["time"][0], {"units": "s"})}
+    coordinates |= {
+        name: list(entries)
+        for name, entries in labels.items()
+        if any(name == variable[0][1] for variable in variables.values())
+    }
+    if "joint" in coordinates:
+        coordinates["joint_unit"] = ("joint", list(samples.joint_units))
+    return xarray.Dataset(variables, coordinates, samples.attributes)
+
+
 def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
     """Columns of a table by their names, with their units."""
     labels = {
@@ -191,8 +186,7 @@ def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
     return table
 
 
-def _csv(motion: Any, times: Any, fall: Any) -> bytes:
-    samples = _samples(motion, times, fall)
+def _csv(samples: _Samples) -> bytes:
     columns, text = _columns(samples), io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     bracketed = {"time", *samples.joint_names}
@@ -201,9 +195,8 @@ def _csv(motion: Any, times: Any, fall: Any) -> bytes:
     return text.getvalue().encode()
 
 
-def _parquet(motion: Any, times: Any, fall: Any) -> bytes:
+def _parquet(samples: _Samples) -> bytes:
     pyarrow, parquet = (_extra(name, "Parquet files need pyarrow") for name in ("pyarrow", "pyarrow.parquet"))
-    samples = _samples(motion, times, fall)
     columns = _columns(samples)
     fields = [
         pyarrow.field(label, pyarrow.float64(), metadata={"unit": unit} if unit else None)
@@ -216,14 +209,14 @@ def _parquet(motion: Any, times: Any, fall: Any) -> bytes:
     return stream.getvalue()
 
 
-def _netcdf(motion: Any, times: Any, fall: Any) -> bytes:
-    return bytes(motion_dataset(motion, times, **fall).to_netcdf(engine="scipy"))
+def _netcdf(samples: _Samples) -> bytes:
+    return bytes(_dataset(samples).to_netcdf(engine="scipy"))
 
 
-def _matlab(motion: Any, times: Any, fall: Any) -> bytes:
+def _matlab(samples: _Samples) -> bytes:
     from scipy.io import savemat
 
-    samples, stream = _samples(motion, times, fall), io.BytesIO()
+    stream = io.BytesIO()
     arrays: dict[str, Any] = {name: values for name, (values, _, _) in samples.items()}
     if samples.joint_names:
         arrays["joint_names"] = np.array(samples.joint_names, dtype=object)
@@ -233,9 +226,9 @@ def _matlab(motion: Any, times: Any, fall: Any) -> bytes:
     return _MATLAB.ljust(_MATLAB_TEXT).encode() + stream.getvalue()[_MATLAB_TEXT:]
 
 
-def _hdf5(motion: Any, times: Any, fall: Any) -> bytes:
+def _hdf5(samples: _Samples) -> bytes:
     h5py = _extra("h5py", "HDF5 files need h5py")
-    samples, stream = _samples(motion, times, fall), io.BytesIO()
+    stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         for name, (values, _, unit) in samples.items():
             file[name] = values
@@ -249,7 +242,7 @@ def _hdf5(motion: Any, times: Any, fall: Any) -> bytes:
     return stream.getvalue()
 
 
-_WRITERS: dict[str, Callable[[Any, Any, Any], bytes]] = {
+_WRITERS: dict[str, Callable[[_Samples], bytes]] = {
     ".csv": _csv,
     ".parquet": _parquet,
     ".nc": _netcdf,

@@ -1,4 +1,4 @@
-"""Names of users and styles of joints in figures; a left joint and its right one have the same colour and marker."""
+"""Joints in figures: names, styles, lines; a left joint and its right one have the same colour and marker."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from ..arrays import Array, Integers
+from ..errors import unknown_name
 from ..letters import printable
-from .plot_style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SERIES, VERMILION
+from .plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SERIES, VERMILION
 
 _COLOURS = (BLUE, ORANGE, BLACK, GREEN, VERMILION, PURPLE)  # neighbours differ in grey, too
 _MARKERS = ("o", "s", "^", "D", "v", "P")
@@ -18,6 +22,8 @@ _SIDE = re.compile(
 )
 _PALE = 0.5  # share of white in the broad line of the left side
 _MARKS = 6  # along a curve
+MAX_NAMED = 6  # joints with a style and a name: more are not distinguishable
+_MAX_BESIDE = 26  # letters of a name in a legend of two columns
 _MAX_LETTERS = 32  # of a name in a figure: more would leave no room for the curves
 
 
@@ -66,6 +72,43 @@ def joint_styles(names: Sequence[str]) -> list[dict[str, Any]]:
             look = {"color": colour, "linestyle": (0, (4, 2)), "linewidth": 1.3, "zorder": 2.2}
         looks.append({**look, **marks, "markerfacecolor": colour, "markeredgecolor": colour})
     return looks
+
+
+def joint_place(joint: str | int, names: Sequence[str]) -> int:
+    """The index of a joint that is given by its name or its index. Raises UnknownNameError."""
+    if isinstance(joint, str) and joint in names:
+        return list(names).index(joint)
+    if isinstance(joint, (int, np.integer)) and not isinstance(joint, bool) and 0 <= joint < len(names):
+        return int(joint)
+    raise unknown_name("joint", str(joint), names)
+
+
+def plot_joints(
+    places: dict[str, Any],
+    times: Array,
+    values: Array,
+    joints: Integers,
+    names: Sequence[str],
+    units: Sequence[str],
+    shown_units: dict[str, str],
+) -> dict[str, Any]:
+    """Draw columns of joints in time on the axes of their units: the first six by name, the others in grey.
+
+    Returns handles, labels and ncols of a legend, where units are shown if there are several.
+    """
+    handles: list[Any] = []
+    texts: list[str] = []
+    rows: list[int] = joints.tolist()
+    named, others = rows[:MAX_NAMED], rows[MAX_NAMED:]
+    for k, look in zip(named, joint_styles([names[k] for k in named]), strict=True):
+        handles += places[units[k]].plot(times, values[:, k], **look)
+        texts.append(plain_text(names[k]) + ("" if len(places) == 1 else f" [{shown_units[units[k]]}]"))
+    ncols = 1 if max(map(len, texts), default=0) > _MAX_BESIDE else 2
+    for k in others:
+        line = places[units[k]].plot(times, values[:, k], color=GREY, linewidth=0.6, zorder=1.5)
+        handles += line if len(handles) == MAX_NAMED else []
+    texts += [f"{len(others)} other{'s' * (len(others) > 1)}"] if others else []
+    return {"handles": handles, "labels": texts, "ncols": ncols}
 
 
 def _is_left(name: str) -> bool:

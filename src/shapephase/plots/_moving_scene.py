@@ -55,6 +55,8 @@ class MovingNode:
 class MovingScene:
     """Moving shapes of a motion at F frames; lengths in m, in inertial axes unless stated otherwise.
 
+    Made by `moving_scene`.
+
     Attributes
     ----------
     title : of the page
@@ -66,12 +68,6 @@ class MovingScene:
     trail : (F, 3) positions of the origin of a link; None: no trail
     body, shapes : whose links the nodes are, and its joints (F, n); None: particles or the locked inertia
     falls : whether gravity moves the centre of mass
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
-    >>> sp.plots.moving_scene(motion, 5).times.tolist()
-    [0.0, 1.0, 2.0, 3.0, 4.0]
     """
 
     title: str

@@ -50,10 +50,6 @@ def plot_conjugate_locus(
         largest [sqrt(kg) m]
     geodesics : how many are drawn to either side
 
-    Raises
-    ------
-    MissingExtraError, ShapeError
-
     Notes
     -----
     Source: Bonnard, Cots and Shcherbakova 2013, section 4.4; theory.md R12.
@@ -123,10 +119,6 @@ def plot_ellipsoid_locus(
     orders : n = 1, 2, ... of the conjugate points
     latitude : of the start, as a length along the meridian of the ellipsoid of unit equator, between its poles
     geodesics : how many are drawn
-
-    Raises
-    ------
-    MissingExtraError, ShapeError
 
     Notes
     -----

@@ -13,20 +13,20 @@ from ..errors import ShapeError
 from ..phases.momentum_curve import Gauge, MomentumCurve, momentum_curve
 from ..phases.return_map import FixedPoints
 from ..reconstruction.reconstruction import Motion
-from ..rigid_body.portrait import equilibria, heteroclinics, polhodes
+from ..rigid_body.portrait import equilibria, heteroclinics
 from ._joint_styles import plain_text
 from ._sphere_area import AreaCells, enclosed_cells
 from ._sphere_axes import SphereAxes
 from .plot_style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SMALL, VERMILION, check_axes, one_motion, subdivided
-from .polhode_plots import spread_energies
+from .polhode_plots import draw_polhodes, spread_energies
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _CURVE: dict[str, Any] = {"color": BLACK, "linestyle": "-", "linewidth": 1.5}
 _CLOSURE = {"color": VERMILION, "linestyle": (0, (3, 1.2)), "linewidth": 1.7}
-_ROUND_LARGEST = {"color": "#8A8A8A", "linestyle": "-", "linewidth": 0.6}
-_ROUND_SMALLEST = {"color": "#8A8A8A", "linestyle": (0, (4, 2)), "linewidth": 0.6}
+_ROUND_LARGEST = {"color": "#8A8A8A", "linestyle": "-", "linewidth": 0.6, "behind": True}
+_ROUND_SMALLEST = {**_ROUND_LARGEST, "linestyle": (0, (4, 2))}
 _SEPARATRIX = {"color": PURPLE, "linestyle": (0, (6, 1, 1, 1)), "linewidth": 1.3}
 _KINDS: dict[str, dict[str, Any]] = {
     "elliptic": {"marker": "o", "color": BLUE, "markersize": 6.5},
@@ -237,12 +237,7 @@ def _portrait(drawn: SphereAxes, inertia: Array) -> None:
     for lower in (0, 1):
         if moments[lower + 1] - moments[lower] <= _EQUAL * moments[2]:
             moments[lower + 1] = moments[lower]
-    levels = spread_energies(moments)
-    for level, pair in zip(levels, polhodes(moments, levels) if len(levels) else ()):
-        largest = 2.0 * level * moments[1] < 1.0 or moments[0] == moments[1]
-        label = "about largest moment" if largest else "about smallest moment"
-        for line in pair:
-            drawn.curve(line @ axes.T, label, behind=True, **(_ROUND_LARGEST if largest else _ROUND_SMALLEST))
+    draw_polhodes(drawn, moments, spread_energies(moments), axes, _ROUND_LARGEST, _ROUND_SMALLEST)
     if moments[0] < moments[1] < moments[2]:
         for line in heteroclinics(moments):
             drawn.curve(line @ axes.T, "separatrix", behind=True, **_SEPARATRIX)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object
+from ..arguments import check_choice, check_object
 from ..arrays import Array, Integers
 from ..bounds.energy import energy_along
 from ..deformation.deformation import Deformation
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from ..phases.momentum_curve import Gauge
 from ..phases.phases import RunningPhases, running_phases
 from ..phases.split_text import CLOSED_GAP
@@ -74,9 +74,7 @@ def plot_phases(
     >>> sp.plots.plot_phases(ax, motion, "base").get_xlabel()
     '$t$ [s]'
     """
-    check_object(motion, "Motion", "motion")
-    style.check_flat_axes(ax)
-    style.one_motion(motion)
+    style.check_motion_axes(ax, motion)
     t = style.motion_times(motion, times)
     found = running_phases(motion, t, gauge, closing=closing)
     jumps = np.flatnonzero(np.diff(found.jumps))
@@ -89,7 +87,7 @@ def plot_phases(
         ax.plot(*_broken(t, values, at_jumps), label=f"{name} = {_degrees(values[-1])}", **look)
         for k in at_jumps:
             ax.plot(t[k : k + 2], values[k : k + 2], **_JUMPED)
-    ax.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
+    style.zero_line(ax)
     style.in_time(ax, (t[0], t[-1]), "", title=_phase_title(found, len(jumps)))
     style.degrees_first(ax, "phase")
     _enlarged(ax, t, found)
@@ -117,11 +115,8 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
     >>> len(sp.plots.plot_attitude(ax, motion, "quaternion").lines) >= 4
     True
     """
-    check_object(motion, "Motion", "motion")
-    style.check_flat_axes(ax)
-    style.one_motion(motion)
-    if not isinstance(kind, str) or kind not in ATTITUDES:
-        raise unknown_name("kind of attitude", kind, ATTITUDES)
+    style.check_motion_axes(ax, motion)
+    check_choice(kind, "kind of attitude", ATTITUDES)
     t = style.motion_times(motion, times)
     if kind == "quaternion":
         values = motion.quat_xyzw(t)
@@ -138,9 +133,8 @@ def plot_attitude(ax: Axes, motion: Motion, kind: str = "rotation_vector", *, ti
             ax.axhline(turn, color=style.GREY, linewidth=0.5, linestyle=(0, (1, 2)), zorder=1)
         label, title = "", "attitude, base to inertial axes: rotation vector"
         title += "; dots: half turns" if size.max() > np.pi - _HALF_TURN else ""
-    ax.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
-    above = {"ncols": 4, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-    style.in_time(ax, (t[0], t[-1]), label, loops=motion.deformation.loops, title=title, **above)
+    style.zero_line(ax)
+    style.in_time(ax, (t[0], t[-1]), label, loops=motion.deformation.loops, ncols=4, title=title)
     if kind != "quaternion":
         style.degrees_first(ax, "rotation vector")
     return ax
@@ -166,8 +160,7 @@ def plot_inertia(
     """
     check_object(deformation, "Deformation", "deformation")
     style.check_flat_axes(ax)
-    if not isinstance(kind, str) or kind not in INERTIAS:
-        raise unknown_name("kind of inertia", kind, INERTIAS)
+    check_choice(kind, "kind of inertia", INERTIAS)
     t = style.even_times(deformation, times)
     inertia = deformation.inertia(t)
     if kind == "principal":
@@ -177,13 +170,12 @@ def plot_inertia(
     else:
         for k, (i, j, name) in enumerate(_ENTRIES):
             ax.plot(t, inertia[:, i, j], label=f"$I_{{{name}}}$", **style.SERIES[k])
-        ax.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
+        style.zero_line(ax)
     label, title = {
         "principal": ("principal moments [kg m²]", "locked inertia, about the centre of mass"),
         "entries": ("locked inertia [kg m²]", "locked inertia in the deformation's frame"),
     }[kind]
-    above = {"ncols": 3, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-    style.in_time(ax, (t[0], t[-1]), label, loops=deformation.loops, title=title, **above)
+    style.in_time(ax, (t[0], t[-1]), label, loops=deformation.loops, ncols=3, title=title)
     return ax
 
 
@@ -209,9 +201,15 @@ def plot_internal_momentum(ax: Axes, deformation: Deformation, *, times: ArrayLi
     for k, name in enumerate("xyz"):
         ax.plot(t, internal[:, k], label=f"$L_{{o,{name}}}$", **style.SERIES[k])
     ax.plot(t, np.linalg.norm(internal, axis=-1), label="$|L_o|$", color=style.GREY, linewidth=2.2, zorder=1.5)
-    ax.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
-    above = {"ncols": 4, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "loops": deformation.loops}
-    style.in_time(ax, (t[0], t[-1]), "$L_o$ [kg m²/s]", title="momentum of the joints, the base at rest", **above)
+    style.zero_line(ax)
+    style.in_time(
+        ax,
+        (t[0], t[-1]),
+        "$L_o$ [kg m²/s]",
+        title="momentum of the joints, the base at rest",
+        loops=deformation.loops,
+        ncols=4,
+    )
     return ax
 
 
@@ -238,7 +236,6 @@ def plot_energy(
 
     Raises
     ------
-    MissingExtraError
     ShapeError
         If the motion is a batch, or has no momentum.
 
@@ -255,9 +252,7 @@ def plot_energy(
     """
     if certificate is not None:
         check_object(certificate, "RegimeCertificate", "certificate")
-    check_object(motion, "Motion", "motion")
-    style.check_flat_axes(ax)
-    style.one_motion(motion)
+    style.check_motion_axes(ax, motion)
     magnitude = float(np.linalg.norm(motion.momentum))
     if not magnitude:
         raise ShapeError("a motion without angular momentum has E_t = 0 and no regimes")
@@ -318,7 +313,7 @@ def _enlarged(ax: Any, t: Array, found: RunningPhases) -> None:
     inset = style.inset_where_free(ax, (0.27, 0.22), (0.19, 0.1, 0.09)) if _NOTHING < reach < _FLAT * whole else None
     if inset is not None:
         inset.plot(t, np.degrees(found.geometric_phase), **style.SERIES[1])
-        inset.axhline(0.0, color=style.GREY, linewidth=0.5, zorder=1)
+        style.zero_line(inset)
         inset.set_xlim(t[0], t[-1])
         inset.locator_params(nbins=3)
         inset.tick_params(labelsize=style.SMALL - 2, length=2.0, pad=1.5)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..arguments import check_file_name, check_object
+from ..arguments import check_choice, check_file_name, check_object
 from ..display import short_repr
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from ..files import write_whole
 from ..phases.momentum_curve import Gauge
 from ..reconstruction.reconstruction import Motion
@@ -114,8 +114,7 @@ def motion_figure(
 
 def _figure_of(kind: str, motion: Motion) -> Figure:
     """Return a kind of figure that this motion has. Raises UnknownNameError, ShapeError."""
-    if not isinstance(kind, str) or kind not in FIGURES:
-        raise unknown_name("kind of figure", kind, FIGURES)
+    check_choice(kind, "kind of figure", FIGURES)
     if FIGURES[kind].with_momentum and not motion.momentum.any():
         raise ShapeError(f"the figure {kind!r} needs an angular momentum; it is zero here, give one")
     return FIGURES[kind]
@@ -126,8 +125,7 @@ def figure_image(
 ) -> bytes:
     """Return one of `FIGURES` as an image: "svg", "pdf" or "png"."""
     figure = _figure_of(kind, motion)
-    if not isinstance(ending, str) or ending not in ("svg", "pdf", "png"):
-        raise unknown_name("kind of image", ending, ("svg", "pdf", "png"))
+    check_choice(ending, "kind of image", ("svg", "pdf", "png"))
     ax = column_axes(figure.height)
     figure.draw(ax, motion, path, gauge)
     return axes_image(ax, ending)
@@ -178,8 +176,7 @@ def write_rigid_figure(kind: str, top: EulerTop, out: str | os.PathLike[str], ti
     ----------
     time : at which the ellipsoid or the cones are shown [s]
     """
-    if kind not in RIGID_FIGURES:
-        raise unknown_name("kind of figure", kind, RIGID_FIGURES)
+    check_choice(kind, "kind of figure", RIGID_FIGURES)
     height, draw = RIGID_FIGURES[kind]
     ax = column_axes(height)
     draw(ax, top, time)

@@ -37,15 +37,6 @@ class Page:
     html : the whole page as text
     data : what its scripts draw, as plain values and arrays
     duration, speed : of the motion to film [s], and its seconds in a second of film; None: the page is not filmed
-
-    Examples
-    --------
-    >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 3.0]), 4.0), [0.6, 0.9, 0.5])
-    >>> page = sp.view(motion, frames=5)
-    >>> page.write("page.html")
-    >>> from pathlib import Path
-    >>> Path("page.html").read_text() == page.html
-    True
     """
 
     title: str

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_choice, number_argument, times_argument
+from ..arguments import check_choice, check_object, number_argument, times_argument
 from ..arrays import Array
 from ..deformation.deformation import Deformation
 from ..errors import MissingExtraError, ShapeError
@@ -150,6 +150,13 @@ def check_flat_axes(ax: object) -> None:
         raise ShapeError("ax: flat axes are needed here, got three-dimensional ones; make them without a projection")
 
 
+def check_motion_axes(ax: object, motion: Motion) -> None:
+    """Check that these are flat axes for one motion. Raises as `check_axes`, WrongObjectError, ShapeError."""
+    check_object(motion, "Motion", "motion")
+    check_flat_axes(ax)
+    one_motion(motion)
+
+
 def one_motion(motion: Motion) -> None:
     """Raise `ShapeError` for a batch."""
     if motion.batch:
@@ -204,6 +211,11 @@ def finish(ax: Any, **place: Any) -> Any:
     legend.get_title().set_multialignment("center")
     with_symbols(ax)
     return legend
+
+
+def zero_line(ax: Any) -> None:
+    """Draw a faint line at zero."""
+    ax.axhline(0.0, color=GREY, linewidth=0.5, zorder=1)
 
 
 def with_symbols(ax: Any) -> None:

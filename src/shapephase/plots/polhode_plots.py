@@ -53,10 +53,6 @@ def plot_polhodes(
     energies : (N,) of the curves for |Pi| = 1 [1/(kg m^2)]; None: four about each stable axis
     view : elevation and azimuth of the eye [degrees], for flat axes
 
-    Raises
-    ------
-    MissingExtraError, ShapeError
-
     Notes
     -----
     Source: Marsden and Ratiu, figure 15.3.1.
@@ -73,11 +69,7 @@ def plot_polhodes(
     points = equilibria(moments)
     sphere = SphereAxes(ax, view)
     levels = spread_energies(moments) if energies is None else np.atleast_1d(finite_array(energies, "energies"))
-    for level, pair in zip(levels, polhodes(moments, levels) if len(levels) else ()):
-        largest = 2.0 * level * np.median(moments) < 1.0 or np.median(moments) == np.min(moments)
-        label = "about largest moment" if largest else "about smallest moment"
-        for curve in pair:
-            sphere.curve(curve, label, **(_LARGEST if largest else _SMALLEST))
+    draw_polhodes(sphere, moments, levels, np.eye(3), _LARGEST, _SMALLEST)
     kinds = {point.kind for point in points}
     if "saddle" in kinds:
         for curve in heteroclinics(moments):
@@ -118,7 +110,6 @@ def plot_herpolhode(ax: Axes, top: EulerTop, periods: float = 5.0) -> Axes:
 
     Raises
     ------
-    MissingExtraError
     ShapeError
         If the number of periods is not above 0, or the top has no momentum.
 
@@ -228,6 +219,23 @@ def _own_polhode(sphere: SphereAxes, top: EulerTop) -> None:
         points = top.body_momentum(polhode_times(top)) @ top.axes / top.magnitude
         sphere.curve(points, "this top", **_OWN)
     sphere.point(orbit.start / orbit.magnitude, "$t = 0$", marker="*", color=GREEN, markersize=11)
+
+
+def draw_polhodes(
+    sphere: SphereAxes,
+    moments: Array,
+    levels: Array,
+    axes: Array,
+    about_largest: dict[str, Any],
+    about_smallest: dict[str, Any],
+) -> None:
+    """Draw the polhodes of some energies of a body with these moments about axes (3, 3), in two styles."""
+    middle = np.median(moments)
+    for level, pair in zip(levels, polhodes(moments, levels) if len(levels) else ()):
+        largest = 2.0 * level * middle < 1.0 or middle == np.min(moments)
+        label = "about largest moment" if largest else "about smallest moment"
+        for curve in pair:
+            sphere.curve(curve @ axes.T, label, **(about_largest if largest else about_smallest))
 
 
 def spread_energies(moments: Array) -> Array:

@@ -41,10 +41,6 @@ def plot_crown(
     motion : of one momentum, no batch; drawn over the certificate's interval
     view : elevation and azimuth of the eye [degrees]; None: beside the certificate's axis
 
-    Raises
-    ------
-    MissingExtraError, ShapeError
-
     Notes
     -----
     Source: Cabrera 2006, section 4.1; theory.md E8.
@@ -98,10 +94,6 @@ def plot_bounds(ax: Axes, bounds: Sequence[Bound]) -> Axes:
     Parameters
     ----------
     bounds : from `bounds.bounds`
-
-    Raises
-    ------
-    MissingExtraError, ShapeError
 
     Examples
     --------

@@ -60,7 +60,6 @@ def plot_rolling_ellipsoid(
 
     Raises
     ------
-    MissingExtraError
     ShapeError
         If the top has no momentum, or the number of periods is not above 0.
 
@@ -128,7 +127,6 @@ def plot_cones(ax: Axes, top: EulerTop, time: float = 0.0, *, view: tuple[float,
 
     Raises
     ------
-    MissingExtraError
     ShapeError
         If no two moments are equal, or all three, or the momentum is zero.
 

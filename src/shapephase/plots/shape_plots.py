@@ -18,14 +18,12 @@ from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
 from . import plot_style as style
-from ._joint_styles import both_sides, joint_styles, plain_text
+from ._joint_styles import MAX_NAMED, both_sides, joint_place, joint_styles, plain_text, plot_joints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _AT_REST = 1e-9  # [rad or m] range of a joint that does not move
-_MAX_NAMED = 6  # joints with a style and a name: more are not distinguishable
-_MAX_BESIDE = 26  # letters of a name in a legend of two columns
 _LEVELS = 8  # about so many lines of equal curvature
 _COUNT = 61  # points along each joint: smooth under shading, a second of computation
 _MARGIN = 0.25  # of the range of a path: room around it in the plane
@@ -73,42 +71,28 @@ def plot_shape_path(
     span = np.ptp(values, axis=0)
     if joints is not None and (isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray)):
         raise ShapeError(f"joints: several names or numbers in a list are needed, got {value_text(joints)}")
-    chosen = np.flatnonzero(span > _AT_REST) if joints is None else np.array([_place(j, names) for j in joints], int)
+    chosen = (
+        np.flatnonzero(span > _AT_REST) if joints is None else np.array([joint_place(j, names) for j in joints], int)
+    )
     if not names:
         raise ShapeError("the body has no joints to draw; the figure 'attitude' shows how it turns")
     if not len(chosen):
         raise ShapeError("joints: none of them moves along this path; name those to draw")
-    chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > _MAX_NAMED else chosen
+    chosen = chosen[np.argsort(-span[chosen], kind="stable")] if len(chosen) > MAX_NAMED else chosen
     scales = sorted({units[k] for k in chosen}, key=("rad", "m", "1", "rad or m").index)
     places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
-    named = chosen[:_MAX_NAMED]
-    shown = [names[int(k)] for k in named]
-    looks = joint_styles(shown)
-    handles: list[Any] = []
-    texts: list[str] = []
-    for k, look in zip(named, looks, strict=True):
-        handles += places[units[k]].plot(t, values[:, k], **look)
-        own = "" if len(scales) == 1 else f" [{_SHOWN[units[k]]}]"
-        texts.append(plain_text(names[k]) + own)
-    others = [
-        places[units[k]].plot(t, values[:, k], color=style.GREY, linewidth=0.6, zorder=1.5)[0]
-        for k in chosen[_MAX_NAMED:]
-    ]
-    if others:
-        handles.append(others[0])
-        texts.append("1 other" if len(others) == 1 else f"{len(others)} others")
-    if body is not None and _limit_bands(places, units, body.joint_limits, values, named, looks):
-        handles.append(_band_patch())
-        texts.append("beyond a limit")
+    legend = plot_joints(places, t, values, chosen, names, units, _SHOWN)
+    named = chosen[:MAX_NAMED]
+    shown = [names[k] for k in named]
+    if body is not None and _limit_bands(places, units, body.joint_limits, values, named, joint_styles(shown)):
+        legend["handles"].append(_band_patch())
+        legend["labels"].append("beyond a limit")
     for unit, twin in list(places.items())[1:]:
         style.finer(twin, route.loops)
         style.label_ordinate(twin, f"joints [{unit}]", max(map(abs, twin.get_ylim())))
         twin.tick_params(labelsize=style.SMALL)
-    columns = 1 if max(map(len, texts)) > _MAX_BESIDE else 2
-    above = {"ncols": columns, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
     title = "joints in time; dashes: the right side" if both_sides(shown) else "joints in time"
-    named_by = {"handles": handles, "labels": texts, "title": title, **above}
-    style.in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", loops=route.loops, **named_by)
+    style.in_time(ax, (t[0], t[-1]), f"joints [{scales[0]}]", loops=route.loops, title=title, **legend)
     if scales[0] == "rad":
         style.degrees_first(ax, "joints", radians=len(scales) == 1)
     return ax
@@ -148,7 +132,7 @@ def plot_shape_plane(
     _loop(ax, points)
     ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=style.SMALL)
     ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=style.SMALL)
-    style.finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    style.finish(ax, ncols=3)
     return ax
 
 
@@ -207,7 +191,7 @@ def plot_curvature(
     _contours(ax, rows, values, largest)
     if points is not None:
         _loop(ax, points)
-        style.finish(ax, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+        style.finish(ax, ncols=3)
     ax.set(xlim=(rows[0][0], rows[0][-1]), ylim=(rows[1][0], rows[1][-1]))
     ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=style.SMALL)
     ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=style.SMALL)
@@ -382,18 +366,10 @@ def _named(path: ShapePath, body: Body | None) -> tuple[ShapePath, tuple[str, ..
 def _pair(joints: Sequence[str | int], names: Sequence[str]) -> tuple[int, int]:
     if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
         raise ShapeError(f"joints: two joints are needed, got {value_text(joints)}")
-    i, j = (_place(joint, names) for joint in joints)
+    i, j = (joint_place(joint, names) for joint in joints)
     if i == j:
         raise ShapeError(f"joints: two different joints are needed, got {names[i]} twice")
     return i, j
-
-
-def _place(joint: str | int, names: Sequence[str]) -> int:
-    if isinstance(joint, str) and joint in names:
-        return list(names).index(joint)
-    if isinstance(joint, (int, np.integer)) and not isinstance(joint, bool) and 0 <= joint < len(names):
-        return int(joint)
-    raise unknown_name("joint", str(joint), names)
 
 
 def _extent(points: Array) -> Array:

@@ -8,18 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object, names_argument
+from ..arguments import names_argument
 from ..dynamics.torques import joint_torques
-from ..errors import unknown_name
 from ..reconstruction.reconstruction import Motion
-from ._joint_styles import joint_styles, plain_text
-from .plot_style import GREY, SMALL, check_flat_axes, in_time, motion_times, one_motion
+from ._joint_styles import MAX_NAMED, joint_place, plot_joints
+from .plot_style import SMALL, check_motion_axes, in_time, motion_times
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MAX_NAMED = 6  # joints with a style and a name: more are not distinguishable
-_MAX_BESIDE = 26  # letters of a name in a legend of two columns
 _IDLE = 1e-9  # of the largest torque or force: a joint that does nothing
 _SHOWN = {"rad": "N m", "m": "N"}
 _LABELS = {"rad": "torques [N m]", "m": "forces [N]"}
@@ -46,9 +43,7 @@ def plot_torques(
     >>> len(sp.plots.plot_torques(ax, motion).lines)  # one for each joint
     3
     """
-    check_object(motion, "Motion", "motion")
-    check_flat_axes(ax)
-    one_motion(motion)
+    check_motion_axes(ax, motion)
     t = motion_times(motion, times)
     found = joint_torques(motion, t)
     peaks = np.abs(found.torque).max(axis=0)
@@ -56,36 +51,16 @@ def plot_torques(
         chosen = np.flatnonzero(peaks > _IDLE * peaks.max(initial=0.0))
         chosen = chosen if len(chosen) else np.arange(len(peaks))
     else:
-        chosen = np.array([_place(name, found.joint_names) for name in names_argument(joints, "joints", "names")], int)
-    if len(chosen) > _MAX_NAMED:
+        given = names_argument(joints, "joints", "names")
+        chosen = np.array([joint_place(name, found.joint_names) for name in given], int)
+    if len(chosen) > MAX_NAMED:
         chosen = chosen[np.argsort(-peaks[chosen], kind="stable")]
     units = found.joint_units
     scales = sorted({units[k] for k in chosen}, reverse=True)
     places: dict[str, Any] = {unit: ax if n == 0 else ax.twinx() for n, unit in enumerate(scales)}
-    handles: list[Any] = []
-    texts: list[str] = []
-    named = chosen[:_MAX_NAMED]
-    for k, look in zip(named, joint_styles([found.joint_names[k] for k in named]), strict=True):
-        handles += places[units[k]].plot(t, found.torque[:, k], **look)
-        own = "" if len(scales) == 1 else f" [{_SHOWN[units[k]]}]"
-        texts.append(plain_text(found.joint_names[k]) + own)
-    others = [
-        places[units[k]].plot(t, found.torque[:, k], color=GREY, linewidth=0.6, zorder=1.5)[0]
-        for k in chosen[_MAX_NAMED:]
-    ]
-    if others:
-        handles.append(others[0])
-        texts.append("1 other" if len(others) == 1 else f"{len(others)} others")
+    legend = plot_joints(places, t, found.torque, chosen, found.joint_names, units, _SHOWN)
     for unit, twin in list(places.items())[1:]:
         twin.set_ylabel(_LABELS[unit], fontsize=SMALL)
         twin.tick_params(labelsize=SMALL)
-    columns = 1 if max(map(len, texts), default=0) > _MAX_BESIDE else 2
-    above = {"ncols": columns, "loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-    in_time(ax, (t[0], t[-1]), _LABELS[scales[0]] if scales else "", handles=handles, labels=texts, **above)
+    in_time(ax, (t[0], t[-1]), _LABELS[scales[0]] if scales else "", **legend)
     return ax
-
-
-def _place(name: str, names: Sequence[str]) -> int:
-    if name not in names:
-        raise unknown_name("joint", name, names)
-    return names.index(name)

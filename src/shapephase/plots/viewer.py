@@ -70,7 +70,6 @@ def view(
     >>> page.html[:15].lower()
     '<!doctype html>'
     """
-    check_object(motion, "Motion", "motion")
     check_keywords(fall, view)
     scene, data = scene_and_data(motion, speed=speed, frames=frames, trail=trail, ghost=ghost, up=up, fall=fall)
     return page_from(
@@ -99,28 +98,18 @@ def scene_and_data(
     check_flag(ghost, "ghost")
     rate = playing_speed(motion.duration, speed)
     up_axis(up, None)
-    scene = _scene(motion, rate, frames, trail, fall)
+    count = frame_count(motion.duration, rate) if frames is None else frames
+    scene = moving_scene(motion, count, trail=trail, **fall)
+    if frames is None and scene.largest_turn > 0.5 * math.pi:
+        warnings.warn(
+            f"from one frame to the next something turns by {math.degrees(scene.largest_turn):.0f} degrees and may "
+            f"seem to turn the other way; choose more than {count} frames, or a lower speed than {rate:.3g}",
+            VisualWarning,
+            stacklevel=3,
+        )
     if up is None and scene.falls:
         gravity = np.asarray(fall["gravity"], dtype=float)
         upwards = -gravity / np.linalg.norm(gravity)
     else:
         upwards = up_axis(up, scene.body)
     return scene, motion_data(scene, speed=rate, ghost=ghost, up=upwards)
-
-
-def _scene(
-    motion: Motion, speed: float, frames: int | None, trail: str | None, fall: Mapping[str, ArrayLike]
-) -> MovingScene:
-    """Return the scene with the given number of frames, or as many as the speed needs."""
-    if frames is not None:
-        return moving_scene(motion, frames, trail=trail, **fall)
-    count = frame_count(motion.duration, speed)
-    scene = moving_scene(motion, count, trail=trail, **fall)
-    if scene.largest_turn > 0.5 * math.pi:
-        warnings.warn(
-            f"from one frame to the next something turns by {math.degrees(scene.largest_turn):.0f} degrees and may "
-            f"seem to turn the other way; choose more than {count} frames, or a lower speed than {speed:.3g}",
-            VisualWarning,
-            stacklevel=3,
-        )
-    return scene

@@ -52,6 +52,8 @@ _NOT_OF_RIGID = ("motion", "joint_noise", *OF_PARTS)
 class Case:
     """The numbers that make one case, from which the library's own calls compute it.
 
+    Made by `Study.case`.
+
     Attributes
     ----------
     index : of the case
@@ -64,12 +66,6 @@ class Case:
     masses, inertias : (k,) factors of the moving parts' masses, and of their inertias beside those, or None
     centres : (k, 3) by how much their centres of mass are moved, in radii of gyration, or None
     joint_noise : standard deviation of the noise of the path's samples [rad or m], or None
-
-    Examples
-    --------
-    >>> study = sp.study.Study("cat", "cat_righting", {"momentum_z": [0.0, 0.1, 0.2]})
-    >>> study.case(2).momentum
-    array([0. , 0. , 0.2])
     """
 
     index: int

@@ -45,17 +45,12 @@ _PROCESSOR_LENGTH = 96  # bytes
 class StudyStore:
     """A store and its contents.
 
+    Made by `Study.run`.
+
     Attributes
     ----------
     path : of the folder
     attributes : its description: the study, its hash, inputs, versions, seed, the command
-
-    Examples
-    --------
-    >>> study = sp.study.Study("cat", "cat_righting", {"momentum_z": [0.0, 0.1, 0.2]}, outputs=("turn",), chunk=2)
-    >>> store = study.run("cat.zarr", workers=0)
-    >>> store.counts()["done"], store.values("turn").shape, store.attributes["seed"]
-    (3, (3,), 0)
     """
 
     path: Path

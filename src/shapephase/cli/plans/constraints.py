@@ -26,47 +26,21 @@ _STATED = "body"  # stands for the limits that a body's file states
 class JointOptions:
     """Postures of the joints, and which of them move."""
 
-    from_: Annotated[
-        tuple[str, ...],
-        option(
-            "Posture at the start: JOINT=VALUE with blanks or commas between them, in rad or m or with a unit, or the "
-            "first row of a motion file; default: zero, or as near as the limits permit. For example "
-            "`--from waist_pitch=30deg waist_yaw=0.1`.",
-            name="--from",
-            several=True,
-        ),
-    ] = ()
-    to: Annotated[
-        tuple[str, ...],
-        option(
-            "Posture at the end, as --from (last row of a file), or free; default: that of the start. For example "
-            "`--to free`.",
-            several=True,
-        ),
-    ] = ()
-    via: Annotated[
-        tuple[str, ...],
-        option(
-            "Posture passed without stopping: JOINT=VALUE with commas between them, with or without @ and a time in s; "
-            "or FILE@TIME. Repeat for more, in this order. For example "
-            "`--via waist_pitch=60deg@0.4`.",
-            negative_iterable="",
-        ),
-    ] = ()
-    joints: Annotated[
-        str | None,
-        option(
-            "Joints that move, with commas between them, or with a minus before each those that rest; default: all. "
-            "For example `--joints waist_pitch,waist_yaw` or `--joints -head_yaw`.",
-            allow_leading_hyphen=True,
-        ),
-    ] = None
-    mirror: Annotated[
-        str | None,
-        rare(
-            "Joints that follow others, or with a minus move against them; for example `--mirror hip_left=-hip_right`.",
-        ),
-    ] = None
+    from_: Annotated[tuple[str, ...], option(name="--from", several=True)] = ()
+    """Posture at the start: JOINT=VALUE with blanks or commas between them, in rad or m or with a unit, or the first
+    row of a motion file; default: zero, or as near as the limits permit. For example
+    `--from waist_pitch=30deg waist_yaw=0.1`."""
+    to: Annotated[tuple[str, ...], option(several=True)] = ()
+    """Posture at the end, as --from (last row of a file), or free; default: that of the start. For example
+    `--to free`."""
+    via: Annotated[tuple[str, ...], option(negative_iterable="")] = ()
+    """Posture passed without stopping: JOINT=VALUE with commas between them, with or without @ and a time in s; or
+    FILE@TIME. Repeat for more, in this order. For example `--via waist_pitch=60deg@0.4`."""
+    joints: Annotated[str | None, option(allow_leading_hyphen=True)] = None
+    """Joints that move, with commas between them, or with a minus before each those that rest; default: all. For
+    example `--joints waist_pitch,waist_yaw` or `--joints -head_yaw`."""
+    mirror: Annotated[str | None, rare()] = None
+    """Joints that follow others, or with a minus move against them; for example `--mirror hip_left=-hip_right`."""
 
     def arguments(self, body: Body) -> dict[str, Any]:
         """Return those arguments of `plan_reorientation` that concern postures and joints."""
@@ -85,37 +59,17 @@ class JointOptions:
 class LimitOptions:
     """Limits of the joints."""
 
-    rate_limit: Annotated[
-        tuple[str, ...],
-        option(
-            "Largest rate of every joint, or JOINT=VALUE, in rad/s or m/s or with a unit; default: as the body's file "
-            "states. For example `--rate-limit 200deg/s` or `--rate-limit waist_yaw=3`.",
-            several=True,
-        ),
-    ] = ()
-    acceleration_limit: Annotated[
-        tuple[str, ...],
-        rare(
-            "Largest acceleration, likewise, in rad/s^2 or m/s^2; default: none. For example "
-            "`--acceleration-limit 20`.",
-            several=True,
-        ),
-    ] = ()
-    jerk_limit: Annotated[
-        tuple[str, ...],
-        rare(
-            "Largest jerk, likewise, in rad/s^3 or m/s^3; default: none. With one, joints that start from rest start "
-            "without acceleration. For example `--jerk-limit 100`.",
-            several=True,
-        ),
-    ] = ()
-    effort: Annotated[
-        str | None,
-        rare(
-            "Largest torque or force of every joint, in N m or N, or body for the limits that the body's file states; "
-            "default: none. For example `--effort body`.",
-        ),
-    ] = None
+    rate_limit: Annotated[tuple[str, ...], option(several=True)] = ()
+    """Largest rate of every joint, or JOINT=VALUE, in rad/s or m/s or with a unit; default: as the body's file states.
+    For example `--rate-limit 200deg/s` or `--rate-limit waist_yaw=3`."""
+    acceleration_limit: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """Largest acceleration, likewise, in rad/s^2 or m/s^2; default: none. For example `--acceleration-limit 20`."""
+    jerk_limit: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """Largest jerk, likewise, in rad/s^3 or m/s^3; default: none. With one, joints that start from rest start without
+    acceleration. For example `--jerk-limit 100`."""
+    effort: Annotated[str | None, rare()] = None
+    """Largest torque or force of every joint, in N m or N, or body for the limits that the body's file states; default:
+    none. For example `--effort body`."""
 
     def limits(self, body: Body) -> Limits:
         """Return the limits. Raises ShapeError, UnknownNameError."""

@@ -23,40 +23,19 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 class GoalOptions:
     """What the motion reaches."""
 
-    turn: Annotated[
-        tuple[str, ...],
-        option(
-            "Turn at the end: degrees, and an axis of the base at the start (x, y, z, or three numbers with commas "
-            'between them); of several the cheapest. For example `--turn "90 about y"`.',
-            negative_iterable="",
-            allow_leading_hyphen=True,
-        ),
-    ] = ()
-    point: Annotated[
-        tuple[str, str] | None,
-        option(
-            "Axis of the base, or behind a link's name of this link, and its direction at the end, inertial axes; the "
-            'turn about it is free. For example `--point "dish 0 0 1" "0 1 0"`.',
-            negative_iterable="",
-            allow_leading_hyphen=True,
-        ),
-    ] = None
-    somersaults: Annotated[
-        float | None,
-        option("Turns about the momentum; for example `--somersaults 1.5 --momentum 0 40 0`."),
-    ] = None
-    half_twists: Annotated[
-        float | None,
-        option("Half turns about the base's z axis, with --somersaults; for example `--half-twists 2`."),
-    ] = None
-    symmetry: Annotated[
-        str | None,
-        rare(
-            "Symmetry of the body, or of the link of --point: how often it repeats about an axis of the base, or an "
-            'axis alone for all turns about it. For example `--symmetry "4 about x"`.',
-            allow_leading_hyphen=True,
-        ),
-    ] = None
+    turn: Annotated[tuple[str, ...], option(negative_iterable="", allow_leading_hyphen=True)] = ()
+    """Turn at the end: degrees, and an axis of the base at the start (x, y, z, or three numbers with commas between
+    them); of several the cheapest. For example `--turn "90 about y"`."""
+    point: Annotated[tuple[str, str] | None, option(negative_iterable="", allow_leading_hyphen=True)] = None
+    """Axis of the base, or behind a link's name of this link, and its direction at the end, inertial axes; the turn
+    about it is free. For example `--point "dish 0 0 1" "0 1 0"`."""
+    somersaults: Annotated[float | None, option()] = None
+    """Turns about the momentum; for example `--somersaults 1.5 --momentum 0 40 0`."""
+    half_twists: Annotated[float | None, option()] = None
+    """Half turns about the base's z axis, with --somersaults; for example `--half-twists 2`."""
+    symmetry: Annotated[str | None, rare(allow_leading_hyphen=True)] = None
+    """Symmetry of the body, or of the link of --point: how often it repeats about an axis of the base, or an axis alone
+    for all turns about it. For example `--symmetry "4 about x"`."""
 
     def goal(self) -> Goal:
         """Return the goal. Raises ShapeError for options that exclude or need one another, or not finite numbers."""

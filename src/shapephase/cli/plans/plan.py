@@ -21,7 +21,7 @@ from ..options import (
 )
 from ..outcome import ExitCode, Outcome, check_writable
 from ..progress import steps
-from ..terminal import say_written
+from ..terminal import write_file
 from .constraints import JointOptions, LimitOptions
 from .goals import GoalOptions
 from .search import SearchOptions, running_search
@@ -86,8 +86,7 @@ def plan_command(
     target, settings = goal.goal(), searching.search()
     if not 0.0 < duration < math.inf:
         raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
-    aside = check_writable(out, "--out", ".csv")
-    aside = check_writable(html, "--html", ".html") or aside
+    aside = any([check_writable(out, "--out", ".csv"), check_writable(html, "--html", ".html")])
     with steps(3 if html else 2) as work:
         work.begin("loading")
         loaded = load_body(body, **floating.loading)
@@ -113,23 +112,21 @@ def plan_command(
                     raise
                 plan = cast("Plan", failure.best)
                 warnings.warn(str(failure), stacklevel=2)
-        if out is not None:
-            write_shape_path(plan.path, out, comment=plan_comment(loaded, plan))
-            say_written(out)
+        write_file(out, lambda file: write_shape_path(plan.path, file, comment=plan_comment(loaded, plan)))
         if html is not None:
             work.begin("making the report")
             from ...phases.phases import split
             from ...plots.report_page import report
 
-            report(
+            page = report(
                 plan.motion,
                 split(plan.motion),
                 shape_path=plan.path,
                 title=f"{loaded.name} turns itself",
                 purpose=plan_purpose(plan),
                 progress=work.watch,
-            ).write(html)
-            say_written(html)
+            )
+            write_file(html, page.write)
     return Outcome(
         "\n".join(plan_lines(loaded, plan)),
         plan_data(loaded, plan),

@@ -6,7 +6,6 @@ import math
 import multiprocessing
 import os
 import signal
-import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -17,9 +16,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from ...errors import ShapeError
+from ..ctrl_c import handled_by, stop_searches
 from ..options import option, rare
 from ..progress import Steps
-from ..start import stop_searches_on_ctrl_c
 
 if TYPE_CHECKING:
     from ...optimal_control.plan_options import Search
@@ -30,28 +29,19 @@ if TYPE_CHECKING:
 class SearchOptions:
     """How a plan is searched for."""
 
-    starts: Annotated[
-        int, option("Searches from different guesses; the cheapest plan is kept. For example `--starts 4`.")
-    ] = 1
-    workers: Annotated[
-        int | None,
-        option("Processes that search in parallel; default: 1. For example `--workers 4`."),
-    ] = None
-    time_limit: Annotated[
-        float | None,
-        option("Longest time of the search, in s; the best result is written. For example `--time-limit 60`."),
-    ] = None
-    seed: Annotated[int, rare("Seed of the random guesses; for example `--seed 7`.")] = 0
-    pieces: Annotated[
-        int | None,
-        rare(
-            "Pieces of the motion's spline, six or more; default: 20 to 160, by the number of joints. For example "
-            "`--pieces 12`.",
-        ),
-    ] = None
-    iterations: Annotated[
-        int, rare("Most iterations of the solver for each start; for example `--iterations 1000`.")
-    ] = 300
+    starts: Annotated[int, option()] = 1
+    """Searches from different guesses; the cheapest plan is kept. For example `--starts 4`."""
+    workers: Annotated[int | None, option()] = None
+    """Processes that search in parallel; default: 1. For example `--workers 4`."""
+    time_limit: Annotated[float | None, option()] = None
+    """Longest time of the search, in s; the best result is written. For example `--time-limit 60`."""
+    seed: Annotated[int, rare()] = 0
+    """Seed of the random guesses; for example `--seed 7`."""
+    pieces: Annotated[int | None, rare()] = None
+    """Pieces of the motion's spline, six or more; default: 20 to 160, by the number of joints. For example
+    `--pieces 12`."""
+    iterations: Annotated[int, rare()] = 300
+    """Most iterations of the solver for each start; for example `--iterations 1000`."""
 
     def search(self) -> Search:
         """Return the search's settings. Raises ShapeError."""
@@ -113,21 +103,8 @@ def running_search(options: SearchOptions, work: Steps) -> Iterator[tuple[Interr
     """Yield a search that Ctrl-C stops, and its processes if it has several."""
     workers = options.workers if options.workers is not None and options.workers > 1 else None
     search = InterruptibleSearch(work, options.time_limit, in_parallel=workers is not None)
-    with _handler(search.interrupted), _executor(workers, search) as executor:
+    with handled_by(search.interrupted), _executor(workers, search) as executor:
         yield search, executor
-
-
-@contextmanager
-def _handler(interrupted: Any) -> Iterator[None]:
-    """Install a handler of Ctrl-C; in other threads than the main one Python delivers none."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGINT, interrupted)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 @contextmanager
@@ -138,9 +115,9 @@ def _executor(workers: int | None, search: InterruptibleSearch) -> Iterator[Exec
         return
     # A process that was forked beside threads of the solver may hang.
     spawned = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=stop_searches_on_ctrl_c) as processes:
+    with ProcessPoolExecutor(workers, mp_context=spawned, initializer=stop_searches) as processes:
         # They ignore Ctrl-C until their own handler is installed.
-        with _handler(signal.SIG_IGN):
+        with handled_by(signal.SIG_IGN):
             processes.submit(int)
         search.processes = [child.pid for child in multiprocessing.active_children() if child.pid is not None]
         try:

@@ -8,10 +8,9 @@ from cyclopts import Parameter
 
 from ...errors import ShapeError
 from ..options import PRINT_DEFAULTS, Moments, OptionalFigureFile, PrintOptions
-from ..outcome import Outcome, check_writable
-from ..terminal import say_written
+from ..outcome import FIGURE_ENDINGS, FIGURE_HEIGHT, Outcome, check_writable
+from ..terminal import write_file
 
-_ENDINGS = (".svg", ".pdf", ".png")
 _PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.05)  # of the way from the separatrix' p to the largest: the p without --momenta
 
 
@@ -43,7 +42,7 @@ def conjugate_command(
     from ...arrays import finite_array
     from ...rigid_body.geodesics import serret_andoyer_metric
 
-    aside = check_writable(out, "--out", *_ENDINGS)
+    aside = check_writable(out, "--out", *FIGURE_ENDINGS)
     metric = serret_andoyer_metric(moments)
     low, high = metric.separatrix_momentum, metric.largest_momentum
     p = finite_array(momenta if momenta else [low + part * (high - low) for part in _PARTS], "--momenta", (None,))
@@ -59,8 +58,8 @@ def conjugate_command(
         from ...plots.geodesic_plots import plot_conjugate_locus
         from ...plots.plot_style import column_axes, write_axes
 
-        write_axes(plot_conjugate_locus(column_axes(2.8), moments, order, momenta=p), out)
-        say_written(out)
+        ax = plot_conjugate_locus(column_axes(FIGURE_HEIGHT), moments, order, momenta=p)
+        write_file(out, lambda file: write_axes(ax, file))
     rows = zip(p, family.period, family.first_return, found.time, found.phi, found.theta, strict=True)
     listed = " ".join(f"{moment:g}" for moment in moments)
     lines = [

@@ -9,9 +9,9 @@ from cyclopts import Parameter
 
 from ...errors import ShapeError
 from ..options import PRINT_DEFAULTS, FilmFile, Moments, OptionalFigureFile, PageFile, PrintOptions
-from ..outcome import Outcome, check_writable
+from ..outcome import FIGURE_ENDINGS, Outcome, check_writable
 from ..pictures import check_page_files, deliver
-from ..terminal import say_written
+from ..terminal import write_file
 
 if TYPE_CHECKING:
     from ...rigid_body.euler_top import EulerTop
@@ -50,23 +50,19 @@ def rigid_command(
     time
         When the ellipsoid and the cones are shown, in s; for example `--time 1.5`.
     """
-    from ...errors import unknown_name
+    from ...arguments import check_choice
     from ...plots.named_figures import RIGID_FIGURES, write_rigid_figure
     from ...plots.pages.poinsot_page import rolling_ellipsoid, rolling_facts
 
-    if figure not in RIGID_FIGURES:
-        raise unknown_name("kind of figure", figure, RIGID_FIGURES)
+    check_choice(figure, "kind of figure", RIGID_FIGURES)
     if not math.isfinite(time):
         raise ShapeError(f"--time: a number is needed, got {time}")
-    aside = check_writable(out, "--out", ".svg", ".pdf", ".png")
+    aside = check_writable(out, "--out", *FIGURE_ENDINGS)
     aside = check_page_files(html, video) or aside
     top = _top(moments, momentum)
     facts = rolling_facts(top)
-    written: dict[str, str] = {}
-    if out is not None:
-        write_rigid_figure(figure, top, out, time)
-        say_written(out)
-        written = {"figure": str(out)}
+    write_file(out, lambda file: write_rigid_figure(figure, top, file, time))
+    written = {} if out is None else {"figure": str(out)}
     if html is not None or video is not None:
         written |= deliver(rolling_ellipsoid(top), html, video)[1]
     data = {

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ... import so3
+from ...arguments import check_choice
 from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import CurvedJoint
 from ...body.drawing.visual import Visual
 from ...body.link_motions import link_motions
-from ...errors import unknown_name
 from ...shape_space.interpolation import ball_columns, neighbours_signs
 from .._moving_scene import MovingNode, MovingScene
 
@@ -42,23 +42,23 @@ def motion_data(scene: MovingScene, *, speed: float, ghost: bool, up: Array) -> 
         "duration": float(scene.times[-1]),
         "frames": len(scene.times),
         "speed": speed,
-        "turns": _single(so3.quat_from_matrix(scene.base[:, :3, :3])),
-        "places": _single(scene.base[:, :3, 3]),
-        "centre": _single(scene.centre),
+        "turns": single(so3.quat_from_matrix(scene.base[:, :3, :3])),
+        "places": single(scene.base[:, :3, 3]),
+        "centre": single(scene.centre),
         "momentum": scene.momentum.tolist(),
-        "trail": None if scene.trail is None else _single(scene.trail),
+        "trail": None if scene.trail is None else single(scene.trail),
         "reach": scene.reach,
-        "extent": _single(scene.extent),
+        "extent": single(scene.extent),
         "up": up.tolist(),
         "ghost": ghost,
-        "floor": _single(_floor(scene, up)) if scene.falls else None,
+        "floor": single(_floor(scene, up)) if scene.falls else None,
         "meshes": stored,
         "chain": None,
         "joints": [],
     }
     if scene.body is not None and scene.shapes is not None:
         data |= body_data(scene.body) | {
-            "shapes": _single(neighbours_signs(scene.shapes, ball_columns(scene.body.joint_names)))
+            "shapes": single(neighbours_signs(scene.shapes, ball_columns(scene.body.joint_names)))
         }
         data["nodes"] = frame_nodes(scene.body, {node.name: node.shapes for node in scene.nodes}, meshes, stored)
     else:
@@ -118,9 +118,9 @@ def frame_nodes(
 def _moving_node(node: MovingNode, meshes: dict[int, int], stored: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "name": node.name,
-        "turns": _single(so3.quat_from_matrix(node.poses[:, :3, :3])),
-        "places": _single(node.poses[:, :3, 3]),
-        "scales": None if node.scales is None else _single(node.scales),
+        "turns": single(so3.quat_from_matrix(node.poses[:, :3, :3])),
+        "places": single(node.poses[:, :3, 3]),
+        "scales": None if node.scales is None else single(node.scales),
         "shapes": [_shape(shape, shape.pose, meshes, stored) for shape in node.shapes],
     }
 
@@ -136,7 +136,7 @@ def _shape(shape: Visual, pose: Array, meshes: dict[int, int], stored: list[dict
     if shape.kind == "mesh":
         if id(shape.vertices) not in meshes:
             meshes[id(shape.vertices)] = len(stored)
-            stored.append({"vertices": _single(shape.vertices), "faces": shape.faces.astype(np.uint32)})
+            stored.append({"vertices": single(shape.vertices), "faces": shape.faces.astype(np.uint32)})
         described["mesh"] = meshes[id(shape.vertices)]
     return described
 
@@ -159,7 +159,8 @@ def _floor(scene: MovingScene, up: Array) -> Array:
     return np.concatenate(lines).reshape(-1, 3)
 
 
-def _single(values: Array) -> np.ndarray:
+def single(values: Array) -> np.ndarray:
+    """The values as 32-bit floats, as pages hold moving numbers."""
     return np.asarray(values, dtype=np.float32)
 
 
@@ -175,8 +176,7 @@ def up_axis(up: str | None, body: Body | None) -> Array:
         For an unknown axis.
     """
     if up is not None:
-        if not isinstance(up, str) or up not in AXES:
-            raise unknown_name("axis", up, AXES)
+        check_choice(up, "axis", AXES)
         return np.array(AXES[up])
     y_up = body is not None and body.n_shape > 0 and _mirrored(body, 2) and not _mirrored(body, 1)
     return np.array(AXES["y" if y_up else "z"])

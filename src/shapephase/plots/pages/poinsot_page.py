@@ -16,6 +16,7 @@ from ...letters import value_text
 from ...rigid_body.euler_top import EulerTop
 from ...rigid_body.poinsot import Poinsot
 from ..page import Page, frame_count, playing_speed
+from .report_data import plot_data
 from .templates import SCENE_SCRIPTS, page_from
 
 _PERIODS = 3.0  # of the body momentum that are shown
@@ -178,21 +179,16 @@ def _rolling(rolling: Poinsot, times: Array) -> dict[str, Any]:
 def _plots(rolling: Poinsot, times: Array) -> list[dict[str, Any]]:
     velocity = rolling.polhode(times) @ rolling.top.axes
     along = {f"axis of I{sign}": velocity[:, k] for k, sign in enumerate("₁₂₃")}
-    turning = _plot("angular velocity along the principal axes", "rad/s", along)
+    turning = plot_data("angular velocity along the principal axes", "rad/s", along)
     if not rolling.annulus[1]:
         # The herpolhode is a point.
         return [turning]
     radius, angle = rolling.herpolhode_radius(times), np.degrees(rolling.herpolhode_angle(times))
     return [
         turning,
-        _plot("herpolhode: distance from the foot of the momentum", "rad/s", {"radius": radius}),
-        _plot("herpolhode: angle about the momentum", "°", {"angle": angle}),
+        plot_data("herpolhode: distance from the foot of the momentum", "rad/s", {"radius": radius}),
+        plot_data("herpolhode: angle about the momentum", "°", {"angle": angle}),
     ]
-
-
-def _plot(title: str, unit: str, series: dict[str, Array]) -> dict[str, Any]:
-    curves = [{"name": name, "values": values.astype(np.float32)} for name, values in series.items()]
-    return {"title": title, "unit": unit, "series": curves}
 
 
 def rolling_facts(top: EulerTop) -> list[tuple[str, str, str]]:

@@ -12,6 +12,7 @@ from ...body.body import Body
 from ...phases.momentum_curve import Gauge, momentum_curve
 from ...phases.phases import running_phases
 from ...reconstruction.reconstruction import Motion
+from .motion_data import single
 
 _MOST_JOINTS = 8  # those that move most
 _NO_TURN = 1e-9  # [rad] a smaller turn has no axis
@@ -22,14 +23,14 @@ def report_data(motion: Motion, times: Array, gauge: Gauge, body: Body | None, s
     plots = [_turn_plot(motion, times)]
     data: dict[str, Any] = {"plots": plots, "directions": None}
     if motion.momentum.any():
-        data["directions"] = _single(momentum_curve(motion, gauge, times=times).directions(times)[0])
+        data["directions"] = single(momentum_curve(motion, gauge, times=times).directions(times)[0])
         phases = running_phases(motion, times, gauge)
         series = {
             "Montgomery": phases.montgomery_phase,
             "dynamic": phases.dynamic_phase,
             "geometric": phases.geometric_phase,
         }
-        plots.insert(0, _plot("phases so far", "°", {name: np.degrees(values) for name, values in series.items()}))
+        plots.insert(0, plot_data("phases so far", "°", {name: np.degrees(values) for name, values in series.items()}))
     if body is not None and shapes is not None:
         plots += _joint_plots(body, shapes)
     return data
@@ -55,7 +56,7 @@ def _turn_plot(motion: Motion, times: Array) -> dict[str, Any]:
     turned = motion.attitude(times) @ motion.initial_attitude.T
     vectors = np.degrees(continued_rotation_vectors(turned))
     series = {f"about {name}": vectors[:, k] for k, name in enumerate("XYZ")}
-    return _plot("turn since the start, as a rotation vector", "°", series)
+    return plot_data("turn since the start, as a rotation vector", "°", series)
 
 
 def _joint_plots(body: Body, shapes: Array) -> list[dict[str, Any]]:
@@ -71,14 +72,11 @@ def _joint_plots(body: Body, shapes: Array) -> list[dict[str, Any]]:
             scale = np.degrees(1.0) if unit == "rad" else 1.0
             more = f", {len(most)} of {len(moving)}" if left else ""
             series = {body.joint_names[k]: scale * shapes[:, k] for k in sorted(most.tolist())}
-            found.append(_plot(title + more, shown, series))
+            found.append(plot_data(title + more, shown, series))
     return found
 
 
-def _plot(title: str, unit: str, series: dict[str, Array]) -> dict[str, Any]:
-    curves = [{"name": name, "values": _single(values)} for name, values in series.items()]
+def plot_data(title: str, unit: str, series: dict[str, Array]) -> dict[str, Any]:
+    """Data of curves that a page draws in time."""
+    curves = [{"name": name, "values": single(values)} for name, values in series.items()]
     return {"title": title, "unit": unit, "series": curves}
-
-
-def _single(values: Array) -> np.ndarray:
-    return np.asarray(values, dtype=np.float32)
