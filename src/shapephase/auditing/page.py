@@ -15,6 +15,7 @@ from ..plots.page import Page
 from ..plots.pages.templates import page_from
 from ..plots.plot_style import axes_image
 from ..plots.report_page import figure_rows
+from ._held_states import held_states
 from ._observation import observed
 from ._ranking import EXPLAINS
 from ._residuals import residuals
@@ -55,6 +56,7 @@ def audit_page(body: Body, trajectories: FloatingTrajectory | Sequence[FloatingT
     check_object(body, "Body", "body")
     check_object(found, "Audit", "found")
     given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else list(trajectories)
+    given = [held_states(run)[0] for run in given]
     return page_from(
         "audit.html",
         title=f"Audit of {found.body}",

@@ -25,6 +25,7 @@ from ._consistency import rate_agreement
 from ._drag import drag
 from ._filtered_samples import filtered_samples
 from ._gravity import wrong_gravity
+from ._held_states import held_states
 from ._integration_step import StepOrder, integration_step, step_hypothesis, step_order
 from ._joint_offsets import joint_offsets
 from ._missing_term import no_gyroscopic_term
@@ -122,6 +123,8 @@ def audit(
         many = whole_argument(every, "every", 1)
         runs = [run if run.step else replace(run, step=run.integrator_step / many) for run in runs]
     runs = [_with_near_signs(body, run) for run in runs]
+    states = [held_states(run) for run in runs]
+    runs = [run for run, _ in states]
     parts = [_airborne(body, run, flight) for run in runs]
     flown = [run.part(part.first, part.past) for run, part in zip(runs, parts, strict=True)]
     if min(len(run.times) for run in flown) < TOLD_APART:
@@ -144,6 +147,10 @@ def audit(
     if gravity is not None and (falls or all(one.kind == "step" for one in found.tie)):
         found = found.beside(gravity)
         looked = [replace(one, right=False) for one in looked]
+    held = {hypothesis.name: hypothesis for _, hypothesis in states if hypothesis is not None}
+    for hypothesis in held.values():
+        found = found.beside(hypothesis)
+    looked = [replace(one, right=one.right and held is None) for one, (_, held) in zip(looked, states, strict=True)]
     return Audit(
         body=body.name,
         runs=tuple(looked),
