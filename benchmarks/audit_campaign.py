@@ -452,7 +452,7 @@ def is_true(flight: Flight, found: Any) -> bool:
 
 
 def judged(flight: Flight) -> tuple[str, str]:
-    """One of "no alarm", "first", "tie", "missed", "wrong alone", "alarm", "refused", "either"; and what was named."""
+    """Column of the table, and what was named."""
     run = fly(flight)
     try:
         found = sp.audit(body_of(flight.name), run)
@@ -460,6 +460,8 @@ def judged(flight: Flight) -> tuple[str, str]:
         return "refused", str(error)
     names = "; ".join(one.name for one in found.cause)
     by_step = flight.kind in (*RIGHT, "sparse steps") and flight.integrator != "rk4"
+    if not found.right and not found.wrong:
+        return "cannot tell", names
     if found.right:
         hidden = not by_step or flight.drift <= VISIBLE or flight.kind != "right"
         right = flight.silence_allowed or (flight.kind in RIGHT and hidden)
@@ -494,7 +496,7 @@ def main() -> None:
                 f"true {flight.words}; named: {named[:200]}",
                 flush=True,
             )
-    columns = ("no alarm", "first", "tie", "missed", "wrong alone", "alarm", "refused")
+    columns = ("no alarm", "cannot tell", "first", "tie", "missed", "wrong alone", "alarm", "refused")
     print(f"{'kind':24}" + "".join(f"{name:>13}" for name in columns))
     for kind, count in counts.items():
         print(f"{kind:24}" + "".join(f"{count[name]:13d}" for name in columns))

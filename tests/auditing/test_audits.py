@@ -153,7 +153,7 @@ def test_the_record_is_json_and_the_table_says_the_verdict():
 
 def test_a_recorder_in_a_running_loop_and_an_assertion():
     motion = flown("diver", seed=1, step=0.001, every=5, duration=0.3)
-    recorder = sp.auditing.FlightRecorder(body_of("diver"), joint_names=motion.joint_names, step=0.001)
+    recorder = sp.auditing.FlightRecorder(body_of("diver"), joint_names=motion.joint_names, integrator_step=0.001)
     for row in zip(motion.times, motion.qpos, motion.qvel, strict=True):
         recorder.add(*row)
     assert recorder.audit(tolerance=1e-5).right

@@ -20,7 +20,7 @@ from support.planted_faults import trajectory
 
 def without_step(name: str, **more) -> sp.FloatingTrajectory:
     """A run of which nobody states the step."""
-    return replace(trajectory(name, flown(name, **more)), step=None)
+    return replace(trajectory(name, flown(name, **more)), integrator_step=None)
 
 
 def names(found: sp.Audit) -> list[str]:

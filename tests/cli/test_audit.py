@@ -37,7 +37,7 @@ def test_a_wrong_one_ends_with_ten_and_says_why(tmp_path: Path, capsys: pytest.C
 
 
 def test_faults_of_its_arguments_are_usage(capsys: pytest.CaptureFixture[str]):
-    for words in (["cat_two_halves"], ["cat_two_halves", str(FLOWN), "--step", "0.1", "0.2"]):
+    for words in (["cat_two_halves"], ["cat_two_halves", str(FLOWN), "--integrator-step", "0.1", "0.2"]):
         with pytest.raises(SystemExit) as ended:
             main(["audit", *words])
         assert ended.value.code == ExitCode.USAGE

@@ -116,7 +116,7 @@ def rate_differences(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> 
         own = [each[:, [joint]] for each in found]
         pairs.append(("joints", own[0], own[1], joint_rates[:, [joint]], of_shape, of_rate, far))
     slopes, differences, levels, biases, kinds = [], [], [], [], []
-    held = _HELD * trajectory.integrator_step**2
+    held = _HELD * trajectory.assumed_step**2
     again = difference_weights(trajectory.times[inner])
     for kind, own, narrow, given, of_place, of_rate, far in pairs:
         fast = float(np.abs(given).max(initial=0.0))

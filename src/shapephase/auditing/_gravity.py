@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..arrays import Array
+from ..body.body import Body
 from ..shape_space.free_fall import GRAVITY
 from ._observation import Observation
+from ._step_drift import step_drift
 from .audit_result import RunAudit
 from .hypothesis import FittedValue, Hypothesis
 
@@ -19,21 +21,28 @@ _SAG = 8.0  # acceleration of a parabola over T whose middle is off its chord by
 _AXES = "xyz"
 
 
-def wrong_gravity(seen: Sequence[Observation], runs: Sequence[RunAudit], wander: float) -> Hypothesis | None:
+def wrong_gravity(
+    body: Body, seen: Sequence[Observation], runs: Sequence[RunAudit], wander: float, steps: Sequence[float]
+) -> Hypothesis | None:
     """None where every fall is that on earth with x, y or z up, of a recording also down, or none, as in orbit.
 
     Parameters
     ----------
     runs : results of the same trajectories
     wander : of the centre of mass of those that are recordings [m]
+    steps : of semi-implicit Euler, whose drift of the centre of mass is taken off [s]
     """
-    for sampled, run in zip(seen, runs, strict=True):
+    for sampled, run, step in zip(seen, runs, steps, strict=True):
         if sampled.centre is None or sampled.centre_noise is None or run.fall_off is None:
             continue
         off = max(run.fall_off, wander if run.recorded else 0.0)
-        pull, bar = _fall(sampled.times, sampled.centre, sampled.centre_noise, off)
+        drift = step_drift(body, sampled, None).centre if step else None
+        centre = sampled.centre if drift is None else sampled.centre - step * drift
+        pull, bar = _fall(sampled.times, centre, sampled.centre_noise, off)
+        by_step = pull - _fall(sampled.times, sampled.centre, sampled.centre_noise, off)[0]
         size, axis = float(np.linalg.norm(pull)), int(np.argmax(np.abs(pull)))
-        allowed = _ELSEWHERE * GRAVITY + _BARS * bar
+        # What a step adds is known as well as the rates are, whose frame may be wrong.
+        allowed = _ELSEWHERE * GRAVITY + _BARS * bar + float(np.linalg.norm(by_step))
         expected = np.zeros(3)
         expected[axis] = np.copysign(GRAVITY, pull[axis]) if run.recorded else -GRAVITY
         if size > allowed and np.linalg.norm(pull - expected) > allowed:

@@ -26,6 +26,7 @@ _ABOVE = 10.0
 """Drifts in units of what is known of them, by noise and rounding: smaller ones tell no order."""
 _BELONGS = 0.25  # of the drifts: largest share that the law of one order may leave
 _UNEVEN = 1.0  # largest difference of orders between steps where the step alone is the cause
+_BARS = 3.0  # standard deviations by which a fitted step may be off
 _INACCURATE = 0.1  # of a step: what terms of second order add, 0.1 % for 2 ms at 10 rad/s, and 5 % for 20 ms
 
 
@@ -63,9 +64,9 @@ def step_order(runs: Sequence[Observation], least: Sequence[float]) -> StepOrder
 
     least : of each run, what a drift has to exceed, rms relative to the momenta
     """
-    ordered = sorted(zip(runs, least, strict=True), key=lambda pair: pair[0].trajectory.integrator_step)
+    ordered = sorted(zip(runs, least, strict=True), key=lambda pair: pair[0].trajectory.assumed_step)
     known = [(run, _drift(run)) for run, limit in ordered if _rms(_drift(run)) > _ABOVE * limit * run.scale]
-    steps = [run.trajectory.integrator_step for run, _ in known]
+    steps = [run.trajectory.assumed_step for run, _ in known]
     if len(known) < 2 or any(longer < _APART * shorter for shorter, longer in pairwise(steps)):
         return None
     drifts = [_rms(drift) / run.scale for run, drift in known]
@@ -125,9 +126,16 @@ def _together(known: Sequence[tuple[Observation, Array]]) -> Array:
 def _off_law(known: Sequence[tuple[Observation, Array]], order: float) -> float:
     """What one curve times step^order leaves of the drifts, rms relative to them, each run weighing alike."""
     drifts = _together(known)
-    powers = np.array([run.trajectory.integrator_step for run, _ in known]) ** order
+    powers = np.array([run.trajectory.assumed_step for run, _ in known]) ** order
     scaled = drifts / powers[:, None, None]
     return _rms((scaled - scaled.mean(axis=0)).reshape(-1, 3)) / _rms(scaled.reshape(-1, 3))
+
+
+def is_possible_step(fit: Residuals, step: float, bar: float) -> bool:
+    """Whether a fitted step is positive, no longer than the time between samples, and the one that is given."""
+    spacing, given = float(np.median(np.diff(fit.seen.times))), fit.seen.trajectory.integrator_step
+    off = _BARS * bar + _INACCURATE * step
+    return 0.0 < step <= spacing + off and (given is None or abs(step - given) <= off)
 
 
 def integration_step(fits: Sequence[Residuals]) -> list[Hypothesis]:
@@ -139,10 +147,8 @@ def integration_step(fits: Sequence[Residuals]) -> list[Hypothesis]:
     steps = [float(fit.vector @ c[:, 0]) / n for fit, c, n in zip(fits, columns, lengths, strict=True)]
     values, remarks = {}, []
     for fit, step, length in zip(fits, steps, lengths, strict=True):
-        spacing = float(np.median(np.diff(fit.seen.times)))
-        given, bar = fit.seen.trajectory.step, float(1.0 / np.sqrt(length))
-        off = 3.0 * bar + _INACCURATE * step
-        if step <= 0.0 or step > spacing + off or (given is not None and abs(step - given) > off):
+        spacing, bar = float(np.median(np.diff(fit.seen.times))), float(1.0 / np.sqrt(length))
+        if not is_possible_step(fit, step, bar):
             return []
         label = "step" if len(fits) == 1 else f"step of {fit.seen.trajectory.name}"
         values[label] = FittedValue(value=step, bar=bar, unit="s")

@@ -20,6 +20,7 @@ _ROUNDS = 12  # of Fisher's scoring, each of which gains about two digits of an 
 _PLATEAU = 1.5  # lowest cut-off in units of the slow part's highest order: a third of the plateau has to be seen
 _LEAKAGE = 1e-4  # of the largest power: cosines of noise that does not end where it begins
 _SHOULDER = 0.01  # of the plateau: down to there the spectrum has to be that of a filter
+_ALIKE = 6.6  # deviance that a number of its own takes off by chance once in a hundred
 _FEWEST_ORDERS = 5.0  # of a plateau
 _UNLIKE = 2.0  # mean deviance in units of that of noise; 1.3 is exceeded by chance in a thousand with 30 orders
 
@@ -53,7 +54,10 @@ def noise_spectrum(whitened: Array, slow: int) -> Array:
     filtered, _ = _below_cut_offs(power, seen, columns, _PLATEAU * slow)
     spectra = np.vstack([spectra, filtered])
     penalties = np.concatenate([penalties, np.full(len(filtered), 2.0)])
-    return spectra[int(np.argmin(_deviance(power, spectra, seen, columns) + penalties * np.log(columns * seen.sum())))]
+    deviance = _deviance(power, spectra, seen, columns) + penalties * np.log(columns * seen.sum())
+    # Few samples do not tell memories apart: the one that brings most to the slow part counts.
+    alike = np.flatnonzero(deviance <= deviance.min() + _ALIKE)
+    return spectra[alike[int(np.argmax(spectra[alike, : slow + 1].sum(axis=1)))]]
 
 
 def cut_off(whitened: Array, free: int) -> float | None:

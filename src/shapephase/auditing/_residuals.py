@@ -32,7 +32,7 @@ class Residuals:
     seen : what they are of
     rates : given rates less those of the configurations, or None
     step : what a step of one second of semi-implicit Euler would add
-    vector : (M,)
+    vector : (M,); one more number where the drift of a step is projected out, how long the step is [s]
     """
 
     seen: Observation
@@ -43,16 +43,12 @@ class Residuals:
     _centre_factor: Array | None
     _free: Array
     _own: tuple[int, int, int]
+    _drift: Array | None = None
 
     @property
     def square(self) -> float:
         """Sum of squares."""
         return float(self.vector @ self.vector)
-
-    @property
-    def freedom(self) -> int:
-        """Independent numbers."""
-        return len(self.vector) - self._free.shape[1]
 
     def whitened(self, momentum: Array, centre: Array | None = None, rates: Array | None = None) -> Array:
         """Changes of momentum, centre of mass (N, 3, k) and rates (M, c, k) in units of noise: (rows, k)."""
@@ -67,7 +63,11 @@ class Residuals:
     def columns(self, momentum: Array, centre: Array | None = None, rates: Array | None = None) -> Array:
         """What such changes add to the vector: (M, k)."""
         whole = self.whitened(momentum, centre, rates)
-        return whole - self._free @ (self._free.T @ whole)
+        whole = whole - self._free @ (self._free.T @ whole)
+        if self._drift is None:
+            return whole
+        steps = self._drift.T @ whole / (self._drift**2).sum()
+        return np.vstack([whole - self._drift @ steps, steps])
 
     def step_column(self) -> Array:
         """What a step of one second adds: (M, 1)."""
@@ -82,9 +82,18 @@ class Residuals:
     def blocks(self, vector: Array) -> dict[int, Array]:
         """The parts of a vector in samples and directions, (rows, c), for momentum, fall and rates."""
         count = len(self.seen.times)
-        parts = np.split(vector, np.cumsum((3 * count, 3 * count if self._centre_factor is not None else 0)))
+        sizes = (
+            3 * count,
+            3 * count * (self._centre_factor is not None),
+            0 if self.rates is None else self.rates.level.size,
+        )
+        parts = np.split(vector, np.cumsum(sizes))[:3]
         rows = (count, count, 0 if self.rates is None else len(self.rates.times))
         return {k: part.reshape(rows[k], -1) for k, part in enumerate(parts) if len(part)}
+
+    def step_of(self, vector: Array) -> tuple[float, float] | None:
+        """Length of the step that is projected out of a vector and its bar [s]; None where none is."""
+        return None if self._drift is None else (float(vector[-1]), float(1.0 / np.linalg.norm(self._drift)))
 
     def in_time(self, vector: Array) -> Array:
         """The part of a vector that is of momentum and fall."""
@@ -119,19 +128,20 @@ def residuals(body: Body, seen: Observation, *, any_step: bool = False) -> Resid
     step = step_drift(body, seen, None if rates is None else rates.slope)
     basis = np.linalg.qr(np.asarray(block_diag(*blocks), dtype=np.float64))[0]
     made = Residuals(seen, rates, step, np.zeros(0), factor, centre, basis, (own[0], own[1], own[2]))
-    if any_step:
-        column = made.step_column()
-        length = float(np.linalg.norm(column))
-        basis = np.hstack([basis, column / length]) if length > 0.0 else basis
-        made = Residuals(seen, rates, step, np.zeros(0), factor, centre, basis, made._own)
-    return Residuals(seen, rates, step, made.of(seen), factor, centre, basis, made._own)
+    if any_step and (column := made.step_column()).any():
+        made = replace(made, _drift=column)
+    return replace(made, vector=made.of(seen))
 
 
 def leftover(fits: Sequence[Residuals], vector: Array) -> Leftover:
     """Residuals of all runs by blocks; the vectors of the runs come one after the other."""
     parts = np.split(vector, np.cumsum([len(fit.vector) for fit in fits])[:-1])
     left = leftover_of_moments(np.sum([fit.moments(part) for fit, part in zip(fits, parts, strict=True)], axis=0))
-    return replace(left, in_time=np.concatenate([fit.in_time(part) for fit, part in zip(fits, parts, strict=True)]))
+    return replace(
+        left,
+        in_time=np.concatenate([fit.in_time(part) for fit, part in zip(fits, parts, strict=True)]),
+        steps=tuple(step for fit, part in zip(fits, parts, strict=True) if (step := fit.step_of(part)) is not None),
+    )
 
 
 def leftover_of_moments(moments: Array) -> Leftover:

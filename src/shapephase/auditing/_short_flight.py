@@ -84,7 +84,7 @@ def short_run_audit(
         first_time=float(run.times[0]),
         last_time=float(run.times[-1]),
         given_rates=run.joint_rates is not None,
-        step=run.integrator_step,
+        step=run.assumed_step,
         noise=samples_noise,
         times=run.times,
         momentum=fit.momenta,

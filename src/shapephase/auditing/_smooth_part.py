@@ -6,7 +6,7 @@ hold nearly all of the first and little of the second.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -37,6 +37,7 @@ class SmoothPart:
     ratio : its square in units of what noise alone brings, over the limit: above 1, noise does not explain it
     noise : what noise alone brings to the values, rms
     colour : mean power of the noise over that of white noise with its highest frequencies
+    least : (N,) the slowest curve that is not free, as large as it has to be along every axis to exceed noise
 
     Examples
     --------
@@ -50,6 +51,7 @@ class SmoothPart:
     ratio: float
     noise: float
     colour: float = 1.0
+    least: Array = field(default_factory=lambda: np.zeros(0), repr=False)
 
     __repr__ = short_repr
 
@@ -113,5 +115,13 @@ def smooth_part(
     count = parts.size
     matrix = spread.reshape(count, count)
     square = float(parts.ravel() @ np.linalg.solve(matrix, parts.ravel()))
+    axes = residuals.shape[1]
+    slowest = np.linalg.eigvalsh(np.linalg.inv(matrix)[:axes, :axes])[0]
     limit = _UNSURE * count * float(f.isf(_CHANCE, count, known))
-    return SmoothPart(basis @ parts, square / limit, float(np.sqrt(np.trace(matrix) / len(times))), float(power.mean()))
+    return SmoothPart(
+        values=basis @ parts,
+        ratio=square / limit,
+        noise=float(np.sqrt(np.trace(matrix) / len(times))),
+        colour=float(power.mean()),
+        least=basis[:, 0] * float(np.sqrt(limit / slowest)),
+    )

@@ -14,7 +14,7 @@ from ..body.body import Body
 from ..warning_filters import quiet
 from ._noise import TrajectoryNoise
 from ._observation import observed
-from ._residuals import Residuals, fitted_hypothesis, leftover_of_moments, residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover, leftover_of_moments, residuals
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import FittedValue, Hypothesis, Leftover
 
@@ -98,8 +98,7 @@ def other_readings(
             continue
         read = tuple(reading.change(run) for run in runs)
         noise = tuple(reading.noise(level, _turning(body)) for level in levels)
-        moments = [_moments(body, run, level, any_step) for run, level in zip(read, noise, strict=True)]
-        left = leftover_of_moments(np.sum(moments, axis=0))
+        left = replace(_leftover(body, read, noise, any_step), in_time=None)
         found.append(OtherReading(fitted_hypothesis(reading.name, reading.kind, left), read, noise))
     curves = [_Curves(run, level) for run, level in zip(runs, levels, strict=True)]
     return found + [
@@ -242,6 +241,14 @@ def _sharpened_joints(run: FloatingTrajectory, curves: _Curves, width: float) ->
     return replace(run, shapes=shapes, joint_rates=run.joint_rates - half * bent)
 
 
+def _leftover(
+    body: Body, runs: Sequence[FloatingTrajectory], levels: Sequence[TrajectoryNoise], any_step: bool
+) -> Leftover:
+    pairs = zip(runs, levels, strict=True)
+    fits = [residuals(body, observed(body, run, level), any_step=any_step) for run, level in pairs]
+    return leftover(fits, np.concatenate([fit.vector for fit in fits]))
+
+
 def _moments(body: Body, run: FloatingTrajectory, noise: TrajectoryNoise, any_step: bool) -> Array:
     fit = residuals(body, observed(body, run, noise), any_step=any_step)
     return fit.moments(fit.vector)
@@ -312,6 +319,7 @@ def _gradual(
     found, without = left(value, value), left(0.0)
     if found.squares.sum() >= without.squares.sum():
         found, value = without, 0.0
+    found = replace(found, steps=_leftover(body, changed(value, value), levels, any_step).steps)
     bar = float(np.sqrt(2.0 / bend)) if bend > 0.0 else np.inf
     values = {reading.label: FittedValue(value=value, bar=bar, unit=reading.unit)}
     hypothesis = fitted_hypothesis(reading.name, reading.kind, found, parameters=1, values=values)

@@ -25,6 +25,7 @@ class Leftover:
     counts : (3,) independent numbers
     effective : (3,) those of them that the spectrum of the residuals leaves independent: nu = 3 (sum c^2)^2 / sum c^4
         of the coefficients c of cosines (Satterthwaite 1946 with variances c^2, of which c^4 / 3 is the square)
+    steps : of each run the step whose drift was projected out, and its bar [s]; empty where none was
     in_time : (M,) of each run those of momentum and fall, sample by sample; None where the samples are others
     """
 
@@ -32,6 +33,7 @@ class Leftover:
     counts: Array
     effective: Array
     in_time: Array | None = None
+    steps: tuple[tuple[float, float], ...] = ()
 
     @property
     def size(self) -> float:

@@ -41,21 +41,21 @@ Trajectories = Annotated[
 class TrajectoryOptions:
     """How a trajectory is read; each is an argument of `read_trajectory`."""
 
-    step: Annotated[
+    integrator_step: Annotated[
         tuple[float, ...],
         Parameter(
             show_default=False,
             negative_iterable="",
             consume_multiple=True,
             help="Step of the integrator of each trajectory, in s; without it that between its samples. For example "
-            "`--step 0.001 0.002`.",
+            "`--integrator-step 0.001 0.002`.",
         ),
     ] = ()
-    timestep: Annotated[
+    step: Annotated[
         float | None,
         Parameter(
             show_default=False,
-            help="Time between samples, in s, for files without times; for example `--timestep 0.01`.",
+            help="Time between samples, in s, for files without times; for example `--step 0.01`.",
         ),
     ] = None
     names: Annotated[
@@ -143,7 +143,8 @@ def audit_command(
 ) -> Outcome:
     """Audit trajectories in flight: momentum, fall, attitude and rates, and what explains it if they are wrong.
 
-    The exit code is 0 where all are right within their noise or the tolerance, else 10.
+    The exit code is 0 where all are right within their noise or the tolerance, 10 where one is wrong, and 12 where the
+    samples cannot tell, for they hide a fault as large as the tolerance.
 
     Parameters
     ----------
@@ -174,10 +175,11 @@ def audit_command(
     aside = check_writable(html, "--html", ".html") or aside
     if not trajectories:
         raise ShapeError("audit: one trajectory or more is needed after the body")
-    if len(reading.step) not in (0, 1, len(trajectories)):
-        raise ShapeError(f"--step: one for each of {len(trajectories)} trajectories is needed, got {len(reading.step)}")
+    given = reading.integrator_step or (None,)
+    if len(given) not in (1, len(trajectories)):
+        needed = f"one for each of {len(trajectories)} trajectories is needed"
+        raise ShapeError(f"--integrator-step: {needed}, got {len(given)}")
     loaded = body_argument(body, floating)
-    given = reading.step or (None,)
     each = given if len(given) == len(trajectories) else given * len(trajectories)
     with steps(2) as work:
         work.begin("reading")
@@ -185,10 +187,10 @@ def audit_command(
             read_trajectory(
                 file,
                 loaded,
-                step=step,
+                integrator_step=step,
                 names=column_names(reading.names) or None,
                 degrees=reading.degrees,
-                timestep=reading.timestep,
+                timestep=reading.step,
                 joint_order=reading.joint_order,
                 rest_missing=reading.rest_missing,
                 ignore_extra=reading.ignore_extra,
@@ -212,5 +214,5 @@ def audit_command(
 
             audit_page(loaded, runs, found).write(html)
             say_written(html)
-    code = ExitCode.DONE if found.right else ExitCode.WRONG
+    code = ExitCode.WRONG if found.wrong else ExitCode.DONE if found.right else ExitCode.UNDECIDED
     return Outcome(found.table(), found.record, code=code, aside=aside, made_from={})
