@@ -19,24 +19,18 @@ from ..shape_space.free_fall import free_fall
 from ._noise import white_noise
 from .floating_trajectory import FloatingTrajectory
 
-_GRAVITY = 9.81
-"""[m/s^2]"""
+_GRAVITY = 9.81  # [m/s^2]
 _EVEN = 0.3  # of gravity: the ground changes the acceleration of the centre of mass by more
 _WINDOWS = 12  # over the whole trajectory, with an acceleration fitted in each
-_LEAST_WINDOW = 8
-"""Samples of a window."""
-_FEWEST = 8
-"""Samples of a flight: a dive of 0.3 s at 30 frames a second."""
+_LEAST_WINDOW = 8  # samples of a window
+_FEWEST = 8  # samples of a flight: a dive of 0.3 s at 30 frames a second
 _STRAIGHT = 0.5
 """Share of how far the base is off parabolas: the centre of mass of a body that nothing carries is off by less, in most
 windows; that of a body that stands or walks goes with its base, or farther."""
 _OF_A_SAG = 0.02  # rms off a parabola over its sag, a T^2 / 8: 8 mm where 0.8 m are fallen through on the moon in 1 s
-_BY_NOISE = 4.0
-"""Standard deviations of the noise, by which it may be off anyway."""
-_MANY = 5000
-"""Samples; of more, so few a second are looked at that they are about this far apart:"""
-_ENOUGH = 1.0 / 120.0
-"""[s] A twentieth of the shortest flight that can be told from rest."""
+_BY_NOISE = 4.0  # standard deviations of the noise, by which it may be off anyway
+_MANY = 5000  # samples; of more, so few a second are looked at that they are about this far apart:
+_ENOUGH = 1.0 / 120.0  # [s] A twentieth of the shortest flight that can be told from rest
 _CHANCE = 1e-6  # probability with which noise alone ends a flight
 _STEEP = np.sqrt(0.5)  # cosine of the largest angle of the ground's push from upwards, with a friction of 1
 _TOUCH = 0.01  # of gravity: in a hundredth of a second less changes momenta by less than the usual tolerance

@@ -8,15 +8,14 @@ import numpy as np
 
 from ..arrays import Array
 from ..display import short_repr
-from ._differences import REACH, difference_weights, differentiated, fewer_neighbours, turn_rates
 from ._noise import TrajectoryNoise
+from ._observation import REACH, difference_weights, differentiated, fewer_neighbours, turn_rates
 from ._smooth_part import smooth_part
 from .floating_trajectory import FloatingTrajectory
 
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of a rate or coordinate: rounding of 32 operations
 
-_LEAST = 1e-150
-"""[rad/s or m/s] Noise of what never moves, whose square is a number, too."""
+_LEAST = 1e-150  # [rad/s or m/s] Noise of what never moves, whose square is a number, too
 _HELD = 2.0 / 12.0  # of squared step times jerk: torques held over a step shift rates by half a step
 
 

@@ -18,12 +18,9 @@ from ..arrays import Array
 from ..display import short_repr
 from .floating_trajectory import FloatingTrajectory
 
-_LOWEST = 3
-"""Order of differences: the motion itself is in those below."""
-_HIGHEST = 12
-"""Order of differences, the samples allowing."""
-_ROUNDING = 8.0
-"""Units in the last place of a sample: what arithmetic alone leaves of numbers that are otherwise exact."""
+_LOWEST = 3  # order of differences: the motion itself is in those below
+_HIGHEST = 12  # order of differences, the samples allowing
+_ROUNDING = 8.0  # units in the last place of a sample: what arithmetic alone leaves of numbers that are otherwise exact
 
 
 @made_by("auditing.TrajectoryNoise(attitude=0.002), for example")

@@ -23,8 +23,7 @@ from .floating_trajectory import FloatingTrajectory
 
 TOLD_APART = 24
 """Samples from which on rates by differences of samples say what noise has, and causes can be told apart."""
-_BARS = 3.0
-"""Standard deviations by which a momentum has to change."""
+_BARS = 3.0  # standard deviations by which a momentum has to change
 
 
 def short_run_audit(

@@ -12,13 +12,11 @@ from ..arrays import Array
 from ..display import short_repr
 from ._airborne import AirbornePart
 from ._consistency import RateAgreement
-from ._integration_step import StepOrder
+from ._engine_faults import StepOrder
 from ._noise import TrajectoryNoise
-from ._ranking import EXPLAINS
-from .hypothesis import Hypothesis
+from .hypothesis import EXPLAINS, Hypothesis
 
-_MOST_SHOWN = 8
-"""Hypotheses in a table."""
+_MOST_SHOWN = 8  # hypotheses in a table
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

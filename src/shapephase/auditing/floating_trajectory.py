@@ -23,13 +23,10 @@ if TYPE_CHECKING:
     from ._noise import TrajectoryNoise
 
 FRAMES = ("world", "base")
-_FEWEST = 8
-"""Samples: a flight of 0.3 s at 30 frames a second; fewer say nothing of noise."""
+_FEWEST = 8  # samples: a flight of 0.3 s at 30 frames a second; fewer say nothing of noise
 _LARGEST = 1e12  # m, rad/s or s: no recorder has a clock or a place beyond it
-_OF_JOINTS = ("shapes", "joint_rates")
-"""What is read up to `FARTHEST`, as by a body."""
-_OFF_UNIT = 0.1
-"""What is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong."""
+_OF_JOINTS = ("shapes", "joint_rates")  # what is read up to `FARTHEST`, as by a body
+_OFF_UNIT = 0.1  # what is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

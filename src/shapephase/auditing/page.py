@@ -17,12 +17,11 @@ from ..plots.plot_style import axes_image
 from ..plots.report_page import figure_rows
 from ._held_states import held_states
 from ._observation import observed
-from ._ranking import EXPLAINS
 from ._residuals import residuals
 from .audit_result import Audit, RunAudit
 from .figures import fall_figure, left_over_figures, momentum_figure
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import Hypothesis
+from .hypothesis import EXPLAINS, Hypothesis
 from .trajectory_audit import thinned
 
 _MOST_ROWS = 20  # hypotheses of the table; the record has all

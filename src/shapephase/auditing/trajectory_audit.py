@@ -22,25 +22,28 @@ from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
 from ._airborne import AirbornePart, airborne_part, off_parabola
 from ._consistency import rate_agreement
-from ._drag import drag
-from ._filtered_samples import filtered_samples
-from ._gravity import wrong_gravity
+from ._engine_faults import (
+    StepOrder,
+    integration_step,
+    is_possible_step,
+    no_gyroscopic_term,
+    step_hypothesis,
+    step_order,
+)
 from ._held_states import held_states
-from ._integration_step import StepOrder, integration_step, is_possible_step, step_hypothesis, step_order
 from ._joint_offsets import joint_offsets
-from ._missing_term import no_gyroscopic_term
 from ._noise import TrajectoryNoise
 from ._observation import Observation, observed
+from ._other_readings import filtered_samples, other_readings, read_otherwise
 from ._outside_pushes import outside_pushes
-from ._ranking import Evidence, Ranking
 from ._residuals import Residuals, inverse_factor, leftover, residuals
 from ._short_flight import TOLD_APART, short_run_audit
 from ._smooth_part import polynomials, smooth_part
-from ._transformations import other_readings, read_otherwise
+from ._surroundings import drag, wrong_gravity
 from ._wrong_inertias import wrong_inertias
 from .audit_result import Audit, RunAudit
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import AND, Hypothesis
+from .hypothesis import AND, Evidence, Hypothesis, Ranking
 
 _QUIET = 1e-6
 """[rad] Noise of the attitude below which the first sample is tried as the start of the exact reconstruction."""
@@ -50,8 +53,7 @@ _STEADY = 0.01  # of the momentum: a flight does not change it by more
 _TOLERANCE = 1e-3  # of momentum, rates and fall by default
 _WANDER = 0.01
 """[m] Skin moves over bones, and bodies are not what tables make of them: markers and masses wander by so much."""
-_MEASURED = 1e-4
-"""[rad or m] Noise from which on samples were measured, not computed."""
+_MEASURED = 1e-4  # [rad or m] Noise from which on samples were measured, not computed
 _PAIRED = 3  # readings that are tried together with every other cause: those that leave least
 _TAKES = 0.25  # of the squares of a law that either cause leaves alone: two causes have to leave less
 _ONE_AXIS = 1e-3  # of the base's rates: smaller ones across their main axis mean a turn about one axis

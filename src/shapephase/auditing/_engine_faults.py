@@ -1,6 +1,7 @@
-"""The hypothesis that the step of an integrator is too long: several runs with different steps tell, one may agree.
+"""Hypotheses about the engine: the step of its integrator is too long, or its gyroscopic term is missing.
 
-With an order p, what is wrong grows as the step to the power p, by one curve of the time for all runs.
+Several runs with different steps show an order p: what is wrong grows as the step to the power p, by one curve of the
+time for all runs. One run may agree with semi-implicit Euler.
 """
 
 from __future__ import annotations
@@ -12,22 +13,23 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from .. import so3
 from ..arrays import Array
 from ..display import short_repr
 from ._observation import Observation
 from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis, Leftover
 
-_LOWEST = 0.3
-"""Order below which it is none: halving the step then changes next to nothing."""
-_APART = 1.05
-"""Ratio of two steps from which they tell an order."""
-_ABOVE = 10.0
-"""Drifts in units of what is known of them, by noise and rounding: smaller ones tell no order."""
+_LOWEST = 0.3  # order below which it is none: halving the step then changes next to nothing
+_APART = 1.05  # ratio of two steps from which they tell an order
+_ABOVE = 10.0  # drifts in units of what is known of them, by noise and rounding: smaller ones tell no order
 _BELONGS = 0.25  # of the drifts: largest share that the law of one order may leave
 _UNEVEN = 1.0  # largest difference of orders between steps where the step alone is the cause
 _BARS = 3.0  # standard deviations by which a fitted step may be off
 _INACCURATE = 0.1  # of a step: what terms of second order add, 0.1 % for 2 ms at 10 rad/s, and 5 % for 20 ms
+_AS_ONE = 1e-3  # share of the momentum: joints that add less are at rest, and the body turns as one
+_SEEN = 1e-9  # share of the largest column: what moves nothing, as the inertia of a ball does not, takes no part
+_AXES = "xyz"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,3 +167,42 @@ def integration_step(fits: Sequence[Residuals]) -> list[Hypothesis]:
             remark=f"consistent with semi-implicit Euler, {every} steps a sample; a run with half the step tells",
         )
     ]
+
+
+def no_gyroscopic_term(fits: Sequence[Residuals]) -> list[Hypothesis]:
+    """Without omega x I omega in Euler's equations omega is constant in world axes: the momentum goes as R I R^T.
+
+    Empty where joints move: what an engine makes of their motion then is not known.
+    """
+    if any(np.sqrt((fit.seen.internal**2).sum(axis=1).mean()) > _AS_ONE * fit.seen.scale for fit in fits):
+        return []
+    lefts, values = [], {}
+    for fit in fits:
+        seen = fit.seen
+        columns = fit.columns(seen.attitude @ seen.inertia @ so3.transpose(seen.attitude))
+        rate, left = _fitted(columns, fit.vector)
+        lefts.append(left)
+        if not values:
+            values = {
+                f"angular velocity {axis}": FittedValue(value=float(part), bar=float(bar), unit="rad/s")
+                for axis, part, bar in zip(_AXES, *rate, strict=True)
+            }
+    return [
+        fitted_hypothesis(
+            "no gyroscopic term in the engine",
+            "engine",
+            leftover(fits, np.concatenate(lefts)),
+            parameters=3 * len(fits),
+            values=values,
+            remark="the angular velocity is constant in world axes; switch the gyroscopic force of the engine on",
+        )
+    ]
+
+
+def _fitted(columns: Array, vector: Array) -> tuple[tuple[Array, Array], Array]:
+    """Least squares: the coefficients with their bars, and what is left."""
+    left, strengths, right = np.linalg.svd(columns, full_matrices=False)
+    kept = strengths > _SEEN * max(float(strengths.max(initial=0.0)), np.finfo(float).tiny)
+    inverse = right[kept].T / strengths[kept]
+    amounts = left[:, kept].T @ vector
+    return (inverse @ amounts, np.linalg.norm(inverse, axis=1)), vector - left[:, kept] @ amounts
