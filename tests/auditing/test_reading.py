@@ -43,7 +43,7 @@ def test_mujoco_arrays(motion: Flown, tmp_path: Path):
     np.savez(file, qpos=motion.qpos, qvel=motion.qvel, time=motion.times, joint_names=names, timestep=0.001)
     run = sp.read_trajectory(file, body_of(NAME))
     same(run, motion, rates=True)
-    assert run.step == 0.001
+    assert run.integrator_step == 0.001
 
 
 def test_mujoco_columns(motion: Flown, tmp_path: Path):

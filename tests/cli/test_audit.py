@@ -37,7 +37,7 @@ def test_a_wrong_one_ends_with_ten_and_says_why(tmp_path: Path, capsys: pytest.C
 
 
 def test_faults_of_its_arguments_are_usage(capsys: pytest.CaptureFixture[str]):
-    for words in (["cat_two_halves"], ["cat_two_halves", str(FLOWN), "--step", "0.1", "0.2"]):
+    for words in (["cat_two_halves"], ["cat_two_halves", str(FLOWN), "--integrator-step", "0.1", "0.2"]):
         with pytest.raises(SystemExit) as ended:
             main(["audit", *words])
         assert ended.value.code == ExitCode.USAGE
@@ -87,3 +87,13 @@ def test_the_steps_between_samples_are_stated(tmp_path: Path, capsys: pytest.Cap
     assert "integration step" in found["cause"]
     (cause,) = (one for one in found["hypotheses"] if one["name"] == "integration step")
     assert abs(cause["values"]["step"]["value"] - 0.002) < 1e-5
+
+
+def test_samples_that_hide_more_than_the_tolerance_have_a_code_of_their_own(capsys: pytest.CaptureFixture[str]):
+    """Digits of a CSV file are noise for a tolerance of 1e-9."""
+    with pytest.raises(SystemExit) as ended:
+        main(["audit", "cat_two_halves", str(FLOWN), "--tolerance", "1e-9", "--json"])
+    assert ended.value.code == ExitCode.UNDECIDED
+    found = json.loads(capsys.readouterr().out)
+    assert (found["right"], found["wrong"]) == (False, False)
+    assert "cannot tell" in found["verdict"]

@@ -34,7 +34,7 @@ def trajectory(name: str, motion: Flown, *, rates: bool = True, step: float = ST
     qvel = motion.qvel if rates else None
     names = motion.joint_names
     return sp.FloatingTrajectory.from_mujoco(
-        body_of(name), motion.times, motion.qpos, qvel, joint_names=names, step=step
+        body_of(name), motion.times, motion.qpos, qvel, joint_names=names, integrator_step=step
     )
 
 

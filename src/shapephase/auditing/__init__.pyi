@@ -1,6 +1,6 @@
 from ._airborne import AirbornePart
 from ._consistency import RateAgreement
-from ._integration_step import StepOrder
+from ._engine_faults import StepOrder
 from ._noise import TrajectoryNoise
 from ._smooth_part import SmoothPart, smooth_part
 from .audit_result import Audit, RunAudit

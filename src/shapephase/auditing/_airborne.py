@@ -19,23 +19,18 @@ from ..shape_space.free_fall import free_fall
 from ._noise import white_noise
 from .floating_trajectory import FloatingTrajectory
 
-_GRAVITY = 9.81
-"""[m/s^2]"""
+_GRAVITY = 9.81  # [m/s^2]
 _EVEN = 0.3  # of gravity: the ground changes the acceleration of the centre of mass by more
 _WINDOWS = 12  # over the whole trajectory, with an acceleration fitted in each
-_LEAST_WINDOW = 8
-"""Samples of a window."""
-_FEWEST = 8
-"""Samples of a flight: a dive of 0.3 s at 30 frames a second."""
+_LEAST_WINDOW = 8  # samples of a window
+_FEWEST = 8  # samples of a flight: a dive of 0.3 s at 30 frames a second
 _STRAIGHT = 0.5
 """Share of how far the base is off parabolas: the centre of mass of a body that nothing carries is off by less, in most
 windows; that of a body that stands or walks goes with its base, or farther."""
-_BY_NOISE = 4.0
-"""Standard deviations of the noise, by which it may be off anyway."""
-_MANY = 5000
-"""Samples; of more, so few a second are looked at that they are about this far apart:"""
-_ENOUGH = 1.0 / 120.0
-"""[s] A twentieth of the shortest flight that can be told from rest."""
+_OF_A_SAG = 0.02  # rms off a parabola over its sag, a T^2 / 8: 8 mm where 0.8 m are fallen through on the moon in 1 s
+_BY_NOISE = 4.0  # standard deviations of the noise, by which it may be off anyway
+_MANY = 5000  # samples; of more, so few a second are looked at that they are about this far apart:
+_ENOUGH = 1.0 / 120.0  # [s] A twentieth of the shortest flight that can be told from rest
 _CHANCE = 1e-6  # probability with which noise alone ends a flight
 _STEEP = np.sqrt(0.5)  # cosine of the largest angle of the ground's push from upwards, with a friction of 1
 _TOUCH = 0.01  # of gravity: in a hundredth of a second less changes momenta by less than the usual tolerance
@@ -103,6 +98,8 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
     every = max(1, int(_ENOUGH / usual)) if len(times) > _MANY else 1
     some, base = centres[::every], trajectory.position[::every] if trajectory.position is not None else centres
     at = times[::every]
+    if number is None and _falls_whole(at, some):
+        return _clear_part(times, centres, speeds, 0, len(times), "all of it: the centre of mass falls")
     found = _accelerations(at, some)
     if np.linalg.norm(found - np.median(found, axis=0), axis=1).max() < _EVEN * _GRAVITY:
         if number is None and np.linalg.norm(np.median(found, axis=0)) > _EVEN * _GRAVITY:
@@ -129,11 +126,31 @@ def airborne_part(body: Body, trajectory: FloatingTrajectory, flight: str | Sequ
     return _clear_part(times, centres, speeds, every * first, past, f"the centre of mass falls, {fall.up} up{others}")
 
 
+def _falls_whole(times: Array, centres: Array) -> bool:
+    """Whether all samples are near one parabola that sags far: nothing that stands or walks goes so, in any noise."""
+    span = float(times[-1] - times[0])
+    basis = np.vander((times - times[0]) / span, 3)
+    curve, *_ = np.linalg.lstsq(basis, centres, rcond=None)
+    off = float(np.sqrt(((centres - basis @ curve) ** 2).sum(axis=1).mean()))
+    return off <= _OF_A_SAG * 0.25 * float(np.linalg.norm(curve[0]))
+
+
 def _goes_straight(times: Array, centres: Array, base: Array) -> bool:
     """Whether a centre of mass stays on parabolas in most windows, while the base leaves them."""
     noise = float(white_noise(centres[:, None], 3)[0])
     off, beside = (_off_parabolas(times, places) for places in (centres, base))
     return bool(np.median(off <= np.maximum(_STRAIGHT * beside, _BY_NOISE * noise)) > 0.5)
+
+
+def off_parabola(body: Body, trajectory: FloatingTrajectory, part: AirbornePart) -> float:
+    """Rms of what the best parabola leaves of the centre of mass in a stretch [m]; 0 where places are unknown."""
+    centres = _centres(body, trajectory)
+    if centres is None:
+        return 0.0
+    times = trajectory.times[part.first : part.past]
+    basis = np.linalg.qr(((times - times.mean()) / (times[-1] - times[0]))[:, None] ** np.arange(3))[0]
+    inside = centres[part.first : part.past]
+    return float(np.sqrt(((inside - basis @ (basis.T @ inside)) ** 2).sum(axis=1).mean()))
 
 
 def _centres(body: Body, trajectory: FloatingTrajectory) -> Array | None:

@@ -8,15 +8,14 @@ import numpy as np
 
 from ..arrays import Array
 from ..display import short_repr
-from ._differences import REACH, difference_weights, differentiated, fewer_neighbours, turn_rates
 from ._noise import TrajectoryNoise
+from ._observation import REACH, difference_weights, differentiated, fewer_neighbours, turn_rates
 from ._smooth_part import smooth_part
 from .floating_trajectory import FloatingTrajectory
 
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of a rate or coordinate: rounding of 32 operations
 
-_LEAST = 1e-150
-"""[rad/s or m/s] Noise of what never moves, whose square is a number, too."""
+_LEAST = 1e-150  # [rad/s or m/s] Noise of what never moves, whose square is a number, too
 _HELD = 2.0 / 12.0  # of squared step times jerk: torques held over a step shift rates by half a step
 
 
@@ -116,7 +115,7 @@ def rate_differences(trajectory: FloatingTrajectory, noise: TrajectoryNoise) -> 
         own = [each[:, [joint]] for each in found]
         pairs.append(("joints", own[0], own[1], joint_rates[:, [joint]], of_shape, of_rate, far))
     slopes, differences, levels, biases, kinds = [], [], [], [], []
-    held = _HELD * trajectory.integrator_step**2
+    held = _HELD * trajectory.assumed_step**2
     again = difference_weights(trajectory.times[inner])
     for kind, own, narrow, given, of_place, of_rate, far in pairs:
         fast = float(np.abs(given).max(initial=0.0))

@@ -18,12 +18,9 @@ from ..arrays import Array
 from ..display import short_repr
 from .floating_trajectory import FloatingTrajectory
 
-_LOWEST = 3
-"""Order of differences: the motion itself is in those below."""
-_HIGHEST = 12
-"""Order of differences, the samples allowing."""
-_ROUNDING = 8.0
-"""Units in the last place of a sample: what arithmetic alone leaves of numbers that are otherwise exact."""
+_LOWEST = 3  # order of differences: the motion itself is in those below
+_HIGHEST = 12  # order of differences, the samples allowing
+_ROUNDING = 8.0  # units in the last place of a sample: what arithmetic alone leaves of numbers that are otherwise exact
 
 
 @made_by("auditing.TrajectoryNoise(attitude=0.002), for example")
@@ -60,7 +57,7 @@ def estimated_noise(trajectory: FloatingTrajectory) -> TrajectoryNoise:
     """The noise of each kind of samples."""
     return TrajectoryNoise(
         # Half the angle is in the quaternion, across it: three of its four numbers.
-        attitude=2.0 * _of_vector(_continuous(trajectory.quaternion)),
+        attitude=2.0 * _of_vector(continuous(trajectory.quaternion)),
         position=_of_vector(trajectory.position),
         joints=_of_each(trajectory.shapes),
         rate=_of_vector(trajectory.rate),
@@ -100,7 +97,7 @@ def _median_square(freedom: int) -> float:
     return float(chi2.median(freedom))
 
 
-def _continuous(quaternions: Array) -> Array:
+def continuous(quaternions: Array) -> Array:
     """Quaternions of the same attitudes without changes of sign."""
     flips = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
     return quaternions * np.concatenate([[1.0], np.cumprod(flips)])[:, None]

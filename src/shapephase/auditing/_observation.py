@@ -15,16 +15,14 @@ import numpy as np
 from .. import so3
 from ..arrays import Array
 from ..body.body import Body
-from ._differences import REACH, difference_weights, differentiated, turn_rates
 from ._noise import TrajectoryNoise, estimated_noise
 from .floating_trajectory import FloatingTrajectory
 
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of a momentum or place: rounding of 32 operations
 _AT_REST = 1e-6  # rad: a body that turns by less in all the time is at rest
-_NUDGE = 1e-6
-"""[rad or m] By which a joint is moved to see how the centre of mass goes with it: for the noise alone."""
-_ENOUGH = 32
-"""Samples at which that is looked at; between them it is taken as it is nearby."""
+_NUDGE = 1e-6  # [rad or m] By which a joint is moved to see how the centre of mass goes with it: for the noise alone
+_ENOUGH = 32  # samples at which that is looked at; between them it is taken as it is nearby
+REACH = 4  # neighbours on each side, which the samples at both ends do not have
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -209,3 +207,37 @@ def _centre(
     centre = moving.position + so3.apply(attitude, own)
     least = _ROUNDING * float(np.abs(centre).max() + np.abs(own).max() + extent)
     return centre, factors @ np.swapaxes(factors, 1, 2) + (level.position**2 + least**2) * np.eye(3)
+
+
+def difference_weights(times: Array, reach: int = REACH) -> Array:
+    """(N - 2 reach, 2 reach + 1): what neighbours are multiplied by for the derivative in their middle [1/s]."""
+    count = 2 * reach + 1
+    windows = np.lib.stride_tricks.sliding_window_view(times, count)
+    since = windows - windows[:, reach, None]
+    usual = np.abs(since).max(axis=1, keepdims=True)
+    powers = (since / usual)[:, None, :] ** np.arange(count)[:, None]
+    slope = np.zeros((len(windows), count, 1))
+    slope[:, 1] = 1.0
+    return np.linalg.solve(powers, slope)[:, :, 0] / usual
+
+
+def fewer_neighbours(times: Array) -> Array:
+    """Weights without the outermost neighbours, which get zeros: the difference shows the truncation error."""
+    return np.pad(difference_weights(times[1:-1], REACH - 1), ((0, 0), (1, 1)))
+
+
+def differentiated(values: Array, weights: Array) -> Array:
+    """(N, k) -> (N - 2 REACH, k)."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, weights.shape[1], axis=0)
+    return np.einsum("nw,nkw->nk", weights, windows)
+
+
+def turn_rates(attitudes: Array, weights: Array) -> Array:
+    """Angular velocity, base axes: (N, 3, 3) -> (N - 2 REACH, 3), by the turns from the middle to its neighbours."""
+    count = len(weights)
+    middle = so3.transpose(attitudes[REACH : REACH + count])
+    found = np.zeros((count, 3))
+    for k in range(weights.shape[1]):
+        if k != REACH:
+            found += weights[:, k, None] * so3.log(middle @ attitudes[k : k + count])
+    return found

@@ -12,8 +12,7 @@ from ..arrays import Array
 from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis
 
-_KNOTS = 48
-"""Times between which a push is looked for, all pairs of them, before the best is refined."""
+_KNOTS = 48  # times between which a push is looked for, all pairs of them, before the best is refined
 _MOST_CALLS = 600  # of the refinement
 _AS_GOOD_AS_NONE = 1e-6  # of the effect of a blow in the middle: smaller columns are not fitted
 _FARTHEST = 30.0  # radii of gyration: largest lever of a force

@@ -23,8 +23,7 @@ from .floating_trajectory import FloatingTrajectory
 
 TOLD_APART = 24
 """Samples from which on rates by differences of samples say what noise has, and causes can be told apart."""
-_BARS = 3.0
-"""Standard deviations by which a momentum has to change."""
+_BARS = 3.0  # standard deviations by which a momentum has to change
 
 
 def short_run_audit(
@@ -84,7 +83,7 @@ def short_run_audit(
         first_time=float(run.times[0]),
         last_time=float(run.times[-1]),
         given_rates=run.joint_rates is not None,
-        step=run.integrator_step,
+        step=run.assumed_step,
         noise=samples_noise,
         times=run.times,
         momentum=fit.momenta,

@@ -25,10 +25,8 @@ _ENTRIES = ("xx", "yy", "zz", "yz", "xz", "xy")
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 _NARROWER = 0.95
 """Largest ratio of a principal moment to the sum of the other two: what is fitted is known to some per cent."""
-_FARTHEST = 3.0
-"""Radii of gyration of the whole body: no link's centre is farther from where it was."""
-_MOST_TIMES = 100.0
-"""What a link weighs, of what it weighed."""
+_FARTHEST = 3.0  # radii of gyration of the whole body: no link's centre is farther from where it was
+_MOST_TIMES = 100.0  # what a link weighs, of what it weighed
 _STILL = 1e-6  # [rad or m] Range of a joint that is at rest
 _BY_NOISE = 8.0  # standard deviations of the noise that its range is, too
 _OPEN = 1e-6  # share of a number in what the samples leave open

@@ -12,13 +12,11 @@ from ..arrays import Array
 from ..display import short_repr
 from ._airborne import AirbornePart
 from ._consistency import RateAgreement
-from ._integration_step import StepOrder
+from ._engine_faults import StepOrder
 from ._noise import TrajectoryNoise
-from ._ranking import EXPLAINS
-from .hypothesis import Hypothesis
+from .hypothesis import EXPLAINS, Hypothesis
 
-_MOST_SHOWN = 8
-"""Hypotheses in a table."""
+_MOST_SHOWN = 8  # hypotheses in a table
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -49,6 +47,7 @@ class RunAudit:
     momentum_bars : standard deviations of the momentum, world axes [kg m^2/s], of a flight of so few samples that it is
         fitted as a whole; else None
     fall_bar : standard deviation of the fall, with 1 cm of wander [m/s^2], or None
+    least_drift : the smallest steady change of the momentum that the samples would have shown, relative to its scale
 
     Examples
     --------
@@ -82,8 +81,14 @@ class RunAudit:
     right: bool
     momentum_bars: tuple[float, float, float] | None = None
     fall_bar: float | None = None
+    least_drift: float = 0.0
 
     __repr__ = short_repr
+
+    @property
+    def decided(self) -> bool:
+        """False where the momentum changes by more than the tolerance, and noise may be why, or hide why."""
+        return not self.right or min(self.relative_drift, self.least_drift) <= self.tolerance
 
     @property
     def relative_drift(self) -> float:
@@ -132,6 +137,7 @@ class RunAudit:
             "momentum_drift_relative": self.relative_drift,
             "momentum_drift_of_itself": self.drift_of_itself if np.isfinite(self.drift_of_itself) else None,
             "momentum_over_noise": self.momentum_ratio,
+            "momentum_drift_least_shown": self.least_drift,
             "tolerance": self.tolerance,
             "fall_off_m": self.fall_off,
             "fall_over_noise": self.fall_ratio,
@@ -178,14 +184,23 @@ class Audit:
 
     @property
     def right(self) -> bool:
-        """Whether all runs are."""
-        return all(run.right for run in self.runs)
+        """Whether all runs are, and their samples would have shown a fault beyond the tolerance."""
+        return all(run.right and run.decided for run in self.runs)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether a run breaks a law by more than noise and tolerance; neither right nor wrong: it cannot be told."""
+        return not all(run.right for run in self.runs)
 
     @property
     def verdict(self) -> str:
         """In a line."""
         recorded = [run.words for run in self.runs if run.recorded]
         shown = "; ".join(recorded)
+        if not self.wrong and not self.right:
+            least = max(run.least_drift for run in self.runs if not run.decided)
+            hidden = f"the samples hide changes of the momentum below {100.0 * least:.2g} %"
+            return "; ".join([*recorded, f"cannot tell: {hidden}, the tolerance is {100.0 * self.tolerance:.2g} %"])
         if self.right:
             within = f"right within noise or {self.tolerance:.2g}"
             return f"{shown}: {within}, as 1 cm of wander leaves it" if recorded else within
@@ -211,6 +226,7 @@ class Audit:
         return {
             "body": self.body,
             "right": self.right,
+            "wrong": self.wrong,
             "verdict": self.verdict,
             "tolerance": self.tolerance,
             "runs": [run.record for run in self.runs],

@@ -23,13 +23,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_MOST_SHOWN = 8
-"""Hypotheses."""
+_MOST_SHOWN = 8  # hypotheses
 _ENDINGS = (".svg", ".pdf", ".png")
 _LEAST_SHARE = 1e-6  # where the bars begin
 _A_ROW = 3  # names of a legend beside each other
-_LONGEST = 34
-"""Letters of a name."""
+_LONGEST = 34  # letters of a name
 _BINS = 120  # points of a curve of residuals, each the rms of the samples there
 
 

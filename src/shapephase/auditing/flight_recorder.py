@@ -27,7 +27,7 @@ class FlightRecorder:
     body : as it should be
     convention : "mujoco", for `qpos` and `qvel`, or "pinocchio", for `q` and `v`
     joint_names : in the order of these arrays; None: MuJoCo's of the body's file, or Pinocchio's, which is the body's
-    step : of the integrator [s]; None: that between samples
+    integrator_step : of the integrator [s]; None: that between samples
 
     Examples
     --------
@@ -44,14 +44,14 @@ class FlightRecorder:
         convention: str = "mujoco",
         *,
         joint_names: Sequence[str] | None = None,
-        step: float | None = None,
+        integrator_step: float | None = None,
     ) -> None:
         check_object(body, "Body", "body")
         check_choice(convention, "convention", CONVENTIONS)
         self.body = body
         self.convention = convention
         self.joint_names = joint_names
-        self.step = step
+        self.integrator_step = integrator_step
         self._times: list[float] = []
         self._places: list[Any] = []
         self._rates: list[Any] = []
@@ -81,7 +81,7 @@ class FlightRecorder:
             np.array(self._places),
             np.array(self._rates),
             joint_names=self.joint_names,
-            step=self.step,
+            integrator_step=self.integrator_step,
             name="recorded run",
         )
 
@@ -105,7 +105,7 @@ def assert_right_in_flight(
     tolerance: float = 1e-3,
     flight: str | Sequence[float] = "auto",
 ) -> None:
-    """For tests: nothing where the trajectories are right, else an AssertionError with all that was found.
+    """Nothing where the trajectories are right, else, or where that cannot be told, an AssertionError with the table.
 
     Raises
     ------

@@ -23,13 +23,10 @@ if TYPE_CHECKING:
     from ._noise import TrajectoryNoise
 
 FRAMES = ("world", "base")
-_FEWEST = 8
-"""Samples: a flight of 0.3 s at 30 frames a second; fewer say nothing of noise."""
+_FEWEST = 8  # samples: a flight of 0.3 s at 30 frames a second; fewer say nothing of noise
 _LARGEST = 1e12  # m, rad/s or s: no recorder has a clock or a place beyond it
-_OF_JOINTS = ("shapes", "joint_rates")
-"""What is read up to `FARTHEST`, as by a body."""
-_OFF_UNIT = 0.1
-"""What is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong."""
+_OF_JOINTS = ("shapes", "joint_rates")  # what is read up to `FARTHEST`, as by a body
+_OFF_UNIT = 0.1  # what is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -46,7 +43,7 @@ class FloatingTrajectory:
     velocity : (N, 3) of the base's origin [m/s], or None
     joint_rates : (N, n) derivatives of the shapes [rad/s or m/s], or None
     rate_axes, velocity_axes : "world" or "base": in which axes these two are
-    step : of the integrator that made it [s]; None: that between samples
+    integrator_step : of the integrator that made it [s]; None: that between samples
     name : for people
     joint_order : of arrays without names, in which order their joints were taken, in words; None: they had names
     certain : what the format of its file leaves no doubt about, which is no hypothesis: "units" of the joints, "order"
@@ -72,7 +69,7 @@ class FloatingTrajectory:
     joint_rates: Array | None = None
     rate_axes: str = "base"
     velocity_axes: str = "world"
-    step: float | None = None
+    integrator_step: float | None = None
     name: str = "trajectory"
     joint_order: str | None = None
     certain: tuple[str, ...] = ()
@@ -104,8 +101,8 @@ class FloatingTrajectory:
             _check_size(getattr(self, name), f"{where}: {name}", FARTHEST if name in _OF_JOINTS else _LARGEST)
         check_choice(self.rate_axes, "rate_axes", FRAMES)
         check_choice(self.velocity_axes, "velocity_axes", FRAMES)
-        if self.step is not None:
-            positive_argument(self.step, "step")
+        if self.integrator_step is not None:
+            positive_argument(self.integrator_step, "integrator_step")
         if (self.rate is None) != (self.joint_rates is None):
             raise ShapeError(f"{where}: the rates of the base and of the joints come together, and one is missing")
         lengths = np.linalg.norm(self.quaternion, axis=1)
@@ -123,7 +120,7 @@ class FloatingTrajectory:
         *,
         joint_names: Sequence[str] | None = None,
         joint_order: str | None = None,
-        step: float | None = None,
+        integrator_step: float | None = None,
         name: str = "trajectory",
     ) -> FloatingTrajectory:
         """Trajectory of MuJoCo's arrays, free joint first: linear velocity in world axes, angular one in base axes.
@@ -136,7 +133,7 @@ class FloatingTrajectory:
         joint_names : in the order of these arrays; None: in that of `joint_order`
         joint_order : "mujoco", "isaac", "isaac-by-name" or "body", as `read_recorded_motion` has them; None: "mujoco",
             the order in which MuJoCo compiles the body's file
-        step : of the integrator [s]; None: that between samples
+        integrator_step : of the integrator [s]; None: that between samples
 
         Raises
         ------
@@ -156,7 +153,15 @@ class FloatingTrajectory:
             if joint_names is not None:
                 raise ShapeError("joint_order is for arrays without names, and joint_names are given; leave one out")
         return _of_arrays(
-            body, times, (qpos, qvel), ("qpos", "qvel"), MUJOCO_QPOS, joint_names, joint_order, step=step, name=name
+            body,
+            times,
+            (qpos, qvel),
+            ("qpos", "qvel"),
+            MUJOCO_QPOS,
+            joint_names,
+            joint_order,
+            integrator_step=integrator_step,
+            name=name,
         )
 
     @staticmethod
@@ -167,7 +172,7 @@ class FloatingTrajectory:
         v: ArrayLike | None = None,
         *,
         joint_names: Sequence[str] | None = None,
-        step: float | None = None,
+        integrator_step: float | None = None,
         name: str = "trajectory",
     ) -> FloatingTrajectory:
         """Return a trajectory of Pinocchio's arrays (Crocoddyl): both velocities of the base are in base axes.
@@ -178,7 +183,7 @@ class FloatingTrajectory:
         q : (N, 7 + n) place, quaternion x y z w, joints, each by one number
         v : (N, 6 + n), or None
         joint_names : in the order of these arrays; None: in the body's order
-        step : of the integrator [s]; None: that between samples
+        integrator_step : of the integrator [s]; None: that between samples
 
         Raises
         ------
@@ -192,7 +197,9 @@ class FloatingTrajectory:
         >>> sp.FloatingTrajectory.from_pinocchio(cat, np.linspace(0.0, 1.0, 21), q).quaternion[0].tolist()
         [0.0, 0.0, 0.0, 1.0]
         """
-        return _of_arrays(body, times, (q, v), ("q", "v"), PINOCCHIO_Q, joint_names, None, step=step, name=name)
+        return _of_arrays(
+            body, times, (q, v), ("q", "v"), PINOCCHIO_Q, joint_names, None, integrator_step=integrator_step, name=name
+        )
 
     @property
     def attitude(self) -> Array:
@@ -214,9 +221,9 @@ class FloatingTrajectory:
         return so3.apply(self.attitude, self.velocity)
 
     @property
-    def integrator_step(self) -> float:
+    def assumed_step(self) -> float:
         """Step of the integrator: as given, else the median between samples [s]."""
-        return float(np.median(np.diff(self.times))) if self.step is None else self.step
+        return float(np.median(np.diff(self.times))) if self.integrator_step is None else self.integrator_step
 
     def part(self, first: int, past: int) -> FloatingTrajectory:
         """Samples from `first` up to `past`, which is left out."""
@@ -263,7 +270,7 @@ def _of_arrays(
     joint_names: Sequence[str] | None,
     order: str | None,
     *,
-    step: float | None,
+    integrator_step: float | None,
     name: str,
 ) -> FloatingTrajectory:
     """The trajectory in arrays of coordinates and of rates with a free joint."""
@@ -279,7 +286,7 @@ def _of_arrays(
         position=motion.position,
         quaternion=motion.quaternion,
         shapes=motion.shapes(body),
-        step=step,
+        integrator_step=integrator_step,
         name=name,
         joint_order=None if nameless is None else f"{nameless.title}: {', '.join(nameless.names)}",
         **rates_by_name(motion.rates),

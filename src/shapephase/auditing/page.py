@@ -15,13 +15,13 @@ from ..plots.page import Page
 from ..plots.pages.templates import page_from
 from ..plots.plot_style import axes_image
 from ..plots.report_page import figure_rows
+from ._held_states import held_states
 from ._observation import observed
-from ._ranking import EXPLAINS
 from ._residuals import residuals
 from .audit_result import Audit, RunAudit
 from .figures import fall_figure, left_over_figures, momentum_figure
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import Hypothesis
+from .hypothesis import EXPLAINS, Hypothesis
 from .trajectory_audit import thinned
 
 _MOST_ROWS = 20  # hypotheses of the table; the record has all
@@ -55,6 +55,7 @@ def audit_page(body: Body, trajectories: FloatingTrajectory | Sequence[FloatingT
     check_object(body, "Body", "body")
     check_object(found, "Audit", "found")
     given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else list(trajectories)
+    given = [held_states(run)[0] for run in given]
     return page_from(
         "audit.html",
         title=f"Audit of {found.body}",

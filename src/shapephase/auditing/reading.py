@@ -29,7 +29,7 @@ _CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")
 class StepOptions(TrajectoryOptions, total=False):
     """Keyword arguments of `read_trajectory`."""
 
-    step: float | None
+    integrator_step: float | None
 
 
 @show_options(StepOptions)
@@ -42,7 +42,7 @@ def read_trajectory(file: str | os.PathLike[str], body: Body, **options: Unpack[
 
     Parameters
     ----------
-    step : of the integrator that made it [s]; None: that between samples, or the file's array `timestep`
+    integrator_step : of the integrator that made it [s]; None: that between samples, or the file's array `timestep`
     joint_order : of arrays without names, as `read_recorded_motion` has it
     fill, lowpass, resample : of recordings, as `read_recorded_motion` has them; the noise of what is filtered is that
         before the filter: slow changes, which an audit looks for, keep theirs
@@ -65,9 +65,9 @@ def read_trajectory(file: str | os.PathLike[str], body: Body, **options: Unpack[
     check_file_name(file, "file")
     where = Path(file)
     check_options(options, StepOptions, "read_trajectory")
-    step = options.pop("step", None)
+    step = options.pop("integrator_step", None)
     if step is not None:
-        step = positive_argument(step, "step")
+        step = positive_argument(step, "integrator_step")
     names, joint_order, degrees = options.get("names"), options.get("joint_order"), options.get("degrees")
     if joint_order is not None:
         check_choice(joint_order, "joint_order", WORDS)
@@ -95,7 +95,7 @@ def read_trajectory(file: str | os.PathLike[str], body: Body, **options: Unpack[
                 quaternion=table.base_quat_xyzw,
                 shapes=np.stack(joints, axis=1) if joints else np.zeros((len(times), 0)),
                 position=table.base_position,
-                step=table.simulated.step if step is None else step,
+                integrator_step=table.simulated.step if step is None else step,
                 name=where.name,
                 joint_order=order,
                 **rates_by_name(table.simulated.rates),
@@ -126,7 +126,7 @@ def _of_recording(
         quaternion=so3.quat_from_matrix(recorded.base_attitude),
         shapes=recorded.path.shape(recorded.times),
         position=recorded.base_position,
-        step=step,
+        integrator_step=step,
         name=where.name,
         joint_order=order,
         certain=_certain(recorded, degrees),

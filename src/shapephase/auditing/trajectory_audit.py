@@ -20,26 +20,30 @@ from ..reconstruction.reconstruction import reconstruct
 from ..shape_space.interpolation import ball_columns, near_signs
 from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
-from ._airborne import AirbornePart, airborne_part
+from ._airborne import AirbornePart, airborne_part, off_parabola
 from ._consistency import rate_agreement
-from ._drag import drag
-from ._filtered_samples import filtered_samples
-from ._gravity import wrong_gravity
-from ._integration_step import StepOrder, integration_step, step_hypothesis, step_order
+from ._engine_faults import (
+    StepOrder,
+    integration_step,
+    is_possible_step,
+    no_gyroscopic_term,
+    step_hypothesis,
+    step_order,
+)
+from ._held_states import held_states
 from ._joint_offsets import joint_offsets
-from ._missing_term import no_gyroscopic_term
 from ._noise import TrajectoryNoise
 from ._observation import Observation, observed
+from ._other_readings import filtered_samples, other_readings, read_otherwise
 from ._outside_pushes import outside_pushes
-from ._ranking import Evidence, Ranking
 from ._residuals import Residuals, inverse_factor, leftover, residuals
 from ._short_flight import TOLD_APART, short_run_audit
 from ._smooth_part import polynomials, smooth_part
-from ._transformations import other_readings, read_otherwise
+from ._surroundings import drag, wrong_gravity
 from ._wrong_inertias import wrong_inertias
 from .audit_result import Audit, RunAudit
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import AND, Hypothesis
+from .hypothesis import AND, Evidence, Hypothesis, Ranking
 
 _QUIET = 1e-6
 """[rad] Noise of the attitude below which the first sample is tried as the start of the exact reconstruction."""
@@ -49,15 +53,16 @@ _STEADY = 0.01  # of the momentum: a flight does not change it by more
 _TOLERANCE = 1e-3  # of momentum, rates and fall by default
 _WANDER = 0.01
 """[m] Skin moves over bones, and bodies are not what tables make of them: markers and masses wander by so much."""
-_MEASURED = 1e-4
-"""[rad or m] Noise from which on samples were measured, not computed."""
+_MEASURED = 1e-4  # [rad or m] Noise from which on samples were measured, not computed
 _PAIRED = 3  # readings that are tried together with every other cause: those that leave least
+_TAKES = 0.25  # of the squares of a law that either cause leaves alone: two causes have to leave less
 _ONE_AXIS = 1e-3  # of the base's rates: smaller ones across their main axis mean a turn about one axis
 _MOST_SAMPLES = 500  # of each run, for fits of hypotheses
 _MOST_LOOKED_AT = 5000  # samples of a trajectory that is read otherwise to find its fall
 # Share of the samples in the air from which no other reading is tried: a landing at the end leaves more than that, and
 # read wrongly it seems to be in the air.
 _MOSTLY = 0.5
+_NEARER = 0.7  # of the distance from a parabola read otherwise: noise alone does not make it so much less
 _JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing here says whether they are right."
 
 
@@ -91,7 +96,7 @@ def audit(
     flight : "auto", where the centre of mass falls longest; "auto:2", the second such flight; "all"; or its first and
         last time [s]
     noise : of the samples; None: what they show, the white part of it by differences, its spectrum by the residuals
-    every : steps of the integrator between samples, of trajectories that do not have their `step`; None: fitted
+    every : steps of the integrator between samples, where `integrator_step` is not given; None: fitted
 
     Raises
     ------
@@ -120,8 +125,10 @@ def audit(
     within = None if tolerance is None else positive_argument(tolerance, "tolerance", "a ratio")
     if every is not None:
         many = whole_argument(every, "every", 1)
-        runs = [run if run.step else replace(run, step=run.integrator_step / many) for run in runs]
+        runs = [run if run.integrator_step else replace(run, integrator_step=run.assumed_step / many) for run in runs]
     runs = [_with_near_signs(body, run) for run in runs]
+    states = [held_states(run) for run in runs]
+    runs = [run for run, _ in states]
     parts = [_airborne(body, run, flight) for run in runs]
     flown = [run.part(part.first, part.past) for run, part in zip(runs, parts, strict=True)]
     if min(len(run.times) for run in flown) < TOLD_APART:
@@ -139,11 +146,15 @@ def audit(
         levels = np.min(allowed, axis=0), np.max(colours, axis=0)
         found = _ranked(body, flown, looked, levels, order)
     # No residual holds a constant acceleration, so nothing else explains it.
-    gravity = wrong_gravity(seen, looked, _WANDER)
+    gravity = wrong_gravity(body, seen, looked, _WANDER, _steps(found, len(seen)))
     falls = bool(np.all(np.array(allowed)[:, 1] >= 1.0))
     if gravity is not None and (falls or all(one.kind == "step" for one in found.tie)):
         found = found.beside(gravity)
         looked = [replace(one, right=False) for one in looked]
+    held = {hypothesis.name: hypothesis for _, hypothesis in states if hypothesis is not None}
+    for hypothesis in held.values():
+        found = found.beside(hypothesis)
+    looked = [replace(one, right=one.right and held is None) for one, (_, held) in zip(looked, states, strict=True)]
     return Audit(
         body=body.name,
         runs=tuple(looked),
@@ -153,6 +164,13 @@ def audit(
         step_order=order,
         notes=_notes(seen, looked, order),
     )
+
+
+def _steps(found: Ranking, runs: int) -> list[float]:
+    """Steps of semi-implicit Euler that are named, of each run [s]; else zeros."""
+    named = found.tie[0].values if found.tie and found.tie[0].kind == "step" else {}
+    steps = [fitted.value for label, fitted in named.items() if label.startswith("step")]
+    return steps if len(steps) == runs else [0.0] * runs
 
 
 def _short(
@@ -200,13 +218,16 @@ def _airborne(body: Body, run: FloatingTrajectory, flight: str | Sequence[float]
         fault = error
     if found is not None and found.past - found.first >= _MOSTLY * len(run.times):
         return found
-    every = -(-len(run.times) // _MOST_LOOKED_AT)
-    for other in read_otherwise(body, run.every(every)):
+    given, every = found, -(-len(run.times) // _MOST_LOOKED_AT)
+    for changed in read_otherwise(body, run):
+        other = changed.every(every)
         try:
             part = airborne_part(body, other, flight)
         except TrajectoryError:
             continue
         first, past = every * part.first, min(every * (part.past - 1) + 1, len(run.times))
+        if given is not None and off_parabola(body, run, given) <= _NEARER * off_parabola(body, changed, given):
+            continue
         if found is None or past - first > found.past - found.first:
             found = replace(part, first=first, past=past, how=f"{part.how}, if it is read otherwise")
     if found is None:
@@ -231,9 +252,9 @@ def _run_audit(
     # The sum of the momentum over the time is compared with a turn of the body.
     size = scale if seen.given_rates else seen.mass * seen.extent**2
     smooth = smooth_part(seen.times, momentum, seen.momentum_noise, free, seen.carried_noise, inner, size)
-    values, level = smooth.values, smooth.noise
+    values, level, least = smooth.values, smooth.noise, smooth.least
     if not seen.given_rates:
-        values = np.gradient(values, seen.times, axis=0)
+        values, least = (np.gradient(curve, seen.times, axis=0) for curve in (values, least))
         level /= seen.times[-1] - seen.times[0]
     drift = float(np.linalg.norm(values, axis=1).max())
     fall = None
@@ -246,7 +267,7 @@ def _run_audit(
     allowed = [_allowed(smooth.ratio, drift / scale if scale > 0.0 else 0.0, tolerance)]
     allowed.append(1.0 if fall is None or off is None else _allowed(fall.ratio, off / seen.extent, of_fall))
     # Half a step apart, as semi-implicit integrators leave them, is no fault.
-    late = agreement is None or abs(agreement.late) <= run.integrator_step
+    late = agreement is None or abs(agreement.late) <= run.assumed_step
     if agreement is not None:
         rates = _allowed(agreement.ratio, agreement.mismatch, tolerance)
         allowed.append(max(rates, float(late and agreement.mismatch_less_late <= tolerance)))
@@ -258,7 +279,7 @@ def _run_audit(
         first_time=float(run.times[0]),
         last_time=float(run.times[-1]),
         given_rates=seen.given_rates,
-        step=run.integrator_step,
+        step=run.assumed_step,
         noise=seen.noise,
         times=seen.times,
         momentum=seen.momentum,
@@ -266,6 +287,7 @@ def _run_audit(
         momentum_drift=drift,
         momentum_noise=level / scale if scale > 0.0 else 0.0,
         momentum_ratio=smooth.ratio,
+        least_drift=float(np.abs(least).max()) / scale if scale > 0.0 else 0.0,
         fall_off=off,
         fall_ratio=None if fall is None else fall.ratio,
         extent=seen.extent,
@@ -360,7 +382,7 @@ def _ranked(
         stepped = [residuals(body, fit.seen, any_step=True) for fit in fits]
         others = other_readings(body, runs, levels, any_step=True)
         seconds = [*_causes(body, stepped), *(one.hypothesis for one in others)]
-        pairs += [one.paired_with("integration step", len(runs)) for one in seconds]
+        pairs += [one.paired_with("integration step", len(runs)) for one in seconds if _steps_are_possible(one, fits)]
     nearest = {one.name for one in found.ranked[:_PAIRED]}
     for reading in readings:
         first = reading.hypothesis
@@ -368,9 +390,23 @@ def _ranked(
             read = reading.fits(body)
             seconds = [*integration_step(read), *wrong_inertias(body, read)]
             pairs += [one.paired_with(first.name, first.parameters, first.values) for one in seconds]
+    alone = {one.name: one for one in singles}
+    pairs = [one for one in pairs if all(_takes(one, alone.get(name)) for name in one.name.split(AND))]
     nearest = {frozenset(one.name.split(AND)): one for one in sorted(pairs, key=lambda one: -one.square)}
     found = evidence.ranking([*singles, *nearest.values()])
     return found if found.tie else evidence.ranking([*found.ranked, *filtered_samples(fits, without)])
+
+
+def _takes(pair: Hypothesis, alone: Hypothesis | None) -> bool:
+    """Whether two causes leave much less of a law than one of them alone does."""
+    if alone is None or alone.leftover is None or pair.leftover is None:
+        return True
+    return bool(np.any(pair.leftover.squares < _TAKES * alone.leftover.squares))
+
+
+def _steps_are_possible(hypothesis: Hypothesis, fits: Sequence[Residuals]) -> bool:
+    steps = () if hypothesis.leftover is None else hypothesis.leftover.steps
+    return len(steps) == len(fits) and all(is_possible_step(fit, *step) for fit, step in zip(fits, steps, strict=True))
 
 
 def _causes(body: Body, fits: Sequence[Residuals]) -> list[Hypothesis]:

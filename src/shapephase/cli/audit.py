@@ -46,7 +46,8 @@ def audit_command(
 ) -> Outcome:
     """Audit trajectories in flight: momentum, fall, attitude and rates, and what explains it if they are wrong.
 
-    The exit code is 0 where all are right within their noise or the tolerance, else 10.
+    The exit code is 0 where all are right within their noise or the tolerance, 10 where one is wrong, and 12 where the
+    samples cannot tell, for they hide a fault as large as the tolerance.
 
     Parameters
     ----------
@@ -76,21 +77,23 @@ def audit_command(
     aside = check_writable(html, "--html", ".html") or aside
     if not trajectories:
         raise ShapeError("audit: one trajectory or more is needed after the body")
-    given = reading.step or (None,)
+    given = reading.integrator_step or (None,)
     if len(given) not in (1, len(trajectories)):
-        raise ShapeError(f"--step: one for each of {len(trajectories)} trajectories is needed, got {len(reading.step)}")
+        needed = f"one for each of {len(trajectories)} trajectories is needed"
+        raise ShapeError(f"--integrator-step: {needed}, got {len(given)}")
     loaded = body_argument(body, floating)
     each = given if len(given) == len(trajectories) else given * len(trajectories)
-    names = column_names(reading.names) or None
+    options = vars(reading) | {"timestep": reading.step, "names": column_names(reading.names) or None}
+    del options["step"]
     with steps(2) as work:
         work.begin("reading")
         runs = [
-            read_trajectory(file, loaded, **vars(reading) | {"step": step, "names": names})
+            read_trajectory(file, loaded, **options | {"integrator_step": step})
             for file, step in zip(trajectories, each, strict=True)
         ]
         work.begin("auditing")
         found = audit(loaded, runs, tolerance=tolerance, flight=flight_words(flight) or "auto", every=every)
         write_file(figure, lambda file: write_audit_figure(found, file))
         write_file(html, lambda file: audit_page(loaded, runs, found).write(file))
-    code = ExitCode.DONE if found.right else ExitCode.WRONG
+    code = ExitCode.WRONG if found.wrong else ExitCode.DONE if found.right else ExitCode.UNDECIDED
     return Outcome(found.table(), found.record, code=code, aside=aside, made_from={})

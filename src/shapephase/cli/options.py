@@ -264,11 +264,11 @@ class RecordingOptions(ColumnOptions):
 class TrajectoryOptions(ColumnOptions):
     """How a trajectory is read; each is an argument of `read_trajectory`."""
 
-    step: Annotated[tuple[float, ...], option(several=True)] = ()
+    integrator_step: Annotated[tuple[float, ...], option(several=True)] = ()
     """Step of the integrator of each trajectory, in s; default: that between its samples. For example
-    `--step 0.001 0.002`."""
-    timestep: Annotated[float | None, option()] = None
-    """Time between samples, in s, for files without times; for example `--timestep 0.01`."""
+    `--integrator-step 0.001 0.002`."""
+    step: Annotated[float | None, option()] = None
+    """Time between samples, in s, for files without times; for example `--step 0.01`."""
 
 
 @Parameter(name="*")

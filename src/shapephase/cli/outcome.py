@@ -49,6 +49,7 @@ class ExitCode(enum.IntEnum):
     CLUSTER = 9, "no connection to the cluster; stored cases are kept"
     WRONG = 10, "audit: the trajectory is wrong; the explanation is printed"
     FAILED_CASES = 11, "failed cases in a study; the others are stored"
+    UNDECIDED = 12, "audit: the samples cannot tell; a fault beyond the tolerance would not show"
     OUT_OF_TIME = 124, "time limit reached; the best result is written"
     STOPPED = 130, "stopped by Ctrl-C; the best result of plan is written"
     BROKEN_PIPE = 141, "the reader closed the pipe (SIGPIPE)"

@@ -1,4 +1,4 @@
-"""The hypothesis that the air slows a body: forces against the velocities, and their torques."""
+"""Hypotheses about the surroundings: the air slows a body, by forces against the velocities, or gravity is wrong."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from .. import so3
 from ..arrays import Array
 from ..body.body import Body
 from ..body.link_motions import link_motions
-from ._residuals import Residuals, fitted_hypothesis, leftover
+from ..shape_space.free_fall import GRAVITY
+from ._observation import Observation
+from ._residuals import Residuals, fitted_hypothesis, leftover, step_drift
+from .audit_result import RunAudit
 from .hypothesis import FittedValue, Hypothesis
 
 _HIGHEST = 8  # order of the polynomials whose slope is the velocity, the samples allowing
@@ -23,6 +26,10 @@ _STEPS = 12  # of Gauss and Newton, for the arm multiplies the force
 _ENOUGH = 1e-9  # relative change of what is left below which the fit ends
 _UNITS = {"linear": "N s/m", "quadratic": "N s^2/m^2", "density": "kg/m^3", "viscosity": "Pa s", "turn": "N m s"}
 _AXES = "xyz"
+_ELSEWHERE = 0.005  # of gravity: on earth it is 9.78 to 9.83 m/s^2
+_BARS = 4.0  # standard deviations by which it has to be off
+_OF_A_PARABOLA = 720.0  # variance of the acceleration of a parabola over T, of N samples of variance one: 720 / (N T^4)
+_SAG = 8.0  # acceleration of a parabola over T whose middle is off its chord by s: 8 s / T^2
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,3 +177,55 @@ def _hypothesis(
         },
         remark=remark,
     )
+
+
+def wrong_gravity(
+    body: Body, seen: Sequence[Observation], runs: Sequence[RunAudit], wander: float, steps: Sequence[float]
+) -> Hypothesis | None:
+    """None where every fall is that on earth with x, y or z up, of a recording also down, or none, as in orbit.
+
+    Parameters
+    ----------
+    runs : results of the same trajectories
+    wander : of the centre of mass of those that are recordings [m]
+    steps : of semi-implicit Euler, whose drift of the centre of mass is taken off [s]
+    """
+    for sampled, run, step in zip(seen, runs, steps, strict=True):
+        if sampled.centre is None or sampled.centre_noise is None or run.fall_off is None:
+            continue
+        off = max(run.fall_off, wander if run.recorded else 0.0)
+        drift = step_drift(body, sampled, None).centre if step else None
+        centre = sampled.centre if drift is None else sampled.centre - step * drift
+        pull, bar = _fall(sampled.times, centre, sampled.centre_noise, off)
+        by_step = pull - _fall(sampled.times, sampled.centre, sampled.centre_noise, off)[0]
+        size, axis = float(np.linalg.norm(pull)), int(np.argmax(np.abs(pull)))
+        # What a step adds is known as well as the rates are, whose frame may be wrong.
+        allowed = _ELSEWHERE * GRAVITY + _BARS * bar + float(np.linalg.norm(by_step))
+        expected = np.zeros(3)
+        expected[axis] = np.copysign(GRAVITY, pull[axis]) if run.recorded else -GRAVITY
+        if size > allowed and np.linalg.norm(pull - expected) > allowed:
+            tilt = float(np.degrees(np.arccos(min(abs(pull[axis]) / size, 1.0))))
+            return Hypothesis(
+                name="gravity",
+                kind="gravity",
+                square=0.0,
+                left_over=0.0,
+                parameters=3,
+                share=0.0,
+                values={
+                    "size": FittedValue(value=size, bar=bar, unit="m/s^2"),
+                    "tilt": FittedValue(value=tilt, bar=float(np.degrees(bar / size)), unit="deg"),
+                },
+                remark=f"{run.name} falls towards {'-' if pull[axis] < 0.0 else '+'}{_AXES[axis]}; expected "
+                f"{GRAVITY:.4g} m/s^2 along an axis of the world with x, y or z up, or no weight",
+            )
+    return None
+
+
+def _fall(times: Array, centres: Array, covariances: Array, off: float) -> tuple[Array, float]:
+    """Acceleration (3,), and its standard deviation by noise and by how far the centre of mass may be off [m/s^2]."""
+    span = float(times[-1] - times[0])
+    pull = 2.0 * np.linalg.lstsq(np.vander((times - times[0]) / span, 3), centres, rcond=None)[0][0]
+    variance = float(np.trace(covariances, axis1=1, axis2=2).mean()) / 3.0
+    bar = float(np.hypot(np.sqrt(_OF_A_PARABOLA * variance / len(times)), _SAG * off))
+    return pull / span**2, bar / span**2

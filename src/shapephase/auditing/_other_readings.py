@@ -1,4 +1,4 @@
-"""The hypotheses that the numbers mean something else: other frames, orders, units or times than they were read in."""
+"""Hypotheses that the numbers mean something else: other frames, orders, units or times, or filtered samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from ..body.body import Body
 from ..warning_filters import quiet
 from ._noise import TrajectoryNoise
 from ._observation import observed
-from ._residuals import Residuals, fitted_hypothesis, leftover_of_moments, residuals
+from ._residuals import Residuals, fitted_hypothesis, leftover, leftover_of_moments, residuals
+from ._smooth_part import cut_off
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import FittedValue, Hypothesis, Leftover
 
@@ -27,6 +28,8 @@ _SLACK = 1e-12  # of the trajectory: rounding of a time
 _AS_GOOD_AS_EXACT = 1e-7  # of the range of a joint or rate: smaller noise is taken as none
 
 Change = Callable[[FloatingTrajectory], FloatingTrajectory]
+_FREE = (1, 2, 0)  # orders of cosines that the laws leave open in each block
+_APART = 1.7  # ratio of the cut-offs of two laws up to which they are one
 
 
 @dataclass(frozen=True)
@@ -98,8 +101,7 @@ def other_readings(
             continue
         read = tuple(reading.change(run) for run in runs)
         noise = tuple(reading.noise(level, _turning(body)) for level in levels)
-        moments = [_moments(body, run, level, any_step) for run, level in zip(read, noise, strict=True)]
-        left = leftover_of_moments(np.sum(moments, axis=0))
+        left = replace(_leftover(body, read, noise, any_step), in_time=None)
         found.append(OtherReading(fitted_hypothesis(reading.name, reading.kind, left), read, noise))
     curves = [_Curves(run, level) for run, level in zip(runs, levels, strict=True)]
     return found + [
@@ -242,6 +244,14 @@ def _sharpened_joints(run: FloatingTrajectory, curves: _Curves, width: float) ->
     return replace(run, shapes=shapes, joint_rates=run.joint_rates - half * bent)
 
 
+def _leftover(
+    body: Body, runs: Sequence[FloatingTrajectory], levels: Sequence[TrajectoryNoise], any_step: bool
+) -> Leftover:
+    pairs = zip(runs, levels, strict=True)
+    fits = [residuals(body, observed(body, run, level), any_step=any_step) for run, level in pairs]
+    return leftover(fits, np.concatenate([fit.vector for fit in fits]))
+
+
 def _moments(body: Body, run: FloatingTrajectory, noise: TrajectoryNoise, any_step: bool) -> Array:
     fit = residuals(body, observed(body, run, noise), any_step=any_step)
     return fit.moments(fit.vector)
@@ -312,7 +322,33 @@ def _gradual(
     found, without = left(value, value), left(0.0)
     if found.squares.sum() >= without.squares.sum():
         found, value = without, 0.0
+    found = replace(found, steps=_leftover(body, changed(value, value), levels, any_step).steps)
     bar = float(np.sqrt(2.0 / bend)) if bend > 0.0 else np.inf
     values = {reading.label: FittedValue(value=value, bar=bar, unit=reading.unit)}
     hypothesis = fitted_hypothesis(reading.name, reading.kind, found, parameters=1, values=values)
     return OtherReading(hypothesis, changed(value, value), tuple(levels))
+
+
+def filtered_samples(fits: Sequence[Residuals], without: Leftover) -> list[Hypothesis]:
+    """The cut-off; empty where momentum and fall do not end at one frequency, as those of filtered samples do.
+
+    Without rates the momentum is summed over the time, which adds slow noise of its own: there the fall decides.
+    """
+    cuts = []
+    for fit in fits:
+        span = float(fit.seen.times[-1] - fit.seen.times[0])
+        blocks = (0, 1) if fit.seen.given_rates else (1,)
+        for block, part in fit.blocks(fit.vector).items():
+            if block in blocks:  # rates are held against differences of samples, which have a cut-off of their own
+                order = cut_off(part, _FREE[block])
+                if order is None:
+                    return []
+                cuts.append(0.5 * order / span)
+    if not cuts or max(cuts) > _APART * min(cuts):
+        return []
+    value = FittedValue(value=float(np.exp(np.log(cuts).mean())), bar=float(np.ptp(cuts) / 2.0), unit="Hz")
+    left = replace(without, squares=np.minimum(without.squares, without.counts), effective=without.counts)
+    remark = "the noise of the samples ends there; filter a longer recording less, or state its noise"
+    return [
+        fitted_hypothesis("samples filtered", "filter", left, parameters=2, values={"cut-off": value}, remark=remark)
+    ]

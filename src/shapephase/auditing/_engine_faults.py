@@ -1,6 +1,7 @@
-"""The hypothesis that the step of an integrator is too long: several runs with different steps tell, one may agree.
+"""Hypotheses about the engine: the step of its integrator is too long, or its gyroscopic term is missing.
 
-With an order p, what is wrong grows as the step to the power p, by one curve of the time for all runs.
+Several runs with different steps show an order p: what is wrong grows as the step to the power p, by one curve of the
+time for all runs. One run may agree with semi-implicit Euler.
 """
 
 from __future__ import annotations
@@ -12,21 +13,23 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from .. import so3
 from ..arrays import Array
 from ..display import short_repr
 from ._observation import Observation
 from ._residuals import Residuals, fitted_hypothesis, leftover
 from .hypothesis import FittedValue, Hypothesis, Leftover
 
-_LOWEST = 0.3
-"""Order below which it is none: halving the step then changes next to nothing."""
-_APART = 1.05
-"""Ratio of two steps from which they tell an order."""
-_ABOVE = 10.0
-"""Drifts in units of what is known of them, by noise and rounding: smaller ones tell no order."""
+_LOWEST = 0.3  # order below which it is none: halving the step then changes next to nothing
+_APART = 1.05  # ratio of two steps from which they tell an order
+_ABOVE = 10.0  # drifts in units of what is known of them, by noise and rounding: smaller ones tell no order
 _BELONGS = 0.25  # of the drifts: largest share that the law of one order may leave
 _UNEVEN = 1.0  # largest difference of orders between steps where the step alone is the cause
+_BARS = 3.0  # standard deviations by which a fitted step may be off
 _INACCURATE = 0.1  # of a step: what terms of second order add, 0.1 % for 2 ms at 10 rad/s, and 5 % for 20 ms
+_AS_ONE = 1e-3  # share of the momentum: joints that add less are at rest, and the body turns as one
+_SEEN = 1e-9  # share of the largest column: what moves nothing, as the inertia of a ball does not, takes no part
+_AXES = "xyz"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,9 +66,9 @@ def step_order(runs: Sequence[Observation], least: Sequence[float]) -> StepOrder
 
     least : of each run, what a drift has to exceed, rms relative to the momenta
     """
-    ordered = sorted(zip(runs, least, strict=True), key=lambda pair: pair[0].trajectory.integrator_step)
+    ordered = sorted(zip(runs, least, strict=True), key=lambda pair: pair[0].trajectory.assumed_step)
     known = [(run, _drift(run)) for run, limit in ordered if _rms(_drift(run)) > _ABOVE * limit * run.scale]
-    steps = [run.trajectory.integrator_step for run, _ in known]
+    steps = [run.trajectory.assumed_step for run, _ in known]
     if len(known) < 2 or any(longer < _APART * shorter for shorter, longer in pairwise(steps)):
         return None
     drifts = [_rms(drift) / run.scale for run, drift in known]
@@ -125,9 +128,16 @@ def _together(known: Sequence[tuple[Observation, Array]]) -> Array:
 def _off_law(known: Sequence[tuple[Observation, Array]], order: float) -> float:
     """What one curve times step^order leaves of the drifts, rms relative to them, each run weighing alike."""
     drifts = _together(known)
-    powers = np.array([run.trajectory.integrator_step for run, _ in known]) ** order
+    powers = np.array([run.trajectory.assumed_step for run, _ in known]) ** order
     scaled = drifts / powers[:, None, None]
     return _rms((scaled - scaled.mean(axis=0)).reshape(-1, 3)) / _rms(scaled.reshape(-1, 3))
+
+
+def is_possible_step(fit: Residuals, step: float, bar: float) -> bool:
+    """Whether a fitted step is positive, no longer than the time between samples, and the one that is given."""
+    spacing, given = float(np.median(np.diff(fit.seen.times))), fit.seen.trajectory.integrator_step
+    off = _BARS * bar + _INACCURATE * step
+    return 0.0 < step <= spacing + off and (given is None or abs(step - given) <= off)
 
 
 def integration_step(fits: Sequence[Residuals]) -> list[Hypothesis]:
@@ -139,10 +149,8 @@ def integration_step(fits: Sequence[Residuals]) -> list[Hypothesis]:
     steps = [float(fit.vector @ c[:, 0]) / n for fit, c, n in zip(fits, columns, lengths, strict=True)]
     values, remarks = {}, []
     for fit, step, length in zip(fits, steps, lengths, strict=True):
-        spacing = float(np.median(np.diff(fit.seen.times)))
-        given, bar = fit.seen.trajectory.step, float(1.0 / np.sqrt(length))
-        off = 3.0 * bar + _INACCURATE * step
-        if step <= 0.0 or step > spacing + off or (given is not None and abs(step - given) > off):
+        spacing, bar = float(np.median(np.diff(fit.seen.times))), float(1.0 / np.sqrt(length))
+        if not is_possible_step(fit, step, bar):
             return []
         label = "step" if len(fits) == 1 else f"step of {fit.seen.trajectory.name}"
         values[label] = FittedValue(value=step, bar=bar, unit="s")
@@ -159,3 +167,42 @@ def integration_step(fits: Sequence[Residuals]) -> list[Hypothesis]:
             remark=f"consistent with semi-implicit Euler, {every} steps a sample; a run with half the step tells",
         )
     ]
+
+
+def no_gyroscopic_term(fits: Sequence[Residuals]) -> list[Hypothesis]:
+    """Without omega x I omega in Euler's equations omega is constant in world axes: the momentum goes as R I R^T.
+
+    Empty where joints move: what an engine makes of their motion then is not known.
+    """
+    if any(np.sqrt((fit.seen.internal**2).sum(axis=1).mean()) > _AS_ONE * fit.seen.scale for fit in fits):
+        return []
+    lefts, values = [], {}
+    for fit in fits:
+        seen = fit.seen
+        columns = fit.columns(seen.attitude @ seen.inertia @ so3.transpose(seen.attitude))
+        rate, left = _fitted(columns, fit.vector)
+        lefts.append(left)
+        if not values:
+            values = {
+                f"angular velocity {axis}": FittedValue(value=float(part), bar=float(bar), unit="rad/s")
+                for axis, part, bar in zip(_AXES, *rate, strict=True)
+            }
+    return [
+        fitted_hypothesis(
+            "no gyroscopic term in the engine",
+            "engine",
+            leftover(fits, np.concatenate(lefts)),
+            parameters=3 * len(fits),
+            values=values,
+            remark="the angular velocity is constant in world axes; switch the gyroscopic force of the engine on",
+        )
+    ]
+
+
+def _fitted(columns: Array, vector: Array) -> tuple[tuple[Array, Array], Array]:
+    """Least squares: the coefficients with their bars, and what is left."""
+    left, strengths, right = np.linalg.svd(columns, full_matrices=False)
+    kept = strengths > _SEEN * max(float(strengths.max(initial=0.0)), np.finfo(float).tiny)
+    inverse = right[kept].T / strengths[kept]
+    amounts = left[:, kept].T @ vector
+    return (inverse @ amounts, np.linalg.norm(inverse, axis=1)), vector - left[:, kept] @ amounts
