@@ -1,1 +1,6 @@
-__all__: list[str] = []
+from .limbs import JointGroups, joint_groups
+
+__all__ = [
+    "JointGroups",
+    "joint_groups",
+]
