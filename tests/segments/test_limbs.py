@@ -38,7 +38,7 @@ FINGERS = urdf(
     *(link(f"bras_{side}", 3.0, SMALL, (0.0, 0.0, -0.2)) for side in "dg"),
     link("palme", 0.5, SMALL),
     *(link(f"doigt_{k}", 0.02, (1e-6, 1e-6, 1e-6)) for k in range(3)),
-    *(joint(f"epaule_{s}", "revolute", "chest", f"bras_{s}", (1, 0, 0), (0, y, 0)) for s, y in (("d", -0.2), ("g", 0.2))),
+    *(joint(f"epaule_{s}", "revolute", "chest", f"bras_{s}", (1, 0, 0), (0, y, 0)) for s, y in (("d", -1), ("g", 1))),
     joint("poignet", "revolute", "bras_d", "palme", (0, 1, 0), (0, 0, -0.4)),
     *(joint(f"phalange_{k}", "revolute", "palme", f"doigt_{k}", (0, 1, 0), (0.01 * k, 0, -0.1)) for k in range(3)),
 )  # fmt: skip
