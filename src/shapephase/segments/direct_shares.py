@@ -34,7 +34,8 @@ _NAMED = {sign + axis: float(f"{sign}1") * np.eye(3)[k] for sign in ("", "-") fo
 _NODES = 12  # of Gauss on a panel: 1e-12 of smooth motions that turn by a radian there
 _NEAR = 0.05  # of the attitude's tolerance, for the error of the quadrature
 _MOST_HALVED = 20  # times: panels of 1e-6 of their first length
-_PARTS = 8  # of a step, at which angles are continued, as those of `Motion`
+_PARTS = 2  # of a step, which turns the base by a radian at most, at which angles are continued
+_PARTS_OF_LINKS = 8  # the same where joints turn the link against the base
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,8 +96,10 @@ class LinkChart:
 
     def angles(self, motion: Motion, times: Array) -> Array:
         """Somersault, tilt and twist, continuous in time: (N,) -> (N, 3) [rad]."""
-        ends = np.union1d(motion.solution.times, motion.deformation.breaks) if self.frame else motion.solution.times
-        known = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(_PARTS) / _PARTS).ravel(), ends[-1])
+        ends, parts = motion.solution.times, _PARTS
+        if self.frame:
+            ends, parts = np.union1d(ends, motion.deformation.breaks), _PARTS_OF_LINKS
+        known = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(parts) / parts).ravel(), ends[-1])
 
         def quaternions(sampled: Array) -> Array:
             return so3.quat_from_matrix(self.there.T @ self.attitude(motion, sampled) @ self.here)[None]
@@ -149,6 +152,7 @@ class DirectShares:
     shares : (N, J + 1) of each up to each time; their sum is the angle less that at the start [rad]
     angle : (N,) the angle itself, followed in time, from 0 at the start [rad]
     error : (N,) estimate of the difference of sum and angle [rad]
+    total : (J + 1,) shares up to the time for which the result is stated [rad]
     largest_tilt : of the link [rad], at the time `tilt_time` [s]
 
     Examples
@@ -166,6 +170,7 @@ class DirectShares:
     shares: Array
     angle: Array
     error: Array
+    total: Array
     largest_tilt: float
     tilt_time: float
 
@@ -228,8 +233,8 @@ class DirectRates:
         return np.einsum("ni,nij->nj", row, turning), sensitive, along
 
 
-def direct_shares(rates: DirectRates, times: Array) -> DirectShares:
-    """Return the integrals of the rates of an angle.
+def direct_shares(rates: DirectRates, times: Array, at: float) -> DirectShares:
+    """Return the integrals of the rates of an angle up to times (N,), and to one of them for which totals are stated.
 
     Raises
     ------
@@ -248,8 +253,9 @@ def direct_shares(rates: DirectRates, times: Array) -> DirectShares:
             f"the tilt of {rates.chart.link} reaches {np.degrees(tilt):.1f} degrees at {when:.4g} s; beyond 85 degrees "
             f"shares of {rates.of} have no meaning: take the rotation about an axis, of='rotation', or another link"
         )
-    panel = np.clip(np.searchsorted(left, times, side="right") - 1, 0, len(left) - 1)
-    place = 2.0 * (times - left[panel]) / (right - left)[panel] - 1.0
+    instants = np.append(times, at)
+    panel = np.clip(np.searchsorted(left, instants, side="right") - 1, 0, len(left) - 1)
+    place = 2.0 * (instants - left[panel]) / (right - left)[panel] - 1.0
     half = 0.5 * (right - left)
     shares = _integrals(values, half, panel, place)
     error = float(motion.error_estimate)
@@ -258,15 +264,16 @@ def direct_shares(rates: DirectRates, times: Array) -> DirectShares:
     if rates.of == "rotation":
         angle, ends = shares.sum(axis=1), 0.0
     else:
-        followed = rates.chart.angles(motion, np.append(0.0, times))[:, ANGLES.index(rates.of)]
+        followed = rates.chart.angles(motion, np.append(0.0, instants))[:, ANGLES.index(rates.of)]
         angle, ends = followed[1:] - followed[0], 2.0 * error / np.cos(tilt)
     rounding = 1e-14 * (np.abs(shares).sum(axis=1) + np.abs(angle)) * len(left)
     return DirectShares(
         times=times,
         sources=("momentum", *rates.joints),
-        shares=shares,
-        angle=angle,
-        error=quadrature + drift + ends + rounding,
+        shares=shares[:-1],
+        angle=angle[:-1],
+        error=(quadrature + drift + ends + rounding)[:-1],
+        total=shares[-1],
         largest_tilt=tilt,
         tilt_time=when,
     )

@@ -23,6 +23,8 @@ _BRANCH = (
     0.01  # of the mass: a hand is 0.6 % of a person, a forearm with hand 2.2 % (de Leva 1996); fingers fork no trunk
 )
 _MIRRORED = 0.01  # difference of masses and distances of two limbs, relative: left and right of measured models
+GROUPINGS = ("limbs", "joints")
+CONDITIONS = ("momentum", "attitude", "duration", "body")  # in which two motions can differ besides their joints
 _KINDS = {
     "leg": re.compile(r"(?i)leg|thigh|shank|femur|tibia|foot|hip|knee|ankle|cuisse|jambe|calf|hind"),
     "arm": re.compile(r"(?i)arm|hand|humer|radius|elbow|wrist|shoulder|clavic|bras"),
@@ -312,8 +314,8 @@ def joint_groups(body: Body, groups: str | Mapping[str, str | Iterable[str]] = "
     """
     tree = SegmentTree(body)
     if isinstance(groups, str):
-        if groups not in ("limbs", "joints"):
-            raise unknown_name("groups", groups, ("limbs", "joints"))
+        if groups not in GROUPINGS:
+            raise unknown_name("groups", groups, GROUPINGS)
         limbs = tree.limbs()
         by_limb = {name: limb.joints for name, limb in limbs.items() if any(j in tree.joints for j in limb.joints)}
         if groups == "limbs" and len(by_limb) > 1:
@@ -363,15 +365,22 @@ def _coordinate_names(body: Body) -> tuple[str, ...]:
     return tuple(dict.fromkeys(numbers.get(name, name) for name in body.joint_names))
 
 
-def pattern_words(words: Iterable[str]) -> dict[str, tuple[str, ...]]:
-    """Return groups from words such as "arms=left_*,right_*". Raises ShapeError for another word, or one twice."""
+def groups_of_words(words: Iterable[str]) -> str | dict[str, tuple[str, ...]]:
+    """Return groups from "limbs", "joints", or words such as "arms=left_*,right_*" and "momentum".
+
+    Raises ShapeError for a word without patterns, or a group that stands twice.
+    """
+    several = tuple(words)
+    if len(several) == 1 and several[0] in GROUPINGS:
+        return several[0]
     groups: dict[str, tuple[str, ...]] = {}
-    for word in words:
-        name, equals, patterns = word.partition("=")
-        several = tuple(filter(None, (pattern.strip() for pattern in patterns.split(","))))
-        if not (name.strip() and equals and several) or name.strip() in groups:
+    for word in several:
+        name, _, patterns = word.partition("=")
+        parts = tuple(filter(None, (pattern.strip() for pattern in patterns.split(","))))
+        if not name.strip() or name.strip() in groups or not (parts or word in CONDITIONS):
             raise ShapeError(
-                f"--groups: words such as arms=left_*,right_* are needed, each group once, got {word!r:.60}"
+                f"--groups: limbs, joints, or words such as arms=left_*,right_* are needed, each group once; with "
+                f"--baseline FILE also {', '.join(CONDITIONS)}; got {word!r:.60}"
             )
-        groups[name.strip()] = several
+        groups[name.strip()] = parts
     return groups
