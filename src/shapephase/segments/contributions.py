@@ -151,8 +151,7 @@ class Contributions:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON can hold it, angles in radians."""
-        data = plain(self)
-        return data | {"pairs": {both: list(pair) for both, pair in data.pop("_pairs").items()}}
+        return plain(self) | {"pairs": {both: list(pair) for both, pair in self._pairs.items()}}
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the direct shares in time: time_s, angle_rad, and one column in rad for each source.

@@ -22,6 +22,7 @@ from ..body.link_motions import link_motions
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ChartPoleError, WrongObjectError
+from ..integrator.stepped import SteppedRotation
 from ..reconstruction.attitude_angles import EulerAngles, continued_angles
 from ..reconstruction.reconstruction import Motion
 from ..refinement import least_over
@@ -34,8 +35,7 @@ _NAMED = {sign + axis: float(f"{sign}1") * np.eye(3)[k] for sign in ("", "-") fo
 _NODES = 12  # of Gauss on a panel: 1e-12 of smooth motions that turn by a radian there
 _NEAR = 0.05  # of the attitude's tolerance, for the error of the quadrature
 _MOST_HALVED = 20  # times: panels of 1e-6 of their first length
-_PARTS = 2  # of a step, which turns the base by a radian at most, at which angles are continued
-_PARTS_OF_LINKS = 8  # the same where joints turn the link against the base
+_PARTS = 8  # of a step, at which angles of a link other than the base are continued: joints turn it more
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ class LinkChart:
 
     def attitude(self, motion: Motion, times: Array) -> Array:
         """Attitudes of the link, to inertial axes: (N,) -> (N, 3, 3)."""
-        base = motion.attitude(times)
+        base = _base_attitudes(motion, times)
         if not self.frame:
             return base @ self.pose
         body, path = articulated_parts(motion.deformation)
@@ -96,10 +96,10 @@ class LinkChart:
 
     def angles(self, motion: Motion, times: Array) -> Array:
         """Somersault, tilt and twist, continuous in time: (N,) -> (N, 3) [rad]."""
-        ends, parts = motion.solution.times, _PARTS
+        known = motion.solution.times
         if self.frame:
-            ends, parts = np.union1d(ends, motion.deformation.breaks), _PARTS_OF_LINKS
-        known = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(parts) / parts).ravel(), ends[-1])
+            ends = np.union1d(known, motion.deformation.breaks)
+            known = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(_PARTS) / _PARTS).ravel(), ends[-1])
 
         def quaternions(sampled: Array) -> Array:
             return so3.quat_from_matrix(self.there.T @ self.attitude(motion, sampled) @ self.here)[None]
@@ -123,6 +123,19 @@ class LinkChart:
         rows = np.stack([across, np.stack([cosine, -sine, zero], axis=-1), along[:, None] * across], axis=1)
         rows[:, 2] += np.stack([zero, zero, one], axis=-1)
         return rows @ self.here.T, along
+
+
+def _base_attitudes(motion: Motion, times: Array) -> Array:
+    """`Motion.attitude`, read off at the ends of steps, where nothing has to be evaluated: (N,) -> (N, 3, 3)."""
+    solution = motion.solution
+    if not isinstance(solution, SteppedRotation):
+        return motion.attitude(times)
+    index = np.minimum(np.searchsorted(solution.times, times), len(solution.times) - 1)
+    attitudes = motion.initial_attitude @ so3.matrix_from_quat(solution.quaternions[0, index])
+    between = solution.times[index] != times
+    if between.any():
+        attitudes[between] = motion.attitude(times[between])
+    return attitudes
 
 
 def articulated_parts(deformation: Deformation) -> tuple[Body, ShapePath]:
