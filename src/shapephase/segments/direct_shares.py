@@ -34,6 +34,7 @@ ANGLES = ("somersault", "tilt", "twist")
 _NAMED = {sign + axis: float(f"{sign}1") * np.eye(3)[k] for sign in ("", "-") for k, axis in enumerate("xyz")}
 _NODES = 12  # of Gauss on a panel: 1e-12 of smooth motions that turn by a radian there
 _NEAR = 0.05  # of the attitude's tolerance, for the error of the quadrature
+_ROUNDING = 1e-12  # of the largest rate: what rounding of attitudes leaves of the last terms
 _MOST_HALVED = 20  # times: panels of 1e-6 of their first length
 _PARTS = 8  # of a step, at which angles of a link other than the base are continued: joints turn it more
 
@@ -303,6 +304,7 @@ def _resolved(rates: DirectRates, edges: Array) -> tuple[Array, ...]:
     nodes, transform = _gauss()
     left, right = edges[:-1], edges[1:]
     done: list[tuple[Array, ...]] = []
+    largest = 0.0
     for _ in range(_MOST_HALVED):
         half = 0.5 * (right - left)
         times = (left + half)[:, None] + half[:, None] * nodes
@@ -310,9 +312,9 @@ def _resolved(rates: DirectRates, edges: Array) -> tuple[Array, ...]:
             result.reshape(len(left), _NODES, *result.shape[1:]) for result in rates(times.ravel())
         )
         series = np.einsum("pnj,nk->pkj", values, transform)
-        # The integral of the last terms, and what rounding makes of them.
         tail = np.abs(series[:, -2:]).max(axis=(1, 2)) * 2.0 * half
-        rough = tail > np.maximum(2.0 * half * goal, 1e-14 * np.abs(series).max(axis=(1, 2)) * half)
+        largest = max(largest, float(np.abs(series).max()))
+        rough = tail > 2.0 * half * max(goal, _ROUNDING * largest)
         done.append((left[~rough], right[~rough], values[~rough], sensitive[~rough], along[~rough], tail[~rough]))
         if not rough.any():
             order = np.argsort(np.concatenate([panels[0] for panels in done]))
