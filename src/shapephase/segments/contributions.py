@@ -132,9 +132,11 @@ class Contributions:
                 lines.append(f"{names:24}{text(value):>12}{small}")
         if self.direct is not None:
             shown = sorted(zip(self.direct.sources, self.direct.total, strict=True), key=lambda pair: -abs(pair[1]))
-            change = text(float(self.direct.total.sum()))
-            lines += ["", f"direct, along the motion: {change} in all, largest tilt "
-                      f"{np.degrees(self.direct.largest_tilt):.1f} deg at {self.direct.tilt_time:.3g} s"]  # fmt: skip
+            change = text(float(self.direct.total.sum())) + " in all"
+            if self.of != "rotation":
+                degrees = np.degrees(self.direct.largest_tilt)
+                change += f", largest tilt {degrees:.1f} deg at {self.direct.tilt_time:.3g} s"
+            lines += ["", f"direct, along the motion: {change}"]
             lines += [f"  {name:22.22}{text(value):>12}" for name, value in shown if abs(value) > 0.0]
         if self.rest:
             lines += ["", f"in no group, moving in all motions: {', '.join(self.rest)}"]
@@ -241,7 +243,7 @@ def contributions(
     direct, chart, instant = None, None, motion.duration
     axis = np.zeros(3)
     if function is None and name not in _WITHOUT_JOINTS:
-        chart = LinkChart.of(motion, link, tree.trunk, **axes)
+        chart = LinkChart.of(motion, tree.trunk if link is None else link, name in ANGLES, **axes)
         if name == "rotation":
             axis = _axis(motion, about)
         if name == "tilt":
@@ -250,7 +252,7 @@ def contributions(
         direct = direct_shares(DirectRates(motion, chart, name, axis, tree.joints), np.ravel(sampled), instant)
     measure = _Measure(name, function, chart, axis, instant / motion.duration)
     values = _Values(held, measure)
-    return _shares(values, grouped, direct, _Choice(name, baseline, instant, chart, axis, orders, seed))
+    return _shares(values, grouped, direct, _Choice(name, baseline, instant, chart, orders, seed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,7 +261,6 @@ class _Choice:
     baseline: Any
     at: float
     chart: LinkChart | None
-    about: Array
     orders: int
     seed: int
 
@@ -399,7 +400,7 @@ def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
     closes = float(np.abs(path.gap).max(initial=0.0)) <= CLOSED and not motion.momentum.any()
     if not closes or not isinstance(choice.baseline, str) or choice.baseline != "first" or chart is None:
         return None
-    if choice.of == "tilt" or body.ball_joints:
+    if choice.of not in ("twist", "somersault") or body.ball_joints:
         return None
     times = np.linspace(0.0, motion.duration, 4097)  # even samples of a smooth loop: their sum converges fast
     shapes, rates = path.curve(times)
@@ -407,8 +408,7 @@ def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
     turns = np.einsum("ni,nj->ij", moved, rates[:-1]) * (times[1] - times[0])
     areas = 0.5 * (turns - turns.T)
     vectors = -curvature(body, shapes[0]) * areas[..., None]
-    row = chart.rates(chart.attitude(motion, np.zeros(1)), choice.about if choice.of == "rotation" else None)[0][0]
-    row = row[0] if choice.of == "rotation" else row[ANGLES.index(choice.of)]
+    row = chart.rates(chart.attitude(motion, np.zeros(1)), None)[0][0, ANGLES.index(choice.of)]
     axes = motion.attitude(0.0).T @ chart.attitude(motion, np.zeros(1))[0]
     by_pair = 0.5 * vectors @ axes @ row
     result = np.zeros((len(held.names),) * 2)

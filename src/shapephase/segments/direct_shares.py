@@ -61,12 +61,16 @@ class LinkChart:
     __repr__ = short_repr
 
     @classmethod
-    def of(cls, motion: Motion, link: str | None, trunk: str, **given: Any) -> LinkChart:
-        """Return the chart of a link, by axes given in its own axes, else those of `Motion.athlete_axes`."""
+    def of(cls, motion: Motion, link: str, of_athlete: bool, **given: Any) -> LinkChart:
+        """Return the chart of a link, by axes given in its own axes, else those of `Motion.athlete_axes`.
+
+        Without an athlete's angles, all axes are those of the link and the laboratory.
+        """
         body, path = articulated_parts(motion.deformation)
-        name = trunk if link is None else link
-        body.link_pose(body.shape(), name)
-        frame, pose = body.chain.link_frames[name]
+        body.link_pose(body.shape(), link)
+        frame, pose = body.chain.link_frames[link]
+        if not of_athlete:
+            return cls(link, frame, pose[:3, :3], np.eye(3), np.eye(3))
 
         def width(times: Array) -> Array:
             moments = np.linalg.eigvalsh(motion.deformation.description.sample(times)[0])
@@ -85,7 +89,7 @@ class LinkChart:
         axes = motion.athlete_axes(**own)
         here = turn.T @ np.stack([axes.frontal, axes.lateral, axes.longitudinal], axis=-1)
         there = np.stack([np.cross(axes.somersault, axes.up), axes.somersault, axes.up], axis=-1)
-        return cls(name, frame, pose[:3, :3], here, there)
+        return cls(link, frame, pose[:3, :3], here, there)
 
     def attitude(self, motion: Motion, times: Array) -> Array:
         """Attitudes of the link, to inertial axes: (N,) -> (N, 3, 3)."""
@@ -167,7 +171,7 @@ class DirectShares:
     angle : (N,) the angle itself, followed in time, from 0 at the start [rad]
     error : (N,) estimate of the difference of sum and angle [rad]
     total : (J + 1,) shares up to the time for which the result is stated [rad]
-    largest_tilt : of the link [rad], at the time `tilt_time` [s]
+    largest_tilt : of the link [rad], at the time `tilt_time` [s]; 0 for a rotation
 
     Examples
     --------
@@ -258,15 +262,7 @@ def direct_shares(rates: DirectRates, times: Array, at: float) -> DirectShares:
     motion = rates.motion
     edges = np.union1d(motion.solution.times, motion.deformation.breaks)
     left, right, values, sensitive, along, truncation = _resolved(rates, edges)
-    steepest = np.unravel_index(int(np.argmax(np.abs(along))), along.shape)
-    nodes, _ = _gauss()
-    when = float(left[steepest[0]] + 0.5 * (right - left)[steepest[0]] * (1.0 + nodes[steepest[1]]))
-    tilt = float(np.arcsin(min(1.0, abs(along[steepest]))))
-    if rates.of != "rotation" and tilt > STEEP:
-        raise ChartPoleError(
-            f"the tilt of {rates.chart.link} reaches {np.degrees(tilt):.1f} degrees at {when:.4g} s; beyond 85 degrees "
-            f"shares of {rates.of} have no meaning: take the rotation about an axis, of='rotation', or another link"
-        )
+    tilt, when = _largest_tilt(rates, left, right, along)
     instants = np.append(times, at)
     panel = np.clip(np.searchsorted(left, instants, side="right") - 1, 0, len(left) - 1)
     place = 2.0 * (instants - left[panel]) / (right - left)[panel] - 1.0
@@ -293,6 +289,21 @@ def direct_shares(rates: DirectRates, times: Array, at: float) -> DirectShares:
     )
 
 
+def _largest_tilt(rates: DirectRates, left: Array, right: Array, along: Array) -> tuple[float, float]:
+    """Largest tilt at nodes of panels and its time; 0 for a rotation. Raises ChartPoleError beyond 85 degrees."""
+    if rates.of == "rotation":
+        return 0.0, 0.0
+    panel, node = np.unravel_index(int(np.argmax(np.abs(along))), along.shape)
+    when = float(left[panel] + 0.5 * (right - left)[panel] * (1.0 + _gauss()[0][node]))
+    tilt = float(np.arcsin(min(1.0, abs(along[panel, node]))))
+    if tilt > STEEP:
+        raise ChartPoleError(
+            f"the tilt of {rates.chart.link} reaches {np.degrees(tilt):.1f} degrees at {when:.4g} s; beyond 85 degrees "
+            f"shares of {rates.of} have no meaning: take the rotation about an axis, of='rotation', or another link"
+        )
+    return tilt, when
+
+
 def _gauss() -> tuple[Array, Array]:
     nodes, weights = legendre.leggauss(_NODES)
     return nodes, legendre.legvander(nodes, _NODES - 1) * weights[:, None] * (np.arange(_NODES) + 0.5)
@@ -311,6 +322,7 @@ def _resolved(rates: DirectRates, edges: Array) -> tuple[Array, ...]:
         values, sensitive, along = (
             result.reshape(len(left), _NODES, *result.shape[1:]) for result in rates(times.ravel())
         )
+        _largest_tilt(rates, left, right, along)
         series = np.einsum("pnj,nk->pkj", values, transform)
         tail = np.abs(series[:, -2:]).max(axis=(1, 2)) * 2.0 * half
         largest = max(largest, float(np.abs(series).max()))

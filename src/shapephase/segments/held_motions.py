@@ -281,10 +281,8 @@ def _still_path(body: Body, path: ShapePath, baseline: str | ArrayLike | Motion)
     """Path of a body that rests in the baseline's posture, for another motion in the first one."""
     if isinstance(baseline, str) and baseline not in BASELINES:
         raise unknown_name("baseline", baseline, BASELINES)
-    if isinstance(baseline, Motion) or baseline == "first":
-        shape = path.shape(0.0)
-    elif isinstance(baseline, str):
-        shape = body.shape()
+    if isinstance(baseline, str | Motion):
+        shape = body.shape() if baseline == "neutral" else path.shape(0.0)
     else:
         shape = finite_array(baseline, "baseline", (body.n_shape,))
         if shape.ndim != 1:
