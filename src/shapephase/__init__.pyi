@@ -84,6 +84,7 @@ from .reconstruction.recorded_base import BaseDifference, base_difference
 from .rigid_body import geodesics
 from .rigid_body.euler_top import EulerTop
 from .rigid_body.gyrostat import Gyrostat
+from .segments.segment_momentum import SegmentMomentum, segment_momentum
 from .shape_space.connection import (
     HorizontalLift,
     curvature,
@@ -147,6 +148,7 @@ __all__ = [
     "ReturnMap",
     "Returns",
     "RunningPhases",
+    "SegmentMomentum",
     "Sensitivity",
     "ShapePath",
     "ShapePhaseError",
@@ -229,6 +231,7 @@ __all__ = [
     "robot_names",
     "running_phases",
     "sampled_uncertainty",
+    "segment_momentum",
     "segments",
     "shape_space",
     "so3",

@@ -1,1 +1,3 @@
-__all__: list[str] = []
+from .segment_momentum import FlightMomentum, Normalisation, SegmentMomentum, segment_momentum
+
+__all__ = ["FlightMomentum", "Normalisation", "SegmentMomentum", "segment_momentum"]
