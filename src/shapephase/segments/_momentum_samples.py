@@ -23,10 +23,10 @@ from ..shape_space.path_noise import path_errors, stated_noise, summed_errors, w
 from ..shape_space.shape_path import ShapePath
 
 _FEWEST = 8  # samples: fewer do not separate a motion from its noise
-_STEP = 1e-5  # [rad or m] of central differences of momenta, which are smooth over a radian
+_STEP = 1e-6  # [rad or m] of differences of momenta, which are smooth over a radian: bars keep five digits
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of the links' momenta: rounding of 32 operations
 _AT_ONCE = 256  # times whose derivatives are in memory together
-_CUBIC = 0.125  # rates of a cubic spline are off as the third power of the step: an eighth of what twice the step is
+_TRUNCATION = 0.5  # of what a spline through every second sample differs by: at the ends a third was measured
 _QUATERNION = 4  # columns of the base, before those of the joints
 _BASE = tuple(f"base.{part}" for part in "xyzw")  # the names make a ball joint of it, whose columns smooth alike
 
@@ -188,32 +188,35 @@ def samples_of_recording(body: Body, recorded: Recorded) -> MomentumSamples:
         joints = values[:, _QUATERNION:], rates[:, _QUATERNION:]
         return _along(directions, attitude, link_momenta(body.chain, attitude, spin, *joints))
 
-    def slopes(directions: Directions, part: slice, *, whole: bool) -> Array:
-        """Derivatives of the whole, and of links, by values and rates: (N, m, C, 4 + n, 2)."""
+    def slopes(directions: Directions, part: slice) -> Array:
+        """Derivatives of the whole, then of links, by values and rates: (N, 1 + F, C, 4 + n, 2)."""
         values, rates = columns.values[part], columns.rates[part]
-        found = []
-        for column in np.eye(values.shape[1]):
+        here = of_columns(directions, values, rates, part)
+        moved = [
+            _whole_first(of_columns(directions, values + move, rates + turn, part) - here) / step
+            for column in np.eye(values.shape[1])
             # Momenta are linear in the rates, so that any step gives the derivative.
-            for move, turn, step in ((_STEP * column, 0.0, _STEP), (0.0, column, 1.0)):
-                ahead, behind = (
-                    of_columns(directions, values + sign * move, rates + sign * turn, part) for sign in (1.0, -1.0)
-                )
-                difference = _whole_first(ahead - behind) / (2.0 * step)
-                found.append(difference[:, :1] if whole else difference)
-        return np.stack(found, axis=-1).reshape(*found[0].shape, -1, 2)
+            for move, turn, step in ((_STEP * column, 0.0, _STEP), (0.0, column, 1.0))
+        ]
+        return np.stack(moved, axis=-1).reshape(*moved[0].shape, -1, 2)
+
+    slopes_of_whole: dict[tuple[str, ...], Array] = {}
 
     def bars(directions: Directions) -> Array:
-        blocks = [slice(k, k + _AT_ONCE) for k in range(0, len(since), _AT_ONCE)]
-        shape = (1 + len(body.chain.masses), len(directions.names))
-        parts = []
-        for block in blocks:
-            derivative = slopes(directions, block, whole=False)
+        parts, wholes = [], []
+        for first in range(0, len(since), _AT_ONCE):
+            block = slice(first, first + _AT_ONCE)
+            derivative = slopes(directions, block)
             flat = derivative.reshape(len(derivative), -1, *derivative.shape[3:])
-            parts.append(columns.bars(flat, block).reshape(-1, *shape))
+            parts.append(columns.bars(flat, block).reshape(derivative.shape[:3]))
+            wholes.append(derivative[:, 0])
+        slopes_of_whole[directions.names] = np.concatenate(wholes)
         return np.concatenate(parts)
 
     def summed_bars(directions: Directions, weights: Array) -> Array:
-        derivative = slopes(directions, slice(None), whole=True)[:, 0]
+        if directions.names not in slopes_of_whole:
+            bars(directions)
+        derivative = slopes_of_whole[directions.names]
         weighted = weights.T[:, :, None, None, None] * derivative[:, None]
         return columns.summed(weighted.reshape(len(since), -1, *derivative.shape[2:])).reshape(len(weights), -1)
 
@@ -310,7 +313,7 @@ def _truncation(times: Array, values: Array, rates: Array, names: tuple[str, ...
     """Errors of splines between samples, by those through every second one: (N, 4 + n, 2) of values and rates."""
     half = np.unique(np.append(np.arange(0, len(times), 2), len(times) - 1))
     coarse = ShapePath.spline(times[half], values[half], False, joint_names=names).curve(times)
-    return _CUBIC * np.stack([coarse[0] - values, coarse[1] - rates], axis=-1)
+    return _TRUNCATION * np.stack([coarse[0] - values, coarse[1] - rates], axis=-1)
 
 
 def _near(times: Array, samples: Array, noise: Array, names: tuple[str, ...]) -> ShapePath:

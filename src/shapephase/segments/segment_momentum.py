@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arguments import check_choice, check_object, positive_argument, times_argument
 from ..arrays import Array, finite_array, lock_arrays
-from ..body import Body, inertia_box
+from ..body import Body, visuals
 from ..body.link_motions import link_motions
 from ..deformation.deformation import articulated
 from ..display import short_repr
@@ -243,8 +243,8 @@ def segment_momentum(
     axes : "inertial"; "athlete": somersault (inertial), frontal and longitudinal axis (both with the body), by
         `Motion.athlete_axes`; or an inertial direction (3,)
     normalise : "speed" divides by m h v, "gravity" by m h sqrt(g h), "inertia" by m h^2; None: kg m^2/s
-    stature : h [m]; None: extent of the body along its longitudinal axis in the first posture, links as boxes of their
-        inertia
+    stature : h [m]; None: extent of the body along its longitudinal axis in the first posture, by the shapes that are
+        drawn: those of its file, else boxes of the links' inertia
     speed : v [m/s]; None: mean horizontal speed of the centre of mass, where places were recorded
     gravity : g [m/s^2], also of the falls that are flights
     flight : of a recording "auto": the flight that was read, else each fall of the centre of mass; "all"; or its first
@@ -466,7 +466,7 @@ def _normalisation(
     else:
         assert athlete is not None
         assert source.path is not None
-        height, by = _stature(body, source.path.shape(0.0), athlete.longitudinal), "first posture, boxes of inertia"
+        height, by = _stature(body, source.path.shape(0.0), athlete.longitudinal), "first posture, as drawn"
     if word == "inertia":
         return Normalisation(formula, body.mass * height**2, body.mass, height, by)
     if word == "gravity":
@@ -478,16 +478,16 @@ def _normalisation(
 
 
 def _stature(body: Body, shape: Array, axis: Array) -> float:
-    """Extent along an axis of the base, with each link as the box of its inertia [m]."""
-    chain = body.chain
-    links = link_motions(chain, shape[None], np.zeros_like(shape)[None])
-    places = links.places[0] @ axis
-    reach = np.zeros(len(places))
-    for frame in np.flatnonzero(chain.masses):
-        edges, box = inertia_box(float(chain.masses[frame]), chain.inertias[frame])
-        reach[frame] = 0.5 * np.abs(axis @ links.turns[0, frame] @ box) @ edges
-    heavy = chain.masses > 0.0
-    return float((places + reach)[heavy].max() - (places - reach)[heavy].min())
+    """Extent along an axis of the base of the shapes that are drawn: those of its file, else boxes of inertia [m]."""
+    links = link_motions(body.chain, shape[None], np.zeros_like(shape)[None])
+    origins = links.places[0] - so3.apply(links.turns[0], body.chain.centres)
+    heights: list[float] = []
+    for visual in visuals(body):
+        frame, pose = body.chain.link_frames[visual.link]
+        in_frame = pose @ visual.pose
+        corners = visual.corners @ in_frame[:3, :3].T + in_frame[:3, 3]
+        heights += ((origins[frame] + corners @ links.turns[0, frame].T) @ axis).tolist()
+    return max(heights) - min(heights)
 
 
 def _mean_speed(source: _Source, athlete: AthleteAxes | None) -> float:
