@@ -20,7 +20,7 @@ __getattr__, _, __all__ = attach_stub(__name__, __file__)
 _SHOWN = """
 auditing body bounds deformation dynamics error_bars errors examples exports optimal_control phases plots reconstruction
 rigid_body segments shape_space so3 study
-EulerTop InertiaErrors ShapePath articulated audit curvature export_motion holonomy in_gauge joint_torques
+EulerTop InertiaErrors ShapePath articulated audit contributions curvature export_motion holonomy in_gauge joint_torques
 load_body load_motion mechanical_connection particle_body plan_reorientation
 reachable read_recorded_motion read_shape_path read_trajectory reconstruct rigid robot_names segment_momentum split
 uncertainty

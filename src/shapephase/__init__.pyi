@@ -84,6 +84,7 @@ from .reconstruction.recorded_base import BaseDifference, base_difference
 from .rigid_body import geodesics
 from .rigid_body.euler_top import EulerTop
 from .rigid_body.gyrostat import Gyrostat
+from .segments.contributions import Contributions, contributions
 from .segments.segment_momentum import SegmentMomentum, segment_momentum
 from .shape_space.connection import (
     HorizontalLift,
@@ -113,6 +114,7 @@ __all__ = [
     "BodyFamily",
     "BodySummary",
     "CompiledCodeWarning",
+    "Contributions",
     "Crossings",
     "Deformation",
     "DeformationFamily",
@@ -169,6 +171,7 @@ __all__ = [
     "closed_orbits",
     "compile_steps",
     "continued_orbits",
+    "contributions",
     "curvature",
     "curvature_on_plane",
     "deformation",

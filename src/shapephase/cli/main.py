@@ -23,6 +23,7 @@ from ..integrator.machine_code import as_command
 from ..provenance import command_line, provenance
 from .audit import audit_command
 from .check import check_command
+from .contributions import contributions_command
 from .installation import compile_command, doctor_command, robots_command
 from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
@@ -62,6 +63,7 @@ plot_app.command(plot_study_command, name="sweep")
 sweep_app.help_epilogue = _WHERE_EXIT_CODES
 for _name, _command in {
     "split": split_command,
+    "contributions": contributions_command,
     "torques": torques_command,
     "view": view_command,
     "plot": plot_app,

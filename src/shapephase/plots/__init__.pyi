@@ -1,4 +1,5 @@
 from ._moving_scene import MovingScene, moving_scene
+from .contribution_plots import contributions_figure, plot_direct_shares, plot_shares
 from .explorer import explore
 from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
@@ -21,6 +22,7 @@ __all__ = [
     "MovingScene",
     "Page",
     "column_axes",
+    "contributions_figure",
     "explore",
     "moving_scene",
     "plot_attitude",
@@ -30,6 +32,7 @@ __all__ = [
     "plot_conjugate_locus",
     "plot_crown",
     "plot_curvature",
+    "plot_direct_shares",
     "plot_ellipsoid_locus",
     "plot_energy",
     "plot_fixed_points",
@@ -44,6 +47,7 @@ __all__ = [
     "plot_rolling_ellipsoid",
     "plot_shape_path",
     "plot_shape_plane",
+    "plot_shares",
     "plot_torques",
     "report",
     "rolling_ellipsoid",

@@ -1,0 +1,114 @@
+"""`shapephase contributions`: the share of every limb in a twist, tilt, somersault or other turn."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from .options import (
+    BODY_DEFAULTS,
+    PRINT_DEFAULTS,
+    RECORDING_DEFAULTS,
+    START_DEFAULTS,
+    BodyArgument,
+    BodyOptions,
+    MotionArgument,
+    PrintOptions,
+    RecordingOptions,
+    StartOptions,
+    Tolerance,
+    option,
+)
+from .outcome import Outcome, check_writable
+from .progress import steps
+from .terminal import say_written
+
+
+def contributions_command(
+    body: BodyArgument,
+    motion: MotionArgument,
+    /,
+    *,
+    of: Annotated[
+        str,
+        option(
+            "What is explained: twist, somersault, tilt, rotation or phase (Montgomery's); default: twist. For example "
+            "`--of tilt`."
+        ),
+    ] = "twist",
+    groups: Annotated[
+        tuple[str, ...],
+        option(
+            "Groups of joints: limbs, joints, or patterns of names; with --baseline FILE also momentum, attitude, "
+            "duration and body. Default: limbs. For example `--groups arms=left_*,right_* legs=*hip*,*knee*`.",
+            several=True,
+        ),
+    ] = ("limbs",),
+    baseline: Annotated[
+        str,
+        option(
+            "What held joints do: first (their first posture), neutral, or the file or name of another motion, whose "
+            "difference is explained; default: first. For example `--baseline bad.csv`."
+        ),
+    ] = "first",
+    at: Annotated[
+        float | str, option("Time of the tilt, in s, or mid-twist; default: mid-twist. For example `--at 0.8`.")
+    ] = "mid-twist",
+    about: Annotated[
+        tuple[float, float, float] | None,
+        option(
+            "Inertial axis of the rotation; default: the momentum. For example `--about 1 0 0`.", negative_iterable=""
+        ),
+    ] = None,
+    link: Annotated[
+        str | None, option("Link whose turn is explained; default: the trunk. For example `--link pelvis`.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        option("Write the direct shares in time, in rad, to this CSV file; for example `--out shares.csv`."),
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        option("Write bars and areas to this file, .svg, .pdf or .png; for example `--figure shares.pdf`."),
+    ] = None,
+    start: StartOptions = START_DEFAULTS,
+    tolerance: Tolerance = 1e-9,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    floating: BodyOptions = BODY_DEFAULTS,
+    printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
+) -> Outcome:
+    """Find who made a turn: the share of momentum and limbs in a twist, tilt or somersault.
+
+    Direct: what each did along the motion. Held: the motion again with a limb held. Shared: what a limb adds, averaged
+    over all orders in which limbs join (Shapley).
+    """
+    from ..segments.contributions import contributions
+    from ..segments.held_motions import BASELINES
+    from ..segments.limbs import groups_of_words
+    from . import motion as motions
+    from .texts.recording_text import recording_data
+    from .texts.result_text import split_heading
+
+    aside = check_writable(out, "--out", ".csv")
+    aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
+    chosen = groups_of_words(groups)
+    with steps(2) as work:
+        work.begin("loading and reconstructing")
+        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
+        other = baseline
+        if baseline not in BASELINES:
+            other = motions.flight(body, baseline, start, recording, tolerance, work.watch, floating=floating).motion
+        work.begin("holding groups")
+        shares = contributions(flown.motion, of, groups=chosen, baseline=other, at=at, about=about, link=link)
+        if out is not None:
+            shares.write_csv(out)
+            say_written(out)
+        if figure is not None:
+            from ..plots.contribution_plots import contributions_figure
+            from ..plots.plot_style import write_axes
+
+            write_axes(contributions_figure(shares), figure)
+            say_written(figure)
+    text = f"{split_heading(flown.body, motion, flown.motion)}{flown.beginning}\n\n{shares}"
+    data = shares.to_dict() | recording_data(flown.recorded)
+    return Outcome(text, data, aside=aside, made_from=flown.motion.deformation.made_from)

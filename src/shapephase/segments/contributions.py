@@ -1,0 +1,421 @@
+"""Shares of the limbs in a turn: along the motion, with limbs held, and fairly shared over all subsets of limbs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import check_object, times_argument, vector_argument, whole_argument
+from ..arrays import Array, lock_arrays, read_only
+from ..display import number_with_bar, short_repr
+from ..errors import ShapeError, WrongObjectError, unknown_name
+from ..letters import value_text
+from ..phases.phases import split
+from ..plain_data import plain
+from ..reconstruction.motion_record import write_table
+from ..reconstruction.reconstruction import Motion
+from ..shape_space.connection import curvature
+from ..shape_space.shape_path import CLOSED
+from .coalitions import sampled_orders, shapley_interactions, shapley_weights
+from .direct_shares import ANGLES, STEEP, DirectRates, DirectShares, LinkChart, articulated_parts, direct_shares
+from .held_motions import HeldMotions
+from .limbs import CONDITIONS, JointGroups, SegmentTree, joint_groups
+
+MOST_EXACT = 10  # groups of which all subsets are computed: 1,024 motions
+_ROWS = 201  # times of the direct shares, as many as of other tables
+_WITHOUT_JOINTS = ("phase",)  # results without a rate by joint
+
+Result = Callable[[Motion], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Contributions:
+    """Shares of groups of joints in a result of a motion. Made by `contributions`; printing it shows a table.
+
+    Attributes
+    ----------
+    of : "twist", "tilt", "somersault", "rotation", "phase", or the name of a function
+    link : whose angle it is
+    at : time of the tilt [s]; the duration for other results
+    groups : names of joints by group
+    rest : joints in no group, which move in all motions
+    whole, none : result of the motion, and with all groups on the baseline [rad, or as the function has it]
+    held_names : groups, then mirrored pairs
+    without, alone : results with each of `held_names` on the baseline, and with it alone off the baseline
+    shared : (k,) Shapley values of the groups; they add up to whole - none
+    errors : (k,) estimates of the errors of `shared`; of sampled orders standard errors
+    interactions : (k, k) Shapley-Taylor: alone on the diagonal, pairs beside it; None for sampled orders
+    small_loop : (k, k) curvature times area, what a small loop without momentum tends to; None for other motions
+    error : estimate of the error of `whole`, and of each held motion at most
+    steep : groups that move in those motions whose tilt passes 85 degrees, where counts lose their meaning
+    direct : what momentum and joints did along the motion; None for results without rates
+
+    Examples
+    --------
+    >>> dive = sp.reconstruct(
+    ...     sp.articulated(sp.load_body("diver"), sp.examples.MOTIONS["diver_twist"].path()), [0.0, 61.558831, 0.0]
+    ... )
+    >>> shares = sp.contributions(dive, of="somersault")
+    >>> print(abs(shares.shared.sum() - (shares.whole - shares.none)) < 1e-12)
+    True
+    """
+
+    of: str
+    link: str
+    at: float
+    groups: dict[str, tuple[str, ...]]
+    rest: tuple[str, ...]
+    baseline: str
+    whole: float
+    none: float
+    held_names: tuple[str, ...]
+    without: Array
+    alone: Array
+    shared: Array
+    errors: Array
+    interactions: Array | None
+    small_loop: Array | None
+    error: float
+    steep: tuple[str, ...]
+    direct: DirectShares | None
+    _pairs: dict[str, tuple[str, str]] = field(repr=False, default_factory=dict)
+
+    __post_init__ = lock_arrays
+    __repr__ = short_repr
+
+    @property
+    def scale(self) -> float:
+        """Number of radians in the unit of the table: turns for counts, else degrees; 1 for functions."""
+        if self.of in ("twist", "somersault"):
+            return 2.0 * np.pi
+        return np.pi / 180.0 if self.of in ("tilt", "rotation", "phase") else 1.0
+
+    @property
+    def unit(self) -> str:
+        """Unit of the table."""
+        return {2.0 * np.pi: "turns", 1.0: ""}.get(self.scale, "deg")
+
+    def __str__(self) -> str:
+        """Return the table: held, alone and shared by group, then the direct shares."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> list[str]:
+        def text(value: float, bar: float = 0.0) -> str:
+            return number_with_bar(value / self.scale, bar / self.scale) if bar > 5e-4 * self.scale else (
+                f"{value / self.scale:.3f}"
+            )  # fmt: skip
+
+        when = f" at {self.at:.4g} s" if self.of == "tilt" else ""
+        unit = f" [{self.unit}]" if self.unit else ""
+        lines = [
+            f"{self.of}{when} of {self.link}{unit}: {text(self.whole)} ± {self.error / self.scale:.0e}; with all "
+            f"groups {self.baseline} {text(self.none)}",
+            "",
+            f"{'':24}{'held':>12}{'alone':>12}{'shared':>18}",
+        ]  # fmt: skip
+        shares = dict(zip(self.groups, zip(self.shared, self.errors, strict=True), strict=True))
+        for name, without, alone in zip(self.held_names, self.without, self.alone, strict=True):
+            pair = self._pairs.get(name)
+            share, bar = shares[name] if pair is None else (sum(shares[n][0] for n in pair), 0.0)
+            lines.append(f"{name:24.24}{text(without):>12}{text(alone):>12}{text(share, bar):>18}")
+        lines.append(f"{'all groups':24}{text(self.none):>12}{text(self.whole):>12}{text(self.shared.sum()):>18}")
+        if self.interactions is not None and len(self.groups) > 1:
+            lines += ["", f"{'beyond both alone':24}{'pair':>12}" + ("" if self.small_loop is None else "  small loop")]
+            for first, second, value in self._strongest():
+                small = "" if self.small_loop is None else f"{text(self.small_loop[first, second]):>12}"
+                names = f"{[*self.groups][first]} with {[*self.groups][second]}"
+                lines.append(f"{names:24}{text(value):>12}{small}")
+        if self.direct is not None:
+            shown = sorted(zip(self.direct.sources, self.direct.total, strict=True), key=lambda pair: -abs(pair[1]))
+            change = text(float(self.direct.total.sum()))
+            lines += ["", f"direct, along the motion: {change} in all, largest tilt "
+                      f"{np.degrees(self.direct.largest_tilt):.1f} deg at {self.direct.tilt_time:.3g} s"]  # fmt: skip
+            lines += [f"  {name:22.22}{text(value):>12}" for name, value in shown if abs(value) > 0.0]
+        if self.rest:
+            lines += ["", f"in no group, moving in all motions: {', '.join(self.rest)}"]
+        if self.steep:
+            lines += ["", f"tilt beyond 85 deg, counts without meaning, in motions of: {'; '.join(self.steep)}"]
+        return lines
+
+    def _strongest(self) -> list[tuple[int, int, float]]:
+        """Pairs of groups with the largest interactions, six at most."""
+        assert self.interactions is not None
+        count = len(self.groups)
+        pairs = [(i, j, float(self.interactions[i, j])) for i in range(count) for j in range(i + 1, count)]
+        return sorted(pairs, key=lambda pair: -abs(pair[2]))[:6]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as JSON can hold it, angles in radians."""
+        data = plain(self)
+        return data | {"pairs": {both: list(pair) for both, pair in data.pop("_pairs").items()}}
+
+    def write_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write the direct shares in time: time_s, angle_rad, and one column in rad for each source.
+
+        Raises
+        ------
+        WrongObjectError
+            For a result without direct shares.
+        """
+        if self.direct is None:
+            raise WrongObjectError(
+                f"{self.of} has no direct shares in time; take 'twist', 'tilt', 'somersault' or 'rotation'"
+            )
+        columns = {f"{name}_rad": self.direct.shares[:, k] for k, name in enumerate(self.direct.sources)}
+        write_table(path, {"time_s": self.direct.times, "angle_rad": self.direct.angle, **columns})
+
+
+def contributions(
+    motion: Motion,
+    of: str | Result = "twist",
+    *,
+    groups: str | Mapping[str, str | Iterable[str]] = "limbs",
+    baseline: str | ArrayLike | Motion = "first",
+    at: str | float = "mid-twist",
+    about: ArrayLike | None = None,
+    link: str | None = None,
+    times: ArrayLike | None = None,
+    orders: int = 200,
+    seed: int = 0,
+    **axes: Any,
+) -> Contributions:
+    """Return the shares of limbs in a twist, tilt, somersault or another result of a motion, in three exact readings.
+
+    *Direct*: the angle's rate is at every instant a sum over the momentum and the joints; its integrals say what each
+    did along the motion that took place. *Held*: the motion again with a group of joints on the baseline, and with that
+    group alone off it. *Shared*: Shapley values, which average what a group adds over all orders in which groups join;
+    they add up to the whole. They answer different questions, and none says what an athlete did on purpose.
+
+    Parameters
+    ----------
+    motion : made by `reconstruct` of `articulated(body, path)`
+    of : "twist" or "somersault" (counts, followed in time), "tilt" (at the time `at`), "rotation" (turn about `about`),
+        "phase" (Montgomery's, horizontal gauge), or a function of a Motion that returns a number
+    groups : "limbs", "joints", or patterns of joint names by group, {"arms": ["left_*", "right_*"]}; where another
+        motion is the baseline also "momentum", "attitude", "duration" and "body", with an empty pattern
+    baseline : "first" posture, "neutral" posture, a shape (n,), or another motion of the same joints
+    at : time of the tilt [s], or "mid-twist", when the motion has done half of its twist
+    about : (3,) axis in inertial axes; None: the momentum
+    link : whose angles; None: the trunk
+    times : (N,) of the direct shares [s]; None: 201 even ones
+    orders, seed : of random orders of groups, for more than 10 groups
+    axes : lateral, longitudinal (axes of the link), somersault, up, as for `Motion.athlete_axes`
+
+    Raises
+    ------
+    WrongObjectError, UnknownNameError, ShapeError
+        For another kind of motion, an unknown word, a joint in two groups, or a difference of two motions in no group.
+    ChartPoleError
+        If the tilt of the motion passes 85 degrees and `of` is one of the three angles.
+
+    Notes
+    -----
+    Source: Yeadon 1993 (simulations with techniques taken out); Shapley 1953; docs/howto/contributions.md.
+
+    Examples
+    --------
+    >>> cat = sp.load_body("cat_two_halves")
+    >>> motion = sp.reconstruct(sp.articulated(cat, sp.examples.kane_scher(0.3, 0.6)), [0.0, 0.0, 0.0])
+    >>> shares = sp.contributions(motion, of="rotation", about=[1.0, 0.0, 0.0], groups="joints")
+    >>> print(shares.held_names, np.abs(shares.without).max().round(2) < abs(shares.whole))
+    ('waist_pitch', 'waist_yaw', 'waist_roll') True
+    """
+    check_object(motion, "Motion", "motion")
+    if motion.batch:
+        raise ShapeError(f"motion: one motion is needed, this is a batch of {motion.batch}")
+    body, _ = articulated_parts(motion.deformation)
+    tree = SegmentTree(body)
+    conditions, chosen = _conditions(groups)
+    grouped = joint_groups(body, chosen)
+    held = HeldMotions(motion, grouped.columns, baseline, conditions, grouped.rest)
+    function = of if callable(of) else None
+    name = getattr(of, "__name__", "function") if callable(of) else of
+    if function is None and name not in (*ANGLES, "rotation", *_WITHOUT_JOINTS):
+        raise unknown_name("result", str(of), (*ANGLES, "rotation", *_WITHOUT_JOINTS))
+    if name == "phase" and not motion.momentum.any():
+        raise WrongObjectError("of: without momentum there is no Montgomery phase; take 'twist' or 'rotation'")
+    direct, chart, instant = None, None, motion.duration
+    axis = np.zeros(3)
+    if function is None and name not in _WITHOUT_JOINTS:
+        chart = LinkChart.of(motion, link, tree.trunk, **axes)
+        if name == "rotation":
+            axis = _axis(motion, about)
+        if name == "tilt":
+            instant = _instant(motion, chart, at)
+        sampled = np.linspace(0.0, motion.duration, _ROWS) if times is None else times_argument(times, motion.duration)
+        direct = direct_shares(DirectRates(motion, chart, name, axis, tree.joints), np.ravel(sampled), instant)
+    measure = _Measure(name, function, chart, axis, instant / motion.duration)
+    values = _Values(held, measure)
+    return _shares(values, grouped, direct, _Choice(name, baseline, instant, chart, axis, orders, seed))
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    of: str
+    baseline: Any
+    at: float
+    chart: LinkChart | None
+    about: Array
+    orders: int
+    seed: int
+
+
+def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, choice: _Choice) -> Contributions:
+    held = values.held
+    names, whole = held.names, held.whole
+    bits = {name: 1 << place for place, name in enumerate(names)}
+    bits |= {both: bits[first] | bits[second] for both, (first, second) in grouped.pairs.items()}
+    removals = {*bits.values()} | {whole & ~bit for bit in bits.values()} | {0, whole}
+    count = len(names)
+    interactions = None
+    if count <= MOST_EXACT:
+        results = values(range(1 << count))
+        function, bars = (np.array([results[mask][part] for mask in range(1 << count)]) for part in (0, 1))
+        weights = shapley_weights(count)
+        shared, errors = weights @ function, np.abs(weights) @ bars
+        interactions = shapley_interactions(function)
+    else:
+        order, before = sampled_orders(count, whole_argument(choice.orders, "orders", 2), choice.seed)
+        results = values({int(mask) for mask in before.ravel()} | removals)
+        function = np.array([[results[int(mask)][0] for mask in row] for row in before])
+        gains = np.take_along_axis(np.diff(function, axis=1), np.argsort(order, axis=1), axis=1)
+        shared, errors = gains.mean(axis=0), gains.std(axis=0, ddof=1) / np.sqrt(len(gains))
+    steep = [mask for mask, (_, _, tilt) in sorted(results.items()) if tilt > STEEP]
+    baseline = choice.baseline
+    named = "as in the baseline" if isinstance(baseline, Motion) else (
+        f"held at the {baseline} posture" if isinstance(baseline, str) else "held at the given posture"
+    )  # fmt: skip
+    return Contributions(
+        of=choice.of,
+        link=choice.chart.link if choice.chart is not None else held.body.link_names[0],
+        at=choice.at,
+        groups=grouped.joints | {name: () for name in names if name not in grouped.joints},
+        rest=grouped.rest,
+        baseline=named,
+        whole=results[whole][0],
+        none=results[0][0],
+        held_names=tuple(bits),
+        without=np.array([results[whole & ~bit][0] for bit in bits.values()]),
+        alone=np.array([results[bit][0] for bit in bits.values()]),
+        shared=shared,
+        errors=errors,
+        interactions=interactions,
+        small_loop=_small_loop(held, choice),
+        error=max(bar for _, bar, _ in results.values()),
+        steep=tuple(" + ".join(n for k, n in enumerate(names) if mask >> k & 1) or "none" for mask in steep),
+        direct=direct,
+        _pairs=grouped.pairs,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Measure:
+    """A number of a motion, with its error estimate and the largest tilt."""
+
+    of: str
+    function: Result | None
+    chart: LinkChart | None
+    about: Array
+    fraction: float
+
+    def __call__(self, motion: Motion) -> tuple[float, float, float]:
+        error = float(motion.error_estimate)
+        if self.function is not None:
+            value = self.function(motion)
+            if not isinstance(value, int | float | np.number) or not np.isfinite(value):
+                raise ShapeError(f"of: the function must return a finite number for a motion, got {value_text(value)}")
+            return float(value), error, 0.0
+        if self.of == "phase":
+            return float(split(motion).montgomery_phase), error, 0.0
+        assert self.chart is not None
+        if self.of == "rotation":
+            body, _ = articulated_parts(motion.deformation)
+            shares = direct_shares(
+                DirectRates(motion, self.chart, self.of, self.about, {"all": tuple(range(body.n_shape))}),
+                np.array([motion.duration]),
+                motion.duration,
+            )
+            return float(shares.angle[0]), float(shares.error[0]), 0.0
+        instants = np.append(motion.solution.times, self.fraction * motion.duration)
+        angles = self.chart.angles(motion, instants)
+        tilt = float(np.abs(angles[:, 1]).max())
+        column = ANGLES.index(self.of)
+        value = angles[-1, column] if self.of == "tilt" else angles[-1, column] - angles[0, column]
+        return float(value), 2.0 * error / max(abs(np.cos(tilt)), 1e-12), tilt
+
+
+@dataclass(frozen=True, eq=False)
+class _Values:
+    held: HeldMotions
+    measure: _Measure
+
+    def __call__(self, subsets: Iterable[int]) -> dict[int, tuple[float, float, float]]:
+        """Value, error and largest tilt of each subset; the motion itself is not computed again."""
+        wanted = set(subsets)
+        motions = self.held.motions(wanted - {self.held.whole}) | {self.held.whole: self.held.motion}
+        return {mask: self.measure(motions[mask]) for mask in wanted}
+
+
+def _conditions(groups: Any) -> tuple[list[str] | None, Any]:
+    """Conditions among the groups, and the groups of joints; None where none were chosen by name."""
+    if not isinstance(groups, Mapping):
+        return None, groups
+    conditions = [name for name, patterns in groups.items() if name in CONDITIONS and not patterns]
+    return conditions, {name: patterns for name, patterns in groups.items() if name not in conditions}
+
+
+def _axis(motion: Motion, about: ArrayLike | None) -> Array:
+    axis = motion.momentum if about is None else vector_argument(about, "about")
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        raise ShapeError("about: an axis (3,) in inertial axes is needed, since there is no momentum to turn about")
+    return axis / length
+
+
+def _instant(motion: Motion, chart: LinkChart, at: str | float) -> float:
+    """Time of the tilt [s]."""
+    if isinstance(at, str):
+        if at != "mid-twist":
+            raise unknown_name("time of the tilt", at, ["mid-twist", "a time in s"])
+        instants = np.union1d(np.linspace(0.0, motion.duration, 1025), motion.solution.times)
+        twist = chart.angles(motion, instants)[:, 2]
+        done = (twist - twist[0]) - 0.5 * (twist[-1] - twist[0])
+        first = int(np.argmax(done * done[-1] >= 0.0))
+        if first == 0:
+            return 0.5 * motion.duration
+        left, right = instants[first - 1], instants[first]
+        return float(left + (right - left) * done[first - 1] / (done[first - 1] - done[first]))
+    return float(times_argument(at, motion.duration))
+
+
+def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
+    """Curvature at the first posture times projected areas, by pairs of groups: (k, k); None for other motions."""
+    motion, chart = held.motion, choice.chart
+    body, path = articulated_parts(motion.deformation)
+    closes = float(np.abs(path.gap).max(initial=0.0)) <= CLOSED and not motion.momentum.any()
+    if not closes or not isinstance(choice.baseline, str) or choice.baseline != "first" or chart is None:
+        return None
+    if choice.of == "tilt" or body.ball_joints:
+        return None
+    times = np.linspace(0.0, motion.duration, 4097)  # even samples of a smooth loop: their sum converges fast
+    shapes, rates = path.curve(times)
+    moved = (shapes - shapes[0])[:-1]
+    turns = np.einsum("ni,nj->ij", moved, rates[:-1]) * (times[1] - times[0])
+    areas = 0.5 * (turns - turns.T)
+    vectors = -curvature(body, shapes[0]) * areas[..., None]
+    row = chart.rates(chart.attitude(motion, np.zeros(1)), choice.about if choice.of == "rotation" else None)[0][0]
+    row = row[0] if choice.of == "rotation" else row[ANGLES.index(choice.of)]
+    axes = motion.attitude(0.0).T @ chart.attitude(motion, np.zeros(1))[0]
+    by_pair = 0.5 * vectors @ axes @ row
+    result = np.zeros((len(held.names),) * 2)
+    columns = list(held.columns.values())
+    for i, first in enumerate(columns):
+        for j, second in enumerate(columns):
+            block = by_pair[np.ix_(list(first), list(second))].sum()
+            result[i, j] = block if i == j else 2.0 * block
+    return read_only(result)
