@@ -158,8 +158,8 @@ def plot_command(
     Parameters
     ----------
     kind
-        What is drawn: momentum, phases, attitude, shape, torques, inertia, internal_momentum or energy; for example
-        `phases`.
+        What is drawn: somersault, momentum, phases, attitude, shape, torques, inertia, internal_momentum or energy; for
+        example `phases`.
     """
     from ..plots.named_figures import FIGURES, write_figure
     from . import motion as motions

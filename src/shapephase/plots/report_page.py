@@ -109,6 +109,7 @@ def report(
     kinds = [kind for kind in kinds if result.has_phase or not FIGURES[kind].with_momentum]
     kinds = [kind for kind in kinds if has_joints or not FIGURES[kind].with_path]
     kinds = [kind for kind in kinds if not (FIGURES[kind].of_change and is_rigid(motion))]
+    kinds = [kind for kind in kinds if not FIGURES[kind].of_athlete or motion.counted_axes() is not None]
     figures = []
     for done, kind in enumerate(kinds, start=1):
         _report_to(progress, done / (len(kinds) + 1), f"drawing {kind.replace('_', ' ')}")

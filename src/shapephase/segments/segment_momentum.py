@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -35,6 +35,7 @@ from ._momentum_samples import (
     samples_of_recording,
     with_noise,
 )
+from .limbs import SegmentTree
 
 _ROWS = 201  # times of a motion, by default
 _BEYOND = 3.6  # bars of a change in one of three components: chance brings it in one of 1000 flights
@@ -130,6 +131,7 @@ class SegmentMomentum:
     ----------
     times : (N,) [s]
     links : names of the L moving parts, each by its first link
+    limbs : limb of each of them, or "trunk"
     axes : names of the C axes
     local, remote : (N, L, C) in `unit`
     bars : (N, L, C) standard deviations of local and remote together
@@ -149,6 +151,7 @@ class SegmentMomentum:
 
     times: Array
     links: tuple[str, ...]
+    limbs: tuple[str, ...]
     axes: tuple[str, ...]
     local: Array
     remote: Array
@@ -167,6 +170,11 @@ class SegmentMomentum:
     def by_link(self) -> Array:
         """Local and remote parts together: (N, L, C)."""
         return self.local + self.remote
+
+    def by_limb(self) -> dict[str, Array]:
+        """Local and remote parts of the links of each limb together, (N, C) by its name."""
+        names = np.array(self.limbs)
+        return {limb: self.by_link[:, names == limb].sum(axis=1) for limb in dict.fromkeys(self.limbs)}
 
     def __str__(self) -> str:
         """Return flights and links as a table."""
@@ -329,6 +337,7 @@ def segment_momentum(
     return SegmentMomentum(
         times=found.times,
         links=tuple(frames),
+        limbs=_limbs(found.body, frames.values()),
         axes=directions.names,
         local=momenta[:, list(frames.values()), 0],
         remote=momenta[:, list(frames.values()), 1],
@@ -348,6 +357,16 @@ def _frames_with_links(body: Body) -> dict[str, int]:
     for part in body.moving_parts:
         frames.setdefault(body.chain.link_frames[part.links[0]][0], part.links[0])
     return {link: frame for frame, link in sorted(frames.items()) if body.chain.masses[frame] > 0.0 or len(frames) == 1}
+
+
+def _limbs(body: Body, frames: Iterable[int]) -> tuple[str, ...]:
+    """Limb of each of some frames, or "trunk"."""
+    tree = SegmentTree(body)
+    by_joint = {joint: name for name, limb in tree.limbs().items() for joint in limb.joints}
+    inside = tree.trunk_frames
+    return tuple(
+        "trunk" if frame in inside else by_joint.get(tree.joint_of.get(frame, ""), "trunk") for frame in frames
+    )
 
 
 def _of_motion(motion: Motion, times: ArrayLike | None) -> _Source:
