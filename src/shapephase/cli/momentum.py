@@ -24,8 +24,6 @@ from .outcome import Outcome, check_writable
 from .progress import steps
 from .terminal import say_written
 
-_COMPONENTS = 3  # of a direction
-
 
 def momentum_command(
     body: BodyArgument,
@@ -33,14 +31,13 @@ def momentum_command(
     /,
     *,
     axes: Annotated[
-        tuple[str, ...],
+        str,
         option(
             "Axes of the momentum: inertial, athlete (somersault, frontal and longitudinal axis), or three numbers; "
-            "default: inertial. For example `--axes athlete` or `--axes 0 1 0`.",
-            several=True,
-            allow_leading_hyphen=True,  # components may be negative
+            "default: inertial. For example `--axes athlete` or `--axes 0,1,0`.",
+            allow_leading_hyphen=True,  # the first number may be negative
         ),
-    ] = ("inertial",),
+    ] = "inertial",
     normalise: Annotated[
         str | None,
         option(
@@ -101,7 +98,7 @@ def momentum_command(
 
     A recording with its base is taken as recorded: nothing is presumed to be conserved.
     """
-    from ..errors import ShapeError, unknown_name
+    from ..errors import unknown_name
     from ..segments.segment_momentum import AXES, segment_momentum
     from ..shape_space.files.labels import amounts
     from ..shape_space.free_fall import GRAVITY
@@ -111,13 +108,11 @@ def momentum_command(
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
     try:
-        chosen = axes[0] if len(axes) == 1 else [float(word) for word in axes]
+        chosen = axes if axes in AXES else [float(word) for word in axes.split(",")]
     except ValueError:
-        raise unknown_name("axes", " ".join(axes), (*AXES, "three numbers")) from None
+        raise unknown_name("axes", axes, (*AXES, "three numbers such as 0,1,0")) from None
     levels = None if joint_noise is None else amounts(joint_noise, "--joint-noise")
     turn = None if attitude_noise is None else amounts(attitude_noise, "--attitude-noise")["rad"]
-    if not isinstance(chosen, str) and len(chosen) != _COMPONENTS:
-        raise ShapeError(f"--axes: {', '.join(AXES)} or three numbers are needed, got {len(chosen)} numbers")
     with steps(2) as work:
         work.begin("loading")
         loaded = motions.body_argument(body, floating)

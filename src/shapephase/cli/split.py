@@ -52,6 +52,14 @@ def split_command(
             "example `--samples fall.nc`.",
         ),
     ] = None,
+    link_momenta: Annotated[
+        bool,
+        rare(
+            "Write the angular momentum of each link into --samples, too, in kg m^2/s; for example "
+            "`--samples fall.csv --link-momenta`.",
+            negative="",
+        ),
+    ] = False,
     phases: Annotated[
         Path | None,
         rare(
@@ -65,6 +73,7 @@ def split_command(
     """Split the rotation of a free body into shape holonomy and Montgomery phase."""
     import numpy as np
 
+    from ..errors import ShapeError
     from ..exports.tables import ENDINGS, export_motion
     from ..phases.phases import running_phases, split
     from ..phases.split_text import split_lines, wrapped
@@ -79,6 +88,8 @@ def split_command(
     aside = check_writable(samples, "--samples", *ENDINGS) or aside
     aside = check_writable(phases, "--phases", ".csv") or aside
     aside = check_writable(html, "--html", ".html") or aside
+    if link_momenta and samples is None:
+        raise ShapeError("--link-momenta: the momenta are written into --samples; give its file, too")
     if html is not None:
         from ..plots.pages.motion_data import up_axis
 
@@ -97,7 +108,7 @@ def split_command(
             flown.motion.save(out)
             say_written(out)
         if samples is not None:
-            export_motion(flown.motion, samples)
+            export_motion(flown.motion, samples, links=link_momenta)
             say_written(samples)
         if phases is not None:
             times = np.linspace(0.0, flown.motion.duration, _ROWS)

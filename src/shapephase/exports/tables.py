@@ -9,13 +9,13 @@ import os
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_file_name, check_keywords
+from ..arguments import check_file_name, check_flag, check_keywords, check_object
 from ..arrays import Array
 from ..dynamics.moving_body import body_and_path
 from ..errors import MissingExtraError, unknown_name
@@ -27,6 +27,7 @@ from ._whole_motion import Fall, checked_times, continued_quaternions, whole_mot
 
 _AXES = ("x", "y", "z")
 _QUATERNION = ("qx", "qy", "qz", "qw")
+_TURNS = ("somersault", "tilt", "twist")
 _MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
 _MATLAB_TEXT = 116  # bytes of text at the beginning of a MATLAB file
 
@@ -36,6 +37,7 @@ class _Samples(dict[str, tuple[Array, str, str]]):
 
     joint_names: tuple[str, ...] = ()
     joint_units: tuple[str, ...] = ()
+    link_axes: tuple[str, ...] = ()
     attributes: dict[str, Any]
 
 
@@ -44,7 +46,8 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 
     Variables have their units as attributes. `base_quat_xyzw` (time, quaternion), `base_position` and, where the body
     has joints along a path, `base_velocity` (time, axis) are in inertial axes, `angular_velocity` (time, axis) in base
-    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints.
+    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints. Where somersaults are counted
+    (`Motion.counted_axes`), `turns` and `turn_errors` (time, turn) are somersault, tilt and twist.
 
     Parameters
     ----------
@@ -67,9 +70,18 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     [2. 2.] rad/s
     """
     check_keywords(fall, motion_dataset)
+    return _dataset(_samples(motion, times, fall))
+
+
+def _dataset(samples: _Samples) -> Any:
     xarray = _extra("xarray", "a data set needs xarray", "study")
-    samples = _samples(motion, times, fall)
-    labels = {"quaternion": _QUATERNION, "axis": _AXES, "joint": samples.joint_names}
+    labels = {
+        "quaternion": _QUATERNION,
+        "axis": _AXES,
+        "joint": samples.joint_names,
+        "turn": _TURNS,
+        "link_axis": samples.link_axes,
+    }
     variables = {
         name: (("time", dimension), values, {"units": unit} if unit else {})
         for name, (values, dimension, unit) in samples.items()
@@ -87,7 +99,12 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 
 
 def export_motion(
-    motion: Motion | ForcedMotion, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike
+    motion: Motion | ForcedMotion,
+    path: str | os.PathLike[str],
+    times: ArrayLike | None = None,
+    *,
+    links: bool = False,
+    **fall: ArrayLike,
 ) -> None:
     """Write samples of one motion, base and joints, to a file in the format of its ending.
 
@@ -102,6 +119,7 @@ def export_motion(
     ----------
     motion : a single one
     times : (N,) [s]; None: 201 even times
+    links : True to write the angular momentum of each link about the centre of mass, too, inertial axes
     fall : start, velocity, gravity as in `Motion.base_position`
 
     Raises
@@ -124,11 +142,12 @@ def export_motion(
     (101, 3, 3)
     """
     check_file_name(path, "path")
+    check_flag(links, "links")
     check_keywords(fall, export_motion)
     where = Path(path)
     if where.suffix.lower() not in ENDINGS:
         raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)
-    content = _WRITERS[where.suffix.lower()](motion, times, fall)
+    content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall, links=links))
     write_whole(where, lambda stream: stream.write(content))
 
 
@@ -139,7 +158,9 @@ def _extra(name: str, needed: str, extra: str = "data") -> Any:
         raise MissingExtraError(f"{needed}; install it with: pip install 'shapephase[{extra}]'") from None
 
 
-def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike]) -> _Samples:
+def _samples(
+    motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike], *, links: bool = False
+) -> _Samples:
     at, falling, samples = checked_times(motion, times), Fall.of(**fall), _Samples()
     samples["time"] = at, "", "s"
     if body_and_path(motion) is None:
@@ -158,6 +179,14 @@ def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[
         samples["base_velocity"] = whole.world_velocity, "axis", "m/s"
         samples["shapes"] = whole.shapes, "joint", "rad" * angles
         samples["shape_rates"] = whole.shape_rates, "joint", "rad/s" * angles
+    if isinstance(motion, Motion) and motion.counted_axes() is not None:
+        samples["turns"] = np.stack(motion.somersault_tilt_twist(at), axis=-1), "turn", "rad"
+        samples["turn_errors"] = np.stack(motion.somersault_errors(at), axis=-1), "turn", "rad"
+    if links:
+        check_object(motion, "Motion", "motion")
+        found = cast("Motion", motion).segment_momentum(times=at)
+        samples.link_axes = tuple(f"{link}_momentum_{axis}" for link in found.links for axis in _AXES)
+        samples["link_momentum"] = found.by_link.reshape(len(at), -1), "link_axis", "kg m^2/s"
     momentum = motion.momentum(at) if isinstance(motion, ForcedMotion) else motion.momentum
     samples.attributes = {
         "momentum": np.asarray(momentum).reshape(-1, 3)[0].tolist(),
@@ -177,6 +206,9 @@ def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
         "base_position": [f"base_{axis}_m" for axis in _AXES],
         "base_velocity": [f"base_v{axis}_m_s" for axis in _AXES],
         "shapes": samples.joint_names,
+        "turns": [f"{turn}_rad" for turn in _TURNS],
+        "turn_errors": [f"{turn}_error_rad" for turn in _TURNS],
+        "link_momentum": [f"{label}_kg_m2_s" for label in samples.link_axes],
     }
     units = {"shapes": samples.joint_units}
     table: dict[str, tuple[Array, str]] = {"time": (samples["time"][0], "s")}
@@ -191,8 +223,7 @@ def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
     return table
 
 
-def _csv(motion: Any, times: Any, fall: Any) -> bytes:
-    samples = _samples(motion, times, fall)
+def _csv(samples: _Samples) -> bytes:
     columns, text = _columns(samples), io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     bracketed = {"time", *samples.joint_names}
@@ -201,9 +232,8 @@ def _csv(motion: Any, times: Any, fall: Any) -> bytes:
     return text.getvalue().encode()
 
 
-def _parquet(motion: Any, times: Any, fall: Any) -> bytes:
+def _parquet(samples: _Samples) -> bytes:
     pyarrow, parquet = (_extra(name, "Parquet files need pyarrow") for name in ("pyarrow", "pyarrow.parquet"))
-    samples = _samples(motion, times, fall)
     columns = _columns(samples)
     fields = [
         pyarrow.field(label, pyarrow.float64(), metadata={"unit": unit} if unit else None)
@@ -216,14 +246,14 @@ def _parquet(motion: Any, times: Any, fall: Any) -> bytes:
     return stream.getvalue()
 
 
-def _netcdf(motion: Any, times: Any, fall: Any) -> bytes:
-    return bytes(motion_dataset(motion, times, **fall).to_netcdf(engine="scipy"))
+def _netcdf(samples: _Samples) -> bytes:
+    return bytes(_dataset(samples).to_netcdf(engine="scipy"))
 
 
-def _matlab(motion: Any, times: Any, fall: Any) -> bytes:
+def _matlab(samples: _Samples) -> bytes:
     from scipy.io import savemat
 
-    samples, stream = _samples(motion, times, fall), io.BytesIO()
+    stream = io.BytesIO()
     arrays: dict[str, Any] = {name: values for name, (values, _, _) in samples.items()}
     if samples.joint_names:
         arrays["joint_names"] = np.array(samples.joint_names, dtype=object)
@@ -233,9 +263,9 @@ def _matlab(motion: Any, times: Any, fall: Any) -> bytes:
     return _MATLAB.ljust(_MATLAB_TEXT).encode() + stream.getvalue()[_MATLAB_TEXT:]
 
 
-def _hdf5(motion: Any, times: Any, fall: Any) -> bytes:
+def _hdf5(samples: _Samples) -> bytes:
     h5py = _extra("h5py", "HDF5 files need h5py")
-    samples, stream = _samples(motion, times, fall), io.BytesIO()
+    stream = io.BytesIO()
     with h5py.File(stream, "w") as file:
         for name, (values, _, unit) in samples.items():
             file[name] = values
@@ -249,7 +279,7 @@ def _hdf5(motion: Any, times: Any, fall: Any) -> bytes:
     return stream.getvalue()
 
 
-_WRITERS: dict[str, Callable[[Any, Any, Any], bytes]] = {
+_WRITERS: dict[str, Callable[[_Samples], bytes]] = {
     ".csv": _csv,
     ".parquet": _parquet,
     ".nc": _netcdf,

@@ -86,7 +86,7 @@ def plot_segment_momentum(ax: Axes, momentum: SegmentMomentum, axis: str | None 
     low = min(float(below.min()), float(whole.min()))
     for flight in momentum.flights if momentum.as_recorded else ():
         ends = (flight.first_time, flight.last_time)
-        (mark,) = ax.plot(ends, (low, low), color=GREY, linewidth=3.0, solid_capstyle="butt", clip_on=False)
+        (mark,) = ax.plot(ends, (low, low), color=BLACK, linewidth=0.8, marker="|", clip_on=False)
         if "flight" not in texts:
             handles.append(mark)
             texts.append("flight")
