@@ -85,7 +85,7 @@ from .rigid_body import geodesics
 from .rigid_body.euler_top import EulerTop
 from .rigid_body.gyrostat import Gyrostat
 from .segments.contributions import Contributions, contributions
-from .segments.segment_momentum import SegmentMomentum, segment_momentum
+from .segments.momentum import SegmentMomentum, segment_momentum
 from .shape_space.connection import (
     HorizontalLift,
     curvature,

@@ -99,7 +99,7 @@ def momentum_command(
     A recording with its base is taken as recorded: nothing is presumed to be conserved.
     """
     from ..errors import unknown_name
-    from ..segments.segment_momentum import AXES, segment_momentum
+    from ..segments.momentum import AXES, segment_momentum
     from ..shape_space.files.labels import amounts
     from ..shape_space.free_fall import GRAVITY
     from . import motion as motions

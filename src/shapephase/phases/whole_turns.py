@@ -67,8 +67,8 @@ class AthleteTurns:
             fast = self.somersault_rate / _TURN, self.twist_rate / _TURN
             rates = f", at most {fast[0]:.3f} somersaults and {fast[1]:.3f} twists a second"
         return (
-            f"As an athlete: {_count(self.somersaults)} somersaults (nearest half {halves[0]:g}) and "
-            f"{_count(self.twists)} twists ({halves[1]:g}), tilt at most {math.degrees(self.largest_tilt):.1f} degrees "
+            f"As an athlete: {_count(self.somersaults)} somersaults and {_count(self.twists)} twists (to halves "
+            f"{halves[0]:g} and {halves[1]:g}), tilt at most {math.degrees(self.largest_tilt):.1f} degrees "
             f"at {self.tilt_time:.4g} s{rates} (± {self.error:.0e} turns); {self.axes}."
         )
 

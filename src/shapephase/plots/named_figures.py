@@ -40,7 +40,7 @@ class Figure:
     draw : function of axes, motion, path of the joints and gauge
     with_momentum, with_path : whether it needs a momentum, a path of the joints
     of_change : whether it shows nothing but zero of a rigid body
-    of_athlete : whether a report has it only where somersaults are counted
+    of_athlete : whether a report has it only of a person or an animal whose somersaults are counted
 
     Examples
     --------

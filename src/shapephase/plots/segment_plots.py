@@ -10,7 +10,7 @@ from ..arguments import check_object
 from ..arrays import Array
 from ..errors import unknown_name
 from ..reconstruction.reconstruction import Motion
-from ..segments.segment_momentum import SegmentMomentum
+from ..segments.momentum import SegmentMomentum
 from ._joint_styles import plain_text
 from .plot_style import (
     BLACK,

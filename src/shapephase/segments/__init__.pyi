@@ -2,7 +2,7 @@ from .coalitions import shapley_interactions, shapley_values
 from .contributions import Contributions, contributions
 from .direct_shares import DirectShares
 from .limbs import JointGroups, joint_groups
-from .segment_momentum import FlightMomentum, Normalisation, SegmentMomentum, segment_momentum
+from .momentum import FlightMomentum, Normalisation, SegmentMomentum, segment_momentum
 
 __all__ = [
     "Contributions",

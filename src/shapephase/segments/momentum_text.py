@@ -9,7 +9,7 @@ import numpy as np
 from ..display import number_with_bar
 
 if TYPE_CHECKING:
-    from .segment_momentum import FlightMomentum, SegmentMomentum
+    from .momentum import FlightMomentum, SegmentMomentum
 
 
 def momentum_lines(found: SegmentMomentum) -> list[str]:
