@@ -108,7 +108,7 @@ def test_tables_come_back_bit_by_bit(motion, expected, tmp_path, ending):
 def test_momenta_of_links_are_a_column_set_that_readers_leave_out(motion, expected, tmp_path):
     pandas = pytest.importorskip("pandas")
     sp.export_motion(motion, tmp_path / "motion.csv", TIMES, links=True, **FALL)
-    found, momentum = pandas.read_csv(tmp_path / "motion.csv"), motion.segment_momentum(times=TIMES)
+    found, momentum = pandas.read_csv(tmp_path / "motion.csv"), sp.segment_momentum(motion, times=TIMES)
     for k, link in enumerate(momentum.links):
         columns = [f"{link}_momentum_{axis}_kg_m2_s" for axis in "xyz"]
         np.testing.assert_array_equal(found[columns].to_numpy(), momentum.by_link[:, k])

@@ -39,8 +39,8 @@ class AthleteTurns:
     --------
     >>> dive = sp.examples.full_dive()
     >>> turns = sp.phases.athlete_turns(sp.reconstruct(dive.deformation, dive.momentum))
-    >>> print(turns.halves, f"{math.degrees(turns.largest_tilt):.1f} deg at {turns.tilt_time:.2f} s")
-    (1.5, -1.0) 11.6 deg at 1.06 s
+    >>> print(turns.halves, f"{np.degrees(turns.largest_tilt):.1f} deg at {turns.tilt_time:.2f} s")
+    (1.5, -1.0) 10.3 deg at 0.87 s
     """
 
     somersaults: float
@@ -257,7 +257,7 @@ def _rotation_in_plane(motion: Motion) -> tuple[float | None, Array | None]:
     if speed == 0.0:
         return None, None
     axis = fastest / speed
-    # Of an axis and its opposite the one whose largest component is positive.
+    # The axis, not its opposite, has a positive largest component.
     axis = axis * np.sign(axis[int(np.argmax(np.abs(axis)))])
     off = np.linalg.norm(spins - (spins @ axis)[:, None] * axis, axis=1).max()
     if off > (_FIXED + float(motion.error_estimate)) * speed:

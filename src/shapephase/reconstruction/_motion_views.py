@@ -143,12 +143,20 @@ class MotionViews:
         angles = self._continued(t, EulerAngles("YXZ"), (so3.quat_from_matrix(space), so3.quat_from_matrix(body)))
         return angles[..., 0], angles[..., 1], angles[..., 2]
 
-    def somersault_rates(self: Any, t: ArrayLike, **axes: Any) -> tuple[Array, Array, Array]:
+    def somersault_rates(
+        self: Any,
+        t: ArrayLike,
+        *,
+        lateral: str | ArrayLike | None = None,
+        longitudinal: str | ArrayLike | None = None,
+        somersault: str | ArrayLike | None = None,
+        up: str | ArrayLike | None = None,
+    ) -> tuple[Array, Array, Array]:
         """Rates of somersault, tilt and twist: times (...) -> batch + (...) each [rad/s].
 
         Parameters
         ----------
-        axes : as for `athlete_axes`
+        lateral, longitudinal, somersault, up : as for `athlete_axes`
 
         Raises
         ------
@@ -163,9 +171,9 @@ class MotionViews:
         >>> motion = sp.reconstruct(dive.deformation, dive.momentum)
         >>> somersault, tilt, twist = motion.somersault_rates(0.0)
         >>> print(f"{somersault:.3f} {abs(tilt):.3f} {abs(twist):.3f} rad/s")
-        3.719 0.000 0.000 rad/s
+        5.705 0.000 0.000 rad/s
         """
-        chosen = self.athlete_axes(**axes)
+        axes = {"lateral": lateral, "longitudinal": longitudinal, "somersault": somersault, "up": up}
         _, tilt, twist = self.somersault_tilt_twist(t, **axes)
         cosine = np.cos(tilt)
         if np.any(np.abs(cosine) < _AT_POLE):
@@ -173,20 +181,28 @@ class MotionViews:
                 "the tilt passes through 90 degrees, where somersault and twist are about one axis, and their rates "
                 "are not defined; take other times, or another longitudinal axis"
             )
-        _, body = chosen.matrices
+        _, body = self.athlete_axes(**axes).matrices
         spin = self.angular_velocity(t)
         forward, left, long = np.moveaxis(so3.apply(np.swapaxes(body, -1, -2), spin), -1, 0)
-        somersault = (forward * np.sin(twist) + left * np.cos(twist)) / cosine
-        return somersault, forward * np.cos(twist) - left * np.sin(twist), long + somersault * np.sin(tilt)
+        turning = (forward * np.sin(twist) + left * np.cos(twist)) / cosine
+        return turning, forward * np.cos(twist) - left * np.sin(twist), long + turning * np.sin(tilt)
 
-    def somersault_errors(self: Any, t: ArrayLike, **axes: Any) -> tuple[Array, Array, Array]:
+    def somersault_errors(
+        self: Any,
+        t: ArrayLike,
+        *,
+        lateral: str | ArrayLike | None = None,
+        longitudinal: str | ArrayLike | None = None,
+        somersault: str | ArrayLike | None = None,
+        up: str | ArrayLike | None = None,
+    ) -> tuple[Array, Array, Array]:
         """Numerical errors of somersault, tilt and twist, by the attitude's estimate: -> batch + (...) each [rad].
 
         Towards 90 degrees of tilt an error of the attitude turns somersault and twist by more, half a turn at most.
 
         Parameters
         ----------
-        axes : as for `athlete_axes`
+        lateral, longitudinal, somersault, up : as for `athlete_axes`
 
         Examples
         --------
@@ -195,7 +211,9 @@ class MotionViews:
         >>> bool(max(motion.somersault_errors(1.0)) < 1e-8)
         True
         """
-        _, tilt, _ = self.somersault_tilt_twist(t, **axes)
+        _, tilt, _ = self.somersault_tilt_twist(
+            t, lateral=lateral, longitudinal=longitudinal, somersault=somersault, up=up
+        )
         error = np.reshape(self.error_estimate, (*self.batch, *([1] * (tilt.ndim - len(self.batch)))))
         outer = np.minimum(error / np.maximum(np.abs(np.cos(tilt)), np.finfo(np.float64).tiny), np.pi)
         return outer, np.broadcast_to(error, tilt.shape).copy(), outer.copy()
@@ -291,21 +309,6 @@ class MotionViews:
             For another kind, or one that needs a momentum where there is none; if the motion is a batch.
         """
         return offered("Motion.plot")(self, kind, ax=ax, gauge=gauge)
-
-    def segment_momentum(self: Any, **options: Any) -> Any:
-        """Angular momentum about the centre of mass in time, whole and by link (`shapephase.segment_momentum`).
-
-        Parameters
-        ----------
-        options : of `shapephase.segment_momentum`
-
-        Examples
-        --------
-        >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
-        >>> sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]).segment_momentum().links
-        ('front', 'rear')
-        """
-        return offered("Motion.segment_momentum")(self, **options)
 
     def view(self: Any, **options: Any) -> Any:
         """Return a page of the motion in three dimensions, to write, show or film; a notebook displays it.

@@ -278,7 +278,7 @@ def _smoothed(body: Body, recorded: Recorded) -> _Columns:
             paths.append((near, joints))
     curves = [path.curve(times) for path, _ in paths]
     errors = [path_errors(path, times, level) for path, level in paths]
-    # Of shape and rate; the third is of the acceleration.
+    # Shape and rate; the third is the acceleration.
     covariance = np.concatenate([error.covariance for error in errors], axis=1)[..., :2, :2]
     bias = np.concatenate([error.bias for error in errors], axis=1)[..., :2]
     values, rates = (np.hstack([curve[which] for curve in curves]) for which in (0, 1))

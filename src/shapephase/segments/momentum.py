@@ -239,9 +239,9 @@ def segment_momentum(
 ) -> SegmentMomentum:
     """Angular momentum about the centre of mass in time, whole and by link, of a motion or as it was recorded.
 
-    Of a recording nothing is presumed to be conserved: rates are those of smoothing splines through attitudes and
-    joints, or as recorded, and bars hold the noise of the samples. Of a `Motion` the whole is its momentum at all
-    times, and bars hold its numerical error.
+    A recording is taken as it is, and nothing is presumed to be conserved: rates are those of smoothing splines through
+    attitudes and joints, or as recorded, and bars hold the noise of the samples. The whole of a `Motion` is its
+    momentum at all times, and bars hold its numerical error.
 
     Parameters
     ----------
