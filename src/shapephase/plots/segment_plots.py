@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -73,7 +73,10 @@ def plot_segment_momentum(ax: Axes, momentum: SegmentMomentum, axis: str | None 
     handles, texts = [], []
     for k, (name, values) in enumerate(parts.items()):
         up, down = np.maximum(values[:, along], 0.0), np.minimum(values[:, along], 0.0)
-        look = {"facecolor": _COLOURS[k % len(_COLOURS)], "hatch": _FILLS[k // len(_COLOURS) % len(_FILLS)]}
+        look: dict[str, Any] = {
+            "facecolor": _COLOURS[k % len(_COLOURS)],
+            "hatch": _FILLS[k // len(_COLOURS) % len(_FILLS)],
+        }
         for start, added in ((above, up), (below, down)):
             area = ax.fill_between(times, start, start + added, linewidth=0.3, edgecolor="white", **look)
         handles.append(area)

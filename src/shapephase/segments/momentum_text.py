@@ -27,7 +27,7 @@ def momentum_lines(found: SegmentMomentum) -> list[str]:
             f"  {conservation_text(flight)}",
         ]
     names = ["mean " + axis for axis in found.axes]
-    rows = [("link", *names, "largest", "± (rms)", "local", "remote")]
+    rows: list[tuple[str, ...]] = [("link", *names, "largest", "± (rms)", "local", "remote")]
     sizes = np.linalg.norm(found.by_link, axis=2)
     for k, link in enumerate(found.links):
         means = [f"{value:.4g}" for value in found.by_link[:, k].mean(axis=0)]
