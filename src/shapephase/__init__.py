@@ -22,7 +22,8 @@ auditing body bounds deformation dynamics error_bars errors examples exports opt
 rigid_body segments shape_space so3 study
 EulerTop InertiaErrors ShapePath articulated audit contributions curvature export_motion holonomy in_gauge joint_torques
 load_body load_motion mechanical_connection particle_body plan_reorientation
-reachable read_recorded_motion read_shape_path read_trajectory reconstruct rigid robot_names split uncertainty
+reachable read_recorded_motion read_shape_path read_trajectory reconstruct rigid robot_names segment_momentum split
+uncertainty
 """.split()  # noqa: SIM905
 
 
@@ -33,3 +34,4 @@ def __dir__() -> list[str]:
 offer("Motion.plot", "shapephase.plots.named_figures", "motion_figure")
 offer("Motion.to_xarray", "shapephase.exports.tables", "motion_dataset")
 offer("Motion.view", "shapephase.plots.viewer", "view")
+offer("export_motion.links", "shapephase.segments.momentum", "segment_momentum")

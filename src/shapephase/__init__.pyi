@@ -85,6 +85,7 @@ from .rigid_body import geodesics
 from .rigid_body.euler_top import EulerTop
 from .rigid_body.gyrostat import Gyrostat
 from .segments.contributions import Contributions, contributions
+from .segments.momentum import SegmentMomentum, segment_momentum
 from .shape_space.connection import (
     HorizontalLift,
     curvature,
@@ -149,6 +150,7 @@ __all__ = [
     "ReturnMap",
     "Returns",
     "RunningPhases",
+    "SegmentMomentum",
     "Sensitivity",
     "ShapePath",
     "ShapePhaseError",
@@ -232,6 +234,7 @@ __all__ = [
     "robot_names",
     "running_phases",
     "sampled_uncertainty",
+    "segment_momentum",
     "segments",
     "shape_space",
     "so3",

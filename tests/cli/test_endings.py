@@ -38,6 +38,7 @@ COMMANDS = {
     "orbits": ("orbits", "cat", "cat_righting", "0.02"),
     "doctor": ("doctor",),
     "torques": ("torques", "cat", "cat_righting"),
+    "momentum": ("momentum", "cat", "cat_righting"),
 }
 ALL_COMMANDS = (
     *(*COMMANDS, "plan", "view", "explore", "plot", "compile", "reach"),
@@ -350,6 +351,8 @@ ENDINGS = [
     (2, "conjugate 1 1 2"),
     (6, "conjugate 1 2 3 --out folder.svg"),
     (6, "torques cat cat_righting --out folder.csv"),
+    (6, "momentum cat cat_righting --out folder.csv"),
+    (2, "momentum cat cat_righting --axes sideways"),
     (2, "rigid 1 2 3 --momentum 0 0 1 --figure orbit"),
     (6, "rigid 1 2 3 --momentum 0 0 1 --out folder.svg"),
     (2, "robots more"),

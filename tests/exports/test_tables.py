@@ -90,13 +90,30 @@ def test_tables_come_back_bit_by_bit(motion, expected, tmp_path, ending):
     else:
         labels, found = file.read_text().splitlines()[0].split(","), np.loadtxt(file, delimiter=",", skiprows=1)
     parts = ("time", "base_quat_xyzw", "angular_velocity", "base_position", "base_velocity", "shapes")
-    np.testing.assert_array_equal(found, np.column_stack([expected[name] for name in parts]))
+    own = np.column_stack([expected[name] for name in parts])
+    np.testing.assert_array_equal(found[:, : own.shape[1]], own)
+    # Its wings are named left and right, so that somersaults are counted.
+    turns = [f"{turn}{error}_rad" for error in ("", "_error") for turn in ("somersault", "tilt", "twist")]
+    assert labels[own.shape[1] :] == turns
+    np.testing.assert_array_equal(found[:, -6:-3], np.transpose(motion.somersault_tilt_twist(TIMES)))
+    np.testing.assert_array_equal(found[:, -3:], np.transpose(motion.somersault_errors(TIMES)))
     boom = "boom_extension" if ending == ".parquet" else "boom_extension [m]"
     assert boom in labels
     if ending == ".parquet":
         from pyarrow.parquet import read_schema
 
         assert read_schema(file).field("boom_extension").metadata == {b"unit": b"m"}
+
+
+def test_momenta_of_links_are_a_column_set_that_readers_leave_out(motion, expected, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    sp.export_motion(motion, tmp_path / "motion.csv", TIMES, links=True, **FALL)
+    found, momentum = pandas.read_csv(tmp_path / "motion.csv"), sp.segment_momentum(motion, times=TIMES)
+    for k, link in enumerate(momentum.links):
+        columns = [f"{link}_momentum_{axis}_kg_m2_s" for axis in "xyz"]
+        np.testing.assert_array_equal(found[columns].to_numpy(), momentum.by_link[:, k])
+    again = sp.read_recorded_motion(tmp_path / "motion.csv", body_of("satellite"), close=False)
+    np.testing.assert_allclose(again.path.shape(again.times), expected["shapes"], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -112,7 +129,7 @@ def test_our_readers_find_joints_and_base(motion, expected, tmp_path, ending):
 
 def test_the_data_set_has_units_and_is_a_table_of_joints_for_our_reader(motion, expected):
     found = motion.to_xarray(TIMES, **FALL)
-    assert dict(found.sizes) == {"time": 50, "quaternion": 4, "axis": 3, "joint": 10}
+    assert dict(found.sizes) == {"time": 50, "quaternion": 4, "axis": 3, "joint": 10, "turn": 3}
     assert found.base_velocity.units == "m/s"
     assert found.joint_unit.sel(joint="boom_extension").item() == "m"
     boom = body_of("satellite").joint_index("boom_extension")

@@ -110,8 +110,20 @@ def test_a_report_shows_each_figure_once(moving_report):
     drawn = re.findall(r"<figcaption>(.*?)</figcaption>", page)
     others = ("torques", "inertia", "internal_momentum", "energy")
     assert drawn == [FIGURES[kind].caption for kind in others]
-    assert set(FIGURES) == {"momentum", "phases", "attitude", "shape", *others}
+    assert set(FIGURES) == {"somersault", "momentum", "phases", "attitude", "shape", *others}
     assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2, 2]
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_somersault_tilt_and_twist_come_first_of_a_person(tmp_path):
+    """The satellite of the test above has wings named left and right, but neither arms nor legs."""
+    body = sp.load_body("diver")
+    path = sp.ShapePath.fourier(np.zeros(2), 0.3 * np.ones((2, 1)), np.array([[0.2], [0.1]]), 1.0)
+    motion = sp.reconstruct(sp.articulated(body, path), [0.0, 50.0, 0.0])
+    report(motion, sp.split(motion), shape_path=path).write(tmp_path / "report.html")
+    drawn = re.findall(r"<figcaption>(.*?)</figcaption>", (tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert drawn[0] == "Somersault, tilt and twist"
+    assert len(drawn) == 5
 
 
 @pytest.mark.parametrize("momentum", [True, False])

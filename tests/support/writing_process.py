@@ -35,6 +35,8 @@ COMMANDS = {
         for kind in ("csv", "parquet", "nc", "mat", "h5")
     },
     "torques.csv": ("torques", *CAT, ("0.02", "0.03"), "--out"),
+    "momentum.csv": ("momentum", *CAT, ("0.02", "0.03"), "--out"),
+    **{f"momentum.{kind}": ("momentum", *CAT, ("0.02", "0.03"), "--figure") for kind in ("svg", "pdf", "png")},
     "view.html": ("view", *CAT, ("0.02", "0.03"), "--html"),
     "plot.svg": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
     "plot.pdf": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),

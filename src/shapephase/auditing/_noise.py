@@ -7,20 +7,14 @@ least level that any order leaves is that of the noise.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
-from scipy.special import comb
-from scipy.stats import chi2
 
 from ..arguments import made_by
 from ..arrays import Array
 from ..display import short_repr
+from ..shape_space.path_noise import white_noise
 from .floating_trajectory import FloatingTrajectory
-
-_LOWEST = 3  # order of differences: the motion itself is in those below
-_HIGHEST = 12  # order of differences, the samples allowing
-_ROUNDING = 8.0  # units in the last place of a sample: what arithmetic alone leaves of numbers that are otherwise exact
 
 
 @made_by("auditing.TrajectoryNoise(attitude=0.002), for example")
@@ -72,29 +66,6 @@ def _of_vector(samples: Array | None) -> float:
 
 def _of_each(samples: Array | None) -> tuple[float, ...]:
     return () if samples is None else tuple(white_noise(samples[:, :, None], 1).tolist())
-
-
-def white_noise(samples: Array, freedom: int) -> Array:
-    """Standard deviation of noise that is alike in all directions of c vectors (N, c, k): (c,).
-
-    freedom : in how many directions there is noise
-    """
-    largest = np.abs(samples).max(axis=(0, 2), initial=0.0)
-    least = np.full(samples.shape[1], np.inf)
-    differences = samples
-    for order in range(1, min(_HIGHEST, len(samples) // 2) + 1):
-        differences = np.diff(differences, axis=0)
-        if order >= _LOWEST:
-            # The median: a blow or a break is in few of them.
-            squares = np.median((differences**2).sum(axis=2), axis=0) / comb(2 * order, order)
-            least = np.minimum(least, np.sqrt(squares / _median_square(freedom)))
-    return np.maximum(least, _ROUNDING * float(np.finfo(np.float64).eps) * largest)
-
-
-@lru_cache(maxsize=8)
-def _median_square(freedom: int) -> float:
-    """Median of the squared length of a vector of `freedom` numbers with variance one."""
-    return float(chi2.median(freedom))
 
 
 def continuous(quaternions: Array) -> Array:

@@ -26,6 +26,7 @@ from .check import check_command
 from .contributions import contributions_command
 from .ctrl_c import forget, was_pressed
 from .installation import compile_command, doctor_command, robots_command
+from .momentum import momentum_command
 from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
 from .outcome import ExitCode, Outcome, exit_code_of
@@ -64,6 +65,7 @@ sweep_app.help_epilogue = _WHERE_EXIT_CODES
 for _name, _command in {
     "split": split_command,
     "contributions": contributions_command,
+    "momentum": momentum_command,
     "torques": torques_command,
     "view": view_command,
     "plot": plot_app,

@@ -52,6 +52,14 @@ def split_command(
             "example `--samples fall.nc`.",
         ),
     ] = None,
+    link_momenta: Annotated[
+        bool,
+        rare(
+            "Write the angular momentum of each link into --samples, too, in kg m^2/s; for example "
+            "`--samples fall.csv --link-momenta`.",
+            negative="",
+        ),
+    ] = False,
     phases: Annotated[
         Path | None,
         rare(
@@ -65,6 +73,7 @@ def split_command(
     """Split the rotation of a free body into shape holonomy and Montgomery phase."""
     import numpy as np
 
+    from ..errors import ShapeError
     from ..exports.tables import ENDINGS, export_motion
     from ..phases.phases import running_phases, split
     from ..phases.split_text import split_lines, wrapped
@@ -78,6 +87,8 @@ def split_command(
     files = {"--out": (out, ".npz"), "--samples": (samples, *ENDINGS), "--phases": (phases, ".csv")}
     files["--html"] = html, ".html"
     aside = True in [check_writable(file, option, *endings) for option, (file, *endings) in files.items()]
+    if link_momenta and samples is None:
+        raise ShapeError("--link-momenta: the momenta are written into --samples; give its file, too")
     if html is not None:
         from ..plots.pages.motion_data import up_axis
 
@@ -94,7 +105,7 @@ def split_command(
             lines, data = fit_lines(flown.fitted, bars), fit_data(flown.fitted)
         times = np.linspace(0.0, flown.motion.duration, _ROWS)
         write_file(out, flown.motion.save)
-        write_file(samples, lambda file: export_motion(flown.motion, file))
+        write_file(samples, lambda file: export_motion(flown.motion, file, links=link_momenta))
         write_file(phases, lambda file: running_phases(flown.motion, times, gauge).write_csv(file))
         if html is not None:
             work.begin("making the report")

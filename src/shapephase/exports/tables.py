@@ -15,11 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_file_name, check_keywords
+from ..arguments import check_file_name, check_flag, check_keywords, check_object
 from ..arrays import Array
 from ..dynamics.moving_body import body_and_path
 from ..errors import MissingExtraError, unknown_name
 from ..files import write_whole
+from ..offers import offered
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
@@ -27,6 +28,7 @@ from ._whole_motion import Fall, checked_times, continued_quaternions, whole_mot
 
 _AXES = ("x", "y", "z")
 _QUATERNION = ("qx", "qy", "qz", "qw")
+_TURNS = ("somersault", "tilt", "twist")
 _MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
 _MATLAB_TEXT = 116  # bytes of text at the beginning of a MATLAB file
 
@@ -36,6 +38,7 @@ class _Samples(dict[str, tuple[Array, str, str]]):
 
     joint_names: tuple[str, ...] = ()
     joint_units: tuple[str, ...] = ()
+    link_axes: tuple[str, ...] = ()
     attributes: dict[str, Any]
 
 
@@ -44,7 +47,8 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 
     Variables have their units as attributes. `base_quat_xyzw` (time, quaternion), `base_position` and, where the body
     has joints along a path, `base_velocity` (time, axis) are in inertial axes, `angular_velocity` (time, axis) in base
-    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints.
+    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints. Where somersaults are counted
+    (`Motion.counted_axes`), `turns` and `turn_errors` (time, turn) are somersault, tilt and twist.
 
     Parameters
     ----------
@@ -69,7 +73,12 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 
 
 def export_motion(
-    motion: Motion | ForcedMotion, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike
+    motion: Motion | ForcedMotion,
+    path: str | os.PathLike[str],
+    times: ArrayLike | None = None,
+    *,
+    links: bool = False,
+    **fall: ArrayLike,
 ) -> None:
     """Write samples of one motion, base and joints, to a file in the format of its ending.
 
@@ -84,6 +93,7 @@ def export_motion(
     ----------
     motion : a single one
     times : (N,) [s]; None: 201 even times
+    links : True to write the angular momentum of each link about the centre of mass, too, inertial axes
     fall : start, velocity, gravity as in `Motion.base_position`
 
     Raises
@@ -100,11 +110,12 @@ def export_motion(
     (101, 3, 3)
     """
     check_file_name(path, "path")
+    check_flag(links, "links")
     check_keywords(fall, export_motion)
     where = Path(path)
     if where.suffix.lower() not in ENDINGS:
         raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)
-    content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall))
+    content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall, links=links))
     write_whole(where, lambda stream: stream.write(content))
 
 
@@ -115,7 +126,9 @@ def _extra(name: str, needed: str, extra: str = "data") -> Any:
         raise MissingExtraError(f"{needed}; install it with: pip install 'shapephase[{extra}]'") from None
 
 
-def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike]) -> _Samples:
+def _samples(
+    motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike], *, links: bool = False
+) -> _Samples:
     at, falling, samples = checked_times(motion, times), Fall.of(**fall), _Samples()
     samples["time"] = at, "", "s"
     if body_and_path(motion) is None:
@@ -134,6 +147,14 @@ def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[
         samples["base_velocity"] = whole.world_velocity, "axis", "m/s"
         samples["shapes"] = whole.shapes, "joint", "rad" * angles
         samples["shape_rates"] = whole.shape_rates, "joint", "rad/s" * angles
+    if isinstance(motion, Motion) and motion.counted_axes() is not None:
+        samples["turns"] = np.stack(motion.somersault_tilt_twist(at), axis=-1), "turn", "rad"
+        samples["turn_errors"] = np.stack(motion.somersault_errors(at), axis=-1), "turn", "rad"
+    if links:
+        check_object(motion, "Motion", "motion")
+        found = offered("export_motion.links")(motion, times=at)
+        samples.link_axes = tuple(f"{link}_momentum_{axis}" for link in found.links for axis in _AXES)
+        samples["link_momentum"] = found.by_link.reshape(len(at), -1), "link_axis", "kg m^2/s"
     momentum = motion.momentum(at) if isinstance(motion, ForcedMotion) else motion.momentum
     samples.attributes = {
         "momentum": np.asarray(momentum).reshape(-1, 3)[0].tolist(),
@@ -147,7 +168,13 @@ def _samples(motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[
 
 def _dataset(samples: _Samples) -> Any:
     xarray = _extra("xarray", "a data set needs xarray", "study")
-    labels = {"quaternion": _QUATERNION, "axis": _AXES, "joint": samples.joint_names}
+    labels = {
+        "quaternion": _QUATERNION,
+        "axis": _AXES,
+        "joint": samples.joint_names,
+        "turn": _TURNS,
+        "link_axis": samples.link_axes,
+    }
     variables = {
         name: (("time", dimension), values, {"units": unit} if unit else {})
         for name, (values, dimension, unit) in samples.items()
@@ -172,6 +199,9 @@ def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
         "base_position": [f"base_{axis}_m" for axis in _AXES],
         "base_velocity": [f"base_v{axis}_m_s" for axis in _AXES],
         "shapes": samples.joint_names,
+        "turns": [f"{turn}_rad" for turn in _TURNS],
+        "turn_errors": [f"{turn}_error_rad" for turn in _TURNS],
+        "link_momentum": [f"{label}_kg_m2_s" for label in samples.link_axes],
     }
     units = {"shapes": samples.joint_units}
     table: dict[str, tuple[Array, str]] = {"time": (samples["time"][0], "s")}

@@ -14,11 +14,12 @@ from .phases import (
 )
 from .recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
-from .whole_turns import TurnCounts, turn_counts
+from .whole_turns import AthleteTurns, TurnCounts, athlete_turns, turn_counts
 
 __all__ = [
     "ArcErrors",
     "ArcPhases",
+    "AthleteTurns",
     "Crossings",
     "FixedPoints",
     "ForcedSplit",
@@ -32,6 +33,7 @@ __all__ = [
     "SplitMotion",
     "TurnCounts",
     "arc_phases",
+    "athlete_turns",
     "closed_orbits",
     "continued_orbits",
     "dynamic_phase_from_energy",

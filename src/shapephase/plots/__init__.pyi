@@ -12,6 +12,7 @@ from .polhode_plots import plot_heavy_top_stability, plot_herpolhode, plot_polho
 from .regime_plots import plot_bounds, plot_crown
 from .report_page import report
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
+from .segment_plots import plot_segment_momentum, plot_somersault
 from .shape_plots import plot_curvature, plot_reach, plot_shape_path, plot_shape_plane
 from .torque_plots import plot_torques
 from .viewer import view
@@ -45,9 +46,11 @@ __all__ = [
     "plot_polhodes",
     "plot_reach",
     "plot_rolling_ellipsoid",
+    "plot_segment_momentum",
     "plot_shape_path",
     "plot_shape_plane",
     "plot_shares",
+    "plot_somersault",
     "plot_torques",
     "report",
     "rolling_ellipsoid",

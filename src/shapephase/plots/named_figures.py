@@ -21,6 +21,7 @@ from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_interna
 from .plot_style import axes_image, column_axes, write_axes
 from .polhode_plots import plot_herpolhode, plot_polhodes
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
+from .segment_plots import plot_somersault
 from .shape_plots import plot_shape_path
 from .torque_plots import plot_torques
 
@@ -39,6 +40,7 @@ class Figure:
     draw : function of axes, motion, path of the joints and gauge
     with_momentum, with_path : whether it needs a momentum, a path of the joints
     of_change : whether it shows nothing but zero of a rigid body
+    of_athlete : whether a report has it only of a person or an animal whose somersaults are counted
 
     Examples
     --------
@@ -52,6 +54,7 @@ class Figure:
     with_momentum: bool = False
     with_path: bool = False
     of_change: bool = False
+    of_athlete: bool = False
 
     __repr__ = short_repr
 
@@ -63,6 +66,9 @@ def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
 
 
 FIGURES: Mapping[str, Figure] = {
+    "somersault": Figure(
+        "Somersault, tilt and twist", 2.8, lambda ax, motion, *_: plot_somersault(ax, motion), of_athlete=True
+    ),
     "momentum": Figure(
         "The momentum in the frame of the gauge, and the area it encloses",
         3.9,

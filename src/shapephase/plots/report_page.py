@@ -8,10 +8,12 @@ from typing import Any
 
 from ..arguments import check_object
 from ..arrays import Array
+from ..body.body import Body
 from ..errors import RunStopped
 from ..phases.phases import PhaseSplit
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import ProgressCallback, check_progress
+from ..segments.limbs import SegmentTree
 from ..shape_space.shape_path import ShapePath
 from ._report_text import (
     CONVENTIONS,
@@ -47,6 +49,11 @@ def figure_rows(figures: Sequence[Any]) -> list[Sequence[Any]]:
     return rows + ([figures[last:]] if len(figures) % 2 else [])
 
 
+def _has_arms_or_legs(body: Body) -> bool:
+    """True for a body with an arm or a leg on one side, such as a person or an animal."""
+    return any(limb.side and limb.kind in ("arm", "leg") for limb in SegmentTree(body).limbs().values())
+
+
 def report(
     motion: Motion,
     result: PhaseSplit,
@@ -64,7 +71,8 @@ def report(
     """Page about a motion and its split: words, the moving body beside its curves, figures, numbers and inputs.
 
     The curves and the momentum on its sphere show the time of the moving body. Each figure of `FIGURES` stands there
-    once: momentum, phases, attitude and joints as curves that move, the others as pictures.
+    once: momentum, phases, attitude and joints as curves that move, the others as pictures. Somersault, tilt and twist
+    come first where they are counted and the body has arms or legs.
 
     Parameters
     ----------
@@ -109,6 +117,8 @@ def report(
     kinds = [kind for kind in kinds if result.has_phase or not FIGURES[kind].with_momentum]
     kinds = [kind for kind in kinds if has_joints or not FIGURES[kind].with_path]
     kinds = [kind for kind in kinds if not (FIGURES[kind].of_change and is_rigid(motion))]
+    if scene.body is None or not _has_arms_or_legs(scene.body) or motion.counted_axes() is None:
+        kinds = [kind for kind in kinds if not FIGURES[kind].of_athlete]
     figures = []
     for done, kind in enumerate(kinds, start=1):
         _report_to(progress, done / (len(kinds) + 1), f"drawing {kind.replace('_', ' ')}")

@@ -85,6 +85,13 @@ class AthleteAxes:
         return self.reasons["lateral"] == _BY_LINKS
 
     @property
+    def matrices(self) -> tuple[Array, Array]:
+        """Axes to the front, to the left and up as columns, at zero angles: inertial axes, base axes."""
+        body = np.stack([self.frontal, self.lateral, np.broadcast_to(self.longitudinal, self.lateral.shape)], axis=-1)
+        up = np.broadcast_to(self.up, self.somersault.shape)
+        return np.stack([np.cross(self.somersault, up), self.somersault, up], axis=-1), body
+
+    @property
     def frontal(self) -> Array:
         """Axis of the tilt, from back to front, base axes: (3,) or batch + (3,)."""
         return so3.cross(self.lateral, self.longitudinal)

@@ -13,7 +13,7 @@ from ..arguments import check_keywords, times_argument
 from ..arrays import Array, finite_array
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
-from ..errors import MissingExtraError, ShapeError
+from ..errors import ChartPoleError, MissingExtraError, ShapeError, ShapePhaseError
 from ..offers import offered
 from ._athlete_axes import AthleteAxes, athlete_axes
 from .attitude_angles import Chart, EulerAngles, RotationVectors, continued_angles, euler_chart
@@ -24,6 +24,7 @@ _COLUMNS = (
     "base_x_m", "base_y_m", "base_z_m",
 )  # fmt: skip
 _ROWS = 201  # of a table, by default
+_AT_POLE = 1e-6  # cosine of the tilt: rates there have no digits left
 _PARTS = 8  # of a step, at which angles are continued: a step turns by less than a radian or so
 
 
@@ -138,12 +139,103 @@ class MotionViews:
         1.5000 somersaults, 1.0000 twists
         """
         axes = athlete_axes(self, lateral, longitudinal, somersault, up)
-        # Columns: to the front, to the left, up.
-        here = np.stack([axes.frontal, axes.lateral, np.broadcast_to(axes.longitudinal, axes.lateral.shape)], axis=-1)
-        upward = np.broadcast_to(axes.up, axes.somersault.shape)
-        there = np.stack([np.cross(axes.somersault, upward), axes.somersault, upward], axis=-1)
-        angles = self._continued(t, EulerAngles("YXZ"), (so3.quat_from_matrix(there), so3.quat_from_matrix(here)))
+        space, body = axes.matrices
+        angles = self._continued(t, EulerAngles("YXZ"), (so3.quat_from_matrix(space), so3.quat_from_matrix(body)))
         return angles[..., 0], angles[..., 1], angles[..., 2]
+
+    def somersault_rates(
+        self: Any,
+        t: ArrayLike,
+        *,
+        lateral: str | ArrayLike | None = None,
+        longitudinal: str | ArrayLike | None = None,
+        somersault: str | ArrayLike | None = None,
+        up: str | ArrayLike | None = None,
+    ) -> tuple[Array, Array, Array]:
+        """Rates of somersault, tilt and twist: times (...) -> batch + (...) each [rad/s].
+
+        Parameters
+        ----------
+        lateral, longitudinal, somersault, up : as for `athlete_axes`
+
+        Raises
+        ------
+        ChartPoleError
+            Where the tilt is a right angle, to 1e-6 rad: somersault and twist are about one axis there.
+        UnknownNameError, ShapeError, WrongObjectError
+            For the axes that `athlete_axes` refuses.
+
+        Examples
+        --------
+        >>> dive = sp.examples.full_dive()
+        >>> motion = sp.reconstruct(dive.deformation, dive.momentum)
+        >>> somersault, tilt, twist = motion.somersault_rates(0.0)
+        >>> print(f"{somersault:.3f} {abs(tilt):.3f} {abs(twist):.3f} rad/s")
+        5.705 0.000 0.000 rad/s
+        """
+        axes = {"lateral": lateral, "longitudinal": longitudinal, "somersault": somersault, "up": up}
+        _, tilt, twist = self.somersault_tilt_twist(t, **axes)
+        cosine = np.cos(tilt)
+        if np.any(np.abs(cosine) < _AT_POLE):
+            raise ChartPoleError(
+                "the tilt passes through 90 degrees, where somersault and twist are about one axis, and their rates "
+                "are not defined; take other times, or another longitudinal axis"
+            )
+        _, body = self.athlete_axes(**axes).matrices
+        spin = self.angular_velocity(t)
+        forward, left, long = np.moveaxis(so3.apply(np.swapaxes(body, -1, -2), spin), -1, 0)
+        turning = (forward * np.sin(twist) + left * np.cos(twist)) / cosine
+        return turning, forward * np.cos(twist) - left * np.sin(twist), long + turning * np.sin(tilt)
+
+    def somersault_errors(
+        self: Any,
+        t: ArrayLike,
+        *,
+        lateral: str | ArrayLike | None = None,
+        longitudinal: str | ArrayLike | None = None,
+        somersault: str | ArrayLike | None = None,
+        up: str | ArrayLike | None = None,
+    ) -> tuple[Array, Array, Array]:
+        """Numerical errors of somersault, tilt and twist, by the attitude's estimate: -> batch + (...) each [rad].
+
+        Towards 90 degrees of tilt an error of the attitude turns somersault and twist by more, half a turn at most.
+
+        Parameters
+        ----------
+        lateral, longitudinal, somersault, up : as for `athlete_axes`
+
+        Examples
+        --------
+        >>> dive = sp.examples.full_dive()
+        >>> motion = sp.reconstruct(dive.deformation, dive.momentum)
+        >>> bool(max(motion.somersault_errors(1.0)) < 1e-8)
+        True
+        """
+        _, tilt, _ = self.somersault_tilt_twist(
+            t, lateral=lateral, longitudinal=longitudinal, somersault=somersault, up=up
+        )
+        error = np.reshape(self.error_estimate, (*self.batch, *([1] * (tilt.ndim - len(self.batch)))))
+        outer = np.minimum(error / np.maximum(np.abs(np.cos(tilt)), np.finfo(np.float64).tiny), np.pi)
+        return outer, np.broadcast_to(error, tilt.shape).copy(), outer.copy()
+
+    def counted_axes(self: Any) -> AthleteAxes | None:
+        """Axes of `athlete_axes` where somersaults are counted by default, else None.
+
+        They are counted where the body has links named left and right, and a momentum turns it.
+
+        Examples
+        --------
+        >>> dive = sp.examples.full_dive()
+        >>> sp.reconstruct(dive.deformation, dive.momentum).counted_axes().by_links
+        True
+        """
+        if not np.any(self.momentum):
+            return None
+        try:
+            axes = self.athlete_axes()
+        except ShapePhaseError:
+            return None
+        return axes if axes.by_links else None
 
     def write_csv(self: Any, path: str | os.PathLike[str], times: ArrayLike | None = None, **fall: ArrayLike) -> None:
         """Write a time series: attitude (x y z w, one sign throughout), angular velocity, base position.
@@ -204,8 +296,8 @@ class MotionViews:
 
         Parameters
         ----------
-        kind : "phases", "momentum", "attitude", "shape", "torques", "inertia", "internal_momentum" or "energy"; None:
-            the phases, without momentum the attitude
+        kind : "somersault", "phases", "momentum", "attitude", "shape", "torques", "inertia", "internal_momentum" or
+            "energy"; None: the phases, without momentum the attitude
         ax : axes to draw into; None: those of a new figure one column wide, which is `axes.figure`
         gauge : as for `split`
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +17,9 @@ from ..letters import value_text
 from .path_samples import PathSamples, columns_without_samples, path_samples
 from .shape_path import ShapePath
 
+_LOWEST_ORDER = 3  # of differences: the motion itself is in those below
+_HIGHEST_ORDER = 12  # of differences, the samples allowing
+_ROUNDING = 8.0  # units in the last place: what arithmetic leaves of samples that are otherwise exact
 _MOST_NUMBERS = 4_000_000  # in memory at once; more times are taken in parts
 
 
@@ -166,3 +171,28 @@ def _errors(samples: PathSamples, times: Array, levels: Array) -> tuple[Array, A
         covariance += answers @ np.swapaxes(answers, 2, 3)
     bias = np.einsum("atk,kj->tja", rows, samples.bias.reshape(-1, n_shape))
     return covariance, bias
+
+
+def white_noise(samples: Array, freedom: int) -> Array:
+    """Standard deviation of noise that is alike in all directions of c vectors (N, c, k): (c,).
+
+    freedom : in how many directions there is noise
+    """
+    largest = np.abs(samples).max(axis=(0, 2), initial=0.0)
+    least = np.full(samples.shape[1], np.inf)
+    differences = samples
+    for order in range(1, min(_HIGHEST_ORDER, len(samples) // 2) + 1):
+        differences = np.diff(differences, axis=0)
+        if order >= _LOWEST_ORDER:
+            # The median: a blow or a break is in few of them.
+            squares = np.median((differences**2).sum(axis=2), axis=0) / comb(2 * order, order)
+            least = np.minimum(least, np.sqrt(squares / _median_square(freedom)))
+    return np.maximum(least, _ROUNDING * float(np.finfo(np.float64).eps) * largest)
+
+
+@lru_cache(maxsize=8)
+def _median_square(freedom: int) -> float:
+    """Median of the squared length of a vector of `freedom` numbers with variance one."""
+    from scipy.stats import chi2
+
+    return float(chi2.median(freedom))

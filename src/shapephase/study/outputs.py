@@ -16,6 +16,7 @@ from ..errors import StudyError, WrongObjectError
 from ..letters import value_text
 from ..phases.phase_split import PhaseSplit
 from ..phases.return_map import fixed_points
+from ..phases.whole_turns import athlete_turns
 from ..reconstruction.reconstruction import Motion
 from ._axes import check_name
 
@@ -100,6 +101,11 @@ def _field(name: str, shape: tuple[int, ...], unit: str, about: str) -> _OfSplit
     return _OfSplit(name, lambda parts: getattr(parts, name), shape, unit, about)
 
 
+def _count(name: str, unit: str, about: str) -> Output:
+    return Output(name, lambda motion: np.nan if (value := getattr(athlete_turns(motion), name)) is None else value, (),
+                  unit, about)  # fmt: skip
+
+
 _ALL = (
     _OfEnds("final_attitude", lambda _start, end, _error: end, _ROTATION, "", "base axes to inertial axes"),
     _OfEnds("error_estimate", lambda _start, _end, error: error, (), "rad", "of the attitude over the whole motion"),
@@ -124,6 +130,12 @@ _ALL = (
     _field("residual", (), "rad", "between two independent computations of the phase"),
     _field("is_loop", (), "", "1 where the shape closes"),
     _field("has_phase", (), "", "1 where there is momentum"),
+    _count("somersaults", "revolutions", "of an athlete, forward ones above zero"),
+    _count("twists", "revolutions", "of an athlete, about the longitudinal axis"),
+    _count("largest_tilt", "rad", "of an athlete, between the longitudinal axis and the plane of the somersault"),
+    _count("tilt_time", "s", "when the tilt of an athlete is largest"),
+    _count("somersault_rate", "rad/s", "the largest rate of an athlete's somersault"),
+    _count("twist_rate", "rad/s", "the largest rate of an athlete's twist"),
     Output(
         "fixed_points", _directions, (MOST_FIXED_POINTS, 3), "",
         "of the return map at the magnitude of the momentum: unit vectors, then NaN",

@@ -23,6 +23,8 @@ from .recording import OFF_UNIT, Recording, checked_quaternions
 ESTIMATE = "estimate"  # axes of the base that a fit determines
 _FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")  # of `Motion.write_csv`; they follow from the rest
 _VELOCITIES = ("base_vx_m_s", "base_vy_m_s", "base_vz_m_s")  # written by `export_motion`
+_COUNTED = tuple(f"{turn}{error}_rad" for turn in ("somersault", "tilt", "twist") for error in ("", "_error"))
+_LINK_MOMENTUM = "_kg_m2_s"  # ends the labels of momenta, which follow from the rest, too
 _AGREES = 0.1  # median error of turns between samples, relative to the rates: both agree
 _CONTRADICTS = 0.5  # relative to the rates: turns that are off by more contradict them
 _LEAST_SLIDES = 2  # sliding joints that determine the place of the base; with one, the other directions are fixed
@@ -187,7 +189,7 @@ class BaseColumns:
         if target in _FOLLOWING:
             self.rates[target] = text
             return True
-        if target in _VELOCITIES:
+        if target in _VELOCITIES or target in _COUNTED or target.endswith(_LINK_MOMENTUM):
             return True
         known = {*KNOWN, *self.own_names}
         parts = Label(target, None) if target in known else label(target)

@@ -1,0 +1,106 @@
+"""Momentum of links as a table for people and as plain data for programs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..display import number_with_bar
+
+if TYPE_CHECKING:
+    from .momentum import FlightMomentum, SegmentMomentum
+
+
+def momentum_lines(found: SegmentMomentum) -> list[str]:
+    """Lines about the whole in each flight, and the mean and the largest size of each link's part."""
+    lines = [f"angular momentum about the centre of mass, {found.unit}, along {', '.join(found.axes)}"]
+    if found.normalisation is not None:
+        lines.append(_normalisation_text(found))
+    if not found.flights:
+        lines.append("no flight found: the centre of mass falls freely nowhere, or places are not recorded")
+    for number, flight in enumerate(found.flights, start=1):
+        mean = ", ".join(number_with_bar(*pair) for pair in zip(flight.mean, flight.mean_bar, strict=True))
+        lines += [
+            "",
+            f"flight {number}, {flight.first_time:.6g} to {flight.last_time:.6g} s: mean ({mean})",
+            f"  {conservation_text(flight)}",
+        ]
+    names = ["mean " + axis for axis in found.axes]
+    rows: list[tuple[str, ...]] = [("link", *names, "largest", "± (rms)", "local", "remote")]
+    sizes = np.linalg.norm(found.by_link, axis=2)
+    for k, link in enumerate(found.links):
+        means = [f"{value:.4g}" for value in found.by_link[:, k].mean(axis=0)]
+        parts = [_rms(values[:, k]) for values in (found.bars, found.local, found.remote)]
+        rows.append((link, *means, f"{sizes[:, k].max():.4g}", *(f"{value:.2g}" for value in parts)))
+    whole = [f"{value:.4g}" for value in found.whole.mean(axis=0)]
+    largest = np.linalg.norm(found.whole, axis=1).max()
+    rows.append(("whole", *whole, f"{largest:.4g}", f"{_rms(found.whole_bars):.2g}", "", ""))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    table = []
+    for name, *cells in rows:
+        aligned = (cell.rjust(width) for cell, width in zip(cells, widths[1:], strict=True))
+        table.append("  ".join([name.ljust(widths[0]), *aligned]).rstrip())
+    by = "numerical error" if not found.as_recorded else "noise of the samples, one standard deviation"
+    return [*lines, "", *table, "", f"local and remote: rms; ±: {by}"]
+
+
+def conservation_text(flight: FlightMomentum) -> str:
+    """How far a flight conserves the momentum, in words."""
+    if flight.percent is None or flight.percent_bar is None:
+        return "no momentum at any time"
+    share = number_with_bar(flight.percent, flight.percent_bar)
+    of = "of the mean" if flight.relative_to == "mean" else "of what the links carry, as the mean is within its noise"
+    verdict = "more than noise: something else acts, or masses are wrong" if flight.more_than_noise else "within noise"
+    return f"changes by {share} % {of}: {verdict}"
+
+
+def momentum_data(found: SegmentMomentum) -> dict[str, Any]:
+    """Flights, links and the normalisation, ready for JSON."""
+    data: dict[str, Any] = {
+        "unit": found.unit,
+        "axes": list(found.axes),
+        "as_recorded": found.as_recorded,
+        "flights": [
+            {
+                "first_time_s": flight.first_time,
+                "last_time_s": flight.last_time,
+                "mean": flight.mean.tolist(),
+                "mean_bar": flight.mean_bar.tolist(),
+                "change": flight.change.tolist(),
+                "change_bar": flight.change_bar.tolist(),
+                "change_percent": flight.percent,
+                "change_percent_bar": flight.percent_bar,
+                "change_relative_to": flight.relative_to,
+                "more_than_noise": flight.more_than_noise,
+            }
+            for flight in found.flights
+        ],
+        "links": {
+            link: {
+                "mean": found.by_link[:, k].mean(axis=0).tolist(),
+                "largest": float(np.linalg.norm(found.by_link[:, k], axis=1).max()),
+                "bar_rms": _rms(found.bars[:, k]),
+                "local_rms": _rms(found.local[:, k]),
+                "remote_rms": _rms(found.remote[:, k]),
+            }
+            for k, link in enumerate(found.links)
+        },
+    }
+    if found.normalisation is not None:
+        data["normalisation"] = {name: value for name, value in vars(found.normalisation).items() if value is not None}
+    return data
+
+
+def _rms(vectors: Any) -> float:
+    """Root mean square of sizes of vectors (N, C)."""
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
+
+
+def _normalisation_text(found: SegmentMomentum) -> str:
+    by = found.normalisation
+    assert by is not None
+    numbers = [f"m = {by.mass:.6g} kg", f"h = {by.stature:.4g} m ({by.stature_by})"]
+    numbers += [] if by.speed is None else [f"v = {by.speed:.4g} m/s"]
+    numbers += [] if by.gravity is None else [f"g = {by.gravity:.4g} m/s^2"]
+    return f"divided by {by.formula} = {by.divisor:.6g}: {', '.join(numbers)}"

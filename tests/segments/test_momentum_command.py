@@ -1,0 +1,64 @@
+"""`shapephase momentum`, and somersaults and momenta among the samples of `split`."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase.cli.main import main
+
+FALL = {"start": [0.0, 0.0, 2.0], "velocity": [0.5, 0.0, 9.81], "gravity": [0.0, 0.0, -9.81]}
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory):
+    file = tmp_path_factory.mktemp("take") / "cat.csv"
+    motion = sp.reconstruct(
+        sp.articulated(sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)), [0.001, 0.002, 0.005]
+    )
+    sp.export_motion(motion, file, np.linspace(0.0, 1.0, 61), **FALL)
+    return file
+
+
+def test_a_recording_is_taken_as_recorded_unless_its_fit_or_a_momentum_is_requested(take, tmp_path, capsys):
+    main(["momentum", "cat_two_halves", str(take), "--json", "--out", str(tmp_path / "m.csv")])
+    data = json.loads(capsys.readouterr().out)
+    assert data["as_recorded"]
+    (flight,) = data["flights"]
+    assert not flight["more_than_noise"]
+    np.testing.assert_allclose(flight["mean"], [0.001, 0.002, 0.005], rtol=0, atol=1e-6)
+    table = np.genfromtxt(tmp_path / "m.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(table["momentum_z_kg_m2_s"], 0.005, rtol=0, atol=1e-5)
+    main(["momentum", "cat_two_halves", str(take), "--fitted", "--json"])
+    fitted = json.loads(capsys.readouterr().out)
+    assert not fitted["as_recorded"]
+    np.testing.assert_allclose(fitted["flights"][0]["mean"], [0.001, 0.002, 0.005], rtol=0, atol=1e-6)
+    main(["momentum", "cat_two_halves", str(take), "--momentum", "0", "0", "0.01", "--json"])
+    given = json.loads(capsys.readouterr().out)
+    np.testing.assert_allclose(given["flights"][0]["mean"], [0.0, 0.0, 0.01], rtol=0, atol=1e-12)
+
+
+def test_axes_and_divisors_are_printed_with_their_numbers(take, tmp_path, capsys):
+    options = ["--axes", "0,0,-1", "--normalise", "gravity", "--stature", "0.5"]
+    main(["momentum", "cat_two_halves", str(take), *options, "--figure", str(tmp_path / "m.svg")])
+    text = capsys.readouterr().out
+    assert "divided by m h sqrt(g h)" in text
+    assert "h = 0.5 m (given)" in text
+    assert "within noise" in text
+    assert "front" in text
+    assert b"<svg" in (tmp_path / "m.svg").read_bytes()
+
+
+def test_link_momenta_go_into_the_samples(tmp_path, capsys):
+    words = ["split", "diver", "diver_twist", "--momentum", "0", "61.558831", "0"]
+    main([*words, "--samples", str(tmp_path / "d.csv"), "--link-momenta"])
+    table = np.genfromtxt(tmp_path / "d.csv", delimiter=",", names=True)
+    total = sum(table[f"{link}_momentum_y_kg_m2_s"] for link in ("trunk", "left_arm", "right_arm"))
+    np.testing.assert_allclose(total, 61.558831, rtol=1e-12)
+    np.testing.assert_allclose(np.ptp(table["somersault_rad"]) / (2.0 * np.pi), 1.5, rtol=0, atol=1e-4)
+    with pytest.raises(SystemExit):
+        main([*words, "--link-momenta"])
+    assert "--samples" in capsys.readouterr().err
