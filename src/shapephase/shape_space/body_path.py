@@ -100,13 +100,18 @@ def path_sampler(body: Body | ParticleBody, path: ShapePath) -> Sampler:
 
 
 def channels_along(body: Body | ParticleBody, path: ShapePath, times: Array) -> Array | None:
-    """I^-1 (xx yy zz yz xz xy) and I^-1 L_o along a path, in machine code: (N,) -> (N, 9).
+    """`channels_at` along a path: (N,) -> (N, 9)."""
+    return channels_at(body, *path.at_samples(times))
+
+
+def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array | None:
+    """I^-1 (xx yy zz yz xz xy) and I^-1 L_o at shapes and rates, in machine code: (N, n), (N, n) -> (N, 9).
 
     None where a tensor is nearly singular or a number is not finite; without machine code or rows; for ball joints.
     """
     if isinstance(body, ParticleBody) or not body.chain.has_rows or not machine_code.is_used():
         return None
-    return tree_channels(body.chain.rows, *path.at_samples(times))
+    return tree_channels(body.chain.rows, shapes, rates)
 
 
 class FamilyVariants:
