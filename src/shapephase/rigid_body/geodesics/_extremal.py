@@ -111,7 +111,7 @@ class Extremal:
         return field * p / distance, -field * slope / distance
 
     def poincare_field(self, times: ArrayLike) -> tuple[Array, Array]:
-        """J_2 = t dq/dt, of phi and theta: the end's derivative by the magnitude of the initial momentum, at times t."""
+        """J_2 = t dq/dt, of phi and theta: the end's derivative by the magnitude of the initial momentum, at t."""
         t = finite_array(times, "times")
         latitude, _, slope = self.state(t)
         return t * slope, t * _spread(self.start.momentum, t) / self.surface.metric(latitude)
