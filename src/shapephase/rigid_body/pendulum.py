@@ -168,7 +168,53 @@ class RigidBodyPendulum:
         faint = (pi != 0.0) & (np.abs(pi) < _FAINT * np.max(np.abs(pi)))
         if faint.any():
             raise ShapeError(f"momentum: {pi} has parts below {_FAINT:g} of the largest; make them zero, or larger")
-        return _motion(self, pi, float(r))
+        # By the angle delta from a stable equilibrium: delta'^2 + W sin^2(delta) = nu^2, W = |stiffness| r^2.
+        # In units of the largest momentum and the least moment, so that nothing overflows.
+        largest, least = float(np.max(np.abs(pi))), float(np.min(self.moments))
+        x, y, z = (Fraction(float(pi[i])) / Fraction(largest) for i in self.axes)
+        a1, a2, a3 = (Fraction(least) / Fraction(float(self.moments[i])) for i in self.axes)
+        u, v = abs(a1 - a3), abs(a2 - a3)
+        swapped = u < v
+        if swapped:
+            x, y, u, v = y, x, v, u
+        restoring = (u - v) * (u * x * x + v * y * y)
+        total = v * (u * z * z + (u - v) * y * y)
+        gap = u * ((u - v) * x * x - v * z * z)
+        unit = largest / least
+        nu, well, speed = (_root(square) * unit for square in (total, restoring, u * v * z * z))
+        share = v * y * y / (u * x * x + v * y * y)
+        # delta is counted from pi/2 where 2 is the stable axis: its cosine goes with Pi_2, its sine with -Pi_1.
+        quarter = (1 if swapped else 0) + (2 if x < 0 else 0)
+        side = (-1.0 if (y < 0) != swapped else 1.0) * (-1.0 if x < 0 else 1.0)
+        sine, cosine = side * _root(share), _root(1 - share)
+        direction = -1.0 if self.orientation * float(z) < 0.0 else 1.0
+        regime, complement, swing = "rotation", 1.0, 1.0
+        rate, start = nu, (sine, cosine, 1.0)
+        if z == 0 and (restoring == 0 or x == 0 or y == 0):
+            regime = "equilibrium"
+            if restoring > 0:
+                quarter += 0 if y == 0 else int(side)
+                rate, swing, start = (well if y == 0 else 0.0), 0.0, (0.0, 1.0, 1.0)
+        elif gap > 0:
+            regime, complement, swing = "libration", float(gap / restoring), nu / well
+            rate, start = well, (side * _root((u - v) * v * y * y / total), speed / nu, cosine)
+        elif gap < 0:
+            complement, start = float(-gap / total), (sine, cosine, speed / nu)
+        else:
+            regime, complement, start = "separatrix", 0.0, (sine, cosine, cosine)
+        sn, cn, dn = start
+        phase = sn * float(elliprf(cn * cn, dn * dn, 1.0))
+        centre = quarter if quarter < 2 or (quarter == 2 and sn <= 0.0) else quarter - 4
+        return PendulumMotion(
+            pendulum=self,
+            radius=float(r),
+            regime=regime,
+            rate=direction * rate,
+            complement=complement,
+            phase=phase,
+            swing=swing,
+            centre=0.5 * np.pi * centre,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,56 +342,6 @@ def rigid_body_pendulum(moments: ArrayLike, axes: Sequence[int] | None = None) -
         inverse_square_k3=float(stiffness / abs(by_first)),
         stiffness=float(stiffness),
         orientation=sign,
-    )
-
-
-def _motion(pendulum: RigidBodyPendulum, pi: Array, r: float) -> PendulumMotion:
-    """Motion by the angle delta from a stable equilibrium: delta'^2 + W sin^2(delta) = nu^2, W = |stiffness| r^2."""
-    # In units of the largest momentum and the least moment, so that nothing overflows.
-    largest, least = float(np.max(np.abs(pi))), float(np.min(pendulum.moments))
-    x, y, z = (Fraction(float(pi[i])) / Fraction(largest) for i in pendulum.axes)
-    a1, a2, a3 = (Fraction(least) / Fraction(float(pendulum.moments[i])) for i in pendulum.axes)
-    u, v = abs(a1 - a3), abs(a2 - a3)
-    swapped = u < v
-    if swapped:
-        x, y, u, v = y, x, v, u
-    restoring = (u - v) * (u * x * x + v * y * y)
-    total = v * (u * z * z + (u - v) * y * y)
-    gap = u * ((u - v) * x * x - v * z * z)
-    unit = largest / least
-    nu, well, speed = (_root(square) * unit for square in (total, restoring, u * v * z * z))
-    share = v * y * y / (u * x * x + v * y * y)
-    # delta is counted from pi/2 where 2 is the stable axis: its cosine goes with Pi_2, its sine with -Pi_1.
-    quarter = (1 if swapped else 0) + (2 if x < 0 else 0)
-    side = (-1.0 if (y < 0) != swapped else 1.0) * (-1.0 if x < 0 else 1.0)
-    sine, cosine = side * _root(share), _root(1 - share)
-    direction = -1.0 if pendulum.orientation * float(z) < 0.0 else 1.0
-    regime, complement, swing = "rotation", 1.0, 1.0
-    rate, start = nu, (sine, cosine, 1.0)
-    if z == 0 and (restoring == 0 or x == 0 or y == 0):
-        regime = "equilibrium"
-        if restoring > 0:
-            quarter += 0 if y == 0 else int(side)
-            rate, swing, start = (well if y == 0 else 0.0), 0.0, (0.0, 1.0, 1.0)
-    elif gap > 0:
-        regime, complement, swing = "libration", float(gap / restoring), nu / well
-        rate, start = well, (side * _root((u - v) * v * y * y / total), speed / nu, cosine)
-    elif gap < 0:
-        complement, start = float(-gap / total), (sine, cosine, speed / nu)
-    else:
-        regime, complement, start = "separatrix", 0.0, (sine, cosine, cosine)
-    sn, cn, dn = start
-    phase = sn * float(elliprf(cn * cn, dn * dn, 1.0))
-    centre = quarter if quarter < 2 or (quarter == 2 and sn <= 0.0) else quarter - 4
-    return PendulumMotion(
-        pendulum=pendulum,
-        radius=r,
-        regime=regime,
-        rate=direction * rate,
-        complement=complement,
-        phase=phase,
-        swing=swing,
-        centre=0.5 * np.pi * centre,
     )
 
 

@@ -113,7 +113,9 @@ def steady_rotation(inertia: ArrayLike, momentum: ArrayLike) -> SteadyRotation:
         )
     others, tangent = _across(tensor, axis)
     gaps = (moment - others) / (moment * others)  # 1/I_i - 1/I_e along the columns of `tangent`
-    gaps[np.abs(moment - others) <= _tie(tensor, axis)] = 0.0
+    # Moments of a diagonal tensor are exact.
+    exact = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0 and np.count_nonzero(axis) == 1
+    gaps[np.abs(moment - others) <= (0.0 if exact else FEW_ULPS * float(np.trace(tensor)))] = 0.0
     low, high = float(gaps.min()), float(gaps.max())
     if low > 0.0:
         definiteness, verdict = "positive definite", "stable"
@@ -266,9 +268,3 @@ def _across(tensor: Array, axis: Array) -> tuple[Array, Array]:
     moments, turn = np.linalg.eigh(0.5 * (plane + plane.T))
     turn[:, 1] *= np.sign(np.linalg.det(turn))
     return moments, basis @ turn
-
-
-def _tie(tensor: Array, axis: Array) -> float:
-    """Largest difference of equal moments [kg m^2]: 0 for a diagonal tensor, else 16 roundings of the trace."""
-    exact = np.count_nonzero(tensor - np.diag(np.diag(tensor))) == 0 and np.count_nonzero(axis) == 1
-    return 0.0 if exact else FEW_ULPS * float(np.trace(tensor))

@@ -136,7 +136,13 @@ def conjugate_locus(
     latitude = number_argument(latitude, "latitude", "rad")
     _check(surface, order)
     if isinstance(directions, int | np.integer):
-        east = _eastward(surface, int(directions), latitude)
+        if directions < 8:
+            raise ShapeError(
+                f"directions: 8 or more are needed, two in each quadrant, to see four cusps, got {directions}"
+            )
+        # The eastward half, none of them along an axis of symmetry.
+        half = 2 * ((int(directions) + 3) // 4)
+        east = _widest(surface, latitude) * (2.0 * (np.arange(half) + 0.5) / half - 1.0)
         if latitude == 0.0:
             points, rate = _points_and_rate(surface, east[len(east) // 2 :], order, latitude)
             points, rate = _mirrored(points, 0.0, ("latitude", "height")), np.concatenate([-rate[::-1], rate])
@@ -348,14 +354,6 @@ def _points_and_rate(
 
 def _whole_bend_rate(surface: SurfaceOfRevolution, q: Array, room: Array) -> Array:
     return surface.bend_rate(q, room, np.full(q.shape, 0.5 * np.pi))
-
-
-def _eastward(surface: SurfaceOfRevolution, count: int, latitude: float) -> Array:
-    """The eastward half of `count` directions of oscillating extremals, none of them along an axis of symmetry."""
-    if count < 8:
-        raise ShapeError(f"directions: at least 8 are needed, two in each quadrant, to see the four cusps, got {count}")
-    half = 2 * ((count + 3) // 4)
-    return _widest(surface, latitude) * (2.0 * (np.arange(half) + 0.5) / half - 1.0)
 
 
 def _mirrored(points: ConjugatePoints, turn: float, changing: tuple[str, ...]) -> ConjugatePoints:
