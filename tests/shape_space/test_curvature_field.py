@@ -172,7 +172,7 @@ def test_curvature_against_differences_of_order_eight(body, rng):
     [
         ("cat_two_halves", "all"),
         ("cat", 2),
-        ("example:human", 2),
+        pytest.param("example:human", 2, marks=pytest.mark.full),
         ("example:kinova", 2),
         ("satellite", [("boom_extension", "wheel_spin"), ("left_wing_drive", "boom_extension")]),
     ],
@@ -361,10 +361,10 @@ def test_going_round_often_costs_nothing_more(monkeypatch, rng):
     assert apart(found, np.linalg.matrix_power(once, 100)) < 1.2e-10
 
 
-def test_a_loop_of_a_hundred_pieces(rng):
+def test_a_loop_of_fifty_pieces(rng):
     diver = sp.load_body("diver")
-    times = np.linspace(0.0, 1.0, 101)
-    corners = ellipse(diver, diver.joint_names, (1.0, 0.8), 1.0).shape(times) + 0.02 * rng.normal(size=(101, 2))
+    times = np.linspace(0.0, 1.0, 51)
+    corners = ellipse(diver, diver.joint_names, (1.0, 0.8), 1.0).shape(times) + 0.02 * rng.normal(size=(51, 2))
     corners[-1] = corners[0]
     path = sp.ShapePath.spline(times, corners)
     assert apart(stokes_holonomy(diver, path, 1e-6), sp.holonomy(diver, path, 1e-9)) < 1e-7
@@ -688,9 +688,7 @@ def test_flatness_is_asked_at_the_shapes_given(planar):
 # ---- Horizontal lifts -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "name", full_but(["cat", "satellite", "example:human", "example:kinova"], "cat", "example:kinova")
-)
+@pytest.mark.parametrize("name", full_but(["cat", "satellite", "example:human", "example:kinova"], "satellite"))
 def test_the_lift_of_an_open_path(name, rng):
     """B2, B8: R' = -R hat(A rate) by a plain integrator, at all times."""
     body = sp.load_body(name)

@@ -35,8 +35,6 @@ _NORMAL_MEDIAN = 0.6745  # median of |x| of a standard normal x
 class FreeFall:
     """A stretch of a recording on which the body falls freely.
 
-    Attributes
-    ----------
     first, last : its samples
     up : the axis of the recorder that points up, as "+y"
     noise : of each coordinate of the centre of mass, by which it was found [m]

@@ -450,6 +450,6 @@ def _components(kind: str, texts: Mapping[str, str]) -> dict[str, str] | None:
             f"quaternion {', '.join(texts[k] for k in '1234')}: its scalar part may be the first or the last; say "
             f"which: --names '{first}=qw' and so on, or '{first}=qx' to '{last}=qw' (names={{{first!r}: 'qw', ...}})"
         )
-    three = "".join(CANONICAL[kind])
-    meant = {"wxyz": "wxyz", "0123": "wxyz"} if kind == QUATERNION else dict.fromkeys(("012", "123", "xyz"), three)
-    return dict(zip(there, meant[there], strict=True)) if there in meant else None
+    forms: tuple[str, ...] = ("wxyz", "0123") if kind == QUATERNION else ("012", "123", "xyz")
+    meant = "wxyz" if kind == QUATERNION else "".join(CANONICAL[kind])
+    return dict(zip(there, meant, strict=True)) if there in forms else None

@@ -38,8 +38,6 @@ _MOST_SWING = 4.0 * FARTHEST  # [rad or m] between two samples: terms of its cub
 class Smoothing:
     """Effect of smoothing on recorded samples.
 
-    Attributes
-    ----------
     noise : (n,) as stated, rms [rad or m]; zero where the path goes through the samples
     penalty : (n,) of the integral of squared third derivatives, beside the sum of squares of samples minus path [s^5]
     degrees_of_freedom : (n,) effective, of as many as there are samples, those before and after the path that were

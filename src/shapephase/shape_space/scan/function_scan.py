@@ -140,8 +140,6 @@ def side_by_side(functions: Sequence[ScannedFunction], subject: str) -> ScannedF
 class FunctionScan:
     """Result of scanning a function.
 
-    Attributes
-    ----------
     resolved : values and rates as series, times their weights
     found_breaks : (K,) times of kinks that were not declared [s]
     evaluations : times at which the function was evaluated
