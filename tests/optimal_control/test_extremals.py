@@ -18,8 +18,8 @@ from shapephase.errors import (
     UnknownNameError,
 )
 from shapephase.optimal_control import conjugate_times, extremal, jacobi_fields, shoot, wong_residual
-from shapephase.optimal_control import hamiltonian as hamiltonian_module
-from shapephase.optimal_control import wong_residual as wong_residual_module
+from shapephase.optimal_control.extremals import hamiltonian as hamiltonian_module
+from shapephase.optimal_control.extremals import wong_residual as wong_residual_module
 from support.bodies import joint, link, random_loop, urdf
 from support.independent import cross
 from support.long_runs import full_but

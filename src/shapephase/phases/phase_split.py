@@ -13,8 +13,7 @@ from ..arrays import Array, Mask
 from ..card_pictures import bars_picture
 from ..display import Card, angle_text, card_html, card_text, error_text, momentum_text, short_repr
 from ..plain_data import plain
-from ._motion_parts import Deferred
-from .error_estimates import SplitErrors
+from .error_estimates import Deferred, SplitErrors
 from .split_text import split_lines
 
 

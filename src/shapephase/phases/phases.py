@@ -23,8 +23,7 @@ from ..reconstruction.motion_record import write_table
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import ProgressCallback, watched
 from ._curve_errors import arc_errors, running_errors, split_errors
-from ._motion_parts import Deferred, by_parts
-from .error_estimates import ArcErrors, RunningErrors
+from .error_estimates import ArcErrors, Deferred, RunningErrors, by_parts
 from .forced_split import ForcedSplit, forced_split
 from .momentum_curve import Gauge, momentum_curve
 from .phase_split import PhaseSplit, SplitMotion
