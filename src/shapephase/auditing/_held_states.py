@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from math import gcd
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -82,12 +83,11 @@ def _at_even_times(states: FloatingTrajectory) -> tuple[FloatingTrajectory, Traj
     unit = np.random.default_rng(0).normal(size=(len(times), _UNITS))
     kept = float(np.median(white_noise(between(unit)[:, :, None], 1)))
     even = replace(states, times=times, **{name: between(values) for name, values in _samples(states).items()})
-    return even, TrajectoryNoise(
-        **{
-            name: tuple(np.divide(value, kept).tolist()) if name in _OF_JOINTS else value / kept
-            for name, value in asdict(estimated_noise(even)).items()
-        }
-    )
+    noise: dict[str, Any] = {
+        name: tuple(np.divide(value, kept).tolist()) if name in _OF_JOINTS else value / kept
+        for name, value in asdict(estimated_noise(even)).items()
+    }
+    return even, TrajectoryNoise(**noise)
 
 
 def _repeats(run: FloatingTrajectory) -> tuple[float, Array, float] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -83,7 +83,7 @@ def audit_command(
         raise ShapeError(f"--integrator-step: {needed}, got {len(given)}")
     loaded = body_argument(body, floating)
     each = given if len(given) == len(trajectories) else given * len(trajectories)
-    options = vars(reading) | {"timestep": reading.step, "names": column_names(reading.names) or None}
+    options: dict[str, Any] = vars(reading) | {"timestep": reading.step, "names": column_names(reading.names) or None}
     del options["step"]
     with steps(2) as work:
         work.begin("reading")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -325,7 +325,8 @@ def _uncertainty(
 ) -> Uncertainty:
     _, total, holonomy, _ = covariances
     bars = _bar(parts.total_rotation, total), _bar(parts.holonomy, holonomy)
-    return Uncertainty(*covariances, *deviations.tolist(), start, *bars, smoothing_bias, draws)
+    numbers: list[Any] = [*covariances, *deviations.tolist(), start, *bars, smoothing_bias, draws]
+    return Uncertainty(*numbers)
 
 
 def _bar(rotation: Array, covariance: Array) -> float:

@@ -71,9 +71,13 @@ class SteppedRotation:
         counts = self._steps_of_all_loops
         return read_only(np.repeat(np.arange(len(counts)), counts))
 
-    @cached_property
+    @property
     def times(self) -> Array:
         """The ends of the steps: (K + 1,) [s]."""
+        return self._times
+
+    @cached_property
+    def _times(self) -> Array:
         edges, steps = self.interpolant.edges, self._steps_of_all_loops
         done = np.cumsum(steps)
         of_panels = np.array([edges[:-1], edges[1:] - edges[:-1], done - steps, steps])

@@ -124,11 +124,12 @@ class LocalSearch:
             "iteration_callback": callback,
             "settles": self.settles,
         }
-        for rounds in range(_TIGHTENINGS + 1):
+        rounds = 0
+        while True:
             solution = program.solve(control, duration, attitudes, **options)
             iterations += solution.iterations
             attempt = corrected_attempt(task, basis, replace(solution, iterations=iterations), began)
-            if not task.efforts_limited or attempt.polished is None or not solution.converged:
+            if rounds == _TIGHTENINGS or not task.efforts_limited or attempt.polished is None or not solution.converged:
                 break
             shares = effort_shares(task, basis, attempt.polished.motion)
             again = guess_of_control(task, basis, solution.control)
@@ -137,6 +138,7 @@ class LocalSearch:
             room = tightened(room, shares, STAGES, rounds)
             options |= {"room": room, "via_places": solution.via_places}
             control, duration, attitudes = solution.control, solution.duration, guessed_attitudes(task, again)
+            rounds += 1
         return attempt, solution.control
 
 

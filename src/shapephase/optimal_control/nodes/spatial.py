@@ -118,7 +118,7 @@ def screws_of(chain: JointChain, frames: list[tuple[Any, Any]]) -> list[Twist]:
 def links_of(chain: JointChain, frames: list[tuple[Any, Any]]) -> list[Inertia]:
     """Inertias of the links of all frames of a tree."""
     links = zip(chain.masses, frames, chain.centres, chain.inertias, strict=True)
-    return [Inertia.of_link(float(mass), *link) for mass, *link in links]
+    return [Inertia.of_link(float(mass), frame, centre, inertia) for mass, frame, centre, inertia in links]
 
 
 def gathered(chain: JointChain, parts: list[Any]) -> list[Any]:
