@@ -40,6 +40,7 @@ class Contributions:
     Attributes
     ----------
     of : "twist", "tilt", "somersault", "rotation", "phase", or the name of a function
+    unit : of the table and the figure, "turns" for counts, else "deg"; "" for a function
     link : whose angle it is
     at : time of the tilt [s]; the duration for other results
     groups : names of joints by group
@@ -66,6 +67,7 @@ class Contributions:
     """
 
     of: str
+    unit: str
     link: str
     at: float
     groups: dict[str, tuple[str, ...]]
@@ -90,15 +92,8 @@ class Contributions:
 
     @property
     def scale(self) -> float:
-        """Number of radians in the unit of the table: turns for counts, else degrees; 1 for functions."""
-        if self.of in ("twist", "somersault"):
-            return 2.0 * np.pi
-        return np.pi / 180.0 if self.of in ("tilt", "rotation", "phase") else 1.0
-
-    @property
-    def unit(self) -> str:
-        """Unit of the table."""
-        return {2.0 * np.pi: "turns", 1.0: ""}.get(self.scale, "deg")
+        """Number of radians in `unit`; 1 for functions."""
+        return {"turns": 2.0 * np.pi, "deg": np.pi / 180.0, "": 1.0}[self.unit]
 
     def __str__(self) -> str:
         """Return the table: held, alone and shared by group, then the direct shares."""
@@ -106,36 +101,41 @@ class Contributions:
 
     def _lines(self) -> list[str]:
         def text(value: float, bar: float = 0.0) -> str:
-            return number_with_bar(value / self.scale, bar / self.scale) if bar > 5e-4 * self.scale else (
-                f"{value / self.scale:.3f}"
-            )  # fmt: skip
+            if bar > 5e-4 * self.scale:
+                return number_with_bar(value / self.scale, bar / self.scale)
+            return f"{round(value / self.scale, 3) + 0.0:.3f}"
 
+        wide = 2 + max(
+            map(len, (*self.held_names, *(self.direct.sources if self.direct is not None else ()), "all groups"))
+        )
         when = f" at {self.at:.4g} s" if self.of == "tilt" else ""
         unit = f" [{self.unit}]" if self.unit else ""
         lines = [
             f"{self.of}{when} of {self.link}{unit}: {text(self.whole)} ± {self.error / self.scale:.0e}; with all "
             f"groups {self.baseline} {text(self.none)}",
             "",
-            f"{'':24}{'held':>12}{'alone':>12}{'shared':>18}",
+            f"{'':{wide}}{'held':>12}{'alone':>12}{'shared':>18}",
         ]  # fmt: skip
         shares = dict(zip(self.groups, zip(self.shared, self.errors, strict=True), strict=True))
         for name, without, alone in zip(self.held_names, self.without, self.alone, strict=True):
             pair = self._pairs.get(name)
             share, bar = shares[name] if pair is None else (sum(shares[n][0] for n in pair), 0.0)
-            lines.append(f"{name:24.24}{text(without):>12}{text(alone):>12}{text(share, bar):>18}")
-        lines.append(f"{'all groups':24}{text(self.none):>12}{text(self.whole):>12}{text(self.shared.sum()):>18}")
+            lines.append(f"{name:{wide}}{text(without):>12}{text(alone):>12}{text(share, bar):>18}")
+        lines.append(f"{'all groups':{wide}}{text(self.none):>12}{text(self.whole):>12}{text(self.shared.sum()):>18}")
         if self.interactions is not None and len(self.groups) > 1:
-            lines += ["", f"{'beyond both alone':24}{'pair':>12}" + ("" if self.small_loop is None else "  small loop")]
+            small = self.small_loop
+            lines += ["", "pairs, beyond what both do alone" + ("" if small is None else "; what small loops tend to")]
             for first, second, value in self._strongest():
-                small = "" if self.small_loop is None else f"{text(self.small_loop[first, second]):>12}"
-                names = f"{[*self.groups][first]} with {[*self.groups][second]}"
-                lines.append(f"{names:24}{text(value):>12}{small}")
+                own = "" if small is None else f"{text(small[first, second]):>12}"
+                lines.append(f"{text(value):>12}{own}   {[*self.groups][first]} with {[*self.groups][second]}")
         if self.direct is not None:
             shown = sorted(zip(self.direct.sources, self.direct.total, strict=True), key=lambda pair: -abs(pair[1]))
-            change = text(float(self.direct.total.sum()))
-            lines += ["", f"direct, along the motion: {change} in all, largest tilt "
-                      f"{np.degrees(self.direct.largest_tilt):.1f} deg at {self.direct.tilt_time:.3g} s"]  # fmt: skip
-            lines += [f"  {name:22.22}{text(value):>12}" for name, value in shown if abs(value) > 0.0]
+            change = text(float(self.direct.total.sum())) + " in all"
+            if self.of != "rotation":
+                degrees = np.degrees(self.direct.largest_tilt)
+                change += f", largest tilt {degrees:.1f} deg at {self.direct.tilt_time:.3g} s"
+            lines += ["", f"direct, along the motion: {change}"]
+            lines += [f"{name:{wide}}{text(value):>12}" for name, value in shown if abs(value) > 0.0]
         if self.rest:
             lines += ["", f"in no group, moving in all motions: {', '.join(self.rest)}"]
         if self.steep:
@@ -151,8 +151,7 @@ class Contributions:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON can hold it, angles in radians."""
-        data = plain(self)
-        return data | {"pairs": {both: list(pair) for both, pair in data.pop("_pairs").items()}}
+        return plain(self) | {"pairs": {both: list(pair) for both, pair in self._pairs.items()}}
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the direct shares in time: time_s, angle_rad, and one column in rad for each source.
@@ -242,7 +241,7 @@ def contributions(
     direct, chart, instant = None, None, motion.duration
     axis = np.zeros(3)
     if function is None and name not in _WITHOUT_JOINTS:
-        chart = LinkChart.of(motion, link, tree.trunk, **axes)
+        chart = LinkChart.of(motion, tree.trunk if link is None else link, name in ANGLES, **axes)
         if name == "rotation":
             axis = _axis(motion, about)
         if name == "tilt":
@@ -251,16 +250,17 @@ def contributions(
         direct = direct_shares(DirectRates(motion, chart, name, axis, tree.joints), np.ravel(sampled), instant)
     measure = _Measure(name, function, chart, axis, instant / motion.duration)
     values = _Values(held, measure)
-    return _shares(values, grouped, direct, _Choice(name, baseline, instant, chart, axis, orders, seed))
+    unit = "" if function is not None else "turns" if name in ("twist", "somersault") else "deg"
+    return _shares(values, grouped, direct, _Choice(name, unit, baseline, instant, chart, orders, seed))
 
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
     of: str
+    unit: str
     baseline: Any
     at: float
     chart: LinkChart | None
-    about: Array
     orders: int
     seed: int
 
@@ -292,6 +292,7 @@ def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, 
     )  # fmt: skip
     return Contributions(
         of=choice.of,
+        unit=choice.unit,
         link=choice.chart.link if choice.chart is not None else held.body.link_names[0],
         at=choice.at,
         groups=grouped.joints | {name: () for name in names if name not in grouped.joints},
@@ -400,7 +401,7 @@ def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
     closes = float(np.abs(path.gap).max(initial=0.0)) <= CLOSED and not motion.momentum.any()
     if not closes or not isinstance(choice.baseline, str) or choice.baseline != "first" or chart is None:
         return None
-    if choice.of == "tilt" or body.ball_joints:
+    if choice.of not in ("twist", "somersault") or body.ball_joints:
         return None
     times = np.linspace(0.0, motion.duration, 4097)  # even samples of a smooth loop: their sum converges fast
     shapes, rates = path.curve(times)
@@ -408,8 +409,7 @@ def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
     turns = np.einsum("ni,nj->ij", moved, rates[:-1]) * (times[1] - times[0])
     areas = 0.5 * (turns - turns.T)
     vectors = -curvature(body, shapes[0]) * areas[..., None]
-    row = chart.rates(chart.attitude(motion, np.zeros(1)), choice.about if choice.of == "rotation" else None)[0][0]
-    row = row[0] if choice.of == "rotation" else row[ANGLES.index(choice.of)]
+    row = chart.rates(chart.attitude(motion, np.zeros(1)), None)[0][0, ANGLES.index(choice.of)]
     axes = motion.attitude(0.0).T @ chart.attitude(motion, np.zeros(1))[0]
     by_pair = 0.5 * vectors @ axes @ row
     result = np.zeros((len(held.names),) * 2)

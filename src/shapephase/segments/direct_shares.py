@@ -22,6 +22,7 @@ from ..body.link_motions import link_motions
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ChartPoleError, WrongObjectError
+from ..integrator.stepped import SteppedRotation
 from ..reconstruction.attitude_angles import EulerAngles, continued_angles
 from ..reconstruction.reconstruction import Motion
 from ..refinement import least_over
@@ -33,9 +34,9 @@ ANGLES = ("somersault", "tilt", "twist")
 _NAMED = {sign + axis: float(f"{sign}1") * np.eye(3)[k] for sign in ("", "-") for k, axis in enumerate("xyz")}
 _NODES = 12  # of Gauss on a panel: 1e-12 of smooth motions that turn by a radian there
 _NEAR = 0.05  # of the attitude's tolerance, for the error of the quadrature
+_ROUNDING = 1e-12  # of the largest rate: what rounding of attitudes leaves of the last terms
 _MOST_HALVED = 20  # times: panels of 1e-6 of their first length
-_PARTS = 2  # of a step, which turns the base by a radian at most, at which angles are continued
-_PARTS_OF_LINKS = 8  # the same where joints turn the link against the base
+_PARTS = 8  # of a step, at which angles of a link other than the base are continued: joints turn it more
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +61,16 @@ class LinkChart:
     __repr__ = short_repr
 
     @classmethod
-    def of(cls, motion: Motion, link: str | None, trunk: str, **given: Any) -> LinkChart:
-        """Return the chart of a link, by axes given in its own axes, else those of `Motion.athlete_axes`."""
+    def of(cls, motion: Motion, link: str, of_athlete: bool, **given: Any) -> LinkChart:
+        """Return the chart of a link, by axes given in its own axes, else those of `Motion.athlete_axes`.
+
+        Without an athlete's angles, all axes are those of the link and the laboratory.
+        """
         body, path = articulated_parts(motion.deformation)
-        name = trunk if link is None else link
-        body.link_pose(body.shape(), name)
-        frame, pose = body.chain.link_frames[name]
+        body.link_pose(body.shape(), link)
+        frame, pose = body.chain.link_frames[link]
+        if not of_athlete:
+            return cls(link, frame, pose[:3, :3], np.eye(3), np.eye(3))
 
         def width(times: Array) -> Array:
             moments = np.linalg.eigvalsh(motion.deformation.description.sample(times)[0])
@@ -84,11 +89,11 @@ class LinkChart:
         axes = motion.athlete_axes(**own)
         here = turn.T @ np.stack([axes.frontal, axes.lateral, axes.longitudinal], axis=-1)
         there = np.stack([np.cross(axes.somersault, axes.up), axes.somersault, axes.up], axis=-1)
-        return cls(name, frame, pose[:3, :3], here, there)
+        return cls(link, frame, pose[:3, :3], here, there)
 
     def attitude(self, motion: Motion, times: Array) -> Array:
         """Attitudes of the link, to inertial axes: (N,) -> (N, 3, 3)."""
-        base = motion.attitude(times)
+        base = _base_attitudes(motion, times)
         if not self.frame:
             return base @ self.pose
         body, path = articulated_parts(motion.deformation)
@@ -96,10 +101,10 @@ class LinkChart:
 
     def angles(self, motion: Motion, times: Array) -> Array:
         """Somersault, tilt and twist, continuous in time: (N,) -> (N, 3) [rad]."""
-        ends, parts = motion.solution.times, _PARTS
+        known = motion.solution.times
         if self.frame:
-            ends, parts = np.union1d(ends, motion.deformation.breaks), _PARTS_OF_LINKS
-        known = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(parts) / parts).ravel(), ends[-1])
+            ends = np.union1d(known, motion.deformation.breaks)
+            known = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(_PARTS) / _PARTS).ravel(), ends[-1])
 
         def quaternions(sampled: Array) -> Array:
             return so3.quat_from_matrix(self.there.T @ self.attitude(motion, sampled) @ self.here)[None]
@@ -123,6 +128,19 @@ class LinkChart:
         rows = np.stack([across, np.stack([cosine, -sine, zero], axis=-1), along[:, None] * across], axis=1)
         rows[:, 2] += np.stack([zero, zero, one], axis=-1)
         return rows @ self.here.T, along
+
+
+def _base_attitudes(motion: Motion, times: Array) -> Array:
+    """`Motion.attitude`, read off at the ends of steps, where nothing has to be evaluated: (N,) -> (N, 3, 3)."""
+    solution = motion.solution
+    if not isinstance(solution, SteppedRotation):
+        return motion.attitude(times)
+    index = np.minimum(np.searchsorted(solution.times, times), len(solution.times) - 1)
+    attitudes = motion.initial_attitude @ so3.matrix_from_quat(solution.quaternions[0, index])
+    between = solution.times[index] != times
+    if between.any():
+        attitudes[between] = motion.attitude(times[between])
+    return attitudes
 
 
 def articulated_parts(deformation: Deformation) -> tuple[Body, ShapePath]:
@@ -153,7 +171,7 @@ class DirectShares:
     angle : (N,) the angle itself, followed in time, from 0 at the start [rad]
     error : (N,) estimate of the difference of sum and angle [rad]
     total : (J + 1,) shares up to the time for which the result is stated [rad]
-    largest_tilt : of the link [rad], at the time `tilt_time` [s]
+    largest_tilt : of the link [rad], at the time `tilt_time` [s]; 0 for a rotation
 
     Examples
     --------
@@ -244,15 +262,7 @@ def direct_shares(rates: DirectRates, times: Array, at: float) -> DirectShares:
     motion = rates.motion
     edges = np.union1d(motion.solution.times, motion.deformation.breaks)
     left, right, values, sensitive, along, truncation = _resolved(rates, edges)
-    steepest = np.unravel_index(int(np.argmax(np.abs(along))), along.shape)
-    nodes, _ = _gauss()
-    when = float(left[steepest[0]] + 0.5 * (right - left)[steepest[0]] * (1.0 + nodes[steepest[1]]))
-    tilt = float(np.arcsin(min(1.0, abs(along[steepest]))))
-    if rates.of != "rotation" and tilt > STEEP:
-        raise ChartPoleError(
-            f"the tilt of {rates.chart.link} reaches {np.degrees(tilt):.1f} degrees at {when:.4g} s; beyond 85 degrees "
-            f"shares of {rates.of} have no meaning: take the rotation about an axis, of='rotation', or another link"
-        )
+    tilt, when = _largest_tilt(rates, left, right, along)
     instants = np.append(times, at)
     panel = np.clip(np.searchsorted(left, instants, side="right") - 1, 0, len(left) - 1)
     place = 2.0 * (instants - left[panel]) / (right - left)[panel] - 1.0
@@ -279,6 +289,21 @@ def direct_shares(rates: DirectRates, times: Array, at: float) -> DirectShares:
     )
 
 
+def _largest_tilt(rates: DirectRates, left: Array, right: Array, along: Array) -> tuple[float, float]:
+    """Largest tilt at nodes of panels and its time; 0 for a rotation. Raises ChartPoleError beyond 85 degrees."""
+    if rates.of == "rotation":
+        return 0.0, 0.0
+    panel, node = np.unravel_index(int(np.argmax(np.abs(along))), along.shape)
+    when = float(left[panel] + 0.5 * (right - left)[panel] * (1.0 + _gauss()[0][node]))
+    tilt = float(np.arcsin(min(1.0, abs(along[panel, node]))))
+    if tilt > STEEP:
+        raise ChartPoleError(
+            f"the tilt of {rates.chart.link} reaches {np.degrees(tilt):.1f} degrees at {when:.4g} s; beyond 85 degrees "
+            f"shares of {rates.of} have no meaning: take the rotation about an axis, of='rotation', or another link"
+        )
+    return tilt, when
+
+
 def _gauss() -> tuple[Array, Array]:
     nodes, weights = legendre.leggauss(_NODES)
     return nodes, legendre.legvander(nodes, _NODES - 1) * weights[:, None] * (np.arange(_NODES) + 0.5)
@@ -290,16 +315,18 @@ def _resolved(rates: DirectRates, edges: Array) -> tuple[Array, ...]:
     nodes, transform = _gauss()
     left, right = edges[:-1], edges[1:]
     done: list[tuple[Array, ...]] = []
+    largest = 0.0
     for _ in range(_MOST_HALVED):
         half = 0.5 * (right - left)
         times = (left + half)[:, None] + half[:, None] * nodes
         values, sensitive, along = (
             result.reshape(len(left), _NODES, *result.shape[1:]) for result in rates(times.ravel())
         )
+        _largest_tilt(rates, left, right, along)
         series = np.einsum("pnj,nk->pkj", values, transform)
-        # The integral of the last terms, and what rounding makes of them.
         tail = np.abs(series[:, -2:]).max(axis=(1, 2)) * 2.0 * half
-        rough = tail > np.maximum(2.0 * half * goal, 1e-14 * np.abs(series).max(axis=(1, 2)) * half)
+        largest = max(largest, float(np.abs(series).max()))
+        rough = tail > 2.0 * half * max(goal, _ROUNDING * largest)
         done.append((left[~rough], right[~rough], values[~rough], sensitive[~rough], along[~rough], tail[~rough]))
         if not rough.any():
             order = np.argsort(np.concatenate([panels[0] for panels in done]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arrays import Array, Integers, Mask, finite_array
 from ..body.body import Body
-from ..deformation.deformation import articulated
+from ..deformation.deformation import deformation_along
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..integrator.families import many_inverted, rotations_of_variants
+from ..integrator.machine_code import expect_work
 from ..integrator.sampling import Sampler
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
@@ -112,7 +113,7 @@ class _MixedVariants:
 
     def _sampler(self, own: Mask) -> Sampler:
         if self.smoothness is None:
-            return articulated(self.body, self.mixed_path(own)).sampler()
+            return deformation_along(self.body, self.mixed_path(own)).sampler()
 
         def mixed(times: Array) -> tuple[Array, Array]:
             shapes, rates = self._mixtures(own[None], times)
@@ -210,7 +211,7 @@ class HeldMotions:
         """Subset of all groups, as bits."""
         return (1 << len(self.names)) - 1
 
-    def motions(self, subsets: Iterable[int]) -> dict[int, Motion]:
+    def motions(self, subsets: Set[int]) -> dict[int, Motion]:
         """Motions in which the groups of each subset, as bits, follow the motion and the others the baseline.
 
         Raises as `reconstruct`, with the number of the motion.
@@ -220,7 +221,8 @@ class HeldMotions:
         def alike(subset: int) -> tuple[bool, bool]:
             return self._follows("body", subset), self._follows("duration", subset)
 
-        for (own_body, own_duration), some in groupby(sorted(set(subsets), key=alike), key=alike):
+        expect_work(momenta=len(subsets))
+        for (own_body, own_duration), some in groupby(sorted(subsets, key=alike), key=alike):
             masks = list(some)
             variants = self._variants(masks, own_body=own_body, own_duration=own_duration)
             sources = [
@@ -233,7 +235,7 @@ class HeldMotions:
             rotations = rotations_of_variants(variants, at_start, self.motion.tolerance)
             for row, mask in enumerate(masks):
                 made[mask] = Motion(
-                    deformation=articulated(variants.body, variants.mixed_path(variants.own[row])),
+                    deformation=deformation_along(variants.body, variants.mixed_path(variants.own[row])),
                     momentum=momenta[row],
                     initial_attitude=starts[row],
                     tolerance=self.motion.tolerance,
@@ -279,10 +281,8 @@ def _still_path(body: Body, path: ShapePath, baseline: str | ArrayLike | Motion)
     """Path of a body that rests in the baseline's posture, for another motion in the first one."""
     if isinstance(baseline, str) and baseline not in BASELINES:
         raise unknown_name("baseline", baseline, BASELINES)
-    if isinstance(baseline, Motion) or baseline == "first":
-        shape = path.shape(0.0)
-    elif isinstance(baseline, str):
-        shape = body.shape()
+    if isinstance(baseline, str | Motion):
+        shape = body.shape() if baseline == "neutral" else path.shape(0.0)
     else:
         shape = finite_array(baseline, "baseline", (body.n_shape,))
         if shape.ndim != 1:

@@ -1,0 +1,525 @@
+"""Shares of limbs: sums along the motion, motions with held limbs, and Shapley values against brute force."""
+
+from __future__ import annotations
+
+import json
+import warnings
+import xml.etree.ElementTree as ET
+from functools import cache
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.spatial.transform import Rotation
+
+import shapephase as sp
+from shapephase.cli.main import main
+from shapephase.errors import ChartPoleError, IgnoredElementWarning, ShapeError, UnknownNameError, WrongObjectError
+from shapephase.segments import shapley_interactions, shapley_values
+from support.ball_bodies import BALLS
+from support.bodies import joint, link, random_loop, urdf
+from support.coupled_bodies import LEG, TURN, couplings
+from support.random_chains import random_chain
+
+FLIGHTS = Path(__file__).parents[1] / "data" / "trampoline"
+AXES = {"lateral": "y", "longitudinal": "z", "somersault": "y", "up": "z"}
+TURNS = 2.0 * np.pi
+
+
+def loaded(tmp_path, text):
+    file = tmp_path / "body.urdf"
+    file.write_text(text)
+    return sp.load_body(file)
+
+
+def of_fourier(mean, cosines, sines, names, duration=1.0):
+    return sp.ShapePath.fourier(mean, cosines, sines, duration, joint_names=names)
+
+
+# The published somersault: the numbers were computed by a script of its own, one reconstruction after another.
+HELD = {
+    ("BrasD", "BrasG"): (1.488, 11.9, 0.163),
+    ("BrasD",): (1.546, 52.9, 5.948),
+    ("BrasG",): (1.548, 10.4, 0.135),
+    ("Thorax",): (1.575, 12.6, 0.017),
+    ("CuisseM",): (1.676, 21.8, -0.904),
+    ("BrasD", "BrasG", "Thorax", "CuisseM"): (1.373, 2.3, -0.155),
+}
+
+
+@cache
+def somersault():
+    """Motion of the published somersault, with the mean of its recorded momentum."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", IgnoredElementWarning)
+        body = sp.load_body(FLIGHTS / "Model_JeCh_15DoFs.bioMod")
+    run = sp.read_trajectory(FLIGHTS / "free_floating.npz", body)
+    path = sp.ShapePath.spline(run.times - run.times[0], run.shapes, periodic=False, joint_names=body.joint_names)
+    momentum = [85.2905763, -0.0660766631, 0.700046244]
+    return sp.reconstruct(sp.articulated(body, path), momentum, np.asarray(run.attitude)[0])
+
+
+ATHLETE = {"lateral": "x", "longitudinal": "z", "somersault": "x", "up": "z"}
+
+
+def test_the_published_somersault_with_limbs_held():
+    motion = somersault()
+    twist, somersaults = (sp.contributions(motion, of, **ATHLETE) for of in ("twist", "somersault"))
+    assert (twist.whole / TURNS, somersaults.whole / TURNS) == pytest.approx((3.016, 1.896), abs=5e-4)
+    assert np.degrees(twist.direct.largest_tilt) == pytest.approx(32.4, abs=0.05)
+    names = {("BrasD", "BrasG"): "arms", ("CuisseM",): "legs"}
+    for held, (turned, _, twisted) in HELD.items():
+        if len(held) == 4:
+            found = somersaults.none, twist.none
+        else:
+            place = twist.held_names.index(names.get(held, held[0]))
+            found = somersaults.without[place], twist.without[place]
+        assert np.array(found) / TURNS == pytest.approx((turned, twisted), abs=5e-4)
+
+
+def test_shapley_values_of_the_published_somersault():
+    twist = sp.contributions(somersault(), **ATHLETE)
+    shares = dict(zip(twist.groups, twist.shared / TURNS, strict=True))
+    known = {"BrasD": -1.868, "BrasG": 2.097, "Thorax": 1.420, "legs": 1.522}
+    assert shares == pytest.approx(known, abs=5e-4)
+    assert twist.shared.sum() == pytest.approx(twist.whole - twist.none, abs=1e-12)
+
+
+def test_direct_shares_of_the_published_somersault():
+    for of, momentum, joints in (("twist", 2.9850, 0.0311), ("somersault", 1.7100, 0.1855)):
+        direct = sp.contributions(somersault(), of, groups={"all": "*"}, **ATHLETE).direct
+        assert direct.total[0] / TURNS == pytest.approx(momentum, abs=5e-5)
+        # By the trapezoid rule, from digits that were cut off.
+        assert direct.total[1:].sum() / TURNS == pytest.approx(joints, abs=1e-4)
+
+
+def random_bodies(tmp_path):
+    """Bodies with hinges, slides, ball joints and joints that follow others."""
+    bodies = [sp.load_body(name) for name in ("cat", "diver", "satellite", "astronaut")]
+    bodies += [loaded(tmp_path, random_chain(seed).urdf) for seed in range(4)]
+    return [*bodies, loaded(tmp_path, BALLS), loaded(tmp_path, LEG).with_couplings(couplings(TURN["smooth"][0]))]
+
+
+def random_path(body, rng):
+    """A loop of the joints; quaternions of ball joints wander around the identity."""
+    if not body.ball_joints:
+        return random_loop(body, rng, amplitude=0.6)
+    mean = np.array([float(name.endswith(".w")) for name in body.joint_names])
+    return of_fourier(mean, *(rng.uniform(-0.2, 0.2, (2, body.n_shape, 2))), body.joint_names, 1.5)
+
+
+def test_direct_shares_sum_to_the_angle_on_200_random_motions(tmp_path):
+    rng = np.random.default_rng(56)
+    bodies, count, worst = random_bodies(tmp_path), 0, 0.0
+    for number in range(400):
+        if count == 200:
+            break
+        body = bodies[number % len(bodies)]
+        path = random_path(body, rng)
+        size = float(np.trace(body.locked_inertia(path.shape(0.0)))) if number % 2 else 0.0
+        motion = sp.reconstruct(sp.articulated(body, path), size * rng.uniform(-0.5, 0.5, 3))
+        of = ("twist", "tilt", "somersault")[number % 3]
+        try:
+            direct = sp.contributions(
+                motion, of, groups={"all": "*"}, at=1.0, link=body.link_names[0], times=[0.4, 1.0, 1.5], **AXES
+            ).direct
+        except ChartPoleError:
+            continue
+        instants = np.append(0.0, direct.times)
+        angle = motion.somersault_tilt_twist(instants, **AXES)[("somersault", "tilt", "twist").index(of)]
+        gap = np.abs(direct.shares.sum(axis=1) - (angle[1:] - angle[0]))
+        assert (gap <= direct.error).all(), (body.name, of, gap, direct.error)
+        assert direct.error.max() < 1e-5
+        assert direct.total == pytest.approx(direct.shares[1 if of == "tilt" else 2], abs=1e-12)
+        worst, count = max(worst, gap.max()), count + 1
+    assert count == 200
+    assert worst < 1e-8
+
+
+def test_a_joint_that_rests_has_a_share_of_exactly_zero():
+    cat = sp.load_body("cat")
+    shapes = np.zeros((5, 23))
+    shapes[1:4, cat.joint_index("waist_yaw")] = 0.3, 0.5, 0.2
+    shapes[1:4, cat.joint_index("tail_2_yaw")] = 0.2, -0.4, 0.6
+    path = sp.ShapePath.spline(np.linspace(0.0, 1.0, 5), shapes, joint_names=cat.joint_names)
+    motion = sp.reconstruct(sp.articulated(cat, path), [0.01, 0.02, -0.01])
+    shares = sp.contributions(motion, "twist", groups={"head": "neck*", "waist": "waist*", "tail": "tail*"}, **AXES)
+    moving = {"momentum", "waist", "tail_2"}
+    for source, share in zip(shares.direct.sources, shares.direct.shares.T, strict=True):
+        assert share.any() == (source in moving)
+    assert shares.shared[0] == 0.0
+    assert shares.rest[0] == "front_left_shoulder_pitch"
+
+
+def rerooted(text, root):
+    """The same body with another link as its root: joints on the way turn the other way round."""
+    robot = ET.fromstring(text)
+    above = {joint_.find("child").get("link"): joint_ for joint_ in robot.findall("joint")}
+    while root in above:
+        old, link_ = above[root], root
+        parent = old.find("parent").get("link")
+        origin = old.find("origin")
+        place = np.array([float(x) for x in (origin.get("xyz", "0 0 0") if origin is not None else "0 0 0").split()])
+        rpy = np.array([float(x) for x in (origin.get("rpy", "0 0 0") if origin is not None else "0 0 0").split()])
+        back = Rotation.from_euler("xyz", rpy).inv()
+        step = f"{link_}_turned"
+        robot.append(ET.fromstring(f'<link name="{step}"/>'))
+        axis = -np.array([float(x) for x in old.find("axis").get("xyz").split()])
+        hinge = joint(old.get("name"), old.get("type"), link_, step, axis)
+        fixed = joint(f"{step}_joint", "fixed", step, parent, xyz=back.apply(-place), rpy=back.as_euler("xyz"))
+        robot.remove(old)
+        robot.append(ET.fromstring(hinge))
+        robot.append(ET.fromstring(fixed))
+        root = parent
+    return ET.tostring(robot, encoding="unicode")
+
+
+@pytest.mark.filterwarnings("ignore::shapephase.ImplausibleBodyWarning")
+def test_shares_of_a_link_do_not_depend_on_the_root(tmp_path):
+    """The angular velocity of the base itself differs; shares of the angles of the front half do not."""
+    text = Path("robots/cat.urdf").read_text()
+    cat = sp.load_body("cat")
+    path, momentum = sp.examples.cat_righting(), np.array([0.01, 0.03, -0.02])
+    axes = {"lateral": [0.0, 1.0, 0.0], "longitudinal": [1.0, 0.0, 0.0], "somersault": "y", "up": "z"}
+    known = None
+    for root in [part.links[0] for part in cat.moving_parts if part.mass > 0.0]:
+        body = loaded(tmp_path, rerooted(text, root))
+        assert body.link_names[0] == root
+        start = cat.link_pose(path.shape(0.0), root)[:3, :3]
+        motion = sp.reconstruct(sp.articulated(body, path), momentum, start, tolerance=1e-12)
+        direct = sp.contributions(
+            motion, "twist", groups={"all": "*"}, link="trunk_front", times=[0.7, 1.3, 2.0], **axes
+        ).direct
+        shares = dict(zip(direct.sources, direct.shares.T, strict=True))
+        known = known or shares
+        assert shares.keys() == known.keys()
+        for source, share in shares.items():
+            assert share == pytest.approx(known[source], abs=1e-12), (root, source)
+
+
+def random_game(seed, count=6):
+    return np.random.default_rng(seed).normal(size=1 << count)
+
+
+def by_brute_force(values, count):
+    """Average over all orders of what each member adds, and of what each pair adds beyond both alone."""
+    shares, pairs = np.zeros(count), np.zeros((count, count))
+    orders = list(permutations(range(count)))
+    for order in orders:
+        before = 0
+        place = {member: k for k, member in enumerate(order)}
+        prefixes = [sum(1 << member for member in order[:k]) for k in range(count)]
+        for member in order:
+            shares[member] += values[before | 1 << member] - values[before]
+            before |= 1 << member
+        for i in range(count):
+            for j in range(i):
+                base = prefixes[min(place[i], place[j])]
+                pairs[i, j] += (
+                    values[base | 1 << i | 1 << j] - values[base | 1 << i] - values[base | 1 << j] + values[base]
+                )
+    return shares / len(orders), (pairs + pairs.T) / len(orders)
+
+
+def test_shapley_values_and_interactions_equal_brute_force_over_all_orders():
+    game = random_game(1)
+    shares, pairs = by_brute_force(game, 6)
+    assert shapley_values(game) == pytest.approx(shares, abs=1e-13)
+    interactions = shapley_interactions(game)
+    off = ~np.eye(6, dtype=bool)
+    assert interactions[off] == pytest.approx(pairs[off], abs=1e-13)
+    assert np.diag(interactions) == pytest.approx([game[1 << k] - game[0] for k in range(6)], abs=0.0)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_axioms_of_shapley(seed):
+    count = 1 + seed % 7
+    first, second = random_game(seed, count), random_game(seed + 100, count)
+    values = shapley_values(first)
+    assert values.sum() == pytest.approx(first[-1] - first[0], abs=1e-12)
+    assert np.triu(shapley_interactions(first)).sum() == pytest.approx(first[-1] - first[0], abs=1e-12)
+    assert shapley_values(2.0 * first - 3.0 * second) == pytest.approx(2.0 * values - 3.0 * shapley_values(second))
+    masks = np.arange(1 << count)
+    if count > 1:
+        # Where the first two members change places, so do their shares.
+        swapped = (masks & ~3) | (masks & 1) << 1 | (masks >> 1 & 1)
+        assert shapley_values(first[swapped]) == pytest.approx(values[[1, 0, *range(2, count)]], abs=1e-12)
+        assert shapley_values(first + first[swapped])[:2].std() == pytest.approx(0.0, abs=1e-12)
+    null = shapley_values(first[masks & ~1])
+    assert null[0] == pytest.approx(0.0, abs=1e-14)
+    assert shapley_interactions(first[masks & ~1])[0] == pytest.approx(np.zeros(count), abs=1e-14)
+
+
+def test_a_number_of_values_that_is_no_power_of_two_is_refused():
+    with pytest.raises(ShapeError, match=r"2\^k"):
+        shapley_values([0.0, 1.0, 2.0])
+
+
+def rotor_dive(tmp_path):
+    """Closed form of a diver with a wheel, and the same as a body with a joint: the wheel turns while it is on."""
+    dive = sp.rigid_body.rotor_dive([12.0, 11.5, 1.0], 70.0, 50.0, 0.12, somersaults=1.5, twists=1)
+    wheel = 0.5
+    body = loaded(
+        tmp_path,
+        urdf(
+            link("trunk", 60.0, dive.moments - [wheel, 0.3, 0.3]),
+            link("wheel", 4.0, [wheel, 0.3, 0.3]),
+            joint("rotor", "continuous", "trunk", "wheel", (1.0, 0.0, 0.0)),
+        ),
+    )
+    edges = dive.times
+    speeds = np.array([dive.rotor_momentum(t)[0] for t in 0.5 * (edges[1:] + edges[:-1])]) / wheel
+    turned = np.append(0.0, np.cumsum(speeds * np.diff(edges)))
+
+    def rotor(times):
+        stage = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, 4)
+        return (turned[stage] + speeds[stage] * (times - edges[stage]))[:, None], speeds[stage][:, None]
+
+    path = sp.ShapePath.function(rotor, dive.duration, edges[1:-1], joint_names=["rotor"])
+    return dive, sp.reconstruct(sp.articulated(body, path), [0.0, dive.momentum, 0.0])
+
+
+def test_the_tilt_of_a_dive_with_a_rotor_is_that_of_the_rotor(tmp_path):
+    dive, motion = rotor_dive(tmp_path)
+    middle = 0.5 * dive.duration
+    shares = sp.contributions(motion, "tilt", **AXES)
+    assert shares.at == pytest.approx(middle, abs=1e-6)
+    assert abs(shares.whole) == pytest.approx(abs(dive.tilt), abs=1e-8)
+    # Held, the body somersaults alone: the rotor has all of the tilt.
+    assert shares.none == pytest.approx(0.0, abs=1e-10)
+    assert shares.shared[0] == pytest.approx(shares.whole, abs=1e-9)
+    # Along the motion its torque turns the body about x, of which the cosine of the twist is tilt.
+    start, end = dive.times[1:3]
+    direct, _ = quad(lambda t: -dive.rotor / dive.moments[0] * np.cos(dive.twist(t)), start, end, epsabs=1e-12)
+    assert dict(zip(shares.direct.sources, shares.direct.total, strict=True))["rotor"] == pytest.approx(
+        direct, abs=1e-8
+    )
+    assert 0.5 < direct / shares.whole < 0.999
+
+
+def test_mirrored_arms_have_equal_shares_of_somersault_and_opposite_ones_of_tilt_and_twist():
+    diver = sp.load_body("diver")
+    moved = np.array([[2.5, -2.5], [2.4, -2.4], [0.4, -0.4], [0.3, -0.3]])
+    path = sp.ShapePath.spline([0.0, 0.2, 0.8, 1.2], moved, joint_names=diver.joint_names)
+    motion = sp.reconstruct(sp.articulated(diver, path), [0.0, 60.0, 0.0])
+    turned, tilted, twisted = (sp.contributions(motion, of, **AXES, **more) for of, more in (
+        ("somersault", {}), ("tilt", {"at": 0.7}), ("twist", {})))  # fmt: skip
+    assert twisted.held_names == ("left arm", "right arm", "arms")
+    assert turned.shared[0] == pytest.approx(turned.shared[1], abs=1e-9)
+    for shares in (tilted, twisted):
+        assert shares.shared[0] == pytest.approx(-shares.shared[1], abs=1e-8)
+        assert shares.without[0] == pytest.approx(-shares.without[1], abs=1e-8)
+        assert abs(shares.without[0]) > 0.05
+    assert tilted.direct.total[1] == pytest.approx(-tilted.direct.total[2], abs=1e-9)
+
+
+def test_the_cat_of_kane_and_scher_turns_by_the_pair():
+    cat = sp.load_body("cat_untwisted")
+    path = sp.examples.kane_scher(np.radians(20.0), np.radians(61.8), body="cat_untwisted")
+    motion = sp.reconstruct(sp.articulated(cat, path), np.zeros(3))
+    shares = sp.contributions(motion, "rotation", about=[1.0, 0.0, 0.0])
+    assert list(shares.groups) == ["waist_pitch", "waist_yaw"]
+    assert abs(shares.whole) > 1.0
+    # One coordinate that goes to and fro turns nothing, so that each has one half of what the pair does.
+    assert shares.alone == pytest.approx(0.0, abs=1e-8)
+    assert shares.interactions[0, 1] == pytest.approx(shares.whole, abs=1e-7)
+    assert shares.shared == pytest.approx(np.full(2, 0.5 * shares.whole), abs=1e-7)
+
+
+def test_interactions_of_small_loops_tend_to_curvature_times_area(tmp_path):
+    body = loaded(tmp_path, random_chain(5).urdf)
+    rng = np.random.default_rng(7)
+    mean = rng.uniform(-0.3, 0.3, body.n_shape)
+    cosines, sines = rng.uniform(-1.0, 1.0, (2, body.n_shape, 2))
+    gaps, strokes = [], (0.02, 0.04, 0.08)
+    for stroke in strokes:
+        path = of_fourier(mean, stroke * cosines, stroke * sines, body.joint_names)
+        motion = sp.reconstruct(sp.articulated(body, path), np.zeros(3), tolerance=1e-13)
+        shares = sp.contributions(motion, "twist", groups="joints", **AXES)
+        off = np.triu(np.ones(shares.interactions.shape, dtype=bool), 1)
+        gaps.append(np.abs((shares.interactions - shares.small_loop)[off]).max())
+        assert gaps[-1] < 0.5 * np.abs(shares.small_loop[off]).max()
+    slopes = np.diff(np.log(gaps)) / np.diff(np.log(strokes))
+    assert (slopes >= 2.9).all(), slopes
+
+
+def test_a_held_motion_is_that_of_the_path_with_the_limb_at_rest():
+    cat, path = sp.load_body("cat"), sp.examples.cat_righting()
+    momentum = np.array([0.002, 0.01, -0.003])
+    motion = sp.reconstruct(sp.articulated(cat, path), momentum)
+    shares = sp.contributions(motion, lambda made: float(made.final_attitude[0, 1]), groups={"waist": "waist_*"})
+    columns = cat.joint_columns(["waist_pitch", "waist_yaw", "waist_roll"])
+
+    def held(times):
+        shapes, rates = (values.copy() for values in path.curve(times))
+        shapes[:, columns], rates[:, columns] = path.shape(0.0)[columns], 0.0
+        return shapes, rates
+
+    still = sp.ShapePath.function(held, path.duration, joint_names=cat.joint_names)
+    known = sp.reconstruct(sp.articulated(cat, still), momentum).final_attitude[0, 1]
+    assert shares.without[0] == pytest.approx(known, abs=1e-8)
+    assert shares.of == "<lambda>"
+    assert shares.direct is None
+
+
+def two_trials(stretch=1.0):
+    diver = sp.load_body("diver")
+    good, bad = (
+        sp.ShapePath.waypoints([0.0, 0.3, 0.9, 1.2], [[2.5, -2.5], [left, -2.5], [left, -2.5], [2.5, -2.5]],
+                               joint_names=diver.joint_names)
+        for left in (0.5, 1.9)
+    )  # fmt: skip
+    return (
+        sp.reconstruct(sp.articulated(diver, good), [0.0, 62.0, 0.0]),
+        sp.reconstruct(sp.articulated(diver, bad.stretched(stretch)), [0.0, 55.0, 0.0]),
+    )
+
+
+def test_the_difference_of_two_trials_is_shared_among_limbs_momentum_and_duration():
+    good, bad = two_trials(1.25)
+    shares = sp.contributions(good, baseline=bad, **AXES)
+    assert list(shares.groups) == ["left arm", "right arm", "momentum", "duration"]
+    twists = [np.ptp(motion.somersault_tilt_twist([0.0, motion.duration], **AXES)[2]) for motion in (good, bad)]
+    assert abs(shares.whole) == pytest.approx(twists[0], abs=1e-8)
+    assert abs(shares.none) == pytest.approx(twists[1], abs=1e-8)
+    assert shares.shared.sum() == pytest.approx(shares.whole - shares.none, abs=1e-12)
+    assert shares.shared[1] == pytest.approx(0.0, abs=1e-8)
+    assert abs(shares.shared[0]) > 0.5
+
+
+def test_other_masses_are_a_group_of_their_own():
+    good, bad = two_trials()
+    diver = sp.load_body("diver")
+    heavy = diver.with_inertias(masses={"left_arm": 4.0, "right_arm": 4.0})
+    other = sp.reconstruct(sp.articulated(heavy, bad.deformation.description.path), bad.momentum)
+    shares = sp.contributions(good, "somersault", baseline=other, **AXES)
+    assert list(shares.groups)[2:] == ["momentum", "body"]
+    with_masses = sp.reconstruct(sp.articulated(heavy, good.deformation.description.path), good.momentum)
+    known = np.ptp(with_masses.somersault_tilt_twist([0.0, 1.2], **AXES)[0])
+    assert shares.without[3] == pytest.approx(known, abs=1e-8)
+
+
+def test_what_differs_and_is_in_no_group_is_named():
+    good, bad = two_trials()
+    with pytest.raises(ShapeError, match=r"differ in momentum, in no group"):
+        sp.contributions(good, baseline=bad, groups={"arms": ["*arm*", "*shoulder*"][1]}, **AXES)
+    with pytest.raises(ShapeError, match=r"joints that are in no group: left_shoulder_abduction"):
+        sp.contributions(good, baseline=bad, groups={"right": "right_*", "momentum": ()}, **AXES)
+    with pytest.raises(ShapeError, match="another motion is the baseline"):
+        sp.contributions(good, groups={"right": "right_*", "momentum": ()}, **AXES)
+
+
+def test_more_than_ten_groups_take_random_orders():
+    cat = sp.load_body("cat")
+    motion = sp.reconstruct(sp.articulated(cat, sp.examples.cat_righting()), np.zeros(3))
+    shares = sp.contributions(motion, groups="joints", orders=8, longitudinal="x", lateral="y", somersault="y")
+    assert len(shares.groups) == 13
+    assert shares.interactions is None
+    assert shares.shared.sum() == pytest.approx(shares.whole - shares.none, abs=1e-12)
+    place = list(shares.groups).index("tail_2")
+    assert shares.shared[place] == pytest.approx(0.0, abs=1e-9)
+    assert shares.errors[list(shares.groups).index("waist")] > 1e-4
+
+
+def test_the_montgomery_phase_and_a_posture_as_baseline():
+    motion = somersault()
+    shares = sp.contributions(motion, "phase", baseline="neutral")
+    assert shares.whole == pytest.approx(float(sp.split(motion).montgomery_phase), abs=1e-12)
+    assert shares.shared.sum() == pytest.approx(shares.whole - shares.none, abs=1e-9)
+    body = motion.deformation.description.body
+    again = sp.contributions(motion, "phase", baseline=body.shape())
+    assert again.none == shares.none
+
+
+def test_what_cannot_be_explained_is_refused():
+    cat = sp.load_body("cat_two_halves")
+    motion = sp.reconstruct(sp.articulated(cat, sp.examples.kane_scher(0.3, 0.6)), np.zeros(3))
+    rigid = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [0.0, 0.0, 1.0])
+    with pytest.raises(WrongObjectError, match="shares are those of joints"):
+        sp.contributions(rigid)
+    with pytest.raises(UnknownNameError, match="unknown result 'twists'"):
+        sp.contributions(motion, "twists")
+    with pytest.raises(WrongObjectError, match="no Montgomery phase"):
+        sp.contributions(motion, "phase")
+    with pytest.raises(ShapeError, match="no momentum to turn about"):
+        sp.contributions(motion, "rotation")
+    with pytest.raises(UnknownNameError, match="unknown baseline 'second'"):
+        sp.contributions(motion, baseline="second", **AXES)
+    with pytest.raises(ShapeError, match="finite number"):
+        sp.contributions(motion, lambda made: made.final_attitude)
+    with pytest.raises(UnknownNameError, match="link"):
+        sp.contributions(motion, link="middle", **AXES)
+
+
+def test_beyond_85_degrees_of_tilt_there_are_no_shares_of_a_count():
+    diver = sp.load_body("diver")
+    path = sp.ShapePath.waypoints([0.0, 1.0], [[0.1, -0.1], [0.2, -0.2]], joint_names=diver.joint_names)
+    motion = sp.reconstruct(sp.articulated(diver, path), [30.0, 0.0, 0.0])
+    with pytest.raises(ChartPoleError, match=r"tilt of trunk reaches 8[5-9]|tilt of trunk reaches 90"):
+        sp.contributions(motion, **AXES)
+    assert sp.contributions(motion, "rotation", **AXES).whole > 1.0
+
+
+def test_table_json_and_csv(tmp_path):
+    good, _ = two_trials()
+    shares = sp.contributions(good, **AXES)
+    text = str(shares)
+    assert "twist of trunk [turns]" in text
+    assert "left arm" in text
+    assert shares.to_dict()["pairs"] == {"arms": ["left arm", "right arm"]}
+    shares.write_csv(tmp_path / "shares.csv")
+    table = np.genfromtxt(tmp_path / "shares.csv", delimiter=",", names=True)
+    assert table["angle_rad"] == pytest.approx(shares.direct.shares.sum(axis=1), abs=1e-7)
+    with pytest.raises(WrongObjectError, match="no direct shares"):
+        sp.contributions(good, "phase").write_csv(tmp_path / "none.csv")
+
+
+DIVE = ("diver", "diver_twist", "--momentum", "0", "61.558831", "0")
+
+
+def command(capsys, *words):
+    main(["contributions", *words])
+    return capsys.readouterr().out
+
+
+def test_the_command_prints_what_the_function_finds(capsys, tmp_path):
+    data = json.loads(command(capsys, *DIVE, "--json", "--out", str(tmp_path / "s.csv")))
+    path = sp.examples.MOTIONS["diver_twist"].path()
+    shares = sp.contributions(sp.reconstruct(sp.articulated(sp.load_body("diver"), path), [0.0, 61.558831, 0.0]))
+    assert data["whole"] == pytest.approx(shares.whole, abs=1e-9)
+    assert data["shared"] == pytest.approx(shares.shared, abs=1e-8)
+    assert (tmp_path / "s.csv").read_text().startswith("time_s,angle_rad,momentum_rad,left_shoulder_abduction_rad")
+    chosen = command(capsys, *DIVE, "--groups", "left=left_*", "--of", "tilt", "--at", "0.75", "--baseline", "neutral")
+    assert "tilt at 0.75 s of trunk [deg]" in chosen
+    assert "in no group, moving in all motions: right_shoulder_abduction" in chosen
+
+
+def test_the_command_explains_the_difference_of_two_motions(capsys):
+    text = command(capsys, *DIVE, "--baseline", "five_stage_dive", "--groups", "arms=*shoulder*", "duration")
+    assert "as in the baseline" in text
+    assert "\nduration" in text
+
+
+@pytest.mark.parametrize("words", [["arms"], ["a=x*", "a=y*"], ["=x"]])
+def test_groups_that_are_no_patterns_end_the_command(words, capsys):
+    with pytest.raises(SystemExit):
+        main(["contributions", *DIVE, "--groups", *words])
+    assert "words such as arms=left_*,right_*" in capsys.readouterr().err
+
+
+def test_bars_and_areas_show_the_numbers(capsys, tmp_path):
+    good, _ = two_trials()
+    shares = sp.contributions(good, **AXES)
+    bars, areas = sp.plots.contributions_figure(shares).figure.axes
+    widths = [bar.get_width() for bar in bars.patches]
+    assert widths[:2] == pytest.approx(shares.shared / TURNS)
+    assert widths[2:] == pytest.approx((shares.whole - shares.without[:2]) / TURNS)
+    assert areas.lines[0].get_ydata()[-1] == pytest.approx(shares.whole / TURNS)
+    phase = sp.contributions(good, "phase")
+    assert len(sp.plots.contributions_figure(phase).figure.axes) == 1
+    with pytest.raises(WrongObjectError, match="no direct shares"):
+        sp.plots.plot_direct_shares(sp.plots.column_axes(), phase)
+    command(capsys, *DIVE, "--figure", str(tmp_path / "s.svg"))
+    assert (tmp_path / "s.svg").read_text().startswith("<?xml")
