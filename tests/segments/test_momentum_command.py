@@ -9,7 +9,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.cli.main import main
-from shapephase.errors import UnknownNameError
+from shapephase.errors import TrajectoryWarning, UnknownNameError
 
 FALL = {"start": [0.0, 0.0, 2.0], "velocity": [0.5, 0.0, 9.81], "gravity": [0.0, 0.0, -9.81]}
 
@@ -81,3 +81,12 @@ def test_the_figure_stacks_limbs_up_to_the_whole():
     np.testing.assert_allclose(high, np.maximum(parts, 0.0).sum(axis=0).max(), rtol=1e-12)
     with pytest.raises(UnknownNameError, match="along"):
         sp.plots.plot_segment_momentum(sp.plots.column_axes(3.4), sp.segment_momentum(motion, axes=[0, 1, 0]), "z")
+
+
+def test_after_a_low_pass_filter_the_noise_of_the_base_has_to_be_stated(take):
+    body = sp.load_body("cat_two_halves")
+    recorded = sp.read_recorded_motion(take, body, lowpass=10.0)
+    with pytest.warns(TrajectoryWarning, match="--attitude-noise"):
+        short = sp.segment_momentum(recorded, body)
+    stated = sp.segment_momentum(recorded, body, attitude_noise=0.01)
+    assert np.all(stated.whole_bars > short.whole_bars)
