@@ -32,6 +32,6 @@ def __dir__() -> list[str]:
 
 
 offer("Motion.plot", "shapephase.plots.named_figures", "motion_figure")
+offer("Motion.segment_momentum", "shapephase.segments.momentum", "segment_momentum")
 offer("Motion.to_xarray", "shapephase.exports.tables", "motion_dataset")
 offer("Motion.view", "shapephase.plots.viewer", "view")
-offer("export_motion.links", "shapephase.segments.momentum", "segment_momentum")

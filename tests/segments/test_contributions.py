@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 import xml.etree.ElementTree as ET
 from functools import cache
@@ -14,6 +15,7 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 import shapephase as sp
+from shapephase.cli.main import main
 from shapephase.errors import ChartPoleError, IgnoredElementWarning, ShapeError, UnknownNameError, WrongObjectError
 from shapephase.segments import shapley_interactions, shapley_values
 from support.ball_bodies import BALLS
@@ -472,3 +474,52 @@ def test_table_json_and_csv(tmp_path):
     assert table["angle_rad"] == pytest.approx(shares.direct.shares.sum(axis=1), abs=1e-7)
     with pytest.raises(WrongObjectError, match="no direct shares"):
         sp.contributions(good, "phase").write_csv(tmp_path / "none.csv")
+
+
+DIVE = ("diver", "diver_twist", "--momentum", "0", "61.558831", "0")
+
+
+def command(capsys, *words):
+    main(["contributions", *words])
+    return capsys.readouterr().out
+
+
+def test_the_command_prints_what_the_function_finds(capsys, tmp_path):
+    data = json.loads(command(capsys, *DIVE, "--json", "--out", str(tmp_path / "s.csv")))
+    path = sp.examples.MOTIONS["diver_twist"].path()
+    shares = sp.contributions(sp.reconstruct(sp.articulated(sp.load_body("diver"), path), [0.0, 61.558831, 0.0]))
+    assert data["whole"] == pytest.approx(shares.whole, abs=1e-9)
+    assert data["shared"] == pytest.approx(shares.shared, abs=1e-8)
+    assert (tmp_path / "s.csv").read_text().startswith("time_s,angle_rad,momentum_rad,left_shoulder_abduction_rad")
+    chosen = command(capsys, *DIVE, "--groups", "left=left_*", "--of", "tilt", "--at", "0.75", "--baseline", "neutral")
+    assert "tilt at 0.75 s of trunk [deg]" in chosen
+    assert "in no group, moving in all motions: right_shoulder_abduction" in chosen
+
+
+def test_the_command_explains_the_difference_of_two_motions(capsys):
+    text = command(capsys, *DIVE, "--baseline", "five_stage_dive", "--groups", "arms=*shoulder*", "duration")
+    assert "as in the baseline" in text
+    assert "\nduration" in text
+
+
+@pytest.mark.parametrize("words", [["arms"], ["a=x*", "a=y*"], ["=x"]])
+def test_groups_that_are_no_patterns_end_the_command(words, capsys):
+    with pytest.raises(SystemExit):
+        main(["contributions", *DIVE, "--groups", *words])
+    assert "words such as arms=left_*,right_*" in capsys.readouterr().err
+
+
+def test_bars_and_areas_show_the_numbers(capsys, tmp_path):
+    good, _ = two_trials()
+    shares = sp.contributions(good, **AXES)
+    bars, areas = sp.plots.contributions_figure(shares).figure.axes
+    widths = [bar.get_width() for bar in bars.patches]
+    assert widths[:2] == pytest.approx(shares.shared / TURNS)
+    assert widths[2:] == pytest.approx((shares.whole - shares.without[:2]) / TURNS)
+    assert areas.lines[0].get_ydata()[-1] == pytest.approx(shares.whole / TURNS)
+    phase = sp.contributions(good, "phase")
+    assert len(sp.plots.contributions_figure(phase).figure.axes) == 1
+    with pytest.raises(WrongObjectError, match="no direct shares"):
+        sp.plots.plot_direct_shares(sp.plots.column_axes(), phase)
+    command(capsys, *DIVE, "--figure", str(tmp_path / "s.svg"))
+    assert (tmp_path / "s.svg").read_text().startswith("<?xml")

@@ -9,6 +9,7 @@ import pytest
 
 import shapephase as sp
 from shapephase.cli.main import main
+from shapephase.errors import TrajectoryWarning, UnknownNameError
 
 FALL = {"start": [0.0, 0.0, 2.0], "velocity": [0.5, 0.0, 9.81], "gravity": [0.0, 0.0, -9.81]}
 
@@ -62,3 +63,30 @@ def test_link_momenta_go_into_the_samples(tmp_path, capsys):
     with pytest.raises(SystemExit):
         main([*words, "--link-momenta"])
     assert "--samples" in capsys.readouterr().err
+
+
+def test_the_figure_stacks_limbs_up_to_the_whole():
+    cat = sp.load_body("cat")
+    motion = sp.reconstruct(sp.articulated(cat, sp.examples.cat_righting()), [0.01, 0.02, -0.05])
+    found = sp.segment_momentum(motion)
+    ax = sp.plots.plot_segment_momentum(sp.plots.column_axes(3.4), found)
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts == [*found.by_limb(), "whole"]
+    # Along z, where it is largest: areas above zero and below it add up to the whole.
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), -0.05, rtol=1e-12)
+    heights = [area.get_paths()[0].vertices[:, 1] for area in ax.collections]
+    low, high = min(y.min() for y in heights), max(y.max() for y in heights)
+    parts = np.array(list(found.by_limb().values()))[..., 2]
+    np.testing.assert_allclose(low, np.minimum(parts, 0.0).sum(axis=0).min(), rtol=1e-12)
+    np.testing.assert_allclose(high, np.maximum(parts, 0.0).sum(axis=0).max(), rtol=1e-12)
+    with pytest.raises(UnknownNameError, match="along"):
+        sp.plots.plot_segment_momentum(sp.plots.column_axes(3.4), sp.segment_momentum(motion, axes=[0, 1, 0]), "z")
+
+
+def test_after_a_low_pass_filter_the_noise_of_the_base_has_to_be_stated(take):
+    body = sp.load_body("cat_two_halves")
+    recorded = sp.read_recorded_motion(take, body, lowpass=10.0)
+    with pytest.warns(TrajectoryWarning, match="--attitude-noise"):
+        short = sp.segment_momentum(recorded, body)
+    stated = sp.segment_momentum(recorded, body, attitude_noise=0.01)
+    assert np.all(stated.whole_bars > short.whole_bars)

@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,6 @@ from ..arrays import Array
 from ..dynamics.moving_body import body_and_path
 from ..errors import MissingExtraError, unknown_name
 from ..files import write_whole
-from ..offers import offered
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
@@ -152,7 +151,7 @@ def _samples(
         samples["turn_errors"] = np.stack(motion.somersault_errors(at), axis=-1), "turn", "rad"
     if links:
         check_object(motion, "Motion", "motion")
-        found = offered("export_motion.links")(motion, times=at)
+        found = cast("Motion", motion).segment_momentum(at)
         samples.link_axes = tuple(f"{link}_momentum_{axis}" for link in found.links for axis in _AXES)
         samples["link_momentum"] = found.by_link.reshape(len(at), -1), "link_axis", "kg m^2/s"
     momentum = motion.momentum(at) if isinstance(motion, ForcedMotion) else motion.momentum

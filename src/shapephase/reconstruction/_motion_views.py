@@ -310,6 +310,21 @@ class MotionViews:
         """
         return offered("Motion.plot")(self, kind, ax=ax, gauge=gauge)
 
+    def segment_momentum(self: Any, times: ArrayLike | None = None) -> Any:
+        """Angular momentum about the centre of mass, whole and by link, inertial axes (`shapephase.segment_momentum`).
+
+        Parameters
+        ----------
+        times : (N,) [s]; None: 201 even times
+
+        Examples
+        --------
+        >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.3, 0.5)
+        >>> sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.005]).segment_momentum().links
+        ('front', 'rear')
+        """
+        return offered("Motion.segment_momentum")(self, times=times)
+
     def view(self: Any, **options: Any) -> Any:
         """Return a page of the motion in three dimensions, to write, show or film; a notebook displays it.
 

@@ -18,7 +18,7 @@ from ..errors import TrajectoryError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.files.smoothing import smoothed_path
-from ..shape_space.interpolation import ball_columns, neighbours_signs
+from ..shape_space.interpolation import neighbours_signs
 from ..shape_space.path_noise import path_errors, stated_noise, summed_errors, white_noise
 from ..shape_space.shape_path import ShapePath
 
@@ -27,6 +27,7 @@ _STEP = 1e-6  # [rad or m] of differences of momenta, which are smooth over a ra
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of the links' momenta: rounding of 32 operations
 _AT_ONCE = 256  # times whose derivatives are in memory together
 _TRUNCATION = 0.5  # of what a spline through every second sample differs by: at the ends a third was measured
+_LINE = 10.0  # noise levels over the whole time: three of them rms, which is motion
 _QUATERNION = 4  # columns of the base, before those of the joints
 _BASE = tuple(f"base.{part}" for part in "xyzw")  # the names make a ball joint of it, whose columns smooth alike
 
@@ -268,20 +269,24 @@ def _smoothed(body: Body, recorded: Recorded) -> _Columns:
     left = so3.transpose(so3.exp(times[:, None] * mean_turn)) @ recorded.attitude
     quaternion = neighbours_signs(so3.quat_from_matrix(left), (slice(0, _QUATERNION),))
     base, joints = _levels(recorded, quaternion)
-    paths = [(_near(times, quaternion, np.full(_QUATERNION, base), _BASE), np.full(_QUATERNION, base))]
+    near, slopes = _near(times, quaternion, np.full(_QUATERNION, base), _BASE)
+    paths = [(near, np.full(_QUATERNION, base))]
     if body.n_shape:
         known = None if recorded.path is None else stated_noise(recorded.path)
         if recorded.path is not None and known is not None:
             paths.append((recorded.path, known if recorded.noise[1] is None else joints))
+            slopes = np.append(slopes, np.zeros(body.n_shape))
         else:
-            near = _near(times, recorded.shapes, joints, body.joint_names)
+            near, more = _near(times, recorded.shapes, joints, body.joint_names)
             paths.append((near, joints))
+            slopes = np.append(slopes, more)
     curves = [path.curve(times) for path, _ in paths]
     errors = [path_errors(path, times, level) for path, level in paths]
     # Shape and rate; the third is the acceleration.
     covariance = np.concatenate([error.covariance for error in errors], axis=1)[..., :2, :2]
     bias = np.concatenate([error.bias for error in errors], axis=1)[..., :2]
     values, rates = (np.hstack([curve[which] for curve in curves]) for which in (0, 1))
+    values, rates = values - times[:, None] * slopes, rates - slopes
     missed = _truncation(times, values, rates, (*_BASE, *body.joint_names))
 
     def bars(derivative: Array, part: slice) -> Array:
@@ -316,12 +321,14 @@ def _truncation(times: Array, values: Array, rates: Array, names: tuple[str, ...
     return _TRUNCATION * np.stack([coarse[0] - values, coarse[1] - rates], axis=-1)
 
 
-def _near(times: Array, samples: Array, noise: Array, names: tuple[str, ...]) -> ShapePath:
-    """A smooth path near samples; columns that move no more than their noise are interpolated."""
-    moves = noise < samples.std(axis=0)
-    for ball in ball_columns(names):
-        moves[ball] = moves[ball].any()
-    return smoothed_path(times, samples, np.where(moves, noise, 0.0), False, names)[0]
+def _near(times: Array, samples: Array, noise: Array, names: tuple[str, ...]) -> tuple[ShapePath, Array]:
+    """A smoothing spline near samples plus lines in time, and the slopes of these (n,).
+
+    Columns that move no more than their noise get a line: smoothing, and its penalty, do not depend on lines, and
+    others are refused as noise alone.
+    """
+    slopes = np.where(noise < samples.std(axis=0), 0.0, _LINE * noise / times[-1])
+    return smoothed_path(times, samples + times[:, None] * slopes, noise, False, names)[0], slopes
 
 
 def with_noise(recorded: Recorded, base: float | None, joints: Array | None) -> Recorded:

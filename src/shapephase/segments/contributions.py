@@ -40,6 +40,7 @@ class Contributions:
     Attributes
     ----------
     of : "twist", "tilt", "somersault", "rotation", "phase", or the name of a function
+    unit : of the table and the figure, "turns" for counts, else "deg"; "" for a function
     link : whose angle it is
     at : time of the tilt [s]; the duration for other results
     groups : names of joints by group
@@ -66,6 +67,7 @@ class Contributions:
     """
 
     of: str
+    unit: str
     link: str
     at: float
     groups: dict[str, tuple[str, ...]]
@@ -90,15 +92,8 @@ class Contributions:
 
     @property
     def scale(self) -> float:
-        """Number of radians in the unit of the table: turns for counts, else degrees; 1 for functions."""
-        if self.of in ("twist", "somersault"):
-            return 2.0 * np.pi
-        return np.pi / 180.0 if self.of in ("tilt", "rotation", "phase") else 1.0
-
-    @property
-    def unit(self) -> str:
-        """Unit of the table."""
-        return {2.0 * np.pi: "turns", 1.0: ""}.get(self.scale, "deg")
+        """Number of radians in `unit`; 1 for functions."""
+        return {"turns": 2.0 * np.pi, "deg": np.pi / 180.0, "": 1.0}[self.unit]
 
     def __str__(self) -> str:
         """Return the table: held, alone and shared by group, then the direct shares."""
@@ -106,30 +101,33 @@ class Contributions:
 
     def _lines(self) -> list[str]:
         def text(value: float, bar: float = 0.0) -> str:
-            return number_with_bar(value / self.scale, bar / self.scale) if bar > 5e-4 * self.scale else (
-                f"{value / self.scale:.3f}"
-            )  # fmt: skip
+            if bar > 5e-4 * self.scale:
+                return number_with_bar(value / self.scale, bar / self.scale)
+            return f"{round(value / self.scale, 3) + 0.0:.3f}"
 
+        wide = 2 + max(
+            map(len, (*self.held_names, *(self.direct.sources if self.direct is not None else ()), "all groups"))
+        )
         when = f" at {self.at:.4g} s" if self.of == "tilt" else ""
         unit = f" [{self.unit}]" if self.unit else ""
         lines = [
             f"{self.of}{when} of {self.link}{unit}: {text(self.whole)} ± {self.error / self.scale:.0e}; with all "
             f"groups {self.baseline} {text(self.none)}",
             "",
-            f"{'':24}{'held':>12}{'alone':>12}{'shared':>18}",
+            f"{'':{wide}}{'held':>12}{'alone':>12}{'shared':>18}",
         ]  # fmt: skip
         shares = dict(zip(self.groups, zip(self.shared, self.errors, strict=True), strict=True))
         for name, without, alone in zip(self.held_names, self.without, self.alone, strict=True):
             pair = self._pairs.get(name)
             share, bar = shares[name] if pair is None else (sum(shares[n][0] for n in pair), 0.0)
-            lines.append(f"{name:24.24}{text(without):>12}{text(alone):>12}{text(share, bar):>18}")
-        lines.append(f"{'all groups':24}{text(self.none):>12}{text(self.whole):>12}{text(self.shared.sum()):>18}")
+            lines.append(f"{name:{wide}}{text(without):>12}{text(alone):>12}{text(share, bar):>18}")
+        lines.append(f"{'all groups':{wide}}{text(self.none):>12}{text(self.whole):>12}{text(self.shared.sum()):>18}")
         if self.interactions is not None and len(self.groups) > 1:
-            lines += ["", f"{'beyond both alone':24}{'pair':>12}" + ("" if self.small_loop is None else "  small loop")]
+            small = self.small_loop
+            lines += ["", "pairs, beyond what both do alone" + ("" if small is None else "; what small loops tend to")]
             for first, second, value in self._strongest():
-                small = "" if self.small_loop is None else f"{text(self.small_loop[first, second]):>12}"
-                names = f"{[*self.groups][first]} with {[*self.groups][second]}"
-                lines.append(f"{names:24}{text(value):>12}{small}")
+                own = "" if small is None else f"{text(small[first, second]):>12}"
+                lines.append(f"{text(value):>12}{own}   {[*self.groups][first]} with {[*self.groups][second]}")
         if self.direct is not None:
             shown = sorted(zip(self.direct.sources, self.direct.total, strict=True), key=lambda pair: -abs(pair[1]))
             change = text(float(self.direct.total.sum())) + " in all"
@@ -137,7 +135,7 @@ class Contributions:
                 degrees = np.degrees(self.direct.largest_tilt)
                 change += f", largest tilt {degrees:.1f} deg at {self.direct.tilt_time:.3g} s"
             lines += ["", f"direct, along the motion: {change}"]
-            lines += [f"  {name:22.22}{text(value):>12}" for name, value in shown if abs(value) > 0.0]
+            lines += [f"{name:{wide}}{text(value):>12}" for name, value in shown if abs(value) > 0.0]
         if self.rest:
             lines += ["", f"in no group, moving in all motions: {', '.join(self.rest)}"]
         if self.steep:
@@ -252,12 +250,14 @@ def contributions(
         direct = direct_shares(DirectRates(motion, chart, name, axis, tree.joints), np.ravel(sampled), instant)
     measure = _Measure(name, function, chart, axis, instant / motion.duration)
     values = _Values(held, measure)
-    return _shares(values, grouped, direct, _Choice(name, baseline, instant, chart, orders, seed))
+    unit = "" if function is not None else "turns" if name in ("twist", "somersault") else "deg"
+    return _shares(values, grouped, direct, _Choice(name, unit, baseline, instant, chart, orders, seed))
 
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
     of: str
+    unit: str
     baseline: Any
     at: float
     chart: LinkChart | None
@@ -292,6 +292,7 @@ def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, 
     )  # fmt: skip
     return Contributions(
         of=choice.of,
+        unit=choice.unit,
         link=choice.chart.link if choice.chart is not None else held.body.link_names[0],
         at=choice.at,
         groups=grouped.joints | {name: () for name in names if name not in grouped.joints},

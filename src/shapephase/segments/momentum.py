@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -18,7 +19,7 @@ from ..body.link_motions import link_motions
 from ..deformation.deformation import articulated
 from ..display import short_repr
 from ..dynamics.moving_body import needed_body_and_path
-from ..errors import ShapeError, TrajectoryError, WrongObjectError
+from ..errors import ShapeError, TrajectoryError, TrajectoryWarning, WrongObjectError
 from ..letters import value_text
 from ..reconstruction import AthleteAxes
 from ..reconstruction.motion_record import write_table
@@ -268,10 +269,14 @@ def segment_momentum(
     ShapeError, UnknownNameError, TrajectoryError
         For arguments that do not fit, a recording without the attitude of the base, or of less than eight samples.
 
+    Warns
+    -----
+    TrajectoryWarning
+        For a recording that was low-pass filtered, without `attitude_noise`.
+
     Notes
     -----
-    Bars of a recording take its noise to be white, and the body's masses to be right. What a low-pass filter took off
-    the noise of the base is no longer in the samples: give `attitude_noise`.
+    Bars of a recording take its noise to be white, and the body's masses to be right.
 
     Examples
     --------
@@ -293,6 +298,13 @@ def segment_momentum(
         if isinstance(motion, RecordedMotion):
             check_object(body, "Body", "body")
             recorded, given = _of_recording(motion), motion.flight is not None
+            if motion.smoothing is not None and motion.smoothing.low_pass is not None and attitude_noise is None:
+                warnings.warn(
+                    "what the low-pass filter took off the noise of the base is no longer in its samples, so that bars "
+                    "are too short; give the noise before the filter: attitude_noise (--attitude-noise 0.2deg)",
+                    TrajectoryWarning,
+                    stacklevel=2,
+                )
         elif kind == "FloatingTrajectory":
             check_object(body, "Body", "body")
             recorded, given = _of_trajectory(motion), False
