@@ -100,7 +100,7 @@ def test_faults_of_files_are_named(motion: Flown, tmp_path: Path):
     rows = np.column_stack([motion.times, motion.qpos[:, 7:]])
     header = ",".join(["time", *motion.joint_names])
     np.savetxt(tmp_path / "run.csv", rows, delimiter=",", header=header, comments="")
-    with pytest.raises(sp.errors.TrajectoryError, match="attitude of the base"):
+    with pytest.raises(sp.errors.TrajectoryError, match="attitude"):
         sp.read_trajectory(tmp_path / "run.csv", body)
 
 
@@ -115,5 +115,5 @@ def test_joints_that_are_in_no_unit_of_ours_are_asked_for_theirs(field):
         "joint_rates": np.zeros((count, 1)),
     }
     given[field] = np.linspace(0.0, 2e6, count)[:, None]
-    with pytest.raises(TrajectoryError, match=rf"{field}: sample 8 has 2e\+06; .*which unit.*millimetres"):
+    with pytest.raises(TrajectoryError, match=rf"{field}.*millimetres"):
         sp.FloatingTrajectory(**given)

@@ -103,14 +103,14 @@ def test_flights_are_counted_in_time(two_jumps, tmp_path):
     for flight, ends in ((first, (0.4, 0.9)), (second, (1.5, 2.2))):
         np.testing.assert_allclose([flight.first_time, flight.last_time], ends, rtol=0.0, atol=0.07)
         assert flight.all_times == ((first.first_time, first.last_time), (second.first_time, second.last_time))
-    with pytest.raises(TrajectoryError, match=r"no flight number 3.*--flight auto:2"):
+    with pytest.raises(TrajectoryError, match="auto:2"):
         sp.read_recorded_motion(two_jumps, DIVER, flight="auto:3")
     two_jumps.to_csv(tmp_path / "jumps.csv", index=False)
     trajectory = sp.read_trajectory(tmp_path / "jumps.csv", DIVER)
     for number, flight in ((1, first), (2, second)):
         (run,) = sp.audit(DIVER, trajectory, flight=f"auto:{number}").runs
         assert (run.first_time, run.last_time) == pytest.approx((flight.first_time, flight.last_time), abs=0.03)
-    with pytest.raises(TrajectoryError, match="no flight number 3"):
+    with pytest.raises(TrajectoryError, match="number 3"):
         sp.audit(DIVER, trajectory, flight="auto:3")
 
 

@@ -18,7 +18,7 @@ from ..arrays import Array
 from ..display import short_repr
 from ._observation import Observation
 from ._residuals import Residuals, fitted_hypothesis, leftover
-from .hypothesis import FittedValue, Hypothesis, Leftover
+from .hypothesis import FittedValue, Hypothesis, Leftover, milliseconds
 
 _LOWEST = 0.3  # order below which it is none: halving the step then changes next to nothing
 _APART = 1.05  # ratio of two steps from which they tell an order
@@ -92,7 +92,7 @@ def step_hypothesis(found: StepOrder, without: Leftover, late: float) -> Hypothe
     uneven = max(abs(each - found.order) for each in found.between)
     if found.order < _LOWEST or uneven > _UNEVEN or found.off_law > _BELONGS:
         return None
-    steps = ", ".join(f"{1e3 * step:.4g}" for step in found.steps)
+    steps = ", ".join(milliseconds(step) for step in found.steps)
     shares = np.array([found.off_law**2, found.off_law**2, late])
     return fitted_hypothesis(
         "integration step",

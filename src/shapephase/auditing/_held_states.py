@@ -17,20 +17,17 @@ from scipy.signal import savgol_coeffs, savgol_filter
 from ..arrays import Array
 from ._noise import TrajectoryNoise, continuous, estimated_noise, white_noise
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import FittedValue, Hypothesis
+from .hypothesis import FittedValue, Hypothesis, milliseconds
 
 _ORDER = 6  # of differences: a motion of 11 rad/s at every 20 ms keeps 1e-4 of itself
 _LONGEST_PATTERN = 40  # samples: 2 ms at 60 Hz have 3, 1/240 s at 7 ms has 25
-_MOST_STEPS = 100  # between samples: 0.3 ms at 30 Hz
 _BARS = 3.0  # standard deviations within which a rounder step is taken
 _ROUND = 1e-4  # s
 _REPEATS = 3  # of a pattern within the samples
 _EVEN = 1e-3  # of the time between samples: logs with uneven times have those of the states
 _LEFT = 0.5  # of the squares of differences; noise alike in m coordinates keeps 1 - 1/m of them at least
 _BLOWS = 20.0  # times the median of squares: samples at which something struck
-_FEWEST_STATES = 8
 _OF_JOINTS = ("joints", "joint_rates")
-_UNITS = 16  # columns of unit noise whose median is taken
 _SLOPE = 9  # samples of a slope, over which steps up to four times the time between samples are smooth
 _AT_REST = 1e-9  # [rad or m] range of a coordinate that does not move
 _SLACK = 1e-3  # relative gain of a longer pattern over a shorter one that chance does not bring
@@ -52,15 +49,15 @@ def held_states(run: FloatingTrajectory) -> tuple[FloatingTrajectory, Hypothesis
     even, noise = _at_even_times(states)
     states = replace(even if run.joint_rates is None else states, noise=run.noise or noise)
     hypothesis = Hypothesis(
-        name=f"states held between steps of {1e3 * step:.4g} ms",
+        name=f"states held between steps of {milliseconds(step)} ms",
         kind="time",
         square=0.0,
         left_over=0.0,
         parameters=2,
         share=0.0,
         values={"step between states": FittedValue(value=step, bar=bar, unit="s")},
-        remark=f"{run.name}: samples every {1e3 * spacing:.4g} ms repeat the last state, late by up to "
-        f"{1e3 * float(late.max()):.3g} ms; log the times of the states",
+        remark=f"{run.name}: samples every {milliseconds(spacing)} ms repeat the last state, late by up to "
+        f"{milliseconds(float(late.max()), 3)} ms; log the times of the states",
     )
     return states, hypothesis
 
@@ -80,14 +77,14 @@ def _at_even_times(states: FloatingTrajectory) -> tuple[FloatingTrajectory, Traj
     def between(values: Array) -> Array:
         return np.asarray(make_interp_spline(states.times, values, k=5)(times))
 
-    unit = np.random.default_rng(0).normal(size=(len(times), _UNITS))
+    unit = np.random.default_rng(0).normal(size=(len(times), _SLOPE))
     kept = float(np.median(white_noise(between(unit)[:, :, None], 1)))
     even = replace(states, times=times, **{name: between(values) for name, values in _samples(states).items()})
-    noise: dict[str, Any] = {
+    scaled: dict[str, Any] = {
         name: tuple(np.divide(value, kept).tolist()) if name in _OF_JOINTS else value / kept
         for name, value in asdict(estimated_noise(even)).items()
     }
-    return even, TrajectoryNoise(**noise)
+    return even, TrajectoryNoise(**scaled)
 
 
 def _repeats(run: FloatingTrajectory) -> tuple[float, Array, float] | None:
@@ -96,7 +93,7 @@ def _repeats(run: FloatingTrajectory) -> tuple[float, Array, float] | None:
     new = np.concatenate([[True], np.any(np.diff(values, axis=0) != 0.0, axis=1)])
     first = np.flatnonzero(new)[1:]
     lengths = np.diff(first)
-    if len(first) < _FEWEST_STATES or lengths.min() < 2 or np.ptp(lengths) > 1:
+    if len(first) < _SLOPE or lengths.min() < 2 or np.ptp(lengths) > 1:
         return None
     count = np.arange(len(first))
     step = float(np.polyfit(count, run.times[first], 1)[0])
@@ -144,7 +141,7 @@ def _pattern(run: FloatingTrajectory, spacing: float) -> tuple[float, Array, flo
     amount /= max(1.0 - noise / float(weight.sum()), 0.5)
     bar = float(np.sqrt(left / (count * strength)))
     # T / h = p / q, where p is the turn and a number of whole q; simulators have round steps.
-    steps = spacing * length / (turn + length * np.arange(_MOST_STEPS))
+    steps = spacing * length / (turn + length * np.arange(len(values)))
     off = np.abs(steps - amount)
     near = np.flatnonzero(off <= max(_BARS * bar, float(off.min())))
     uneven = np.abs(steps / _ROUND - np.round(steps / _ROUND)) > _EVEN

@@ -45,7 +45,7 @@ class _Reading:
     def noise(self, level: TrajectoryNoise, turning: Array) -> TrajectoryNoise:
         """Noise of the samples read in this way: angles, rates of joints and of the base may be in degrees."""
         angles, rates, base = self.degrees
-        factor = np.where(turning, np.pi / 180.0, 1.0)
+        factor = np.where(turning, np.radians(1.0), 1.0)
         return replace(
             level,
             joints=tuple((np.array(level.joints) * factor).tolist()) if angles else level.joints,
@@ -167,7 +167,7 @@ def _inverse(run: FloatingTrajectory) -> FloatingTrajectory:
 
 
 def _scaled(run: FloatingTrajectory, turning: Array, angles: bool, rates: bool, base: bool) -> FloatingTrajectory:
-    factor = np.where(turning, np.pi / 180.0, 1.0)
+    factor = np.where(turning, np.radians(1.0), 1.0)
     return replace(
         run,
         shapes=run.shapes * factor if angles else run.shapes,

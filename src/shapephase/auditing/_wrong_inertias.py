@@ -26,6 +26,7 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 _NARROWER = 0.95
 """Largest ratio of a principal moment to the sum of the other two: what is fitted is known to some per cent."""
 _FARTHEST = 3.0  # radii of gyration of the whole body: no link's centre is farther from where it was
+_PERCENT = 100.0
 _MOST_TIMES = 100.0  # what a link weighs, of what it weighed
 _STILL = 1e-6  # [rad or m] Range of a joint that is at rest
 _BY_NOISE = 8.0  # standard deviations of the noise that its range is, too
@@ -189,8 +190,8 @@ def _directions(body: Body, parts: Sequence[_Part]) -> list[_Direction]:
             continue
         link = parts[frame].name_of(frame)
         inertia = chain.inertias[frame]
-        found.append(_Direction(f"mass of {link}", "mass", "%", frame, mass, none, zero, 100.0))
-        found.append(_Direction(f"mass and inertia of {link}", "both", "%", frame, mass, none, inertia, 100.0))
+        found.append(_Direction(f"mass of {link}", "mass", "%", frame, mass, none, zero, _PERCENT))
+        found.append(_Direction(f"mass and inertia of {link}", "both", "%", frame, mass, none, inertia, _PERCENT))
         for axis in range(3):
             label = f"{_AXES[axis]}"
             found.append(
@@ -294,7 +295,7 @@ def _whole_part(
     # What the samples leave open is not bounded by them.
     open_sides = np.abs(right[~kept]).max(axis=0, initial=0.0) > _OPEN
     bars[open_sides] = np.inf
-    values = {"mass": FittedValue(value=100.0 * numbers[0] / mass, bar=100.0 * bars[0] / mass, unit="%")}
+    values = {"mass": FittedValue(value=_PERCENT * numbers[0] / mass, bar=_PERCENT * bars[0] / mass, unit="%")}
     for axis in range(3):
         values[f"centre {_AXES[axis]}"] = FittedValue(
             value=float(numbers[1 + axis]), bar=float(bars[1 + axis]), unit="m"

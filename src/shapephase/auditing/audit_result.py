@@ -14,7 +14,7 @@ from ._airborne import AirbornePart
 from ._consistency import RateAgreement
 from ._engine_faults import StepOrder
 from ._noise import TrajectoryNoise
-from .hypothesis import EXPLAINS, Hypothesis
+from .hypothesis import EXPLAINS, Hypothesis, milliseconds, percent
 
 _MOST_SHOWN = 8  # hypotheses in a table
 
@@ -108,9 +108,9 @@ class RunAudit:
         if not np.isfinite(part):
             found = "no angular momentum"
         elif self.right:
-            found = f"conserved within {100.0 * part:.2g} % of itself"
+            found = f"conserved within {percent(part)} of itself"
         else:
-            found = f"not conserved, changes by {100.0 * part:.2g} % of itself"
+            found = f"not conserved, changes by {percent(part)} of itself"
         if self.airborne.acceleration is not None:
             found += f", falls with {float(np.linalg.norm(self.airborne.acceleration)):.3g} m/s^2"
         return found
@@ -199,8 +199,8 @@ class Audit:
         shown = "; ".join(recorded)
         if not self.wrong and not self.right:
             least = max(run.least_drift for run in self.runs if not run.decided)
-            hidden = f"the samples hide changes of the momentum below {100.0 * least:.2g} %"
-            return "; ".join([*recorded, f"cannot tell: {hidden}, the tolerance is {100.0 * self.tolerance:.2g} %"])
+            hidden = f"the samples hide changes of the momentum below {percent(least)}"
+            return "; ".join([*recorded, f"cannot tell: {hidden}, the tolerance is {percent(self.tolerance)}"])
         if self.right:
             within = f"right within noise or {self.tolerance:.2g}"
             return f"{shown}: {within}, as 1 cm of wander leaves it" if recorded else within
@@ -254,7 +254,7 @@ class Audit:
             lines += [
                 "",
                 "what explains it, by what it leaves over, of all and in units of the noise; * leaves no more than "
-                f"{100.0 * EXPLAINS:.0f} % or noise:",
+                f"{percent(EXPLAINS)} or noise:",
             ]
             names = {one.name for one in self.cause}
             width = max(len(one.name) for one in self.hypotheses[:_MOST_SHOWN])
@@ -262,7 +262,7 @@ class Audit:
                 mark = "*" if one.name in names else " "
                 rest = "; ".join(part for part in (one.text, one.remark) if part)
                 lines.append(
-                    f" {mark} {one.name:<{width}}  {_percent(one.share):>8}  {one.left_over:>8.2g}  {rest}".rstrip()
+                    f" {mark} {one.name:<{width}}  {percent(one.share):>8}  {one.left_over:>8.2g}  {rest}".rstrip()
                 )
         return "\n".join([*lines, "", *self.notes, "", self.verdict])
 
@@ -281,7 +281,7 @@ def _run_lines(run: RunAudit) -> list[str]:
         pull += f" ± {run.fall_bar:.2g}" if run.fall_bar is not None else ""
         found.append(f"  fall               {pull} m/s^2, off by {run.fall_off:.2g} m{_by_noise(run.fall_ratio)}")
     if run.agreement is not None:
-        late = f", late by {1e3 * run.agreement.late:.3g} ms" if run.agreement.ratio > 1.0 else ""
+        late = f", late by {milliseconds(run.agreement.late, 3)} ms" if run.agreement.ratio > 1.0 else ""
         found.append(
             f"  rates              off those of the configurations by {run.agreement.mismatch:.2g}{late}"
             f"{_by_noise(run.agreement.ratio)}"
@@ -292,16 +292,12 @@ def _run_lines(run: RunAudit) -> list[str]:
     return found
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
-
-
 def _by_noise(ratio: float) -> str:
     return ", as noise explains" if ratio <= 1.0 else ""
 
 
 def _order_lines(order: StepOrder) -> list[str]:
     pairs: Mapping[float, float] = dict(zip(order.steps, order.drifts, strict=True))
-    shown = ", ".join(f"{drift:.2g} at {1e3 * step:.4g} ms" for step, drift in pairs.items())
+    shown = ", ".join(f"{drift:.2g} at {milliseconds(step)} ms" for step, drift in pairs.items())
     between = ", ".join(f"{each:.2f}" for each in order.between)
     return ["", f"drift of the momentum by the step: {shown}; order {order.order:.2f} (from step to step {between})"]

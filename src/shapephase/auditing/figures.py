@@ -17,7 +17,7 @@ from ..plots.plot_style import BLACK, BLUE, COLUMN, GREY, SERIES, SKY, SMALL, ax
 from ._observation import Observation
 from ._residuals import Residuals
 from .audit_result import Audit, RunAudit
-from .hypothesis import Hypothesis
+from .hypothesis import Hypothesis, milliseconds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -217,7 +217,7 @@ def _causes(ax: Axes, found: Audit) -> None:
 
 
 def _named(name: str, step: float, runs: int) -> str:
-    return f"{name}, {1e3 * step:.4g} ms" if runs > 1 else name
+    return f"{name}, {milliseconds(step)} ms" if runs > 1 else name
 
 
 def _styles(count: int) -> list[dict[str, Any]]:

@@ -12,6 +12,7 @@ from ..arrays import Array
 from ..display import short_repr
 from ..plain_data import plain
 
+_HUNDRED, _THOUSAND = 100.0, 1000.0
 AND = ", and "  # between the names of two causes that are fitted together
 _STRONG = 10.0  # difference of two criteria that is very strong evidence (Kass and Raftery 1995)
 _FEWEST = 3.0  # effective numbers of a single cosine
@@ -220,3 +221,13 @@ class Evidence:
         assert left is not None
         most = np.maximum(_NOISE * self.colour * left.counts, np.maximum(share, self.allowed) * self.without.squares)
         return bool(np.all(left.squares <= most))
+
+
+def percent(share: float) -> str:
+    """Share as text."""
+    return f"{_HUNDRED * share:.2g} %"
+
+
+def milliseconds(time: float, digits: int = 4) -> str:
+    """Time, in seconds, as text in milliseconds."""
+    return f"{_THOUSAND * time:.{digits}g}"

@@ -21,7 +21,7 @@ from ._residuals import residuals
 from .audit_result import Audit, RunAudit
 from .figures import fall_figure, left_over_figures, momentum_figure
 from .floating_trajectory import FloatingTrajectory
-from .hypothesis import EXPLAINS, Hypothesis
+from .hypothesis import EXPLAINS, Hypothesis, percent
 from .trajectory_audit import thinned
 
 _MOST_ROWS = 20  # hypotheses of the table; the record has all
@@ -68,7 +68,7 @@ def audit_page(body: Body, trajectories: FloatingTrajectory | Sequence[FloatingT
         runs=[(run.name, _facts(run)) for run in found.runs],
         hypotheses=[_row(hypothesis, found) for hypothesis in found.hypotheses[:_MOST_ROWS]],
         others=max(len(found.hypotheses) - _MOST_ROWS, 0),
-        enough=f"{100.0 * EXPLAINS:.0f} %",
+        enough=percent(EXPLAINS),
         notes=found.notes,
     )
 
@@ -89,7 +89,7 @@ def _left_over(body: Body, trajectories: Sequence[FloatingTrajectory], found: Au
     flown = thinned(trajectories[0].part(part.first, part.past))
     before = residuals(body, observed(body, flown, found.runs[0].noise))
     for hypothesis, figure in left_over_figures(found, before):
-        yield _shown(figure, f"{hypothesis.name}: {100.0 * hypothesis.share:.2g} % left over")
+        yield _shown(figure, f"{hypothesis.name}: {percent(hypothesis.share)} left over")
 
 
 def _shown(figure: Any, caption: str) -> dict[str, str]:
@@ -128,7 +128,7 @@ def _row(hypothesis: Hypothesis, found: Audit) -> tuple[str, ...]:
     return (
         "named" if named else "",
         hypothesis.name,
-        f"{100.0 * hypothesis.share:.2g} %",
+        percent(hypothesis.share),
         f"{hypothesis.left_over:.2g}",
         "; ".join(text for text in (hypothesis.text, hypothesis.remark) if text),
     )
