@@ -16,6 +16,7 @@ from ..arguments import check_mapping
 from ..arrays import Array
 from ..body.body import Body
 from ..body.link_motions import link_motions
+from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..letters import value_text
 
@@ -282,12 +283,19 @@ class JointGroups:
     joints : names of joints, by name of the group
     rest : joints in no group
     pairs : mirrored groups by the name of both
+
+    Examples
+    --------
+    >>> sp.segments.joint_groups(sp.load_body("diver")).pairs
+    {'arms': ('left arm', 'right arm')}
     """
 
     columns: dict[str, tuple[int, ...]]
     joints: dict[str, tuple[str, ...]]
     rest: tuple[str, ...]
     pairs: dict[str, tuple[str, str]]
+
+    __repr__ = short_repr
 
 
 def joint_groups(body: Body, groups: str | Mapping[str, str | Iterable[str]] = "limbs") -> JointGroups:
