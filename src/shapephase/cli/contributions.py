@@ -82,8 +82,8 @@ def contributions_command(
     Direct: what each did along the motion. Held: the motion again with a limb held. Shared: what a limb adds, averaged
     over all orders in which limbs join (Shapley).
     """
-    from ..segments.contributions import contributions
     from ..segments.held_motions import BASELINES
+    from ..segments.limb_contributions import contributions
     from ..segments.limbs import groups_of_words
     from . import motion as motions
     from .texts.recording_text import recording_data

@@ -12,7 +12,7 @@ from itertools import pairwise, takewhile
 
 import numpy as np
 
-from ..arguments import check_mapping
+from ..arguments import check_mapping, check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.link_motions import link_motions
@@ -320,6 +320,7 @@ def joint_groups(body: Body, groups: str | Mapping[str, str | Iterable[str]] = "
     >>> sp.segments.joint_groups(sp.load_body("satellite"), {"arm": "arm_*"}).rest
     ('boom_extension', 'left_wing_drive', 'right_wing_drive', 'wheel_spin')
     """
+    check_object(body, "Body", "body")
     tree = SegmentTree(body)
     if isinstance(groups, str):
         if groups not in GROUPINGS:
