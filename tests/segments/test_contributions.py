@@ -509,6 +509,14 @@ def test_the_command_explains_the_difference_of_two_motions(capsys):
     assert "\nduration" in text
 
 
+def test_axes_that_no_names_of_links_give_are_given_to_the_command(capsys):
+    with pytest.raises(SystemExit):
+        main(["contributions", "cat_two_halves", "kane_scher"])
+    assert "lateral" in capsys.readouterr().err
+    text = command(capsys, "cat_two_halves", "kane_scher", "--lateral", "y", "--longitudinal", "x")
+    assert "waist_pitch with waist_yaw" in text
+
+
 @pytest.mark.parametrize("words", [["arms"], ["a=x*", "a=y*"], ["=x"]])
 def test_groups_that_are_no_patterns_end_the_command(words, capsys):
     with pytest.raises(SystemExit):

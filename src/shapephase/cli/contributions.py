@@ -63,6 +63,22 @@ def contributions_command(
     link: Annotated[
         str | None, option("Link whose turn is explained; default: the trunk. For example `--link pelvis`.")
     ] = None,
+    lateral: Annotated[
+        str | None,
+        option(
+            "Axis from the right side to the left, x to -z in axes of the link; default: links named left and right. "
+            "For example `--lateral y`.",
+            allow_leading_hyphen=True,
+        ),
+    ] = None,
+    longitudinal: Annotated[
+        str | None,
+        option(
+            "Axis from the feet to the head, x to -z in axes of the link; default: that of least inertia. For example "
+            "`--longitudinal z`.",
+            allow_leading_hyphen=True,
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         option("Write the direct shares in time, in rad, to this CSV file; for example `--out shares.csv`."),
@@ -99,7 +115,18 @@ def contributions_command(
         if baseline not in BASELINES:
             other = motions.flight(body, baseline, start, recording, tolerance, work.watch, floating=floating).motion
         work.begin("holding groups")
-        shares = contributions(flown.motion, of, groups=chosen, baseline=other, at=at, about=about, link=link)
+        shares = contributions(
+            flown.motion,
+            of,
+            groups=chosen,
+            baseline=other,
+            at=at,
+            about=about,
+            link=link,
+            lateral=lateral,
+            longitudinal=longitudinal,
+            up=recording.up,
+        )
         if out is not None:
             shares.write_csv(out)
             say_written(out)
