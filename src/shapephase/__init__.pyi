@@ -84,7 +84,7 @@ from .reconstruction.recorded_base import BaseDifference, base_difference
 from .rigid_body import geodesics
 from .rigid_body.euler_top import EulerTop
 from .rigid_body.gyrostat import Gyrostat
-from .segments.contributions import Contributions, contributions
+from .segments.limb_contributions import Contributions, contributions
 from .segments.momentum import SegmentMomentum, segment_momentum
 from .shape_space.connection import (
     HorizontalLift,

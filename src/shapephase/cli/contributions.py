@@ -63,6 +63,22 @@ def contributions_command(
     link: Annotated[
         str | None, option("Link whose turn is explained; default: the trunk. For example `--link pelvis`.")
     ] = None,
+    lateral: Annotated[
+        str | None,
+        option(
+            "Axis from the right side to the left, x to -z in axes of the link; default: links named left and right. "
+            "For example `--lateral y`.",
+            allow_leading_hyphen=True,
+        ),
+    ] = None,
+    longitudinal: Annotated[
+        str | None,
+        option(
+            "Axis from the feet to the head, x to -z in axes of the link; default: that of least inertia. For example "
+            "`--longitudinal z`.",
+            allow_leading_hyphen=True,
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         option("Write the direct shares in time, in rad, to this CSV file; for example `--out shares.csv`."),
@@ -82,8 +98,8 @@ def contributions_command(
     Direct: what each did along the motion. Held: the motion again with a limb held. Shared: what a limb adds, averaged
     over all orders in which limbs join (Shapley).
     """
-    from ..segments.contributions import contributions
     from ..segments.held_motions import BASELINES
+    from ..segments.limb_contributions import contributions
     from ..segments.limbs import groups_of_words
     from . import motion as motions
     from .texts.recording_text import recording_data
@@ -99,7 +115,18 @@ def contributions_command(
         if baseline not in BASELINES:
             other = motions.flight(body, baseline, start, recording, tolerance, work.watch, floating=floating).motion
         work.begin("holding groups")
-        shares = contributions(flown.motion, of, groups=chosen, baseline=other, at=at, about=about, link=link)
+        shares = contributions(
+            flown.motion,
+            of,
+            groups=chosen,
+            baseline=other,
+            at=at,
+            about=about,
+            link=link,
+            lateral=lateral,
+            longitudinal=longitudinal,
+            up=recording.up,
+        )
         if out is not None:
             shares.write_csv(out)
             say_written(out)

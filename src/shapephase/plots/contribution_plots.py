@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arguments import check_object
 from ..errors import WrongObjectError
-from ..segments.contributions import Contributions
+from ..segments.limb_contributions import Contributions
 from ._joint_styles import plain_text
 from .plot_style import (
     BLACK,

@@ -1,6 +1,6 @@
 from .coalitions import shapley_interactions, shapley_values
-from .contributions import Contributions, contributions
 from .direct_shares import DirectShares
+from .limb_contributions import Contributions, contributions
 from .limbs import JointGroups, joint_groups
 from .momentum import FlightMomentum, Normalisation, SegmentMomentum, segment_momentum
 

@@ -12,10 +12,11 @@ from itertools import pairwise, takewhile
 
 import numpy as np
 
-from ..arguments import check_mapping
+from ..arguments import check_mapping, check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.link_motions import link_motions
+from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..letters import value_text
 
@@ -282,12 +283,19 @@ class JointGroups:
     joints : names of joints, by name of the group
     rest : joints in no group
     pairs : mirrored groups by the name of both
+
+    Examples
+    --------
+    >>> sp.segments.joint_groups(sp.load_body("diver")).pairs
+    {'arms': ('left arm', 'right arm')}
     """
 
     columns: dict[str, tuple[int, ...]]
     joints: dict[str, tuple[str, ...]]
     rest: tuple[str, ...]
     pairs: dict[str, tuple[str, str]]
+
+    __repr__ = short_repr
 
 
 def joint_groups(body: Body, groups: str | Mapping[str, str | Iterable[str]] = "limbs") -> JointGroups:
@@ -312,6 +320,7 @@ def joint_groups(body: Body, groups: str | Mapping[str, str | Iterable[str]] = "
     >>> sp.segments.joint_groups(sp.load_body("satellite"), {"arm": "arm_*"}).rest
     ('boom_extension', 'left_wing_drive', 'right_wing_drive', 'wheel_spin')
     """
+    check_object(body, "Body", "body")
     tree = SegmentTree(body)
     if isinstance(groups, str):
         if groups not in GROUPINGS:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object, times_argument, vector_argument, whole_argument
+from ..arguments import check_object, number_argument, times_argument, vector_argument, whole_argument
 from ..arrays import Array, lock_arrays, read_only
 from ..display import number_with_bar, short_repr
 from ..errors import ShapeError, WrongObjectError, unknown_name
@@ -234,8 +234,8 @@ def contributions(
     held = HeldMotions(motion, grouped.columns, baseline, conditions, grouped.rest)
     function = of if callable(of) else None
     name = getattr(of, "__name__", "function") if callable(of) else of
-    if function is None and name not in (*ANGLES, "rotation", *_WITHOUT_JOINTS):
-        raise unknown_name("result", str(of), (*ANGLES, "rotation", *_WITHOUT_JOINTS))
+    if function is None and (not isinstance(name, str) or name not in (*ANGLES, "rotation", *_WITHOUT_JOINTS)):
+        raise unknown_name("result", of, (*ANGLES, "rotation", *_WITHOUT_JOINTS))
     if name == "phase" and not motion.momentum.any():
         raise WrongObjectError("of: without momentum there is no Montgomery phase; take 'twist' or 'rotation'")
     direct, chart, instant = None, None, motion.duration
@@ -327,7 +327,10 @@ class _Measure:
     def __call__(self, motion: Motion) -> tuple[float, float, float]:
         error = float(motion.error_estimate)
         if self.function is not None:
-            value = self.function(motion)
+            try:
+                value = self.function(motion)
+            except (TypeError, AttributeError) as error:
+                raise WrongObjectError(f"of: the function {self.of} does not take a Motion: {error}") from error
             if not isinstance(value, int | float | np.number) or not np.isfinite(value):
                 raise ShapeError(f"of: the function must return a finite number for a motion, got {value_text(value)}")
             return float(value), error, 0.0
@@ -391,7 +394,7 @@ def _instant(motion: Motion, chart: LinkChart, at: str | float) -> float:
             return 0.5 * motion.duration
         left, right = instants[first - 1], instants[first]
         return float(left + (right - left) * done[first - 1] / (done[first - 1] - done[first]))
-    return float(times_argument(at, motion.duration))
+    return float(times_argument(number_argument(at, "at", "s"), motion.duration))
 
 
 def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
