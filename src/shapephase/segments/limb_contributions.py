@@ -28,7 +28,7 @@ from .limbs import CONDITIONS, JointGroups, SegmentTree, joint_groups
 
 MOST_EXACT = 10  # groups of which all subsets are computed: 1,024 motions
 _ROWS = 201  # times of the direct shares, as many as of other tables
-_WITHOUT_JOINTS = ("phase",)  # results without a rate by joint
+RESULTS = (*ANGLES, "rotation", "phase")
 
 Result = Callable[[Motion], float]
 
@@ -234,13 +234,13 @@ def contributions(
     held = HeldMotions(motion, grouped.columns, baseline, conditions, grouped.rest)
     function = of if callable(of) else None
     name = getattr(of, "__name__", "function") if callable(of) else of
-    if function is None and (not isinstance(name, str) or name not in (*ANGLES, "rotation", *_WITHOUT_JOINTS)):
-        raise unknown_name("result", of, (*ANGLES, "rotation", *_WITHOUT_JOINTS))
-    if name == "phase" and not motion.momentum.any():
+    if not callable(of) and (not isinstance(of, str) or of not in RESULTS):
+        raise unknown_name("result", of, RESULTS)
+    if function is None and name == "phase" and not motion.momentum.any():
         raise WrongObjectError("of: without momentum there is no Montgomery phase; take 'twist' or 'rotation'")
     direct, chart, instant = None, None, motion.duration
     axis = np.zeros(3)
-    if function is None and name not in _WITHOUT_JOINTS:
+    if function is None and name != "phase":
         chart = LinkChart.of(motion, tree.trunk if link is None else link, name in ANGLES, **axes)
         if name == "rotation":
             axis = _axis(motion, about)
