@@ -84,11 +84,11 @@ def audit_command(
     loaded = body_argument(body, floating)
     each = given if len(given) == len(trajectories) else given * len(trajectories)
     options: dict[str, Any] = vars(reading) | {"timestep": reading.step, "names": column_names(reading.names) or None}
-    del options["step"]
+    del options["step"], options["integrator_step"]
     with steps(2) as work:
         work.begin("reading")
         runs = [
-            read_trajectory(file, loaded, **options | {"integrator_step": step})
+            read_trajectory(file, loaded, integrator_step=step, **options)
             for file, step in zip(trajectories, each, strict=True)
         ]
         work.begin("auditing")
