@@ -57,11 +57,15 @@ NEEDS = re.compile(
 """A message such as "MATLAB files need pymatreader and h5py; install them with: pip install 'shapephase[data]'"."""
 
 
+BY_LIBRARY = re.compile(r"by_library\(\w+(?:\(\w+\))?, f?\"[^\"]*\", \"([^\"]+)\"")
+"""Packages of readers, whose message names the extra `data`."""
+
+
 def test_messages_name_the_extra_that_brings_the_package():
     checked = set()
     for file in (ROOT / "src").rglob("*.py"):
         text = re.sub(r"\"\s+f?\"", "", file.read_text(encoding="utf-8"))
-        for names, extra in NEEDS.findall(text):
+        for names, extra in (*NEEDS.findall(text), *((names, "data") for names in BY_LIBRARY.findall(text))):
             for name in names.split(" and "):
                 brought = {"zarr": "study", "dask": "study"}.get(name.lower()) or extra
                 assert name.lower() in packages(brought), (file, name, extra)

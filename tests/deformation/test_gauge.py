@@ -611,7 +611,7 @@ def test_with_zero_momentum_the_body_is_at_rest_in_the_horizontal_gauge(loop):
 def test_frames_of_an_integrated_lift(loop):
     """The same U and rates as the horizontal gauge, from the interpolant alone."""
     lift = stepped_rotation(loop.sampler(), np.zeros((1, 3)), 1e-12)
-    frame, omega = lift.rotation(T)[0], -lift.inverse_and_drift(T)[1]
+    frame, omega = lift.rotation(T)[0], -lift.interpolant.inverse_and_drift(T)[1]
     np.testing.assert_allclose(frame, sp.horizontal_gauge(loop).frame(T), atol=3e-12, rtol=0)
     drift = np.linalg.solve(loop.inertia(T), loop.internal_momentum(T)[..., None])[..., 0]
     np.testing.assert_allclose(omega, -drift, atol=1e-10, rtol=0)

@@ -831,6 +831,9 @@ def test_every_figure_returns_its_axes_and_is_drawn_within_its_column(motions, c
     motion, path = motions["cat"], cat_righting(0.5)
     joints = ("waist_pitch", "waist_yaw")
     points = sp.fixed_points(motion.deformation, 0.02)
+    dive = sp.articulated(sp.load_body("diver"), sp.examples.MOTIONS["diver_twist"].path())
+    dive = sp.reconstruct(dive, [0.0, 61.558831, 0.0])
+    shares = sp.contributions(dive)
     figures = {
         plots.plot_momentum_curve: (motion,),
         plots.plot_fixed_points: (points,),
@@ -843,6 +846,10 @@ def test_every_figure_returns_its_axes_and_is_drawn_within_its_column(motions, c
         plots.plot_shape_plane: (path, joints, cat),
         plots.plot_curvature: (cat, joints),
         plots.plot_torques: (motion,),
+        plots.plot_segment_momentum: (sp.segment_momentum(motion),),
+        plots.plot_somersault: (dive,),
+        plots.plot_shares: (shares,),
+        plots.plot_direct_shares: (shares,),
         plots.plot_reach: (sp.reachable(sp.load_body("cat_two_halves")),),
     }
     elsewhere = ("polhodes", "herpolhode", "heavy_top_stability", "crown", "bounds")

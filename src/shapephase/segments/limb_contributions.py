@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_object, number_argument, times_argument, vector_argument, whole_argument
+from ..arguments import check_keywords, check_object, number_argument, times_argument, vector_argument, whole_argument
 from ..arrays import Array, lock_arrays, read_only
 from ..display import number_with_bar, short_repr
 from ..errors import ShapeError, WrongObjectError, unknown_name
@@ -225,6 +225,7 @@ def contributions(
     ('waist_pitch', 'waist_yaw', 'waist_roll') True
     """
     check_object(motion, "Motion", "motion")
+    check_keywords(axes, contributions, ("lateral", "longitudinal", "somersault", "up"))
     if motion.batch:
         raise ShapeError(f"motion: one motion is needed, this is a batch of {motion.batch}")
     body, _ = articulated_parts(motion.deformation)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -222,8 +223,8 @@ def warn(message: str) -> None:
 
 def file_bytes(where: Path) -> bytes:
     """Content of a regular file. Raises InputFileNotFoundError if it is not there, no file, or not to be opened."""
-    if not where.is_file():
-        raise InputFileNotFoundError(f"{where}: is no regular file") if where.exists() else no_such_file(where)
+    if not os.path.isfile(where):
+        raise InputFileNotFoundError(f"{where}: is no regular file") if os.path.exists(where) else no_such_file(where)
     try:
         return where.read_bytes()
     except OSError as error:
