@@ -1,7 +1,8 @@
 """What a fresh interpreter pays: `python -m benchmarks.imports [SOURCE]`.
 
 Processor time of importing the library, of `shapephase --help`, of loading the cat, reconstructing and splitting its
-righting, and of the shares of eight groups of its joints by the command with kept code, each in interpreters of their own that take turns; medians, and ratios to importing NumPy and Pinocchio.
+righting, and of the shares of eight groups of its joints by the command, each in interpreters of their own that take
+turns; medians, and ratios to importing NumPy and Pinocchio.
 SOURCE is the `src` folder of another checkout, to be compared in the same turns.
 """
 
