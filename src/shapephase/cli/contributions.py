@@ -47,8 +47,9 @@ def contributions_command(
     baseline: Annotated[
         str,
         option(
-            "What held joints do: first (their first posture), neutral, or the file or name of another motion, whose "
-            "difference is explained; default: first. For example `--baseline bad.csv`."
+            "What held joints do: first (their first posture), neutral, mirrored (left and right exchanged), or the "
+            "file or name of another motion, whose difference is explained; default: first. For example `--baseline "
+            "bad.csv`."
         ),
     ] = "first",
     at: Annotated[
