@@ -1,7 +1,8 @@
 """What a fresh interpreter pays: `python -m benchmarks.imports [SOURCE]`.
 
-Processor time of importing the library, of `shapephase --help`, and of loading the cat, reconstructing and splitting
-its righting, each in interpreters of their own that take turns; medians, and ratios to importing NumPy and Pinocchio.
+Processor time of importing the library, of `shapephase --help`, of loading the cat, reconstructing and splitting its
+righting, and of the shares of eight groups of its joints by the command, each in interpreters of their own that take
+turns; medians, and ratios to importing NumPy and Pinocchio.
 SOURCE is the `src` folder of another checkout, to be compared in the same turns.
 """
 
@@ -21,6 +22,8 @@ CAT = "import shapephase as sp; body = sp.load_body('cat')"
 READ = f"{CAT}; path = sp.read_shape_path({str(ROOT / 'robots' / 'cat_righting.csv')!r}, body)"
 MOTION = f"{READ}; motion = sp.reconstruct(sp.articulated(body, path), [0.0125, 0.0, 0.025])"
 HELP = "import sys, runpy; sys.argv = ['shapephase', '--help']; runpy.run_module('shapephase', run_name='__main__')"
+GROUPS = "a=front_left* b=front_right* c=neck* d=waist_pitch e=waist_yaw f=waist_roll g=rear* h=tail*"
+SHARES = f"contributions cat cat_righting --of twist --lateral y --longitudinal x --groups {GROUPS}"
 WORK = {
     "numpy and pinocchio": "import numpy, pinocchio",
     "import shapephase": "import shapephase",
@@ -28,6 +31,7 @@ WORK = {
     "load the cat": CAT,
     "reconstruct": MOTION,
     "split": f"{MOTION}; sp.split(motion)",
+    "contributions": HELP.replace("['shapephase', '--help']", repr(["shapephase", *SHARES.split()])),
 }
 
 

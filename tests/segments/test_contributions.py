@@ -396,6 +396,31 @@ def test_the_difference_of_two_trials_is_shared_among_limbs_momentum_and_duratio
     assert abs(shares.shared[0]) > 0.5
 
 
+@pytest.mark.parametrize("name", ["diver", "astronaut", "cat"])
+def test_the_mirrored_motion_twists_the_other_way(name):
+    """Seen in a mirror, a motion has the same somersault and the opposite twist: the momentum is across the mirror."""
+    body = sp.load_body(name)
+    rng = np.random.default_rng(11)
+    cosines, sines = 0.2 * rng.uniform(-1.0, 1.0, (2, body.n_shape, 1))
+    path = sp.ShapePath.fourier(np.zeros(body.n_shape), cosines, sines, 1.0, joint_names=body.joint_names)
+    momentum = np.array([0.0, 0.05 if name == "cat" else 40.0, 0.0])
+    motion = sp.reconstruct(sp.articulated(body, path), momentum)
+    axes = {"lateral": "y", "longitudinal": "x" if name == "cat" else "z"}
+    twist, somersault = (sp.contributions(motion, of, groups={"all": "*"}, baseline="mirrored", **axes)
+                         for of in ("twist", "somersault"))  # fmt: skip
+    assert abs(twist.whole) > 0.01
+    assert twist.none == pytest.approx(-twist.whole, abs=1e-6)
+    assert somersault.none == pytest.approx(somersault.whole, abs=1e-6)
+    assert "as in the mirrored motion" in str(twist)
+
+
+def test_a_body_of_one_side_has_no_mirrored_motion():
+    satellite = sp.load_body("satellite")
+    motion = sp.reconstruct(sp.articulated(satellite, sp.examples.satellite_sweep()), np.zeros(3))
+    with pytest.raises(ShapeError, match="joint arm_1 of satellite has no mirror image"):
+        sp.contributions(motion, baseline="mirrored", lateral="y", longitudinal="z")
+
+
 def test_other_masses_are_a_group_of_their_own():
     good, bad = two_trials()
     diver = sp.load_body("diver")

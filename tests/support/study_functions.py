@@ -19,6 +19,11 @@ def peak_rate(motion: sp.Motion) -> float:
     return float(np.linalg.norm(motion.angular_velocity(np.linspace(0.0, motion.duration, 11)), axis=-1).max())
 
 
+def share_of_the_arms(motion: sp.Motion) -> float:
+    """What both arms add to the twist [turns]."""
+    return float(sp.contributions(motion).shared.sum() / (2.0 * np.pi))
+
+
 def bend(depth: float, duration: float = 1.0) -> sp.ShapePath:
     """A loop of the cat of two halves."""
     return sp.examples.kane_scher(0.0, depth, duration)

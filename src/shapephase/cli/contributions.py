@@ -47,8 +47,9 @@ def contributions_command(
     baseline: Annotated[
         str,
         option(
-            "What held joints do: first (their first posture), neutral, or the file or name of another motion, whose "
-            "difference is explained; default: first. For example `--baseline bad.csv`."
+            "What held joints do: first (their first posture), neutral, mirrored (left and right exchanged), or the "
+            "file or name of another motion, whose difference is explained; default: first. For example `--baseline "
+            "bad.csv`."
         ),
     ] = "first",
     at: Annotated[
@@ -98,6 +99,7 @@ def contributions_command(
     Direct: what each did along the motion. Held: the motion again with a limb held. Shared: what a limb adds, averaged
     over all orders in which limbs join (Shapley).
     """
+    from ..integrator.machine_code import expect_work
     from ..segments.held_motions import BASELINES
     from ..segments.limb_contributions import contributions
     from ..segments.limbs import groups_of_words
@@ -108,6 +110,8 @@ def contributions_command(
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
     chosen = groups_of_words(groups)
+    # Known before the motion itself is computed, which is then by machine code as well.
+    expect_work(momenta=2 ** len(groups))
     with steps(2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)

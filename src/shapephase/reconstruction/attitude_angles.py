@@ -51,15 +51,19 @@ def continued_angles(
     uncertainty : estimated error of the attitudes [rad]
     """
     at_pole = max(_AT_POLE, uncertainty)
-    own = _followed(quaternions_at, known, chart, at_pole)
-    sampled = np.union1d(own, times)
-    curves = [continuous(curve) for curve in quaternions_at(sampled)]
+    sampled, quaternions = _followed(quaternions_at, known, chart, at_pole)
+    further = np.setdiff1d(times, sampled)
+    if len(further):
+        sampled, quaternions = _merged(sampled, quaternions, further, quaternions_at(further))
+    curves = [continuous(curve) for curve in quaternions]
     angles = np.array([chart.numbers(curve, at_pole) for curve in curves]).reshape(len(curves), len(sampled), 3)
     return angles[:, np.searchsorted(sampled, times)]
 
 
-def _followed(quaternions_at: Callable[[Array], Array], known: Array, chart: Chart, at_pole: float) -> Array:
-    """Times between which no vector of the chart turns by more than 30 degrees: (M,) [s]."""
+def _followed(
+    quaternions_at: Callable[[Array], Array], known: Array, chart: Chart, at_pole: float
+) -> tuple[Array, Array]:
+    """Times between which no vector of the chart turns by more than 30 degrees, and attitudes: (M,) [s], (B, M, 4)."""
     times, quaternions = known, quaternions_at(known)
     while True:
         signs = np.where(np.sum(quaternions[:, 1:] * quaternions[:, :-1], axis=-1) < 0.0, -1.0, 1.0)[..., None]
@@ -70,11 +74,16 @@ def _followed(quaternions_at: Callable[[Array], Array], known: Array, chart: Cha
             coarse |= (moved > np.maximum(_NEAR * np.maximum(length[:, 1:], length[:, :-1]), at_pole)).any(axis=0)
         coarse &= np.diff(times) > _SHORTEST * times[-1]
         if not coarse.any():
-            return times
+            return times, quaternions
         middle = 0.5 * (times[:-1] + times[1:])[coarse]
-        order = np.argsort(np.concatenate([times, middle]))
-        times = np.concatenate([times, middle])[order]
-        quaternions = np.concatenate([quaternions, quaternions_at(middle)], axis=1)[:, order]
+        times, quaternions = _merged(times, quaternions, middle, quaternions_at(middle))
+
+
+def _merged(times: Array, quaternions: Array, further: Array, there: Array) -> tuple[Array, Array]:
+    """Attitudes at times and at further ones, in the order of time."""
+    both = np.concatenate([times, further])
+    order = np.argsort(both)
+    return both[order], np.concatenate([quaternions, there], axis=1)[:, order]
 
 
 def continuous(quaternions: Array) -> Array:

@@ -26,7 +26,8 @@ from ..shape_space.curves import Curve, Swings, most_swings, swings_of
 from ..shape_space.shape_path import ShapePath
 from .direct_shares import articulated_parts
 
-BASELINES = ("first", "neutral")
+MIRRORED = "mirrored"
+BASELINES = ("first", "neutral", MIRRORED)
 _SAME = 1e-9  # relative difference of two trials that counts as none: files are written with ten digits or more
 _COMPARED = 257  # times at which joints of two trials are compared
 

@@ -23,8 +23,9 @@ from ..shape_space.connection import curvature
 from ..shape_space.shape_path import CLOSED
 from .coalitions import sampled_orders, shapley_interactions, shapley_weights
 from .direct_shares import ANGLES, STEEP, DirectRates, DirectShares, LinkChart, articulated_parts, direct_shares
-from .held_motions import HeldMotions
+from .held_motions import MIRRORED, HeldMotions
 from .limbs import CONDITIONS, JointGroups, SegmentTree, joint_groups
+from .mirrored_motion import mirrored_motion
 
 MOST_EXACT = 10  # groups of which all subsets are computed: 1,024 motions
 _ROWS = 201  # times of the direct shares, as many as of other tables
@@ -197,7 +198,8 @@ def contributions(
         "phase" (Montgomery's, horizontal gauge), or a function of a Motion that returns a number
     groups : "limbs", "joints", or patterns of joint names by group, {"arms": ["left_*", "right_*"]}; where another
         motion is the baseline also "momentum", "attitude", "duration" and "body", with an empty pattern
-    baseline : "first" posture, "neutral" posture, a shape (n,), or another motion of the same joints
+    baseline : "first" posture, "neutral" posture, a shape (n,), another motion of the same joints, or "mirrored", the
+        motion with left and right exchanged
     at : time of the tilt [s], or "mid-twist", when the motion has done half of its twist
     about : (3,) axis in inertial axes; None: the momentum
     link : whose angles; None: the trunk
@@ -232,7 +234,9 @@ def contributions(
     tree = SegmentTree(body)
     conditions, chosen = _conditions(groups)
     grouped = joint_groups(body, chosen)
-    held = HeldMotions(motion, grouped.columns, baseline, conditions, grouped.rest)
+    is_mirrored = isinstance(baseline, str) and baseline == MIRRORED
+    compared = mirrored_motion(motion, **axes) if is_mirrored else baseline
+    held = HeldMotions(motion, grouped.columns, compared, conditions, grouped.rest)
     function = of if callable(of) else None
     name = getattr(of, "__name__", "function") if callable(of) else of
     if not callable(of) and (not isinstance(of, str) or of not in RESULTS):
@@ -289,6 +293,7 @@ def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, 
     steep = [mask for mask, (_, _, tilt) in sorted(results.items()) if tilt > STEEP]
     baseline = choice.baseline
     named = "as in the baseline" if isinstance(baseline, Motion) else (
+        "as in the mirrored motion" if isinstance(baseline, str) and baseline == MIRRORED else
         f"held at the {baseline} posture" if isinstance(baseline, str) else "held at the given posture"
     )  # fmt: skip
     return Contributions(

@@ -19,16 +19,19 @@ from ..arrays import Array, Integers
 from ..body.body import Body
 from ..body.loading import load_body
 from ..deformation.deformation import Deformation, DeformationFamily, articulated, rigid
+from ..error_bars.recorded_flight import motion_from_recording
 from ..errors import StudyError
 from ..integrator import machine_code
 from ..letters import printable
 from ..phases.phases import split
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.body_path import in_joint_order
+from ..shape_space.files.read import read_recorded_motion
 from ..shape_space.many_paths import final_attitudes
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
 from ..warning_filters import quiet
+from ._identity import file_digest
 from ._recipes import RigidBody, described, inertia_factors, loaded_body_inputs, made_path
 from .cases import Case, CaseTable
 from .distributions import generators
@@ -115,6 +118,8 @@ class Evaluator:
 
     def _batches(self, cases: list[Case]) -> list[list[int]]:
         """Return rows that are computed together: those of one path, and for ends those with a path of their own."""
+        if self.study.recording is not None:
+            return [[row] for row in range(len(cases))]
         groups: dict[Any, list[int]] = {}
         for row, case in enumerate(cases):
             is_alone = self._needs != {"ends"} and not _has_own_inertias(case)
@@ -149,6 +154,9 @@ class Evaluator:
 
     def _compute_batch(self, cases: list[Case], rows: list[int], results: Results) -> None:
         first = cases[0]
+        if self.study.recording is not None:
+            self._put_motion(self._fitted(first), first, rows[0], results)
+            return
         settings: dict[str, Any] = {"tolerance": first.tolerance, "threads": 1}
         momenta = np.array([case.momentum for case in cases])
         attitudes = None if first.attitude is None else np.array([case.attitude for case in cases])
@@ -215,6 +223,19 @@ class Evaluator:
         if key not in self._deformations:
             self._deformations = {key: articulated(body, self._path(case, body))}
         return self._deformations[key]
+
+    def _fitted(self, case: Case) -> Motion:
+        """The motion of a recording, with the momentum that fits its base."""
+        body, name = self._body(case), f"motion {described(case.motion)}"
+        self._check(name, file_digest(case.motion))
+        recorded = read_recorded_motion(case.motion, body, **self.study.reading_options(case.motion))
+        flown = motion_from_recording(body, recorded, tolerance=case.tolerance)
+        if flown.fitted is None:
+            raise StudyError(
+                f"{name}: nothing of the base is recorded, to which a momentum could be fitted; leave `recording` out "
+                "and give the momentum"
+            )
+        return flown.motion
 
     def _body(self, case: Case) -> Body:
         name = str(case.body)

@@ -15,14 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import number_argument, tolerance_argument, vector_argument
+from ..arguments import check_mapping, number_argument, tolerance_argument, vector_argument
 from ..arrays import Array, Integers, lock_arrays
 from ..body.body import Body
 from ..body.loading import load_body, loading_options
 from ..deformation.frames import gauge_link
 from ..display import short_repr
-from ..errors import ShapePhaseError, StudyError, WrongObjectError
+from ..errors import ShapePhaseError, StudyError, WrongObjectError, unknown_name
 from ..letters import value_text
+from ..shape_space.files.options import ReadingOptions, check_options
 from . import _recipes
 from ._axes import (
     COMPONENTS,
@@ -111,6 +112,7 @@ class CaseTable:
     on_unphysical: str = "error"
     length_unit: float | None = None
     person_mass: float | None = None
+    recording: Mapping[str, Any] | None = None
 
     __repr__ = short_repr
 
@@ -137,6 +139,8 @@ class CaseTable:
             raise StudyError(f"{next(iter(self.loading))}: a rigid body is not read from a file")
         if self.cases > MOST_CASES:
             raise StudyError(f"{self.cases} cases; at most {MOST_CASES} fit into one study")
+        if self.recording is not None:
+            self._check_recording(self.recording)
         _ = self.resolved_outputs, self.inputs
 
     def __getstate__(self) -> dict[str, Any]:
@@ -174,6 +178,31 @@ class CaseTable:
     def loading(self) -> dict[str, Any]:
         """Arguments of `load_body` for its bodies."""
         return loading_options(**{name: getattr(self, name) for name in LOADING})
+
+    def reading_options(self, source: MotionSource) -> dict[str, Any]:
+        """Arguments of `read_recorded_motion` for a file: those of all files, and its own by its name."""
+        given = self.recording or {}
+        common = {name: value for name, value in given.items() if name in ReadingOptions.__annotations__}
+        return common | dict(given.get(os.path.basename(described(source)), {}))
+
+    def _check_recording(self, given: Mapping[str, Any]) -> None:
+        check_mapping(given, "recording", "arguments of `read_recorded_motion` by name, such as {'flight': 'all'}")
+        for source in self._motions:
+            if not _recipes.is_file(source):
+                raise StudyError(f"recording: it is for motions from files, {described(source)} is none")
+        for name in self.over:
+            if name not in (*LABELS, "tolerance"):
+                raise StudyError(
+                    f"over.{name}: with a recording, momentum and attitude are fitted to the base of each file, and "
+                    f"only {', '.join(LABELS)} and tolerance are varied"
+                )
+        files = [os.path.basename(described(source)) for source in self._motions]
+        for name, value in given.items():
+            if name not in ReadingOptions.__annotations__ and name not in files:
+                raise unknown_name("entry of recording", name, (*ReadingOptions.__annotations__, *files))
+            if name in files:
+                check_mapping(value, f"recording[{name!r}]", "arguments of `read_recorded_motion` by name")
+                check_options(value, ReadingOptions, "read_recorded_motion")
 
     @property
     def grid_shape(self) -> tuple[int, ...]:
@@ -220,7 +249,8 @@ class CaseTable:
     @cached_property
     def description(self) -> dict[str, Any]:
         """All that its results depend on, as JSON can hold it."""
-        names = [attribute.name for attribute in fields(self) if attribute.name not in (*LOADING, "outputs")]
+        left_out = {*LOADING, "outputs"} | ({"recording"} if self.recording is None else set())
+        names = [attribute.name for attribute in fields(self) if attribute.name not in left_out]
         whole = {
             **{name: getattr(self, name) for name in names},
             "outputs": [(output.name, output.shape, output.unit) for output in self.resolved_outputs],

@@ -113,6 +113,7 @@ _ALL = (
         "turn", lambda start, end, _error: so3.angle(so3.transpose(start) @ end), (), "rad",
         "angle from the start to the end, up to pi",
     ),
+    Output("initial_momentum", lambda motion: motion.momentum, (3,), "kg m^2/s", "inertial axes; fitted or given"),
     Output("evaluations", lambda motion: motion.evaluations, (), "", "how often inertia and momentum were computed"),
     Output("amplification", lambda motion: motion.amplification, (), "", "the largest growth of a small error"),
     _field("total_rotation", _ROTATION, "", "from the start to the end, inertial axes"),
