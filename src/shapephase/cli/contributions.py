@@ -98,6 +98,8 @@ def contributions_command(
     Direct: what each did along the motion. Held: the motion again with a limb held. Shared: what a limb adds, averaged
     over all orders in which limbs join (Shapley).
     """
+    from ..errors import unknown_name
+    from ..examples.scenarios import MOTIONS
     from ..segments.held_motions import BASELINES
     from ..segments.limb_contributions import contributions
     from ..segments.limbs import groups_of_words
@@ -108,6 +110,8 @@ def contributions_command(
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
     chosen = groups_of_words(groups)
+    if not Path(baseline).suffix and baseline not in (*BASELINES, *MOTIONS, "-") and not Path(baseline).exists():
+        raise unknown_name("baseline (no such file either)", baseline, (*BASELINES, *MOTIONS))
     with steps(2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
