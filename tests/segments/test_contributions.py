@@ -128,9 +128,10 @@ def test_direct_shares_sum_to_the_angle_on_200_random_motions(tmp_path):
         size = float(np.trace(body.locked_inertia(path.shape(0.0)))) if number % 2 else 0.0
         motion = sp.reconstruct(sp.articulated(body, path), size * rng.uniform(-0.5, 0.5, 3))
         of = ("twist", "tilt", "somersault")[number % 3]
+        at = 1.0 if of == "tilt" else "mid-twist"
         try:
             direct = sp.contributions(
-                motion, of, groups={"all": "*"}, at=1.0, link=body.link_names[0], times=[0.4, 1.0, 1.5], **AXES
+                motion, of, groups={"all": "*"}, at=at, link=body.link_names[0], times=[0.4, 1.0, 1.5], **AXES
             ).direct
         except ChartPoleError:
             continue
@@ -500,6 +501,7 @@ def test_table_json_and_csv(tmp_path):
     text = str(shares)
     assert "twist of trunk [turns]" in text
     assert "left arm" in text
+    assert shares.to_dict()["unit"] == "rad"  # the table is in turns, plain data in radians
     assert shares.to_dict()["pairs"] == {"arms": ["left arm", "right arm"]}
     shares.write_csv(tmp_path / "shares.csv")
     table = np.genfromtxt(tmp_path / "shares.csv", delimiter=",", names=True)
@@ -563,3 +565,30 @@ def test_bars_and_areas_show_the_numbers(capsys, tmp_path):
         sp.plots.plot_direct_shares(sp.plots.column_axes(), phase)
     command(capsys, *DIVE, "--figure", str(tmp_path / "s.svg"))
     assert (tmp_path / "s.svg").read_text().startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    ("of", "given", "message"),
+    [
+        ("twist", {"at": 0.5}, "a time is that of a tilt, not of twist"),
+        ("twist", {"about": [1.0, 0.0, 0.0]}, "an axis is that of a rotation, not of twist"),
+        ("rotation", {"about": [0.0, 0.0, 0.0]}, "--about 1 0 0"),
+        ("twist", {"groups": {}}, "one group at least"),
+        ("twist", {"groups": {"a": 3}}, "got 'a': 3"),
+        ("twist", {"groups": {3: "left_*"}}, "got 3: 'left_"),
+        ("twist", {"orders": 1}, "orders: a whole number"),
+        ("twist", {"seed": "x"}, "seed: a whole number"),
+        ("twist", {"lateral": "x", "longitudinal": "x"}, "an axis across the lateral one"),
+    ],
+)
+def test_arguments_without_meaning_are_refused(of, given, message):
+    path = sp.examples.MOTIONS["diver_twist"].path()
+    motion = sp.reconstruct(sp.articulated(sp.load_body("diver"), path), [0.0, 61.558831, 0.0])
+    with pytest.raises(ShapeError, match=message):
+        sp.contributions(motion, of, **given)
+
+
+def test_a_baseline_that_does_not_exist_is_named_with_the_nearest(capsys):
+    with pytest.raises(SystemExit):
+        main(["contributions", *DIVE, "--baseline", "frist"])
+    assert "unknown baseline (no such file either) 'frist'. Did you mean 'first'?" in capsys.readouterr().err

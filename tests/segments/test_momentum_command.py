@@ -90,3 +90,20 @@ def test_after_a_low_pass_filter_the_noise_of_the_base_has_to_be_stated(take):
         short = sp.segment_momentum(recorded, body)
     stated = sp.segment_momentum(recorded, body, attitude_noise=0.01)
     assert np.all(stated.whole_bars > short.whole_bars)
+
+
+def test_a_motion_without_a_recorded_base_states_the_momentum_that_is_taken(capsys):
+    main(["momentum", "diver", "diver_twist", "--momentum", "0", "61.558831", "0", "--axes", "0,1,0"])
+    text = capsys.readouterr().out
+    assert "momentum (0 61.5588 0) kg m^2/s" in text.splitlines()[0]
+    assert "along the given axis" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [(["--joint-noise", "0.3deg"], "joint_noise"), (["--stature", "1.7"], "stature"), (["--speed", "1"], "speed")],
+)
+def test_options_without_effect_are_refused(words, name, capsys):
+    with pytest.raises(SystemExit):
+        main(["momentum", "diver", "diver_twist", *words])
+    assert f"{name}: without effect here; leave it out" in capsys.readouterr().err

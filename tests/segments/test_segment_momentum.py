@@ -353,3 +353,23 @@ def test_wrong_arguments_are_named(tmp_path):
         sp.segment_momentum(joints, cat)
     with pytest.raises(WrongObjectError, match="body"):
         sp.segment_momentum(joints)
+
+
+def test_along_oblique_axes_no_size_is_larger_than_the_momentum():
+    path = sp.examples.MOTIONS["diver_twist"].path()
+    motion = sp.reconstruct(sp.articulated(sp.load_body("diver"), path), [0.0, 61.558831, 0.0])
+    found = sp.segment_momentum(motion, axes="athlete")
+    sizes = np.linalg.norm(sp.segment_momentum(motion).by_link, axis=2).max(axis=0)
+    data = found.to_dict()["links"]
+    assert all(data[link]["largest"] <= size * (1.0 + 1e-12) for link, size in zip(found.links, sizes, strict=True))
+    (whole,) = (line.split() for line in str(found).splitlines() if line.startswith("whole"))
+    assert float(whole[4]) == pytest.approx(61.56)
+    assert "axes are oblique" in str(found)
+
+
+@pytest.mark.parametrize(
+    "given", [{"flight": [0.5, 0.2]}, {"attitude_noise": 0.1}, {"joint_noise": 0.1}, {"speed": 1.0}]
+)
+def test_arguments_without_effect_are_refused(given):
+    with pytest.raises(ShapeError, match=f"{next(iter(given))}: without effect here"):
+        sp.segment_momentum(motion_of("diver"), **given)

@@ -99,6 +99,8 @@ def contributions_command(
     Direct: what each did along the motion. Held: the motion again with a limb held. Shared: what a limb adds, averaged
     over all orders in which limbs join (Shapley).
     """
+    from ..errors import unknown_name
+    from ..examples.scenarios import MOTIONS
     from ..integrator.machine_code import expect_work
     from ..segments.held_motions import BASELINES
     from ..segments.limb_contributions import contributions
@@ -112,6 +114,8 @@ def contributions_command(
     chosen = groups_of_words(groups)
     # Known before the motion itself is computed, which is then by machine code as well.
     expect_work(momenta=2 ** len(groups))
+    if not Path(baseline).suffix and baseline not in (*BASELINES, *MOTIONS, "-") and not Path(baseline).exists():
+        raise unknown_name("baseline (no such file either)", baseline, (*BASELINES, *MOTIONS))
     with steps(2) as work:
         work.begin("loading and reconstructing")
         flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)

@@ -104,6 +104,7 @@ def momentum_command(
     from ..shape_space.free_fall import GRAVITY
     from . import motion as motions
     from .texts.recording_text import recording_data
+    from .texts.result_text import split_heading
 
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
@@ -123,17 +124,21 @@ def momentum_command(
         made_from: dict[str, object] = {}
         options = {"axes": chosen, "normalise": normalise, "stature": stature, "speed": speed}
         options |= {"gravity": recording.gravity or GRAVITY, "up": recording.up}
+        options |= {"joint_noise": None if levels is None else [levels[unit] for unit in loaded.joint_units]}
+        options |= {"attitude_noise": turn}
         if as_recorded:
-            noise = None if levels is None else [levels[unit] for unit in loaded.joint_units]
             work.begin("momenta and their bars")
-            found = segment_momentum(recorded, loaded, joint_noise=noise, attitude_noise=turn, **options)
-            heading = f"{loaded.name} along {motion}, as recorded"
+            found = segment_momentum(recorded, loaded, **options)
+            seconds = float(found.times[-1] - found.times[0])
+            heading = (
+                f"{loaded.name} along {motion}, as recorded: {seconds:g} s, {path.n_shape} joints, {loaded.mass:.6g} kg"
+            )
         else:
             flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
             work.begin("momenta and their bars")
             found = segment_momentum(flown.motion, **options)
             made_from = dict(flown.motion.deformation.made_from)
-            heading = f"{loaded.name} along {motion}{flown.beginning}"
+            heading = f"{split_heading(flown.body, motion, flown.motion)}{flown.beginning}"
         if out is not None:
             found.write_csv(out)
             say_written(out)
@@ -143,7 +148,6 @@ def momentum_command(
 
             write_axes(plot_segment_momentum(column_axes(HEIGHT), found), figure)
             say_written(figure)
-    last = float(found.times[-1] - found.times[0])
-    text = f"{heading}: {last:g} s, {path.n_shape} joints, {loaded.mass:.6g} kg\n{found}"
+    text = f"{heading}\n{found}"
     data = {"body": loaded.name, "motion": motion, **found.to_dict()} | recording_data(recorded)
     return Outcome(text, data, aside=aside, made_from=made_from)

@@ -37,7 +37,7 @@ _LOWER_LINKS = re.compile(r"(?i)foot|feet|toe|shank|calf|tibia|ankle")
 _BY_LINKS = "links named right and left"
 _NO_SIDES = (
     "{}: the axis from right to left is unknown, since no two links of one trunk are named left and right; give it: "
-    "lateral='y', or three numbers in base axes"
+    "lateral='y' (--lateral y), or three numbers in base axes"
 )
 
 
@@ -117,7 +117,7 @@ def athlete_axes(
     if lateral is not None:
         side = _across(_axis(lateral, "lateral axis", reasons), long)
         if side is None:
-            raise unknown_name("longitudinal axis", "along the lateral one", ["another axis"])
+            raise ShapeError("longitudinal: an axis across the lateral one is needed, and these two are along one line")
     elif trunk.body is not None and (leftward := _from_right_to_left(trunk.body, trunk.shape)) is not None:
         side = _across(leftward, long)
         reasons["lateral"] = _BY_LINKS

@@ -261,16 +261,14 @@ class HeldMotions:
                 for path in (moving, baseline)
             )
             # Both ends of the breaks are the same number.
-            baseline = replace(baseline, duration=moving.duration, breaks=_ending(baseline.breaks, moving.duration))
+            baseline = replace(
+                baseline, duration=moving.duration, breaks=np.append(baseline.breaks[:-1], moving.duration)
+            )
         own = np.zeros((len(masks), body.n_shape), dtype=bool)
         own[:, self._shared] = True
         for place, columns in enumerate(self.columns.values()):
             own[:, list(columns)] |= (np.array([mask >> place & 1 for mask in masks]) > 0)[:, None]
         return _MixedVariants(body, moving, baseline, own)
-
-
-def _ending(breaks: Array, end: float) -> Array:
-    return np.append(breaks[:-1], end)
 
 
 def _apart(first: Array, second: Array) -> bool:

@@ -23,7 +23,7 @@ from ..shape_space.connection import curvature
 from ..shape_space.shape_path import CLOSED
 from .coalitions import sampled_orders, shapley_interactions, shapley_weights
 from .direct_shares import ANGLES, STEEP, DirectRates, DirectShares, LinkChart, articulated_parts, direct_shares
-from .held_motions import MIRRORED, HeldMotions
+from .held_motions import MIRRORED, HeldMotions, mirrored_motion
 from .limbs import CONDITIONS, JointGroups, SegmentTree, joint_groups
 from .mirrored_motion import mirrored_motion
 
@@ -152,7 +152,10 @@ class Contributions:
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON can hold it, angles in radians."""
-        return plain(self) | {"pairs": {both: list(pair) for both, pair in self._pairs.items()}}
+        return plain(self) | {
+            "unit": "rad" if self.unit else "",
+            "pairs": {both: list(pair) for both, pair in self._pairs.items()},
+        }
 
     def write_csv(self, path: str | os.PathLike[str]) -> None:
         """Write the direct shares in time: time_s, angle_rad, and one column in rad for each source.
@@ -237,12 +240,19 @@ def contributions(
     is_mirrored = isinstance(baseline, str) and baseline == MIRRORED
     compared = mirrored_motion(motion, **axes) if is_mirrored else baseline
     held = HeldMotions(motion, grouped.columns, compared, conditions, grouped.rest)
+    if not held.names:
+        raise ShapeError("groups: one group at least is needed, such as {'arms': ['left_*', 'right_*']}, or 'limbs'")
+    whole_argument(orders, "orders", 2), whole_argument(seed, "seed", 0)
     function = of if callable(of) else None
     name = getattr(of, "__name__", "function") if callable(of) else of
     if not callable(of) and (not isinstance(of, str) or of not in RESULTS):
         raise unknown_name("result", of, RESULTS)
     if function is None and name == "phase" and not motion.momentum.any():
         raise WrongObjectError("of: without momentum there is no Montgomery phase; take 'twist' or 'rotation'")
+    if about is not None and (function is not None or name != "rotation"):
+        raise ShapeError(f"about: an axis is that of a rotation, not of {name}; leave it out, or take of='rotation'")
+    if name != "tilt" and not (isinstance(at, str) and at == "mid-twist"):
+        raise ShapeError(f"at: a time is that of a tilt, not of {name}; leave it out, or take of='tilt'")
     direct, chart, instant = None, None, motion.duration
     axis = np.zeros(3)
     if function is None and name != "phase":
@@ -285,7 +295,7 @@ def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, 
         shared, errors = weights @ function, np.abs(weights) @ bars
         interactions = shapley_interactions(function)
     else:
-        order, before = sampled_orders(count, whole_argument(choice.orders, "orders", 2), choice.seed)
+        order, before = sampled_orders(count, choice.orders, choice.seed)
         results = values({int(mask) for mask in before.ravel()} | removals)
         function = np.array([[results[int(mask)][0] for mask in row] for row in before])
         gains = np.take_along_axis(np.diff(function, axis=1), np.argsort(order, axis=1), axis=1)
@@ -383,7 +393,10 @@ def _axis(motion: Motion, about: ArrayLike | None) -> Array:
     axis = motion.momentum if about is None else vector_argument(about, "about")
     length = float(np.linalg.norm(axis))
     if length == 0.0:
-        raise ShapeError("about: an axis (3,) in inertial axes is needed, since there is no momentum to turn about")
+        raise ShapeError(
+            "about: an axis (3,) in inertial axes, not all zero, is needed where there is no momentum to turn about, "
+            "such as [1, 0, 0] (--about 1 0 0)"
+        )
     return axis / length
 
 

@@ -344,9 +344,12 @@ def _matched_groups(tree: SegmentTree, groups: Mapping[str, str | Iterable[str]]
     names = _coordinate_names(body)
     joints: dict[str, tuple[str, ...]] = {}
     for group, patterns in groups.items():
-        several = (patterns,) if isinstance(patterns, str) else tuple(patterns)
-        if not several or not all(isinstance(pattern, str) for pattern in several):
-            raise ShapeError(f"groups: names of joints are needed for {group!r}, got {value_text(patterns)}")
+        several = (patterns,) if isinstance(patterns, str) else tuple(patterns) if np.iterable(patterns) else ()
+        if not isinstance(group, str) or not several or not all(isinstance(pattern, str) for pattern in several):
+            raise ShapeError(
+                f"groups: the name of a group and names of its joints are needed, got {value_text(group)}: "
+                f"{value_text(patterns)}"
+            )
         for pattern in several:
             # The name of a joint with several axes stands for them all.
             wanted = {c for joint, columns in tree.joints.items() if fnmatchcase(joint, pattern) for c in columns}

@@ -292,6 +292,19 @@ def segment_momentum(
         check_choice(normalise, "normalise", NORMALISATIONS)
     pull = positive_argument(gravity, "gravity", "an acceleration in m/s^2")
     kind = type(motion).__name__
+    unused = {
+        "stature": stature is not None and normalise is None,
+        "speed": speed is not None and normalise != "speed",
+    }
+    if isinstance(motion, Motion):
+        unused |= {"flight": not isinstance(flight, str) or flight != "auto"}
+        unused |= {"attitude_noise": attitude_noise is not None, "joint_noise": joint_noise is not None}
+    if any(unused.values()):
+        names = ", ".join(name for name, given in unused.items() if given)
+        raise ShapeError(
+            f"{names}: without effect here; leave it out: stature needs normalise, speed needs normalise='speed', and "
+            "flight and noise need a recording"
+        )
     if isinstance(motion, Motion):
         source = _of_motion(motion, times)
     else:

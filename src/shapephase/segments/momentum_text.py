@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 def momentum_lines(found: SegmentMomentum) -> list[str]:
     """Lines about the whole in each flight, and the mean and the largest size of each link's part."""
-    lines = [f"angular momentum about the centre of mass, {found.unit}, along {', '.join(found.axes)}"]
+    unit = "no unit" if found.unit == "1" else found.unit
+    axes = "the given axis" if len(found.axes) == 1 else ", ".join(found.axes)
+    lines = [f"angular momentum about the centre of mass, {unit}, along {axes}"]
     if found.normalisation is not None:
         lines.append(_normalisation_text(found))
     if not found.flights:
@@ -28,21 +30,23 @@ def momentum_lines(found: SegmentMomentum) -> list[str]:
         ]
     names = ["mean " + axis for axis in found.axes]
     rows: list[tuple[str, ...]] = [("link", *names, "largest", "± (rms)", "local", "remote")]
-    sizes = np.linalg.norm(found.by_link, axis=2)
     for k, link in enumerate(found.links):
         means = [f"{value:.4g}" for value in found.by_link[:, k].mean(axis=0)]
-        parts = [_rms(values[:, k]) for values in (found.bars, found.local, found.remote)]
-        rows.append((link, *means, f"{sizes[:, k].max():.4g}", *(f"{value:.2g}" for value in parts)))
+        parts = [_rms(found, values[:, k]) for values in (found.bars, found.local, found.remote)]
+        rows.append(
+            (link, *means, f"{_sizes(found, found.by_link[:, k]).max():.4g}", *(f"{value:.2g}" for value in parts))
+        )
     whole = [f"{value:.4g}" for value in found.whole.mean(axis=0)]
-    largest = np.linalg.norm(found.whole, axis=1).max()
-    rows.append(("whole", *whole, f"{largest:.4g}", f"{_rms(found.whole_bars):.2g}", "", ""))
+    largest = _sizes(found, found.whole).max()
+    rows.append(("whole", *whole, f"{largest:.4g}", f"{_rms(found, found.whole_bars):.2g}", "", ""))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     table = []
     for name, *cells in rows:
         aligned = (cell.rjust(width) for cell, width in zip(cells, widths[1:], strict=True))
         table.append("  ".join([name.ljust(widths[0]), *aligned]).rstrip())
     by = "numerical error" if not found.as_recorded else "noise of the samples, one standard deviation"
-    return [*lines, "", *table, "", f"local and remote: rms; ±: {by}"]
+    oblique = "; sizes: of the largest component, as these axes are oblique" if "somersault" in found.axes else ""
+    return [*lines, "", *table, "", f"local and remote: rms; ±: {by}{oblique}"]
 
 
 def conservation_text(flight: FlightMomentum) -> str:
@@ -79,10 +83,10 @@ def momentum_data(found: SegmentMomentum) -> dict[str, Any]:
         "links": {
             link: {
                 "mean": found.by_link[:, k].mean(axis=0).tolist(),
-                "largest": float(np.linalg.norm(found.by_link[:, k], axis=1).max()),
-                "bar_rms": _rms(found.bars[:, k]),
-                "local_rms": _rms(found.local[:, k]),
-                "remote_rms": _rms(found.remote[:, k]),
+                "largest": float(_sizes(found, found.by_link[:, k]).max()),
+                "bar_rms": _rms(found, found.bars[:, k]),
+                "local_rms": _rms(found, found.local[:, k]),
+                "remote_rms": _rms(found, found.remote[:, k]),
             }
             for k, link in enumerate(found.links)
         },
@@ -92,9 +96,14 @@ def momentum_data(found: SegmentMomentum) -> dict[str, Any]:
     return data
 
 
-def _rms(vectors: Any) -> float:
+def _sizes(found: SegmentMomentum, vectors: Any) -> Any:
+    """Sizes of vectors (N, C); along an athlete's axes, which are oblique, the largest component."""
+    return np.linalg.norm(vectors, ord=np.inf if "somersault" in found.axes else 2, axis=1)
+
+
+def _rms(found: SegmentMomentum, vectors: Any) -> float:
     """Root mean square of sizes of vectors (N, C)."""
-    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
+    return float(np.sqrt((_sizes(found, vectors) ** 2).mean()))
 
 
 def _normalisation_text(found: SegmentMomentum) -> str:
