@@ -24,7 +24,12 @@ HERE = Path(__file__).parent
 RESOLUTION = 130
 COLOURS = 128
 # Angular momenta [kg m^2/s], and the shape of the loop of Kane and Scher [rad].
-MOMENTA = {"cat_two_halves": (0.0, 0.002, 0.005), "diver": (0.0, 61.558831, 0.0), "astronaut": (0.5, 2.0, 3.0)}
+MOMENTA = {
+    "astronaut": (0.5, 2.0, 3.0),
+    "cat": (0.0, 0.0, 0.0),
+    "cat_two_halves": (0.0, 0.002, 0.005),
+    "diver": (0.0, 61.558831, 0.0),
+}
 BEND = 1.037187
 TOP = ([1.0, 2.0, 3.0], [0.3, 0.5, 0.9])
 
@@ -47,6 +52,12 @@ DRAWINGS: dict[str, tuple[float, Callable[[Axes], object]]] = {
     "joints": (2.8, lambda ax: plots.plot_shape_path(ax, MOTIONS["cat_righting"].path(), sp.load_body("cat"))),
     "momentum": (3.9, lambda ax: plots.plot_momentum_curve(ax, motion("cat_two_halves", "kane_scher"))),
     "phases": (2.8, lambda ax: plots.plot_phases(ax, motion("cat_two_halves", "kane_scher"))),
+    "segment_momentum": (
+        3.4,
+        lambda ax: plots.plot_segment_momentum(ax, sp.segment_momentum(motion("cat", "cat_righting")), "z"),
+    ),
+    "direct_shares": (2.8, lambda ax: plots.plot_direct_shares(ax, sp.contributions(motion("cat", "cat_righting")))),
+    "shares": (2.8, lambda ax: plots.plot_shares(ax, sp.contributions(motion("cat", "cat_righting")))),
     "solid_angle": (3.9, lambda ax: plots.plot_momentum_curve(ax, motion("astronaut", "astronaut_leg_swing"))),
     "polhodes": (3.8, lambda ax: plots.plot_polhodes(ax, top(*TOP))),
     "separatrix": (3.8, lambda ax: plots.plot_polhodes(ax, top([3.0, 6.0, 8.0], [0.5, 0.3, 1.0]))),
