@@ -23,7 +23,7 @@ from ..shape_space.connection import curvature
 from ..shape_space.shape_path import CLOSED
 from .coalitions import sampled_orders, shapley_interactions, shapley_weights
 from .direct_shares import ANGLES, STEEP, DirectRates, DirectShares, LinkChart, articulated_parts, direct_shares
-from .held_motions import MIRRORED, HeldMotions, mirrored_motion
+from .held_motions import MIRRORED, HeldMotions
 from .limbs import CONDITIONS, JointGroups, SegmentTree, joint_groups
 from .mirrored_motion import mirrored_motion
 
