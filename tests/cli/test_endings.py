@@ -188,7 +188,8 @@ def test_a_folder_without_an_ending_is_a_folder(capfd, tmp_path):
 
 
 def test_a_result_goes_through_standard_output_and_the_table_aside():
-    command = [sys.executable, "-m", "shapephase", *CAT, *MOVING, "--out", "/dev/stdout"]
+    moving = ("split", "satellite", "satellite_sweep", *MOVING)
+    command = [sys.executable, "-m", "shapephase", *moving, "--out", "/dev/stdout"]
     done = subprocess.run(command, capture_output=True, timeout=300)
     assert done.returncode == 0
     assert np.load(io.BytesIO(done.stdout))["spatial_momentum"].tolist() == [0.0, 0.0, 0.02]

@@ -24,18 +24,13 @@ from shapephase.cli.progress import steps
 SHORT = ("cat_two_halves", "--turn", "60 about x", "--pieces", "8")
 
 
-def ran(*arguments):
-    command = [sys.executable, "-m", "shapephase", "plan", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300)
-
-
-def test_a_plan_is_found_written_and_read_again(tmp_path):
+@pytest.mark.usefixtures("few_guesses")
+def test_a_plan_is_found_written_and_read_again(tmp_path, capsys):
     out = tmp_path / "plan.csv"
-    words = ("--turn", "60 about x", "--duration", 0.8, "--pieces", 8)
-    done = ran("cat_two_halves", *words, "--out", out, "--json")
-    assert done.returncode == 0
-    assert re.fullmatch(rf"wrote {re.escape(str(out))} \([0-9.]+ kB\)\n", done.stderr)
-    data = json.loads(done.stdout)
+    main(["plan", *SHORT, "--duration", "0.8", "--out", str(out), "--json"])
+    said = capsys.readouterr()
+    assert re.fullmatch(rf"wrote {re.escape(str(out))} \([0-9.]+ kB\)\n", said.err)
+    data = json.loads(said.out)
     assert data["miss_rad"] < 1e-8
     assert data["duration_s"] == 0.8
     goal = so3.exp(np.array([np.pi / 3.0, 0.0, 0.0]))

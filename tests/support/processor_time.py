@@ -29,7 +29,7 @@ def _processor_seconds() -> float:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item):
-    """Set-up, call and teardown; fixtures that live longer are put down to the test that asked first."""
+    """Count set-up, call and teardown: a longer-lived fixture in its first test, a longer-lived process in its last."""
     item.stash[_BEGAN] = _processor_seconds()
     return (yield)
 
