@@ -364,6 +364,7 @@ def test_along_oblique_axes_no_size_is_larger_than_the_momentum():
     assert all(data[link]["largest"] <= size * (1.0 + 1e-12) for link, size in zip(found.links, sizes, strict=True))
     (whole,) = (line.split() for line in str(found).splitlines() if line.startswith("whole"))
     assert float(whole[4]) == pytest.approx(61.56)
+    assert found.to_dict()["whole"]["largest"] == pytest.approx(61.558831)
     assert "axes are oblique" in str(found)
 
 

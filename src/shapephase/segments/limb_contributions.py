@@ -242,7 +242,8 @@ def contributions(
     held = HeldMotions(motion, grouped.columns, compared, conditions, grouped.rest)
     if not held.names:
         raise ShapeError("groups: one group at least is needed, such as {'arms': ['left_*', 'right_*']}, or 'limbs'")
-    whole_argument(orders, "orders", 2), whole_argument(seed, "seed", 0)
+    whole_argument(orders, "orders", 2)
+    whole_argument(seed, "seed", 0)
     function = of if callable(of) else None
     name = getattr(of, "__name__", "function") if callable(of) else of
     if not callable(of) and (not isinstance(of, str) or of not in RESULTS):

@@ -91,6 +91,11 @@ def momentum_data(found: SegmentMomentum) -> dict[str, Any]:
             for k, link in enumerate(found.links)
         },
     }
+    data["whole"] = {
+        "mean": found.whole.mean(axis=0).tolist(),
+        "largest": float(_sizes(found, found.whole).max()),
+        "bar_rms": _rms(found, found.whole_bars),
+    }
     if found.normalisation is not None:
         data["normalisation"] = {name: value for name, value in vars(found.normalisation).items() if value is not None}
     return data
