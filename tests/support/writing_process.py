@@ -37,6 +37,8 @@ COMMANDS = {
     "torques.csv": ("torques", *CAT, ("0.02", "0.03"), "--out"),
     "momentum.csv": ("momentum", *CAT, ("0.02", "0.03"), "--out"),
     **{f"momentum.{kind}": ("momentum", *CAT, ("0.02", "0.03"), "--figure") for kind in ("svg", "pdf", "png")},
+    "momentum.html": ("momentum", *CAT, ("0.02", "0.03"), "--html"),
+    "contributions.html": ("contributions", *CAT, ("0.02", "0.03"), "--of", "rotation", "--html"),
     "view.html": ("view", *CAT, ("0.02", "0.03"), "--html"),
     "plot.svg": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),
     "plot.pdf": ("plot", "attitude", *CAT, ("0.02", "0.03"), "--out"),

@@ -13,6 +13,7 @@ from .options import (
     BodyArgument,
     BodyOptions,
     MotionArgument,
+    PageFile,
     PrintOptions,
     RecordingOptions,
     StartOptions,
@@ -88,6 +89,7 @@ def momentum_command(
             "example `--attitude-noise 0.2deg`."
         ),
     ] = None,
+    html: PageFile = None,
     start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
     recording: RecordingOptions = RECORDING_DEFAULTS,
@@ -107,6 +109,7 @@ def momentum_command(
 
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
+    aside = check_writable(html, "--html", ".html") or aside
     try:
         chosen = axes if axes in AXES else [float(word) for word in axes.split(",")]
     except ValueError:
@@ -121,6 +124,7 @@ def momentum_command(
             recorded is not None and recorded.base_attitude is not None and start.momentum is None and not fitted
         )
         made_from: dict[str, object] = {}
+        moving = None
         options = {"axes": chosen, "normalise": normalise, "stature": stature, "speed": speed}
         options |= {"gravity": recording.gravity or GRAVITY, "up": recording.up}
         if as_recorded:
@@ -131,8 +135,9 @@ def momentum_command(
         else:
             flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
             work.begin("momenta and their bars")
-            found = segment_momentum(flown.motion, **options)
-            made_from = dict(flown.motion.deformation.made_from)
+            moving = flown.motion
+            found = segment_momentum(moving, **options)
+            made_from = dict(moving.deformation.made_from)
             heading = f"{loaded.name} along {motion}{flown.beginning}"
         if out is not None:
             found.write_csv(out)
@@ -143,6 +148,11 @@ def momentum_command(
 
             write_axes(plot_segment_momentum(column_axes(HEIGHT), found), figure)
             say_written(figure)
+        if html is not None:
+            from ..plots.segments_page import momentum_page
+
+            momentum_page(found, moving, title=heading, up=recording.up).write(html)
+            say_written(html)
     last = float(found.times[-1] - found.times[0])
     text = f"{heading}: {last:g} s, {path.n_shape} joints, {loaded.mass:.6g} kg\n{found}"
     data = {"body": loaded.name, "motion": motion, **found.to_dict()} | recording_data(recorded)
