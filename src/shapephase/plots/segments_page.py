@@ -48,7 +48,12 @@ def contributions_page(shares: Contributions, *, title: str | None = None, up: s
     held = {name: _motion_data(motion, whole, up) for name, motion in motions.items()}
     unit = f" [{shares.unit}]" if shares.unit else ""
     tables: list[Any] = [
-        (f"Groups{unit}", ("group", "held", "alone", "shared"), shares.rows(), f"Held: the group {shares.baseline}.")
+        (
+            f"Groups{unit}",
+            ("group", "held", "alone", "shared"),
+            shares.rows(),
+            f"Held: the result with the group {shares.baseline}; alone: with all others so; shared: average over all orders.",
+        )
     ]
     if shares.direct is not None:
         tables.append((f"Direct, along the motion{unit}", ("source", shares.of), shares.direct_rows(), None))
@@ -62,7 +67,7 @@ def contributions_page(shares: Contributions, *, title: str | None = None, up: s
         styles=("page", "report_page", "segments_page"),
         data={"motion": real, "held": held},
         lead=str(shares).split("\n", 1)[0],
-        scenes=[("scene", "the motion"), ("beside", "the baseline:")],
+        scenes=[("scene", "the motion"), ("beside", f"{shares.baseline}:")],
         held=list(held),
         flights=[],
         tables=tables,
@@ -105,7 +110,7 @@ def momentum_page(
         scripts=(*SCENE_SCRIPTS, "segments_page"),
         styles=("page", "report_page", "segments_page"),
         data={} if motion is None else {"motion": _motion_data(motion, motion, up)},
-        lead=f"Angular momentum about the centre of mass, {found.unit}, along {', '.join(found.axes)}",
+        lead=f"Angular momentum about the centre of mass, {found.unit.replace('^2', '²')}, along {', '.join(found.axes)}",
         scenes=[] if motion is None else [("scene", "the motion")],
         held=[],
         flights=[
