@@ -52,7 +52,7 @@ def contributions_page(shares: Contributions, *, title: str | None = None, up: s
             f"Groups{unit}",
             ("group", "held", "alone", "shared"),
             shares.rows(),
-            f"Held: the result with the group {shares.baseline}; alone: with all others so; shared: average over all orders.",
+            f"Held: result with the group {shares.baseline}; alone: with all others so; shared: mean over all orders.",
         )
     ]
     if shares.direct is not None:
@@ -110,7 +110,7 @@ def momentum_page(
         scripts=(*SCENE_SCRIPTS, "segments_page"),
         styles=("page", "report_page", "segments_page"),
         data={} if motion is None else {"motion": _motion_data(motion, motion, up)},
-        lead=f"Angular momentum about the centre of mass, {found.unit.replace('^2', '²')}, along {', '.join(found.axes)}",
+        lead=f"Momentum about the centre of mass, {found.unit.replace('^2', '²')}, along {', '.join(found.axes)}",
         scenes=[] if motion is None else [("scene", "the motion")],
         held=[],
         flights=[
