@@ -221,7 +221,7 @@ def test_sequences_that_there_are_not(things):
         assert wrong != "ZYX"
     with pytest.raises(UnknownNameError, match="lateral"):
         things["motion"].somersault_tilt_twist(0.0, lateral="side")
-    with pytest.raises(UnknownNameError, match="longitudinal"):
+    with pytest.raises(ShapeError, match="longitudinal"):
         things["motion"].somersault_tilt_twist(0.0, lateral="z", longitudinal="-z")
     assert euler_angles(np.eye(3)[None], "XYZ").shape == (1, 3)
 

@@ -41,7 +41,7 @@ INNER = ("deformation.frames", "shape_space.body_path", "plots.plot_style", "opt
          "optimal_control.extremals.hamiltonian.checked_metric",
          "optimal_control.extremals.hamiltonian.flow", "phases.error_estimates.by_parts",
          "reconstruction.forced_motion.reconstruct_forced", "reconstruction.motion_record.write_motion_record",
-         "segments.direct_shares.articulated_parts",
+         "segments.direct_shares.articulated_parts", "segments.mirrored_motion",
          "optimal_control.extremals.hamiltonian.natural_scales")  # fmt: skip
 
 

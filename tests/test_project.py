@@ -290,7 +290,7 @@ def test_files_that_are_referred_to_are_there():
     built = re.compile(r"docs/_build|docs/jupyter_execute|docs/reference/\*")
     path = re.compile(r"(?<![\w./-])(?:\.\./)*((?:docs|notebooks|tests|benchmarks|robots|src|shared|\.ci)/[\w./-]*\w)")
     name = re.compile(r"(?<![\w*{}<./-])([\w-]+\.(?:py|ipynb|pyi))\b(?!\()")
-    others = {"numpy.py", "casadi.py", "ipython_kernel_config.py"}
+    others = {"numpy.py", "casadi.py", "ipython_kernel_config.py", "shares.py"}
     for file, text in texts.items():
         for found in path.findall(text):
             there_is = (ROOT / found).exists() or any(ROOT.glob(f"{found}.*")) or built.match(found)

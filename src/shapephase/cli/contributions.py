@@ -13,6 +13,7 @@ from .options import (
     BodyArgument,
     BodyOptions,
     MotionArgument,
+    PageFile,
     PrintOptions,
     RecordingOptions,
     StartOptions,
@@ -88,6 +89,7 @@ def contributions_command(
         Path | None,
         option("Write bars and areas to this file, .svg, .pdf or .png; for example `--figure shares.pdf`."),
     ] = None,
+    html: PageFile = None,
     start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
     recording: RecordingOptions = RECORDING_DEFAULTS,
@@ -111,6 +113,7 @@ def contributions_command(
 
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
+    aside = check_writable(html, "--html", ".html") or aside
     chosen = groups_of_words(groups)
     # Known before the motion itself is computed, which is then by machine code as well.
     expect_work(momenta=2 ** len(groups))
@@ -144,6 +147,11 @@ def contributions_command(
 
             write_axes(contributions_figure(shares), figure)
             say_written(figure)
+        if html is not None:
+            from ..plots.segments_page import contributions_page
+
+            contributions_page(shares, title=f"{flown.body.name} along {motion}", up=recording.up).write(html)
+            say_written(html)
     text = f"{split_heading(flown.body, motion, flown.motion)}{flown.beginning}\n\n{shares}"
     data = shares.to_dict() | recording_data(flown.recorded)
     return Outcome(text, data, aside=aside, made_from=flown.motion.deformation.made_from)

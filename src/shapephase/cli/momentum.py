@@ -13,6 +13,7 @@ from .options import (
     BodyArgument,
     BodyOptions,
     MotionArgument,
+    PageFile,
     PrintOptions,
     RecordingOptions,
     StartOptions,
@@ -88,6 +89,7 @@ def momentum_command(
             "example `--attitude-noise 0.2deg`."
         ),
     ] = None,
+    html: PageFile = None,
     start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
     recording: RecordingOptions = RECORDING_DEFAULTS,
@@ -108,6 +110,7 @@ def momentum_command(
 
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
+    aside = check_writable(html, "--html", ".html") or aside
     try:
         chosen = axes if axes in AXES else [float(word) for word in axes.split(",")]
     except ValueError:
@@ -122,6 +125,7 @@ def momentum_command(
             recorded is not None and recorded.base_attitude is not None and start.momentum is None and not fitted
         )
         made_from: dict[str, object] = {}
+        moving = None
         options = {"axes": chosen, "normalise": normalise, "stature": stature, "speed": speed}
         options |= {"gravity": recording.gravity or GRAVITY, "up": recording.up}
         options |= {"joint_noise": None if levels is None else [levels[unit] for unit in loaded.joint_units]}
@@ -136,9 +140,10 @@ def momentum_command(
         else:
             flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
             work.begin("momenta and their bars")
-            found = segment_momentum(flown.motion, **options)
-            made_from = dict(flown.motion.deformation.made_from)
-            heading = f"{split_heading(flown.body, motion, flown.motion)}{flown.beginning}"
+            moving = flown.motion
+            found = segment_momentum(moving, **options)
+            made_from = dict(moving.deformation.made_from)
+            heading = f"{split_heading(flown.body, motion, moving)}{flown.beginning}"
         if out is not None:
             found.write_csv(out)
             say_written(out)
@@ -148,6 +153,11 @@ def momentum_command(
 
             write_axes(plot_segment_momentum(column_axes(HEIGHT), found), figure)
             say_written(figure)
+        if html is not None:
+            from ..plots.segments_page import momentum_page
+
+            momentum_page(found, moving, title=heading, up=recording.up).write(html)
+            say_written(html)
     text = f"{heading}\n{found}"
     data = {"body": loaded.name, "motion": motion, **found.to_dict()} | recording_data(recorded)
     return Outcome(text, data, aside=aside, made_from=made_from)

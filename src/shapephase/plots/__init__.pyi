@@ -13,6 +13,7 @@ from .regime_plots import plot_bounds, plot_crown
 from .report_page import report
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .segment_plots import plot_segment_momentum, plot_somersault
+from .segments_page import contributions_page, momentum_page
 from .shape_plots import plot_curvature, plot_reach, plot_shape_path, plot_shape_plane
 from .torque_plots import plot_torques
 from .viewer import view
@@ -24,7 +25,9 @@ __all__ = [
     "Page",
     "column_axes",
     "contributions_figure",
+    "contributions_page",
     "explore",
+    "momentum_page",
     "moving_scene",
     "plot_attitude",
     "plot_bounds",

@@ -87,6 +87,7 @@ class Contributions:
     steep: tuple[str, ...]
     direct: DirectShares | None
     _pairs: dict[str, tuple[str, str]] = field(repr=False, default_factory=dict)
+    _held: HeldMotions | None = field(repr=False, default=None)
 
     __post_init__ = lock_arrays
     __repr__ = short_repr
@@ -100,12 +101,47 @@ class Contributions:
         """Return the table: held, alone and shared by group, then the direct shares."""
         return "\n".join(self._lines())
 
-    def _lines(self) -> list[str]:
-        def text(value: float, bar: float = 0.0) -> str:
-            if bar > 5e-4 * self.scale:
-                return number_with_bar(value / self.scale, bar / self.scale)
-            return f"{round(value / self.scale, 3) + 0.0:.3f}"
+    def motions(self) -> dict[str, Motion]:
+        """Return the motion itself, under the empty name, and with each of `held_names` on the baseline.
 
+        Examples
+        --------
+        >>> cat = sp.load_body("cat_two_halves")
+        >>> motion = sp.reconstruct(sp.articulated(cat, sp.examples.kane_scher(0.3, 0.6)), np.zeros(3))
+        >>> list(sp.contributions(motion, of="rotation", about=[1.0, 0.0, 0.0], groups="joints").motions())
+        ['', 'waist_pitch', 'waist_yaw', 'waist_roll']
+        """
+        held = self._held
+        assert held is not None
+        bits = _bits(held.names, self._pairs)
+        made = held.motions({held.whole & ~bit for bit in bits.values()})
+        return {"": held.motion} | {name: made[held.whole & ~bit] for name, bit in bits.items()}
+
+    def text(self, value: float, bar: float = 0.0) -> str:
+        """Return an angle as the table prints it, in `unit`."""
+        if bar > 5e-4 * self.scale:
+            return number_with_bar(value / self.scale, bar / self.scale)
+        return f"{round(value / self.scale, 3) + 0.0:.3f}"
+
+    def rows(self) -> list[tuple[str, str, str, str]]:
+        """Return the rows of the table: name, result without the group, result with it alone, shared."""
+        shares = dict(zip(self.groups, zip(self.shared, self.errors, strict=True), strict=True))
+        rows = []
+        for name, without, alone in zip(self.held_names, self.without, self.alone, strict=True):
+            pair = self._pairs.get(name)
+            share, bar = shares[name] if pair is None else (sum(shares[n][0] for n in pair), 0.0)
+            rows.append((name, self.text(without), self.text(alone), self.text(share, bar)))
+        return [*rows, ("all groups", self.text(self.none), self.text(self.whole), self.text(self.shared.sum()))]
+
+    def direct_rows(self) -> list[tuple[str, str]]:
+        """Return sources of the direct shares that did something, the largest first, with their totals."""
+        if self.direct is None:
+            return []
+        shown = sorted(zip(self.direct.sources, self.direct.total, strict=True), key=lambda pair: -abs(pair[1]))
+        return [(name, self.text(value)) for name, value in shown if abs(value) > 0.0]
+
+    def _lines(self) -> list[str]:
+        text = self.text
         wide = 2 + max(
             map(len, (*self.held_names, *(self.direct.sources if self.direct is not None else ()), "all groups"))
         )
@@ -117,12 +153,7 @@ class Contributions:
             "",
             f"{'':{wide}}{'held':>12}{'alone':>12}{'shared':>18}",
         ]  # fmt: skip
-        shares = dict(zip(self.groups, zip(self.shared, self.errors, strict=True), strict=True))
-        for name, without, alone in zip(self.held_names, self.without, self.alone, strict=True):
-            pair = self._pairs.get(name)
-            share, bar = shares[name] if pair is None else (sum(shares[n][0] for n in pair), 0.0)
-            lines.append(f"{name:{wide}}{text(without):>12}{text(alone):>12}{text(share, bar):>18}")
-        lines.append(f"{'all groups':{wide}}{text(self.none):>12}{text(self.whole):>12}{text(self.shared.sum()):>18}")
+        lines += [f"{name:{wide}}{held:>12}{alone:>12}{shared:>18}" for name, held, alone, shared in self.rows()]
         if self.interactions is not None and len(self.groups) > 1:
             small = self.small_loop
             lines += ["", "pairs, beyond what both do alone" + ("" if small is None else "; what small loops tend to")]
@@ -130,17 +161,22 @@ class Contributions:
                 own = "" if small is None else f"{text(small[first, second]):>12}"
                 lines.append(f"{text(value):>12}{own}   {[*self.groups][first]} with {[*self.groups][second]}")
         if self.direct is not None:
-            shown = sorted(zip(self.direct.sources, self.direct.total, strict=True), key=lambda pair: -abs(pair[1]))
             change = text(float(self.direct.total.sum())) + " in all"
             if self.of != "rotation":
                 degrees = np.degrees(self.direct.largest_tilt)
                 change += f", largest tilt {degrees:.1f} deg at {self.direct.tilt_time:.3g} s"
             lines += ["", f"direct, along the motion: {change}"]
-            lines += [f"{name:{wide}}{text(value):>12}" for name, value in shown if abs(value) > 0.0]
+            lines += [f"{name:{wide}}{value:>12}" for name, value in self.direct_rows()]
         if self.rest:
             lines += ["", f"in no group, moving in all motions: {', '.join(self.rest)}"]
         if self.steep:
             lines += ["", f"tilt beyond 85 deg, counts without meaning, in motions of: {'; '.join(self.steep)}"]
+        if self.of == "phase" and np.ptp([self.whole, self.none, *self.without, *self.alone]) > np.pi:
+            lines += [
+                "",
+                "phases differ by more than half a turn: where the end of the momentum passes the point opposite",
+            ]
+            lines += ["its start, the great circle that closes it jumps, and the phase by 360 deg; see running_phases"]
         return lines
 
     def _strongest(self) -> list[tuple[int, int, float]]:
@@ -284,8 +320,7 @@ class _Choice:
 def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, choice: _Choice) -> Contributions:
     held = values.held
     names, whole = held.names, held.whole
-    bits = {name: 1 << place for place, name in enumerate(names)}
-    bits |= {both: bits[first] | bits[second] for both, (first, second) in grouped.pairs.items()}
+    bits = _bits(names, grouped.pairs)
     removals = {*bits.values()} | {whole & ~bit for bit in bits.values()} | {0, whole}
     count = len(names)
     interactions = None
@@ -328,7 +363,14 @@ def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, 
         steep=tuple(" + ".join(n for k, n in enumerate(names) if mask >> k & 1) or "none" for mask in steep),
         direct=direct,
         _pairs=grouped.pairs,
+        _held=held,
     )
+
+
+def _bits(names: Iterable[str], pairs: Mapping[str, tuple[str, str]]) -> dict[str, int]:
+    """Return the subset of each group and of each mirrored pair, as bits."""
+    bits = {name: 1 << place for place, name in enumerate(names)}
+    return bits | {both: bits[first] | bits[second] for both, (first, second) in pairs.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,12 +22,30 @@ def momentum_lines(found: SegmentMomentum) -> list[str]:
     if not found.flights:
         lines.append("no flight found: the centre of mass falls freely nowhere, or places are not recorded")
     for number, flight in enumerate(found.flights, start=1):
-        mean = ", ".join(number_with_bar(*pair) for pair in zip(flight.mean, flight.mean_bar, strict=True))
+        mean = mean_text(flight)
         lines += [
             "",
             f"flight {number}, {flight.first_time:.6g} to {flight.last_time:.6g} s: mean ({mean})",
             f"  {conservation_text(flight)}",
         ]
+    rows = link_rows(found)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    table = []
+    for name, *cells in rows:
+        aligned = (cell.rjust(width) for cell, width in zip(cells, widths[1:], strict=True))
+        table.append("  ".join([name.ljust(widths[0]), *aligned]).rstrip())
+    return [*lines, "", *table, "", bars_text(found)]
+
+
+def bars_text(found: SegmentMomentum) -> str:
+    """Return what the columns of the table are and where its bars come from."""
+    by = "numerical error" if not found.as_recorded else "noise of the samples, one standard deviation"
+    oblique = "; sizes: of the largest component, as these axes are oblique" if "somersault" in found.axes else ""
+    return f"local and remote: rms; ±: {by}{oblique}"
+
+
+def link_rows(found: SegmentMomentum) -> list[tuple[str, ...]]:
+    """Return the table of links: its heads, the mean and the largest size of each link's part, the whole."""
     names = ["mean " + axis for axis in found.axes]
     rows: list[tuple[str, ...]] = [("link", *names, "largest", "± (rms)", "local", "remote")]
     for k, link in enumerate(found.links):
@@ -39,14 +57,12 @@ def momentum_lines(found: SegmentMomentum) -> list[str]:
     whole = [f"{value:.4g}" for value in found.whole.mean(axis=0)]
     largest = _sizes(found, found.whole).max()
     rows.append(("whole", *whole, f"{largest:.4g}", f"{_rms(found, found.whole_bars):.2g}", "", ""))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    table = []
-    for name, *cells in rows:
-        aligned = (cell.rjust(width) for cell, width in zip(cells, widths[1:], strict=True))
-        table.append("  ".join([name.ljust(widths[0]), *aligned]).rstrip())
-    by = "numerical error" if not found.as_recorded else "noise of the samples, one standard deviation"
-    oblique = "; sizes: of the largest component, as these axes are oblique" if "somersault" in found.axes else ""
-    return [*lines, "", *table, "", f"local and remote: rms; ±: {by}{oblique}"]
+    return rows
+
+
+def mean_text(flight: FlightMomentum) -> str:
+    """Return the mean along the chosen axes, with bars."""
+    return ", ".join(number_with_bar(*pair) for pair in zip(flight.mean, flight.mean_bar, strict=True))
 
 
 def conservation_text(flight: FlightMomentum) -> str:

@@ -50,7 +50,11 @@ class Clock {
 
   // The frame before this time, and how far it is to the next.
   place() {
-    const at = this.time / this.duration * (this.frames - 1);
+    return this.placeAt(this.time);
+  }
+
+  placeAt(time) {
+    const at = Math.min(time / this.duration, 1) * (this.frames - 1);
     const frame = Math.min(Math.floor(at + 1e-9), this.frames - 2);
     return {frame, share: Math.min(Math.max(at - frame, 0), 1)};
   }
