@@ -161,6 +161,10 @@ WAY = '<p><a href="a.html">1</a> <a href="b.html">2</a> <a href="c.html">3</a></
         ({"b.html": '<article><a href="c.html">on</a></article>'}, ["index.html: b.html#there has no such place"]),
         ({"c.html": '<img src="d.png">'}, ["c.html: d.png leads nowhere"]),
         ({"index.html": FRONT.format(more="")}, ["index.html: 1 ways"]),
+        (
+            {"c.html": "<pre>&lt;Figure size 340x300 with 1 Axes&gt;</pre>"},
+            ["c.html: a cell shows the words for a figure; draw on axes of matplotlib.pyplot"],
+        ),
     ],
 )
 def test_links_of_the_built_site_are_followed(change, faults, tmp_path, steps):

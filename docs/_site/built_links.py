@@ -1,4 +1,4 @@
-"""What readers can click on in the built site: links lead somewhere, the three ways of the front page too."""
+"""What readers can click on and see in the built site: links lead somewhere, the three ways too, figures are drawn."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ class _Page(HTMLParser):
         self.links: list[str] = []
         self.in_text: set[str] = set()
         self.ways: list[list[str]] = []
+        self.unseen = False
         self._depth: dict[str, int] = defaultdict(int)
         self._sections: list[str] = []
         self.feed(text)
@@ -43,6 +44,10 @@ class _Page(HTMLParser):
                 self.ways[-1].append(found["href"])
         if tag in ("img", "script", "iframe", "source") and "src" in found:
             self.links.append(found["src"])
+
+    def handle_data(self, data: str) -> None:
+        """Note a figure of which a cell printed the words."""
+        self.unseen |= data.startswith("<Figure size")
 
     def handle_endtag(self, tag: str) -> None:
         """Note where the text ends."""
@@ -70,8 +75,10 @@ def _target(page: Path, link: str) -> tuple[Path, str] | None:
 
 
 def broken(found: dict[Path, _Page]) -> Iterator[str]:
-    """Links to files and anchors that there are not."""
+    """Links to unknown files and anchors, and figures that are words."""
     for page, here in found.items():
+        if here.unseen:
+            yield f"{page.name}: a cell shows the words for a figure; draw on axes of matplotlib.pyplot"
         for link in here.links:
             target = _target(page, link)
             if target is None:
