@@ -19,6 +19,7 @@ from .options import (
     StartOptions,
     Tolerance,
     option,
+    rare,
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
@@ -54,20 +55,20 @@ def contributions_command(
         ),
     ] = "first",
     at: Annotated[
-        float | str, option("Time of the tilt, in s, or mid-twist; default: mid-twist. For example `--at 0.8`.")
+        float | str, rare("Time of the tilt, in s, or mid-twist; default: mid-twist. For example `--at 0.8`.")
     ] = "mid-twist",
     about: Annotated[
         tuple[float, float, float] | None,
-        option(
+        rare(
             "Inertial axis of the rotation; default: the momentum. For example `--about 1 0 0`.", negative_iterable=""
         ),
     ] = None,
     link: Annotated[
-        str | None, option("Link whose turn is explained; default: the trunk. For example `--link pelvis`.")
+        str | None, rare("Link whose turn is explained; default: the trunk. For example `--link pelvis`.")
     ] = None,
     lateral: Annotated[
         str | None,
-        option(
+        rare(
             "Axis from the right side to the left, x to -z in axes of the link; default: links named left and right. "
             "For example `--lateral y`.",
             allow_leading_hyphen=True,
@@ -75,7 +76,7 @@ def contributions_command(
     ] = None,
     longitudinal: Annotated[
         str | None,
-        option(
+        rare(
             "Axis from the feet to the head, x to -z in axes of the link; default: that of least inertia. For example "
             "`--longitudinal z`.",
             allow_leading_hyphen=True,
@@ -83,7 +84,7 @@ def contributions_command(
     ] = None,
     out: Annotated[
         Path | None,
-        option("Write the direct shares in time, in rad, to this CSV file; for example `--out shares.csv`."),
+        rare("Write the direct shares in time, in rad, to this CSV file; for example `--out shares.csv`."),
     ] = None,
     figure: Annotated[
         Path | None,
