@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.cli.main import main
+from shapephase.cli.main import app, main
 from shapephase.cli.outcome import ExitCode
 from shapephase.cli.terminal import printable
 from support.long_runs import full_but
@@ -41,7 +41,7 @@ COMMANDS = {
     "momentum": ("momentum", "cat", "cat_righting"),
 }
 ALL_COMMANDS = (
-    *(*COMMANDS, "plan", "view", "explore", "plot", "compile", "reach"),
+    *(*COMMANDS, "plan", "view", "explore", "plot", "compile", "reach", "audit", "contributions"),
     *("sweep", "sweep status", "sweep export", "plot sweep"),
 )
 
@@ -495,7 +495,7 @@ def test_a_search_that_finds_nothing_writes_its_best_try(capfd, tmp_path):
 # ---- What is said ---------------------------------------------------------------------------------------------------
 
 
-COUNTS = ("--starts", "--seed", "--order", "--pairs", "--pieces", "--iterations", "--workers")
+COUNTS = ("--every", "--about", "--starts", "--seed", "--order", "--pairs", "--pieces", "--iterations", "--workers")
 
 
 def options_of(text):
@@ -543,6 +543,7 @@ def test_every_option_has_a_sentence_and_an_example(name, wide_pages):
 
 def test_help_is_short_and_all_options_are_in_help_all(wide_pages):
     """On a terminal of 80 columns; what `--help` does not list it counts."""
+    assert {name for name in app if not name.startswith("-")} <= set(ALL_COMMANDS)
     for name, page in pages("--help", 80).items():
         assert page.count("\n") < 80, name
         counted = re.search(r"^(\d+) more options: --help-all$", page, re.MULTILINE)

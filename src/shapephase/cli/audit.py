@@ -52,8 +52,9 @@ def audit_command(
     Parameters
     ----------
     tolerance
-        Relative tolerance of momentum and rates, and of the fall relative to the body's extent; without it 0.001, and
-        for recordings with noise, or of people, the effect of a centimetre of wander. For example `--tolerance 1e-6`.
+        Tolerance of momentum and rates as a fraction of them, and of the fall as a fraction of the body's extent;
+        without it 0.001, and for recordings with noise, or of people, the effect of a centimetre of wander. For example
+        `--tolerance 1e-6`.
     flight
         What is in the air: auto (where the centre of mass falls longest), auto:2 (the second such flight), all, or its
         first and last time, in s; for example `--flight all` or `--flight 0.4 1.2`.

@@ -60,7 +60,8 @@ def contributions_command(
     about: Annotated[
         tuple[float, float, float] | None,
         rare(
-            "Inertial axis of the rotation; default: the momentum. For example `--about 1 0 0`.", negative_iterable=""
+            "Inertial axis of the rotation; default: the momentum. For example `--about 1 0 0`.",
+            negative_iterable="",
         ),
     ] = None,
     link: Annotated[
