@@ -28,7 +28,7 @@ NOT_CALLED = {
     "holonomy_derivative", "load_motion", "momentum_crossings", "momentum_from_recording", "momentum_returns",
     "export_motion", "motion_from_recording", "particles", "plan_reorientation", "prescribed",
     "read_recorded_motion", "read_shape_path", "read_trajectory", "rigid",
-    "contributions", "sampled_uncertainty", "segment_momentum",
+    "sampled_uncertainty",
     "stokes_holonomy", "view", "write_shape_path", "base_difference",
 }  # fmt: skip
 

@@ -422,6 +422,31 @@ def test_a_body_of_one_side_has_no_mirrored_motion():
         sp.contributions(motion, baseline="mirrored", lateral="y", longitudinal="z")
 
 
+def test_phases_that_jump_are_named():
+    """Between 1.1 and 1.2 times the momentum its end passes the point opposite its start."""
+    dive = sp.articulated(sp.load_body("diver"), sp.examples.MOTIONS["diver_twist"].path())
+    motions = [sp.reconstruct(dive, [0.0, factor * 61.558831, 0.0]) for factor in (1.0, 1.1, 1.2)]
+    for first, second, jumps in ((0, 1, False), (1, 2, True)):
+        shares = sp.contributions(motions[first], "phase", groups={"momentum": ()}, baseline=motions[second])
+        assert ("jumps" in str(shares)) == ("jumps" in str(shares.notes())) == jumps
+
+
+def test_two_joints_with_one_mirror_image_are_refused(tmp_path):
+    """Two parallel hinges on the left, less than 5 % of the body apart, and one on the right."""
+    file = tmp_path / "lopsided.urdf"
+    limbs = [link(name, 0.2, [0.002, 0.002, 0.001], (0.0, 0.0, -0.2)) for name in ("left_a", "left_b", "right_a")]
+    joints = [
+        joint(f"{name}_hip", "revolute", "trunk", name, (1.0, 0.0, 0.0), (0.0, y, 0.0))
+        for name, y in (("left_a", 0.2), ("left_b", 0.201), ("right_a", -0.2))
+    ]
+    file.write_text(urdf(link("trunk", 20.0, [2.0, 2.0, 1.0]), *limbs, *joints))
+    body = sp.load_body(file)
+    path = sp.ShapePath.fourier(np.zeros(3), np.zeros((3, 1)), [[0.3], [0.2], [0.1]], 1.0)
+    motion = sp.reconstruct(sp.articulated(body, path), [0.0, 5.0, 0.0])
+    with pytest.raises(ShapeError, match="right_a_hip"):
+        sp.contributions(motion, baseline="mirrored", lateral="y", longitudinal="z")
+
+
 def test_other_masses_are_a_group_of_their_own():
     good, bad = two_trials()
     diver = sp.load_body("diver")

@@ -119,6 +119,8 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "reaction_null_space": lambda: sp.reaction_null_space(body, shape),
         "dynamic_manipulability": lambda: sp.dynamic_manipulability(body, shape, given["link"]),
         "particle_body": lambda: sp.curvature(sp.particle_body([1.0, 2.0, 3.0], corners, ["angle"]), [0.4]),
+        "contributions": lambda: sp.contributions(motion, "rotation", groups="joints"),
+        "segment_momentum": lambda: sp.segment_momentum(motion),
         "final_attitudes": lambda: sp.final_attitudes(body, [path, path.reversed()], MOMENTUM),
         "horizontal_gauge": lambda: sp.reconstruct(sp.horizontal_gauge(deformation), MOMENTUM),
         "link_gauge": lambda: sp.link_gauge(deformation, given["link"]).inertia(TIMES),

@@ -22,7 +22,7 @@ from .audit_result import Audit, RunAudit
 from .figures import fall_figure, left_over_figures, momentum_figure
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import EXPLAINS, Hypothesis, percent
-from .trajectory_audit import thinned
+from .trajectory_audit import given_runs, thinned
 
 _MOST_ROWS = 20  # hypotheses of the table; the record has all
 _KEY = "Grey: not audited."
@@ -54,8 +54,7 @@ def audit_page(body: Body, trajectories: FloatingTrajectory | Sequence[FloatingT
     """
     check_object(body, "Body", "body")
     check_object(found, "Audit", "found")
-    given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else list(trajectories)
-    given = [held_states(run)[0] for run in given]
+    given = [held_states(run)[0] for run in given_runs(trajectories)]
     return page_from(
         "audit.html",
         title=f"Audit of {found.body}",

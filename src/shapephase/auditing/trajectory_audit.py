@@ -118,10 +118,7 @@ def audit(
     check_object(body, "Body", "body")
     if noise is not None:
         check_object(noise, "TrajectoryNoise", "noise")
-    given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else trajectories
-    runs = list(given) if isinstance(given, Iterable) else []
-    if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
-        raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {value_text(trajectories)}")
+    runs = given_runs(trajectories)
     within = None if tolerance is None else positive_argument(tolerance, "tolerance", "a ratio")
     if every is not None:
         many = whole_argument(every, "every", 1)
@@ -197,6 +194,15 @@ def _short(
         step_order=None,
         notes=(_JOINT_TORQUES, few),
     )
+
+
+def given_runs(trajectories: FloatingTrajectory | Iterable[FloatingTrajectory]) -> list[FloatingTrajectory]:
+    """One trajectory or several as a list. Raises ShapeError for other objects."""
+    given = [trajectories] if isinstance(trajectories, FloatingTrajectory) else trajectories
+    runs = list(given) if isinstance(given, Iterable) else []
+    if not runs or not all(isinstance(run, FloatingTrajectory) for run in runs):
+        raise ShapeError(f"trajectories: FloatingTrajectory or several are needed, got {value_text(trajectories)}")
+    return runs
 
 
 def _with_near_signs(body: Body, run: FloatingTrajectory) -> FloatingTrajectory:

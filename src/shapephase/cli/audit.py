@@ -69,7 +69,6 @@ def audit_command(
         example `--html audit.html`.
     """
     from ..auditing.figures import write_audit_figure
-    from ..auditing.page import audit_page
     from ..auditing.reading import read_trajectory
     from ..auditing.trajectory_audit import audit
     from .motion import body_argument, column_names, flight_words
@@ -95,6 +94,9 @@ def audit_command(
         work.begin("auditing")
         found = audit(loaded, runs, tolerance=tolerance, flight=flight_words(flight) or "auto", every=every)
         write_file(figure, lambda file: write_audit_figure(found, file))
-        write_file(html, lambda file: audit_page(loaded, runs, found).write(file))
+        if html is not None:
+            from ..auditing.page import audit_page
+
+            write_file(html, audit_page(loaded, runs, found).write)
     code = ExitCode.WRONG if found.wrong else ExitCode.DONE if found.right else ExitCode.UNDECIDED
     return Outcome(found.table(), found.record, code=code, aside=aside, made_from={})

@@ -23,7 +23,7 @@ from .options import (
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
-from .terminal import say_written
+from .terminal import write_file
 
 
 def contributions_command(
@@ -105,7 +105,6 @@ def contributions_command(
     """
     from ..errors import unknown_name
     from ..examples.scenarios import MOTIONS
-    from ..integrator.machine_code import expect_work
     from ..segments.held_motions import BASELINES
     from ..segments.limb_contributions import contributions
     from ..segments.limbs import groups_of_words
@@ -117,8 +116,6 @@ def contributions_command(
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
     aside = check_writable(html, "--html", ".html") or aside
     chosen = groups_of_words(groups)
-    # Known before the motion itself is computed, which is then by machine code as well.
-    expect_work(momenta=2 ** len(groups))
     if not Path(baseline).suffix and baseline not in (*BASELINES, *MOTIONS, "-") and not Path(baseline).exists():
         raise unknown_name("baseline (no such file either)", baseline, (*BASELINES, *MOTIONS))
     with steps(2) as work:
@@ -140,20 +137,17 @@ def contributions_command(
             longitudinal=longitudinal,
             up=recording.up,
         )
-        if out is not None:
-            shares.write_csv(out)
-            say_written(out)
+        write_file(out, shares.write_csv)
         if figure is not None:
             from ..plots.contribution_plots import contributions_figure
             from ..plots.plot_style import write_axes
 
-            write_axes(contributions_figure(shares), figure)
-            say_written(figure)
+            write_file(figure, lambda file: write_axes(contributions_figure(shares), file))
         if html is not None:
             from ..plots.segments_page import contributions_page
 
-            contributions_page(shares, title=f"{flown.body.name} along {motion}", up=recording.up).write(html)
-            say_written(html)
+            page = contributions_page(shares, title=f"{flown.body.name} along {motion}", up=recording.up)
+            write_file(html, page.write)
     text = f"{split_heading(flown.body, motion, flown.motion)}{flown.beginning}\n\n{shares}"
     data = shares.to_dict() | recording_data(flown.recorded)
     return Outcome(text, data, aside=aside, made_from=flown.motion.deformation.made_from)

@@ -23,7 +23,7 @@ from .options import (
 )
 from .outcome import Outcome, check_writable
 from .progress import steps
-from .terminal import say_written
+from .terminal import write_file
 
 
 def momentum_command(
@@ -144,20 +144,16 @@ def momentum_command(
             found = segment_momentum(moving, **options)
             made_from = dict(moving.deformation.made_from)
             heading = f"{split_heading(flown.body, motion, moving)}{flown.beginning}"
-        if out is not None:
-            found.write_csv(out)
-            say_written(out)
+        write_file(out, found.write_csv)
         if figure is not None:
             from ..plots.plot_style import column_axes, write_axes
             from ..plots.segment_plots import HEIGHT, plot_segment_momentum
 
-            write_axes(plot_segment_momentum(column_axes(HEIGHT), found), figure)
-            say_written(figure)
+            write_file(figure, lambda file: write_axes(plot_segment_momentum(column_axes(HEIGHT), found), file))
         if html is not None:
             from ..plots.segments_page import momentum_page
 
-            momentum_page(found, moving, title=heading, up=recording.up).write(html)
-            say_written(html)
+            write_file(html, momentum_page(found, moving, title=heading, up=recording.up).write)
     text = f"{heading}\n{found}"
     data = {"body": loaded.name, "motion": motion, **found.to_dict()} | recording_data(recorded)
     return Outcome(text, data, aside=aside, made_from=made_from)

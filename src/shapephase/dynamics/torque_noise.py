@@ -119,6 +119,7 @@ def load_errors(motion: Motion | ForcedMotion, loads: JointLoads, joints: ArrayL
     >>> bool(found.total_work < found.work.sum())
     True
     """
+    check_object(motion, "Motion", "motion", or_kind="ForcedMotion")
     check_object(loads, "JointLoads", "loads")
     path = _path_of(motion)
     count = len(loads.joint_names)

@@ -196,6 +196,8 @@ def athlete_turns(motion: Motion, axes: AthleteAxes | None = None) -> AthleteTur
     check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"somersaults are counted of one motion, this is a batch of {motion.batch}")
+    if axes is not None:
+        check_object(axes, "AthleteAxes", "axes", call="motion.athlete_axes()")
     known = motion.athlete_axes() if axes is None else axes
     given = {name: getattr(known, name) for name in ("lateral", "longitudinal", "somersault", "up")}
     times = _times_within_steps(motion)

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arguments import check_object
+from ..arguments import check_choice, check_object
 from ..arrays import Array
-from ..errors import unknown_name
 from ..reconstruction.reconstruction import Motion
 from ..segments.momentum import SegmentMomentum
 from ._joint_styles import plain_text
@@ -59,8 +58,8 @@ def plot_segment_momentum(ax: Axes, momentum: SegmentMomentum, axis: str | None 
     """
     check_object(momentum, "SegmentMomentum", "momentum", call="segment_momentum(motion)")
     check_flat_axes(ax)
-    if axis is not None and axis not in momentum.axes:
-        raise unknown_name("axis of this momentum", axis, momentum.axes)
+    if axis is not None:
+        check_choice(axis, "axis of this momentum", momentum.axes)
     sizes = (momentum.whole**2).mean(axis=0)
     if not sizes.any():
         sizes = (momentum.by_link**2).mean(axis=(0, 1))

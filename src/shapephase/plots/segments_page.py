@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 from typing import Any
 
-from ..arguments import check_object
+from ..arguments import check_object, check_text
 from ..reconstruction.reconstruction import Motion
 from ..segments.limb_contributions import Contributions
 from ..segments.momentum import SegmentMomentum
@@ -42,6 +42,8 @@ def contributions_page(shares: Contributions, *, title: str | None = None, up: s
     '<!doctype'
     """
     check_object(shares, "Contributions", "shares", call="contributions(motion)")
+    if title is not None:
+        check_text(title, "title", "a text")
     motions = shares.motions()
     whole = motions.pop("")
     real = _motion_data(whole, whole, up)
@@ -57,9 +59,6 @@ def contributions_page(shares: Contributions, *, title: str | None = None, up: s
     ]
     if shares.direct is not None:
         tables.append((f"Direct, along the motion{unit}", ("source", shares.of), shares.direct_rows(), None))
-    notes = [f"In no group, moving in all motions: {', '.join(shares.rest)}"] if shares.rest else []
-    if shares.steep:
-        notes.append(f"Tilt beyond 85°, counts without meaning, in motions of: {'; '.join(shares.steep)}")
     return page_from(
         "segments.html",
         title=title or whole.deformation.label,
@@ -72,7 +71,7 @@ def contributions_page(shares: Contributions, *, title: str | None = None, up: s
         flights=[],
         tables=tables,
         figures=[[_figure(contributions_figure(shares), "Shares by group, and what was done in time.")]],
-        notes=notes,
+        notes=shares.notes(),
     )
 
 
@@ -103,6 +102,8 @@ def momentum_page(
     check_object(found, "SegmentMomentum", "found", call="segment_momentum(motion)")
     if motion is not None:
         check_object(motion, "Motion", "motion")
+    if title is not None:
+        check_text(title, "title", "a text")
     heads, *rows = link_rows(found)
     return page_from(
         "segments.html",

@@ -172,7 +172,7 @@ class HeldMotions:
             raise ShapeError(f"baseline: one motion is needed, this is a batch of {second.batch}")
         if other_body.joint_names != self.body.joint_names:
             raise WrongObjectError(
-                f"baseline: both motions need the same joints: {self.body.name} has "
+                f"baseline: a Motion of the same joints is needed: {self.body.name} has "
                 f"{', '.join(self.body.joint_names)}, {other_body.name} has {', '.join(other_body.joint_names)}"
             )  # fmt: skip
         own, others = self.body.chain, other_body.chain

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -167,17 +168,29 @@ class Contributions:
                 change += f", largest tilt {degrees:.1f} deg at {self.direct.tilt_time:.3g} s"
             lines += ["", f"direct, along the motion: {change}"]
             lines += [f"{name:{wide}}{value:>12}" for name, value in self.direct_rows()]
-        if self.rest:
-            lines += ["", f"in no group, moving in all motions: {', '.join(self.rest)}"]
-        if self.steep:
-            lines += ["", f"tilt beyond 85 deg, counts without meaning, in motions of: {'; '.join(self.steep)}"]
-        if self.of == "phase" and np.ptp([self.whole, self.none, *self.without, *self.alone]) > np.pi:
-            lines += [
-                "",
-                "phases differ by more than half a turn: where the end of the momentum passes the point opposite",
-            ]
-            lines += ["its start, the great circle that closes it jumps, and the phase by 360 deg; see running_phases"]
+        for note in self.notes():
+            lines += ["", *textwrap.wrap(note)]
         return lines
+
+    def notes(self) -> list[str]:
+        """Return what limits the meaning of the shares: joints that always move, steep tilts, phases that jump.
+
+        Examples
+        --------
+        >>> cat = sp.load_body("cat_two_halves")
+        >>> motion = sp.reconstruct(sp.articulated(cat, sp.examples.kane_scher(0.3, 0.6)), np.zeros(3))
+        >>> sp.contributions(motion, of="rotation", about=[1.0, 0.0, 0.0], groups={"pitch": ["waist_pitch"]}).notes()
+        ['in no group, moving in all motions: waist_yaw, waist_roll']
+        """
+        notes = [f"in no group, moving in all motions: {', '.join(self.rest)}"] if self.rest else []
+        if self.steep:
+            notes.append(f"tilt beyond 85 deg, counts without meaning, in motions of: {'; '.join(self.steep)}")
+        if self.of == "phase" and np.ptp([self.whole, self.none, *self.without, *self.alone]) > np.pi:
+            notes.append(
+                "phases differ by more than half a turn: where the end of the momentum passes the point opposite its "
+                "start, the great circle that closes it jumps, and the phase by 360 deg"
+            )
+        return notes
 
     def _strongest(self) -> list[tuple[int, int, float]]:
         """Pairs of groups with the largest interactions, six at most."""
@@ -289,7 +302,7 @@ def contributions(
     if about is not None and (function is not None or name != "rotation"):
         raise ShapeError(f"about: an axis is that of a rotation, not of {name}; leave it out, or take of='rotation'")
     if name != "tilt" and not (isinstance(at, str) and at == "mid-twist"):
-        raise ShapeError(f"at: a time is that of a tilt, not of {name}; leave it out, or take of='tilt'")
+        raise ShapeError(f"at: a time is that of a tilt, not of {name}, got {value_text(at)}; take of='tilt'")
     direct, chart, instant = None, None, motion.duration
     axis = np.zeros(3)
     if function is None and name != "phase":

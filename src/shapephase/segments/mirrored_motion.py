@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -78,4 +79,7 @@ def _mirror_images(body: Body, lateral: Array) -> tuple[Integers, Array]:
             )
         images.append(nearest)
         signs.append(np.sign(alignment[nearest]))
+    doubled = [body.joint_names[image] for image, count in Counter(images).items() if count > 1]
+    if doubled:
+        raise ShapeError(f"baseline: joints of {body.name} share the mirror image {doubled[0]}; give another motion")
     return np.array(images), np.array(signs)

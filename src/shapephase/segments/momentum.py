@@ -292,15 +292,21 @@ def segment_momentum(
         check_choice(normalise, "normalise", NORMALISATIONS)
     pull = positive_argument(gravity, "gravity", "an acceleration in m/s^2")
     kind = type(motion).__name__
-    unused = {
-        "stature": stature is not None and normalise is None,
-        "speed": speed is not None and normalise != "speed",
+    if not isinstance(motion, Motion | RecordedMotion) and kind != "FloatingTrajectory":
+        raise WrongObjectError(
+            f"motion: a Motion, a RecordedMotion or a FloatingTrajectory is needed, got {value_text(motion)}"
+        )
+    is_recorded, by_fall = not isinstance(motion, Motion), isinstance(flight, str) and flight == "auto"
+    options = {
+        "stature": (stature, normalise is not None),
+        "speed": (speed, normalise == "speed"),
+        "flight": (None if by_fall else flight, is_recorded),
+        "attitude_noise": (attitude_noise, is_recorded),
+        "joint_noise": (joint_noise, is_recorded),
     }
-    if isinstance(motion, Motion):
-        unused |= {"flight": not isinstance(flight, str) or flight != "auto"}
-        unused |= {"attitude_noise": attitude_noise is not None, "joint_noise": joint_noise is not None}
-    if any(unused.values()):
-        names = ", ".join(name for name, given in unused.items() if given)
+    idle = {name: value for name, (value, used) in options.items() if value is not None and not used}
+    if idle:
+        names = ", ".join(f"{name} ({value_text(value)})" for name, value in idle.items())
         raise ShapeError(
             f"{names}: without effect here; leave it out: stature needs normalise, speed needs normalise='speed', and "
             "flight and noise need a recording"
@@ -318,13 +324,9 @@ def segment_momentum(
                     TrajectoryWarning,
                     stacklevel=2,
                 )
-        elif kind == "FloatingTrajectory":
+        else:
             check_object(body, "Body", "body")
             recorded, given = _of_trajectory(motion), False
-        else:
-            raise WrongObjectError(
-                f"motion: a Motion, a RecordedMotion or a FloatingTrajectory is needed, got {value_text(motion)}"
-            )
         assert body is not None
         if times is not None:
             raise ShapeError("times: a recording has its own; resample it as it is read (resample)")
@@ -339,7 +341,7 @@ def segment_momentum(
                 "body that it was read for"
             )
         samples = samples_of_recording(body, recorded)
-        ends = _flights(body, recorded, "all" if given and flight == "auto" else flight, up, pull)
+        ends = _flights(body, recorded, "all" if given and by_fall else flight, up, pull)
         path = ShapePath.spline(
             recorded.times - recorded.times[0], recorded.shapes, False, joint_names=body.joint_names
         )

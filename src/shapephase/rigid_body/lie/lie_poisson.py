@@ -54,7 +54,8 @@ def poisson_tensor(momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:
      [ 3.  0. -1.]
      [-2.  1.  0.]]
     """
-    return -np.einsum("ijk,...k->...ij", algebra.structure, _momentum(momentum, algebra))
+    mu = _momentum(momentum, algebra)
+    return -np.einsum("ijk,...k->...ij", algebra.structure, mu)
 
 
 def lie_poisson_bracket(first: Gradient, second: Gradient, momentum: ArrayLike, algebra: LieAlgebra = _SO3) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...arguments import check_file_name, check_object, check_text
 from ...arrays import Array, finite_array
-from ...errors import TrajectoryError, TrajectoryWarning, unknown_name
+from ...errors import ShapeError, TrajectoryError, TrajectoryWarning, unknown_name
 from ...files import output_target, write_whole
 from ...provenance import provenance
 from ..path_series import spline_error
@@ -74,6 +74,8 @@ def write_shape_path(
         t = path.sample_times
     else:
         t = finite_array(times, "times", (None,), unit="s")
+        if t.ndim != 1:
+            raise ShapeError(f"times: one row of times (N,) is needed, got shape {t.shape}")
         _check_rows(path, t)
     shapes = path.shape(t)
     if suffix == ".npz":
