@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 from .arrays import Array
 from .errors import SingularInertiaError
 
+VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # order of six components: xx yy zz yz xz xy
+SIX_OF_FULL = np.array([3 * i + j for i, j in VOIGT])  # places of the six among the nine entries, row by row
+FULL_FROM_SIX = np.array([[VOIGT.index((min(i, j), max(i, j))) for j in range(3)] for i in range(3)])  # (3, 3) of six
 _WELL_CONDITIONED = 1e-3  # of trace^3: with a larger determinant the adjugate magnifies rounding hundredfold at most
 _SINGULAR = 1e-12  # least ratio of the smallest to the largest moment: below it the inverse has no correct digits left
 

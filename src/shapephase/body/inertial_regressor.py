@@ -13,7 +13,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from .joint_chain import FULL_FROM_SIX, VOIGT, JointChain
+from ..inertia_tensor import FULL_FROM_SIX, VOIGT
+from .joint_chain import JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 PARAMETERS = 10
@@ -50,7 +51,7 @@ class InertialRegressor:
         sums = (given @ self.matrices.reshape(count * OUTPUTS, -1).T).reshape(len(masses), count, OUTPUTS)
         six, momentum, moment, rate = np.split(sums, (6, 9, 12), axis=-1)
         whole = masses.sum(axis=-1)[:, None, None]
-        inertia = six[..., FULL_FROM_SIX].reshape(*sums.shape[:2], 3, 3)
+        inertia = six[..., FULL_FROM_SIX]
         return inertia - _of_point(moment) / whole[..., None], momentum - np.cross(moment, rate) / whole
 
 

@@ -11,13 +11,11 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..display import short_repr
+from ..inertia_tensor import FULL_FROM_SIX, SIX_OF_FULL
 from ._model_tree import moving_joints
 from .couplings.coordinate_map import CoordinateMap
 
 _BASE = 1  # Pinocchio's number of the free-flyer: joint 0 is the universe
-VOIGT = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # xx yy zz yz xz xy
-SIX_OF_FULL = [3 * i + j for i, j in VOIGT]  # these among the nine entries of a tensor
-FULL_FROM_SIX = [VOIGT.index((min(i, j), max(i, j))) for i in range(3) for j in range(3)]  # the nine among these
 NUMBERS = 22
 """In the row of a frame: its turn at rest in the parent's axes (9, row by row), its place there (3) [m]; then of what
 moves with it the mass [kg], the centre of mass (3) [m] and the inertia about that (xx yy zz yz xz xy) [kg m^2]."""
@@ -58,8 +56,8 @@ class LinkRows:
         bases, result = np.asarray(self.bases, dtype=np.float64), derivatives.copy()
         result[..., 1:4] = (bases @ derivatives[..., 1:4, None])[..., 0]
         # An entry off the diagonal of a tensor stands there twice.
-        tensors = derivatives[..., 4:][..., FULL_FROM_SIX] * (0.5 + 0.5 * np.eye(3)).ravel()
-        turned = bases @ tensors.reshape(*derivatives.shape[:2], 3, 3) @ np.swapaxes(bases, -1, -2)
+        tensors = derivatives[..., 4:][..., FULL_FROM_SIX] * (0.5 + 0.5 * np.eye(3))
+        turned = bases @ tensors @ np.swapaxes(bases, -1, -2)
         result[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., SIX_OF_FULL] * np.repeat([1.0, 2.0], 3)
         return result
 

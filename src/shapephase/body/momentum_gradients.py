@@ -11,7 +11,8 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
-from .joint_chain import FULL_FROM_SIX, SIX_OF_FULL, JointChain
+from ..inertia_tensor import FULL_FROM_SIX, SIX_OF_FULL
+from .joint_chain import JointChain
 from .link_motions import LinkMotions, components, cross, link_motions
 
 _STOPS = (3, 6, 9)  # rows of `_link_sums` at which mass times velocity, angular momentum and inertia begin
@@ -71,7 +72,7 @@ def energy_gradients(chain: JointChain, shapes: Array, rates: Array) -> tuple[Ar
     link_sums = _link_sums(chain, links)
     sums, at = _carried(chain, link_sums), _joint_axes(chain, links, chain.follows.with_rates(shapes, rates)[1])
     _, _, momentum, inertia = np.split(link_sums.sum(axis=-1), _STOPS)
-    tensors = np.moveaxis(inertia[FULL_FROM_SIX], 0, -1).reshape(-1, 3, 3)
+    tensors = np.moveaxis(inertia[FULL_FROM_SIX], -1, 0)
     spin = -np.linalg.solve(tensors, momentum.T[..., None])[..., 0].T[:, :, None]
     drift = sums.drift + cross(spin, sums.moment)
     whole = spin + at.spins

@@ -17,14 +17,10 @@ from ..arrays import Array, Mask
 from ..chebyshev import derivative_matrix, local_coordinate, restriction_matrix
 from ..deformation.deformation import Deformation
 from ..display import short_repr
-from ..inertia_tensor import inverse_inertia
+from ..inertia_tensor import FULL_FROM_SIX, SIX_OF_FULL, inverse_inertia
 from ..integrator.interpolant import Interpolant
 
 ROUNDING = 32.0 * float(np.finfo(float).eps)  # relative, generous for every formula here: of a few operations each
-# Channels xx, yy, zz, yz, xz, xy of I^-1, before those of w: row and column of each, and the channel of each entry.
-_CHANNEL = np.array([[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])
-_FULL = np.empty((3, 3), dtype=int)
-_FULL[*_CHANNEL] = _FULL[*_CHANNEL[::-1]] = np.arange(len(_CHANNEL[0]))
 _WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])  # entries that each channel stands for
 _MAX_CELLS = 4096  # limits the loop of `energy_bounds`; the bounds of coarser cells are looser, but they hold
 # Parts of a panel at which the interpolant is compared with the deformation: none is near a Chebyshev node, and they
@@ -232,15 +228,15 @@ def _in_best_frame(edges: Array, coefficients: Array) -> tuple[Array, Array]:
     frame = axes[np.argmax(np.diff(values, axis=1).min(axis=1))]
     # Where the body's axes are the principal axes, the frame is exactly the identity or a permutation.
     frame = np.where(np.abs(frame) < ROUNDING, 0.0, frame)
-    turned = frame.T @ coefficients[:, :, :-3][..., _FULL] @ frame
+    turned = frame.T @ coefficients[:, :, :-3][..., FULL_FROM_SIX] @ frame
     series = np.empty_like(coefficients)
-    series[:, :, :-3] = turned[:, :, _CHANNEL[0], _CHANNEL[1]]
+    series[:, :, :-3] = turned.reshape(*turned.shape[:2], 9)[..., SIX_OF_FULL]
     series[:, :, -3:] = coefficients[:, :, -3:] @ frame
     return frame, series
 
 
 def _matrix(channels: Array) -> Array:
-    return channels[:, :-3][:, _FULL]
+    return channels[:, :-3][:, FULL_FROM_SIX]
 
 
 def _matrix_radius(radius: Array) -> Array:

@@ -10,14 +10,11 @@ import numpy as np
 from .. import run_progress
 from ..arrays import Array
 from ..errors import ShapeError
-from ..inertia_tensor import inverse_inertia
+from ..inertia_tensor import SIX_OF_FULL, inverse_inertia
 
 Evaluate = Callable[[Array], tuple[Array, Array]]  # times (N,) -> I (N, 3, 3), L_o (N, 3)
 Directly = Callable[[Array], Array | None]  # times (N,) -> the channels (N, 9) in one call, or None
 _AT_ONCE = 16_384  # times in one call of the body: some seconds, some hundred MB
-_SIX = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))  # xx yy zz yz xz xy
-VOIGT = np.array([3 * i + j for i, j in _SIX])  # these entries of a matrix, row by row
-MATRIX = np.array([_SIX.index((min(i, j), max(i, j))) for i in range(3) for j in range(3)])  # the matrix from these
 _WEIGHTS = np.sqrt(np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0]))  # off-diagonal channels stand for two entries of I^-1
 
 
@@ -71,7 +68,7 @@ def inverted(inertia: Array, momentum: Array, times: Array) -> Array:
     """
     inverse = inverse_inertia(inertia, times)
     channels = np.empty((len(times), 9))
-    channels[:, :6] = inverse.reshape(-1, 9)[:, VOIGT]
+    channels[:, :6] = inverse.reshape(-1, 9)[:, SIX_OF_FULL]
     channels[:, 6:] = (inverse @ momentum[:, :, None])[:, :, 0]
     if not isfinite(channels[:, 6:].sum()):
         row = int(np.argwhere(~np.isfinite(channels[:, 6:]))[0, 0])

@@ -8,7 +8,7 @@ from functools import cached_property
 from ..arrays import Array, Integers, lock_arrays
 from ..chebyshev import PiecewiseChebyshev
 from ..display import short_repr
-from .channels import MATRIX
+from ..inertia_tensor import FULL_FROM_SIX
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,4 +61,4 @@ class Interpolant:
     def inverse_and_drift(self, times: Array) -> tuple[Array, Array]:
         """I^-1 and I^-1 L_o: (N,) -> (N, 3, 3) [1/(kg m^2)], (N, 3) [rad/s]."""
         values = self.series(times)
-        return values[:, MATRIX].reshape(-1, 3, 3), values[:, 6:]
+        return values[:, FULL_FROM_SIX], values[:, 6:]

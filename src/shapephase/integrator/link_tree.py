@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..arrays import Array, Mask
-from .channels import MATRIX
+from ..inertia_tensor import FULL_FROM_SIX
 from .kernels import gradient_kernel, tree_kernel
 from .kernels.tree_kernel import LANES
 from .machine_code import plain
@@ -58,7 +58,7 @@ def tree_channels(tree: LinkRows, shapes: Array, rates: Array) -> Array | None:
 def tree_inertia_and_momentum(tree: LinkRows, shapes: Array, rates: Array) -> tuple[Array, Array]:
     """I and L_o about the centre of mass, axes of the base: (N, n), (N, n) -> (N, 3, 3), (N, 3)."""
     (values,), _ = _sampled(tree, tree.rows[None], np.array([tree.mass]), shapes, rates, inverted=False)
-    return values[:, MATRIX].reshape(-1, 3, 3), values[:, 6:]
+    return values[:, FULL_FROM_SIX], values[:, 6:]
 
 
 def trees_channels(tree: LinkRows, rows: Array, masses: Array, shapes: Array, rates: Array) -> tuple[Array, Mask]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array, Integers, lock_arrays, read_only
 from ..display import short_repr
 from ..errors import AccuracyNotReached
-from .channels import MATRIX, VOIGT
+from ..inertia_tensor import FULL_FROM_SIX, SIX_OF_FULL
 from .constants import EPS
 from .interpolant import Interpolant
 from .kernels import spectra_kernel as spectra
@@ -96,14 +96,14 @@ def rounded_series(samples: Samples, units: float) -> Array:
     rounded, terms = series.copy(), series.shape[1]
     for first in range(0, len(series), _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
-        inverse, drift = series[part, 0][:, MATRIX].reshape(-1, 1, 3, 3), series[part, :, 6:]
+        inverse, drift = series[part, 0][:, None, FULL_FROM_SIX], series[part, :, 6:]
         count, least = len(inverse), np.linalg.eigvalsh(inverse[:, 0])[:, 0]
         unit = (units * EPS / np.where(least > 0.0, least, np.inf))[:, None, None]
         unit = unit * (np.arange(terms) <= degrees[part, None])[:, :, None]
         tensors, vectors = rng.standard_normal((count, terms, 3, 3)), rng.standard_normal((count, terms, 3))
         turned = inverse @ (tensors + np.swapaxes(tensors, -1, -2))
         vectors *= np.abs(drift).max(axis=(1, 2))[:, None, None]
-        rounded[part, :, :6] += unit * (turned @ inverse).reshape(count, terms, 9)[:, :, VOIGT]
+        rounded[part, :, :6] += unit * (turned @ inverse).reshape(count, terms, 9)[:, :, SIX_OF_FULL]
         of_drift = (turned @ drift[:, None, 0, :, None])[..., 0] + (inverse @ vectors[..., None])[..., 0]
         rounded[part, :, 6:] += unit * of_drift
     return rounded
