@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError, UnphysicalInertiaError
 from shapephase.rigid_body import PseudoRigidBody, pseudo_rigid_spin, steady_rotation
@@ -104,6 +105,25 @@ def test_a_stiff_body_is_the_rigid_one_l8():
     still = pseudo_rigid_spin(BODY, 2, 0.0)
     assert np.array_equal(still.stretches, np.ones(3))
     assert still.rate == 0.0
+
+
+@pytest.mark.parametrize("count", [4, pytest.param(100, marks=pytest.mark.full)])
+def test_a_free_motion_turns_by_the_phases_of_its_stretch(count):
+    """Q by SciPy from symbols; the turn by `reconstruct` from the shape alone; the parts of `split` make the whole."""
+    rng = np.random.default_rng(count)
+    for _ in range(count):
+        start, rate = so3.exp(rng.normal(size=3)) @ (np.eye(3) + 0.1 * rng.normal(size=(3, 3))), rng.normal(size=(3, 3))
+        motion, times = BODY.motion(start, 0.5 * rate, 2.0), np.array([0.0, 0.9, 2.0])
+        q = motion.deformation(times)
+        if count < 10:
+            assert q == pytest.approx(integrated(symbolic_force(), start, 0.5 * rate, times), abs=1e-10)
+        assert motion.attitude(times) @ motion.stretch(times) == pytest.approx(q, abs=1e-13)
+        shapes = sp.prescribed(motion.inertia, motion.internal_momentum, 2.0)
+        moved = sp.reconstruct(shapes, motion.momentum, motion.attitude(0.0), tolerance=1e-11)
+        assert so3.angle(so3.transpose(moved.attitude(times)) @ motion.attitude(times)).max() < 1e-10
+        parts = sp.split(moved)
+        assert so3.angle(parts.total_rotation @ moved.attitude(0.0) @ moved.final_attitude.T) < 1e-10
+        assert parts.residual < 1e-10
 
 
 def test_what_is_no_body_and_no_spin():

@@ -38,8 +38,9 @@ from .lagrange_top import (
 from .pendulum import PendulumEquilibrium, PendulumMotion, RigidBodyPendulum, rigid_body_pendulum
 from .poinsot import Closure, Cones, Poinsot, cones
 from .portrait import Equilibrium, equilibria, heteroclinics, inverse_difference, polhodes
-from .pseudo_rigid import PseudoRigidBody, PseudoRigidSpin, pseudo_rigid_spin
+from .pseudo_rigid import PseudoRigidBody, PseudoRigidMotion, PseudoRigidSpin, pseudo_rigid_spin
 from .stability import SpinInSpace, SteadyRotation, spin_in_space, steady_rotation, steady_rotations
+from .top_phase import HeavyTopPhase, heavy_top_phase
 from .twisting_somersault import RotorDive, rotor_dive, rotor_dive_lasting, tilt_of_ratio
 
 __all__ = [
@@ -57,6 +58,7 @@ __all__ = [
     "HalfTwist",
     "HeavyTop",
     "HeavyTopMotion",
+    "HeavyTopPhase",
     "LagrangeTop",
     "MomentumOrbit",
     "Nutation",
@@ -64,6 +66,7 @@ __all__ = [
     "PendulumMotion",
     "Poinsot",
     "PseudoRigidBody",
+    "PseudoRigidMotion",
     "PseudoRigidSpin",
     "RigidBodyPendulum",
     "RotorDive",
@@ -86,6 +89,7 @@ __all__ = [
     "gyrostat_equilibria",
     "half_twist",
     "half_twist_from_tilt",
+    "heavy_top_phase",
     "heteroclinics",
     "inverse_difference",
     "lie",

@@ -8,24 +8,31 @@ E = diag(E_1, E_2, E_3), the integral of X X^T by mass, the energy is
 V that of a compressible neo-Hookean material, isotropic and at rest at Q = 1; the equation of motion is
 Q'' E = -dV/dQ. A steady spin turns a constant stretch, Q = exp(t hat(Omega)) diag(q).
 
+Any motion is a turn of a changing shape, Q = R S with S symmetric: S is what the phases of the turn R belong to
+(`PseudoRigidMotion`).
+
 Sources: Lewis and Simo 1990; Simo, Lewis and Marsden 1991; Marsden and Ratiu, section 15.9, remark 5; theory.md L8.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import DOP853, OdeSolution
 from scipy.optimize import root
 
 from .. import so3
 from ..arguments import check_object, number_argument
-from ..arrays import Array, finite_array
+from ..arrays import Array, finite_array, lock_arrays
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, UnphysicalInertiaError
-from ._arguments import axis_index, check_entries
+from ._arguments import above_zero, axis_index, check_entries
+from ._flow import TOLERANCE
 
+_LOOSER = 32.0  # tolerance of the second run, whose difference is above the error of the first
+_STEPS = 200_000  # most steps of one run, some minutes of computing
 _EPS = float(np.finfo(float).eps)
 
 
@@ -84,6 +91,60 @@ class PseudoRigidBody:
         inverse = np.linalg.inv(so3.transpose(q))
         return self.shear * (q - inverse) + (self.bulk * log)[..., None, None] * inverse
 
+    def motion(self, deformation: ArrayLike, rate: ArrayLike, duration: float) -> PseudoRigidMotion:
+        """The free motion from these initial values, by DOP853 at its finest tolerance.
+
+        Parameters
+        ----------
+        deformation : (3, 3) Q at the start, of positive determinant
+        rate : (3, 3) Q' at the start [1/s]
+        duration : [s]
+
+        Raises
+        ------
+        AccuracyNotReached
+            If the motion takes too many steps.
+
+        Examples
+        --------
+        >>> body = sp.rigid_body.PseudoRigidBody([3.0, 2.0, 1.0], shear=10.0, bulk=20.0)
+        >>> spin = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+        >>> motion = body.motion(np.diag([1.1, 1.0, 0.9]), spin, 2.0)
+        >>> deformation = sp.prescribed(motion.inertia, motion.internal_momentum, 2.0)
+        >>> turned = sp.reconstruct(deformation, motion.momentum, motion.attitude(0.0)).final_attitude
+        >>> bool(sp.so3.angle(turned.T @ motion.attitude(2.0)) < 1e-8)
+        True
+        """
+        start, speed = self._deformation(deformation)[0], finite_array(rate, "rate", (3, 3), unit="1/s")
+        if start.shape != (3, 3) or speed.shape != (3, 3):
+            raise ShapeError("deformation, rate: one matrix (3, 3) each is needed")
+        time = above_zero(duration, "duration", "s")
+        fine, coarse = (self._solution(start, speed, time, factor) for factor in (1.0, _LOOSER))
+        angular = speed * self.second_moments @ start.T
+        found = PseudoRigidMotion(self, time, so3.vee(angular - angular.T), 0.0, fine)
+        other, times = replace(found, _solution=coarse), fine.ts
+        error = float(so3.angle(so3.transpose(found.attitude(times)) @ other.attitude(times)).max())
+        return replace(found, error_estimate=error)
+
+    def _solution(self, start: Array, speed: Array, duration: float, factor: float) -> OdeSolution:
+        """Q and Q', row by row, in time."""
+
+        def slope(_: float, state: Array) -> Array:
+            return np.concatenate([state[9:], -(self.force(state[:9].reshape(3, 3)) / self.second_moments).ravel()])
+
+        initial = np.concatenate([start.ravel(), speed.ravel()])
+        local, size = factor * TOLERANCE, float(np.abs(initial).max())
+        solver, times, pieces = DOP853(slope, 0.0, initial, duration, rtol=local, atol=local * size), [0.0], []
+        while solver.status == "running" and len(pieces) < _STEPS:
+            solver.step()
+            times.append(solver.t)
+            pieces.append(solver.dense_output())
+        if solver.status != "finished":
+            raise AccuracyNotReached(
+                f"pseudo-rigid body: {len(pieces)} steps reach t = {solver.t:.6g} s; shorten the motion"
+            )
+        return OdeSolution(times, pieces)
+
     def _deformation(self, deformation: ArrayLike) -> tuple[Array, Array]:
         q = finite_array(deformation, "deformation", (3, 3))
         volume = np.linalg.det(q)
@@ -98,6 +159,69 @@ class PseudoRigidBody:
         same = np.eye(len(volume))
         turned = np.einsum("i,j,ik,jl->ijlk", inverse, inverse, np.eye(3), np.eye(3)).reshape(same.shape)
         return self.shear * (same + turned) + self.bulk * (np.outer(volume, volume) - log * turned)
+
+
+@dataclass(frozen=True, eq=False)
+class PseudoRigidMotion:
+    """Free motion of a pseudo-rigid body on [0, duration]. Made by `PseudoRigidBody.motion`; times are (...) [s].
+
+    `prescribed(motion.inertia, motion.internal_momentum, motion.duration)` is its change of shape as a deformation:
+    `reconstruct` turns it as the motion does, and `split` has its holonomy and its phases.
+    """
+
+    body: PseudoRigidBody
+    """The `PseudoRigidBody`."""
+    duration: float
+    """[s]."""
+    momentum: Array
+    """(3,) angular momentum, inertial axes, constant [kg m^2/s]."""
+    error_estimate: float
+    """Of the attitude: the largest difference from a run with 32 times the tolerance [rad]."""
+    _solution: OdeSolution = field(repr=False)
+
+    __repr__ = short_repr
+    __post_init__ = lock_arrays
+
+    def deformation(self, t: ArrayLike) -> Array:
+        """Q(t): (...) -> (..., 3, 3)."""
+        return self._state(t)[0]
+
+    def attitude(self, t: ArrayLike) -> Array:
+        """R(t) of Q = R S, body to inertial axes: (...) -> (..., 3, 3)."""
+        left, _, right = np.linalg.svd(self._state(t)[0])
+        return left @ right
+
+    def stretch(self, t: ArrayLike) -> Array:
+        """S(t) of Q = R S, symmetric positive definite, the shape: (...) -> (..., 3, 3)."""
+        return self._stretch(t)[0]
+
+    def inertia(self, t: ArrayLike) -> Array:
+        """Locked inertia of the shape, tr(S E S) 1 - S E S: (...) -> (..., 3, 3) [kg m^2]."""
+        stretch = self._stretch(t)[0]
+        second = stretch * self.body.second_moments @ stretch
+        return np.trace(second, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - second
+
+    def internal_momentum(self, t: ArrayLike) -> Array:
+        """Momentum L_o of the changing shape that does not turn, body axes: (...) -> (..., 3) [kg m^2/s]."""
+        stretch, rate = self._stretch(t)
+        moved = rate * self.body.second_moments @ stretch
+        return so3.vee(moved - so3.transpose(moved))
+
+    def _state(self, t: ArrayLike) -> tuple[Array, Array]:
+        times = finite_array(t, "t", unit="s")
+        if np.any((times < 0.0) | (times > self.duration)):
+            raise ShapeError(f"t: from {times.min():.6g} to {times.max():.6g} s; the motion is on [0, {self.duration}]")
+        rows = self._solution(times.ravel()).T.reshape(*times.shape, 2, 3, 3)
+        return rows[..., 0, :, :], rows[..., 1, :, :]
+
+    def _stretch(self, t: ArrayLike) -> tuple[Array, Array]:
+        """S and S', from S^2 = Q^T Q in the axes of its eigenvectors."""
+        q, speed = self._state(t)
+        _, stretches, axes = np.linalg.svd(q)
+        squared = so3.transpose(speed) @ q
+        turned = axes @ (squared + so3.transpose(squared)) @ so3.transpose(axes)
+        rate = turned / (stretches[..., :, None] + stretches[..., None, :])
+        return so3.transpose(axes) * stretches[..., None, :] @ axes, so3.transpose(axes) @ rate @ axes
 
 
 @dataclass(frozen=True, eq=False)
