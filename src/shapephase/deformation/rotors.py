@@ -57,7 +57,7 @@ class Rotor:
 
     def at(self, times: Array) -> tuple[Array, Array]:
         """Values and their rates: (N,) -> (N,), (N,)."""
-        if isinstance(self.value, float):
+        if not isinstance(self.value, ShapePath):
             return np.full(len(times), self.value), np.zeros(len(times))
         values, rates = self.value.curve(times)
         return values[:, 0], rates[:, 0]
@@ -290,8 +290,7 @@ def _rotor(body: Body, joint: str, value: float | ShapePath, is_momentum: bool) 
     column = body.momentum_matrix(body.shape())[:, body.joint_index(joint)]
     if abs(float(np.linalg.norm(column)) - about) > _ROUND * about:
         raise ShapeError(f"rotors: another joint follows {joint}; give its angle by the path")
-    # Links in the order of the joints, the base first.
-    link = body.moving_parts[frame].links[0]
+    link = next(name for name, (number, _) in chain.link_frames.items() if number == frame)
     axle = body.link_pose(body.shape(), link)[:3, :3].T @ column / about
     return Rotor(joint=joint, link=link, inertia=about, axle=axle, value=value, is_momentum=is_momentum)
 
