@@ -300,6 +300,12 @@ def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> Shap
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     others = [name for name in body.joint_names if name not in left_out]
+    twice = [name for name in left_out if name in (path.joint_names or ())]
+    if twice:
+        raise TrajectoryError(
+            f"the path has {', '.join(twice)}, which a wheel or a free hinge gives here; leave it out of the path: "
+            f"read_shape_path(..., without={twice})"
+        )
     if path.joint_names is None and path.n_shape != len(others):
         raise TrajectoryError(
             f"the path has {path.n_shape} joints, {body.name} without {', '.join(left_out)} has {len(others)}: "
