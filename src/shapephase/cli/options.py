@@ -176,9 +176,19 @@ class StartOptions:
     momentum: Annotated[tuple[float, float, float] | None, option(negative_iterable="")] = None
     """Angular momentum about the centre of mass, inertial axes, in kg m^2/s; default: fitted to a recorded base, else
     zero. For example `--momentum 0 0 0.02`."""
+    rate: Annotated[tuple[str, ...], option(several=True)] = ()
+    """Angular velocity of the base at the start instead of --momentum, base axes, in rad/s or with a unit; for example
+    `--rate 0 0 0.01` or `--rate "0 0 2 deg/s"`."""
+    rate_time: Annotated[float | None, rare()] = None
+    """Time of --rate, in s from the start of the motion; default: 0. For example `--rate-time 12.5`."""
     attitude: Annotated[tuple[float, float, float, float] | None, rare(negative_iterable="")] = None
     """Attitude of the base at the start, a quaternion x y z w; default: as recorded, or as a motion of the library
     begins, else 0 0 0 1. For example `--attitude 1 0 0 0`."""
+
+    @property
+    def has_momentum(self) -> bool:
+        """True where the momentum is given, or the angular velocity in its place."""
+        return self.momentum is not None or bool(self.rate)
 
 
 @Parameter(name="*")
