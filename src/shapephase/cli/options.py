@@ -223,6 +223,9 @@ class ColumnOptions:
     base_axes: Annotated[str | None, rare()] = None
     """Directions of the base's x, y and z axes in the axes whose attitude was recorded, or estimate, with --flight;
     default: x,-z,y for OpenSim's pelvis, else x,y,z. For example `--base-axes x,y,z`."""
+    base_inverse: Annotated[bool | None, rare(negative="")] = None
+    """The recorded attitudes take the recorder's axes to the base's; default: as recorded rates show, else base axes to
+    the recorder's. For example `--base-inverse`."""
     calibration: Annotated[str | None, rare()] = None
     """How recorded segments lie in the body's links: a time of the zero pose, in s or the unit of the file, the name of
     such a pose in the file, or links if segments have the axes of the links; default: as the file states. For example
