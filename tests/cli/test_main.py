@@ -68,6 +68,23 @@ def test_json_holds_the_split(capsys):
     np.testing.assert_allclose(data["final_attitude_quat_xyzw"], motion.quat_xyzw(motion.duration), atol=1e-15, rtol=0)
 
 
+@pytest.mark.parametrize(
+    ("words", "time"),
+    [
+        (("-0.1", "0.2", "-0.3"), 0.0),
+        (("-0.1 0.2 -0.3 rad/s",), 1.5),
+        (("-5.729577951308232,11.459155902616464,-17.188733853924695 deg/s",), 0.0),
+    ],
+)
+def test_a_rate_in_place_of_the_momentum(words, time, capsys):
+    """The motion has it at its time, in base axes."""
+    data = json.loads(run(capsys, *CAT, "--rate", *words, "--rate-time", time, "--json"))
+    start = so3.matrix_from_quat(np.array(data["initial_attitude_quat_xyzw"]))
+    moving = sp.articulated(sp.load_body("cat"), cat_righting())
+    motion = sp.reconstruct(moving, data["momentum_kg_m2_s"], start)
+    np.testing.assert_allclose(motion.angular_velocity(time), [-0.1, 0.2, -0.3], atol=1e-8)
+
+
 def test_gauge_and_tolerance(capsys):
     data = json.loads(run(capsys, *CAT, "--momentum", 0.01, 0, 0, "--gauge", "base", "--tolerance", 1e-6, "--json"))
     assert data["gauge"] == "base"
@@ -236,6 +253,12 @@ def test_robots_lists_bodies_and_motions(capsys):
         ([*CAT, "--momentum", "1", "2", "x"], 2, "--momentum"),
         ([*CAT, "--momentum", "nan", "0", "0"], 2, "momentum: entry [0] is nan"),
         ([*CAT, "--momentm", "1", "2", "3"], 2, "--momentum"),
+        ([*CAT, "--rate", "0 0 1", "--momentum", "0", "0", "1"], 2, "leave one of them out"),
+        ([*CAT, "--rate", "0", "1", "furlong/s"], 2, "--rate '0 0 2 deg/s'"),
+        ([*CAT, "--rate", "0 0 1 furlong/s"], 2, "--rate '0 0 2 deg/s'"),
+        ([*CAT, "--rate", "0 nan 1"], 2, "rate: entry [1] is nan"),
+        ([*CAT, "--rate-time", "1"], 2, "--rate-time is the time of --rate"),
+        ([*CAT, "--rate", "0 0 1", "--rate-time", "5"], 4, "lies outside the motion"),
         ([*CAT, "--attitude", "0", "0", "0", "0"], 2, "quaternion"),
         ([*CAT, "--gauge", "vertical"], 2, "horizontal, base, principal"),
         ([*CAT, "--tolerance", "1e-20"], 2, "tolerance"),

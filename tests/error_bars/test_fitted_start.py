@@ -42,7 +42,7 @@ def exact() -> sp.RecordedMomentum:
 def test_a_fit_derivatives_to_samples_as_fits_to_others_show(exact: sp.RecordedMomentum):
     """Central differences of fits to one recording; the recorded times are no knots of the path."""
     samples = path_samples(exact.motion.deformation.description.path).values
-    found = fit_by_knots(exact.motion, exact.times, exact.by_attitudes)
+    found = fit_by_knots(exact.motion, exact.times, exact.by_attitudes, exact.by_rates)
     attitudes, step = exact.motion.attitude(exact.times), 1e-4
     for row, joint in ((0, 1), (4, 0)):
         ends = []
@@ -60,7 +60,7 @@ def test_a_body_that_is_heavier_throughout_has_more_momentum_in_the_same_attitud
     parameters = np.zeros((len(chain.masses), 10))
     parameters[:, 0] = chain.masses
     parameters[:, 4:] = chain.inertias[:, [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
-    change = fit_by_inertias(exact.motion, exact.times, exact.by_attitudes) @ parameters.ravel()
+    change = fit_by_inertias(exact.motion, exact.times, exact.by_attitudes, exact.by_rates) @ parameters.ravel()
     np.testing.assert_allclose(change[:3], 0.0, atol=1e-9)
     np.testing.assert_allclose(change[3:], exact.momentum, atol=1e-8)
 

@@ -273,6 +273,22 @@ def test_momentum_from_rate_in_closed_form():
     np.testing.assert_allclose(many, np.tile(turned, (4, 1)), rtol=0, atol=1e-15)
 
 
+def test_momentum_from_a_rate_later_in_the_motion():
+    """Back to the start: of a rigid body by its closed form, of moving joints by the motion itself."""
+    inertia, start = np.diag([1.0, 2.0, 2.5]), random_rotation(2)
+    top = sp.EulerTop(inertia, np.array([0.3, 2.0, 1.0]))
+    rigid, later = sp.rigid(inertia, 20.0), 17.0
+    omega = np.linalg.solve(inertia, top.attitude(np.array([later]))[0].T @ [0.3, 2.0, 1.0])
+    found = sp.momentum_from_rate(rigid, [omega, omega], start, time=later)
+    np.testing.assert_allclose(found, [start @ [0.3, 2.0, 1.0]] * 2, rtol=0, atol=1e-10)
+    motion = sp.reconstruct(articulated("cat"), random_vector(1, 0.05), start, tolerance=1e-12)
+    for time in (0.4, motion.duration):
+        found = sp.momentum_from_rate(motion.deformation, motion.angular_velocity(time), start, time=time)
+        np.testing.assert_allclose(found, motion.momentum, rtol=0, atol=1e-12)
+    with pytest.raises(TrajectoryError, match="lies outside the motion"):
+        sp.momentum_from_rate(rigid, omega, time=21.0)
+
+
 def test_base_position_of_a_rigid_link_away_from_its_centre():
     """R c + position is the centre of mass."""
     body = body_of("satellite")

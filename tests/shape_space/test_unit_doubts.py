@@ -116,11 +116,17 @@ def test_rates_beside_a_quaternion_say_which_number_is_w():
     np.testing.assert_allclose(read.base_attitude, motion.attitude(times), atol=1e-12)
     with pytest.raises(TrajectoryError, match="w x y z"):
         sp.read_recorded_motion(pandas.DataFrame(table(motion, np.roll(right, 1, axis=1), times)), body)
-    # Rates that agree with neither, as those in inertial axes, tell nothing.
+    # Rates in inertial axes show it, too; those that agree with neither order have to be left out.
     turned = so3.apply(motion.attitude(times), motion.angular_velocity(times)).T
     names = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")
     other = table(motion, np.roll(right, 1, axis=1), times) | dict(zip(names, turned, strict=True))
-    sp.read_recorded_motion(pandas.DataFrame(other), body)
+    with pytest.raises(TrajectoryError, match="w x y z"):
+        sp.read_recorded_motion(pandas.DataFrame(other), body)
+    wrong = pandas.DataFrame(table(motion, right, times) | dict(zip(names, -turned[::-1], strict=True)))
+    with pytest.raises(TrajectoryError, match=r"contradict the recorded attitudes .*--names 'omega_x_rad_s=' "):
+        sp.read_recorded_motion(wrong, body)
+    left_out = sp.read_recorded_motion(wrong, body, names=dict.fromkeys(names))
+    assert left_out.base_rates is None
 
 
 def test_a_recorded_base_with_w_first_is_named():

@@ -107,7 +107,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     tokens = sys.argv[1:] if arguments is None else list(arguments)
     SHOWS_ALL.set(HELP_ALL in tokens)
-    tokens = ["--help" if token == HELP_ALL else token for token in tokens]
+    # A vector in quotes that begins with a minus, as "-0.1 0 1", is no option.
+    tokens = ["--help" if token == HELP_ALL else re.sub(r"^(?=-[\d.]+[\s,])", " ", token) for token in tokens]
     with verbosity_from(tokens), command_line(tokens), as_command():
         try:
             code = _ran(tokens, as_json="--json" in tokens)

@@ -121,9 +121,7 @@ def momentum_command(
         work.begin("loading")
         loaded = motions.body_argument(body, floating)
         path, recorded = motions.joint_motion(motion, loaded, recording)
-        as_recorded = (
-            recorded is not None and recorded.base_attitude is not None and start.momentum is None and not fitted
-        )
+        as_recorded = recorded is not None and recorded.base_attitude is not None and not (start.has_momentum or fitted)
         made_from: dict[str, object] = {}
         moving = None
         options = {"axes": chosen, "normalise": normalise, "stature": stature, "speed": speed}

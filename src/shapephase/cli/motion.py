@@ -20,10 +20,11 @@ from ..deformation.frames import gauge_link
 from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.machine_code import expect_work
-from ..reconstruction.reconstruction import Motion, reconstruct
+from ..reconstruction.reconstruction import Motion, momentum_from_rate, reconstruct
 from ..run_progress import ProgressCallback
 from ..shape_space.files.base_columns import ESTIMATE
 from ..shape_space.files.flight import ANY_GRAVITY, RECORDED
+from ..shape_space.files.labels import rate_size
 from ..shape_space.files.options import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
@@ -99,15 +100,19 @@ def flight(
     start = _start(motion, options)
     goal = tolerance_argument(tolerance)
     momentum = None if options.momentum is None else finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
+    rate = _rate(options)
     loaded = body_argument(body, floating)
     for link in (gauge_link(gauge), trail):
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
-    path, recorded = joint_motion(motion, loaded, recording, given=momentum is not None)
+    path, recorded = joint_motion(motion, loaded, recording, given=options.has_momentum)
     expect_work(rows=len(path.breaks))
     if recorded is None:
+        deformation = articulated(loaded, path)
+        if rate is not None:
+            momentum = momentum_from_rate(deformation, rate, start, time=options.rate_time or 0.0)
         zero = np.zeros(3) if momentum is None else momentum
-        moved = reconstruct(articulated(loaded, path), zero, start, tolerance=goal, progress=progress)
+        moved = reconstruct(deformation, zero, start, tolerance=goal, progress=progress)
         return LoadedMotion(motion=moved, body=loaded, path=path, recorded=None)
     from ..error_bars.recorded_flight import motion_from_recording
 
@@ -115,6 +120,8 @@ def flight(
         loaded,
         recorded,
         momentum=momentum,
+        rate=rate,
+        rate_time=options.rate_time or 0.0,
         attitude=start,
         tolerance=goal,
         find_axes=recording.base_axes == ESTIMATE,
@@ -130,6 +137,28 @@ def _start(motion: str, options: StartOptions) -> Array | None:
     return so3.matrix_from_quat(np.array(MOTIONS[motion].attitude)) if _is_named(motion) else None
 
 
+def _rate(options: StartOptions) -> Array | None:
+    """Return --rate [rad/s]. Raises ShapeError for other words than three numbers with a unit or without."""
+    words = " ".join(options.rate).replace(",", " ").split()
+    if not words:
+        if options.rate_time is not None:
+            raise ShapeError("--rate-time is the time of --rate; give it, too, as in --rate 0 0 0.01")
+        return None
+    if options.momentum is not None:
+        raise ShapeError("--rate and --momentum: either states how the body turns; leave one of them out")
+    size = rate_size(words[-1]) if len(words) > 3 else 1.0
+    try:
+        omega = np.array([float(word) for word in words[:3]])
+    except ValueError:
+        size = None
+    if size is None or len(words) not in (3, 4):
+        raise ShapeError(
+            "--rate: three numbers in rad/s, or with a unit behind them, are needed, as in --rate 0 0 0.01 or "
+            f"--rate '0 0 2 deg/s', got {' '.join(words)!r:.{_LONGEST_SHOWN}}"
+        )
+    return size * finite_array(omega, "rate", (3,), unit="rad/s")
+
+
 def _is_named(motion: str) -> bool:
     """True for a motion of the library, if no file has its name."""
     return motion in MOTIONS and not os.path.isfile(motion)
@@ -137,6 +166,8 @@ def _is_named(motion: str) -> bool:
 
 def is_without_momentum(motion: str, options: StartOptions) -> bool:
     """True where the momentum is zero for sure; a recorded base may still give one."""
+    if options.rate:
+        return False  # joints that move carry momentum even where the base rests
     return _is_named(motion) if options.momentum is None else not any(options.momentum)
 
 

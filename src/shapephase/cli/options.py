@@ -176,9 +176,19 @@ class StartOptions:
     momentum: Annotated[tuple[float, float, float] | None, option(negative_iterable="")] = None
     """Angular momentum about the centre of mass, inertial axes, in kg m^2/s; default: fitted to a recorded base, else
     zero. For example `--momentum 0 0 0.02`."""
+    rate: Annotated[tuple[str, ...], option(several=True)] = ()
+    """Angular velocity of the base at the start instead of --momentum, base axes, in rad/s or with a unit; for example
+    `--rate 0 0 0.01` or `--rate "0 0 2 deg/s"`."""
+    rate_time: Annotated[float | None, rare()] = None
+    """Time of --rate, in s from the start of the motion; default: 0. For example `--rate-time 12.5`."""
     attitude: Annotated[tuple[float, float, float, float] | None, rare(negative_iterable="")] = None
     """Attitude of the base at the start, a quaternion x y z w; default: as recorded, or as a motion of the library
     begins, else 0 0 0 1. For example `--attitude 1 0 0 0`."""
+
+    @property
+    def has_momentum(self) -> bool:
+        """True where the momentum is given, or the angular velocity in its place."""
+        return self.momentum is not None or bool(self.rate)
 
 
 @Parameter(name="*")
@@ -213,6 +223,9 @@ class ColumnOptions:
     base_axes: Annotated[str | None, rare()] = None
     """Directions of the base's x, y and z axes in the axes whose attitude was recorded, or estimate, with --flight;
     default: x,-z,y for OpenSim's pelvis, else x,y,z. For example `--base-axes x,y,z`."""
+    base_inverse: Annotated[bool | None, rare(negative="")] = None
+    """The recorded attitudes take the recorder's axes to the base's; default: as recorded rates show, else base axes to
+    the recorder's. For example `--base-inverse`."""
     calibration: Annotated[str | None, rare()] = None
     """How recorded segments lie in the body's links: a time of the zero pose, in s or the unit of the file, the name of
     such a pose in the file, or links if segments have the axes of the links; default: as the file states. For example

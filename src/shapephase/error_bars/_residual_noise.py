@@ -24,6 +24,7 @@ _OWN = 0.01  # white share of the variance of smoothed noise: digits of recordin
 _BLOCK = 128  # samples weighed together, four times the longest mean; blocks count as independent
 _CHANCE = 0.02  # probability with which noise makes bars longer
 _SURE = 0.001  # probability with which noise is taken for a momentum that changes
+_ROUNDED = 1e-9  # singular values of slopes, relative: smaller ones are rounding of the reconstruction
 _MOST_MODES = 6  # Legendre polynomials of a momentum in time: more resolve less than a tenth of the flight
 
 
@@ -52,9 +53,9 @@ class ResidualNoise:
         """Mean correlation of neighbouring residuals."""
         return float(self.weights @ _correlations(2)[:, 1])
 
-    def covariance(self, slopes: Array) -> Array:
-        """Covariance of the parameters of an ordinary least-squares fit: slopes (3 N, m) -> (m, m)."""
-        return _by_correlation(slopes) @ (self.weights * self.variances)
+    def covariance(self, estimator: Array) -> Array:
+        """Covariance of parameters that are linear in these residuals: estimator (m, 3 N) -> (m, m)."""
+        return _by_correlation(estimator) @ (self.weights * self.variances)
 
     def chance(self, last: int) -> float:
         """Probability that the last few parameters come out so far from zero although they are zero: the F test."""
@@ -87,7 +88,7 @@ def residual_noise(residuals: Array, slopes: Array) -> ResidualNoise:
     parameters = np.asarray(np.linalg.solve(precisions, right[:, :, None])[:, :, 0], dtype=np.float64)
     free = 3 * count - unknowns
     plain = residuals.ravel() - slopes @ np.linalg.lstsq(slopes, residuals.ravel(), rcond=None)[0]
-    taken = np.einsum("abf,ba->f", _by_correlation(slopes), slopes.T @ slopes)
+    taken = np.einsum("abf,ba->f", _by_correlation(np.linalg.pinv(slopes)), slopes.T @ slopes)
     left = np.maximum(moments[:, 0, 0] - (right * parameters).sum(axis=1), np.finfo(float).tiny)
     likelihood = -0.5 * (free * np.log(left) + np.linalg.slogdet(precisions)[1]) - volumes
     # One half for the exponential ones, white noise among them, and a quarter for each of the others.
@@ -102,9 +103,15 @@ def residual_noise(residuals: Array, slopes: Array) -> ResidualNoise:
     )
 
 
-def _by_correlation(slopes: Array) -> Array:
-    """Covariances of an ordinary least-squares fit, where residuals have variance one: (3 N, m) -> (m, m, F)."""
-    inverse = np.linalg.pinv(slopes).reshape(slopes.shape[1], -1, 3)
+def independent(slopes: Array) -> Array:
+    """Orthonormal columns for slopes (n, m) of which some parameters may change nothing: (n, r)."""
+    columns, sizes, _ = np.linalg.svd(slopes, full_matrices=False)
+    return columns[:, sizes > _ROUNDED * sizes[0]]
+
+
+def _by_correlation(estimator: Array) -> Array:
+    """Covariances of linear estimates, where residuals have variance one: (m, 3 N) -> (m, m, F)."""
+    inverse = estimator.reshape(len(estimator), -1, 3)
     count = inverse.shape[1]
     size = 1 << (2 * count - 1).bit_length()
     waves = np.fft.rfft(inverse, size, axis=1)

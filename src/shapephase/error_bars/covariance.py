@@ -268,7 +268,7 @@ def _fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
     if inputs.fit is None:
         _, path = described_by(motion)
         return np.zeros((UNKNOWNS, path_samples(path).bias.size))
-    return fit_by_knots(motion, inputs.fit.times, inputs.fit.by_attitudes)
+    return fit_by_knots(motion, inputs.fit.times, inputs.fit.by_attitudes, inputs.fit.by_rates)
 
 
 def _fit_by_links(motion: Motion, inputs: Inputs) -> Array:
@@ -277,7 +277,8 @@ def _fit_by_links(motion: Motion, inputs: Inputs) -> Array:
     if inputs.fit is None:
         return np.zeros((UNKNOWNS, len(inputs.links)))
     body, _ = described_by(motion)
-    return by_relative_errors(body, fit_by_inertias(motion, inputs.fit.times, inputs.fit.by_attitudes))
+    by_parameters = fit_by_inertias(motion, inputs.fit.times, inputs.fit.by_attitudes, inputs.fit.by_rates)
+    return by_relative_errors(body, by_parameters)
 
 
 def _drawn(rng: np.random.Generator, draws: int, covariance: Array) -> Array:

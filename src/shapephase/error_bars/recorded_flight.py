@@ -13,7 +13,7 @@ from ..body.body import Body
 from ..deformation.deformation import Deformation, articulated
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
-from ..reconstruction.reconstruction import Motion, reconstruct
+from ..reconstruction.reconstruction import Motion, momentum_from_rate, reconstruct
 from ..run_progress import ProgressCallback
 from ..shape_space.files.flight import ALL, turns
 from ..shape_space.files.read import RecordedMotion
@@ -45,6 +45,8 @@ def motion_from_recording(
     recorded: RecordedMotion,
     *,
     momentum: ArrayLike | None = None,
+    rate: ArrayLike | None = None,
+    rate_time: float = 0.0,
     attitude: ArrayLike | None = None,
     tolerance: float = 1e-9,
     find_axes: bool = False,
@@ -60,7 +62,10 @@ def motion_from_recording(
     ----------
     recorded : as `read_recorded_motion` gives it; with its flight="recorded" only what is a flight
     momentum : (3,) the recorder's axes [kg m^2/s]; None: as the recorded base shows, or zero
-    attitude : (3, 3) or quaternion (4,) x y z w of the start, beside a momentum; None: as recorded, or the identity
+    rate : (3,) angular velocity of the base at one time instead, base axes [rad/s]
+    rate_time : that time, since the first sample kept [s]
+    attitude : (3, 3) or quaternion (4,) x y z w of the start, beside a momentum or rate; None: as recorded, or the
+        identity
     tolerance : of the attitude [rad]
     find_axes : as for `momentum_from_recording`
     progress : called while it is reconstructed
@@ -68,7 +73,7 @@ def motion_from_recording(
     Raises
     ------
     ShapeError
-        For an attitude beside a momentum that is fitted, or axes to be found without a fit.
+        For an attitude beside a momentum that is fitted, axes to be found without a fit, or momentum and rate.
     TrajectoryError
         If the recording was not declared to be a flight, and its base is none: the fit does not settle, or what it
         leaves is no noise.
@@ -92,8 +97,11 @@ def motion_from_recording(
     check_flag(find_axes, "find_axes")
     if momentum is not None:
         momentum = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
+    if momentum is not None and rate is not None:
+        raise ShapeError("rate and momentum: either states how the body turns; leave one of them out")
     deformation, attitudes = articulated(body, recorded.path), recorded.base_attitude
-    if momentum is None and attitudes is not None and (recorded.flight is not None or turns(attitudes)):
+    given = momentum is not None or rate is not None
+    if not given and attitudes is not None and (recorded.flight is not None or turns(attitudes)):
         if attitude is not None:
             raise ShapeError(
                 "the attitude at the start is fitted to the recorded base, with the momentum; leave it out "
@@ -108,9 +116,11 @@ def motion_from_recording(
         )
     if attitude is None and attitudes is not None:
         attitude = attitudes[0]
+    if rate is not None:
+        momentum = momentum_from_rate(deformation, rate, attitude, time=rate_time)
     start = np.zeros(3) if momentum is None else momentum
     moved = reconstruct(deformation, start, attitude, tolerance=tolerance, progress=progress)
-    return RecordedFlight(moved, "nothing" if momentum is None else "given")
+    return RecordedFlight(moved, "given" if given else "nothing")
 
 
 def _fit(deformation: Deformation, recorded: RecordedMotion, tolerance: float, *, find_axes: bool) -> RecordedMomentum:

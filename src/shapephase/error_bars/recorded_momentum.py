@@ -1,12 +1,12 @@
-"""The momentum of a recorded flight, from the attitudes of its base."""
+"""The momentum of a recorded flight, from attitudes and rates of its base."""
 
 from __future__ import annotations
 
 import warnings
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations, product
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,10 +17,11 @@ from ..arrays import Array, copied_when_read, finite_array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
+from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ..reconstruction.recorded_base import W_FIRST, read_w_first
+from ..reconstruction.recorded_base import INVERSE, W_FIRST, read_w_first
 from ._along_motion import legendre, responses
-from ._residual_noise import drift_modes, held, most_modes, residual_noise
+from ._residual_noise import drift_modes, held, independent, most_modes, residual_noise
 
 _MOST_ROUNDS = 40  # of Gauss and Newton; a flight of many turns takes ten
 _ENOUGH_ROUNDS = 12  # after which a recording far from any flight of the body is refused
@@ -32,6 +33,8 @@ _SAME_AXES = 0.2  # [rad] between equal candidates for the axes
 _MOST_LIKELY = 4  # candidates for the axes that are fitted
 _ROUGH_ROUNDS = 15  # of least squares for a candidate
 _VAGUE_AXES = 0.3  # [rad] uncertainty of axes that the recording leaves open
+_VAGUE_BIAS = 0.1  # of the rates: a bias that is less certain is not fitted to rates alone
+_WEIGHINGS = 3  # of attitudes against rates: the third changes their noise by less than 1e-3
 _FIRST_TIMES = 6  # attitudes that are fitted first, or up to twice as many
 _NO_FLIGHT = 0.5  # [rad] rms from every motion of the body, beyond which a recording is none of its flights
 _ROUNDED = 10.0  # tolerances of the reconstruction: smaller residuals are rounding
@@ -41,7 +44,7 @@ _CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller chan
 @copied_when_read("initial_attitude", "base_axes")
 @dataclass(frozen=True, eq=False)
 class RecordedMomentum:
-    """The momentum and start with which a body comes nearest to the attitudes that were recorded.
+    """The momentum and start with which a body comes nearest to the attitudes and rates that were recorded.
 
     Made by `momentum_from_recording`.
 
@@ -54,7 +57,7 @@ class RecordedMomentum:
     covariance : (6, 6) of both, the turn of the start first, as `uncertainty` takes it: by the noise of the recorded
         attitudes alone, with its correlation in time, and by a momentum that changes; with the noise of the joints it
         is `uncertainty(fit.motion, start=fit, joints=...).start`
-    by_attitudes : (6, 3 N) their change by turns of the recorded attitudes, base axes
+    by_attitudes : (6, 3 N) their change by turns of the attitudes, base axes, those of the rates that follow included
     noise : of each component of a recorded attitude, given or as the fit leaves it [rad]
     noise_correlation : of the noise of neighbouring attitudes, as the fit leaves it: 0 for white noise
     widening : by which this correlation makes the bars of the momentum longer than white noise does, at most
@@ -67,6 +70,11 @@ class RecordedMomentum:
     times : (N,) of the recorded attitudes [s]
     base_axes : (3, 3) base axes to those whose attitude was recorded; the identity where these were the base's
     axes_covariance : (3, 3) of their turn, base axes [rad^2]; zero where they were given
+    by_rates : (6, 3 N) change of start and momentum by the recorded rates, base axes; zero without rates
+    rate_noise : of each component of a recorded rate, given or as the fit leaves it [rad/s]; 0 without rates
+    rate_residuals : (N, 3) from reconstructed to recorded rates less their bias, base axes [rad/s]; (0, 3) without
+    bias : (3,) constant part of the recorded rates that is no motion, base axes [rad/s]; zero where it is not fitted
+    bias_covariance : (3, 3) [rad^2/s^2]; None where the bias is not fitted, and taken for zero
     """
 
     momentum: Array
@@ -85,6 +93,11 @@ class RecordedMomentum:
     times: Array
     base_axes: Array
     axes_covariance: Array
+    by_rates: Array
+    rate_noise: float
+    rate_residuals: Array
+    bias: Array
+    bias_covariance: Array | None
 
     __post_init__ = lock_arrays
     __repr__ = short_repr
@@ -98,24 +111,34 @@ class RecordedMomentum:
 def momentum_from_recording(
     deformation: Deformation,
     times: ArrayLike,
-    attitudes: ArrayLike,
+    attitudes: ArrayLike | None = None,
     *,
+    rates: ArrayLike | None = None,
+    attitude: ArrayLike | None = None,
     noise: float | None = None,
+    rate_noise: float | None = None,
+    find_bias: bool | None = None,
     tolerance: float = 1e-8,
     find_axes: bool = False,
 ) -> RecordedMomentum:
-    """Fit the angular momentum of a flight to recorded attitudes of the base, by reconstructing the whole of it.
+    """Fit the angular momentum of a flight to recorded attitudes and rates of the base, by reconstructing all of it.
 
     Nothing that was recorded is differentiated: the six numbers of momentum and initial attitude are those whose
-    reconstruction is nearest to all attitudes in the sense of least squares, with the covariance that follows.
+    reconstruction is nearest to all attitudes and rates in the sense of least squares, with the covariance that
+    follows. Rates alone leave the attitude at the start open: it is given, without an error.
 
     Parameters
     ----------
     deformation : how the body changes its shape meanwhile
     times : (N,) within it, ascending, three or more [s]
-    attitudes : (N, 3, 3), base axes to the recorder's; nearer to each other than half a turn
+    attitudes : (N, 3, 3), base axes to the recorder's; nearer to each other than half a turn; None: rates alone
+    rates : (N, 3) angular velocity of the base, base axes [rad/s], as a gyro measures it; None: attitudes alone
+    attitude : (3, 3) of the start, for rates alone; None: the identity
     noise : standard deviation of each component of a recorded attitude [rad]; None: what the fit leaves, which holds
         what noise of the joints turns the reconstruction by, too. Bars are never shorter than what the fit leaves says
+    rate_noise : standard deviation of each component of a recorded rate [rad/s]; None: what the fit leaves
+    find_bias : True to fit a constant bias of the rates, False to take it for zero; None: it is fitted beside
+        attitudes, and to rates alone where these determine it to a tenth of themselves
     tolerance : of the reconstruction [rad]
     find_axes : whether the attitudes are those of axes that are fixed to the base in an unknown way, which is fitted
         too: from the way on with which the momentum, roughly, stays most constant
@@ -123,18 +146,18 @@ def momentum_from_recording(
     Raises
     ------
     ShapeError
-        If the shapes disagree.
+        If the shapes disagree; for rates beside axes to be found, and arguments without what they belong to.
     TrajectoryError
         If there are fewer than three times, or they do not ascend; or if the attitudes are a flight only once their
-        quaternions are read with w first.
+        quaternions are read with w first, or as their inverse, or the rates once they are read in deg/s.
     AccuracyNotReached
         If the fit does not settle: the recording is no free flight of this body, or too coarse; or if it does not tell
-        the axes.
+        the axes, or the bias that is to be found.
 
     Warns
     -----
     TrajectoryWarning
-        If the momentum changes: what is left over of the attitudes is no noise. Bars then hold the momentum at every
+        If the momentum changes: what is left over of the recording is no noise. Bars then hold the momentum at every
         time.
 
     Notes
@@ -150,76 +173,219 @@ def momentum_from_recording(
     >>> result = sp.momentum_from_recording(motion.deformation, times, motion.attitude(times))
     >>> print(result.momentum.round(6) + 0.0)
     [0.    0.    0.005]
+    >>> by_gyro = sp.momentum_from_recording(motion.deformation, times, rates=motion.angular_velocity(times))
+    >>> print(by_gyro.momentum.round(6) + 0.0)
+    [0.    0.    0.005]
     """
     check_flag(find_axes, "find_axes")
+    check_flag(find_bias, "find_bias", allow_none=True)
     check_object(deformation, "Deformation", "deformation")
     at = times_argument(finite_array(times, "times", (None,), unit="s"), deformation.duration)
-    recorded = so3.rotation_argument(attitudes, "attitudes")
-    if at.ndim != 1 or recorded.shape != (len(at), 3, 3):
-        raise ShapeError(f"attitudes: ({at.size}, 3, 3), one for each time, are needed, got {recorded.shape}")
+    if attitudes is None and rates is None:
+        raise ShapeError(
+            "attitudes or rates: a momentum is fitted to recorded attitudes, rates or both; none are given"
+        )
+    recorded = None if attitudes is None else so3.rotation_argument(attitudes, "attitudes")
+    if at.ndim != 1 or (recorded is not None and recorded.shape != (len(at), 3, 3)):
+        got = () if recorded is None else recorded.shape
+        raise ShapeError(f"attitudes: ({at.size}, 3, 3), one for each time, are needed, got {got}")
     if len(at) < 3 or np.any(np.diff(at) <= 0.0):
         raise TrajectoryError("times: three or more that ascend are needed to fit a momentum")
-    if noise is not None and not number_argument(noise, "noise", "rad") > 0.0:
-        raise ShapeError(f"noise: a positive standard deviation is needed, got {noise}")
-    try:
-        fit = _flight_fitted(deformation, at, recorded, tolerance, find_axes=find_axes)
-    except AccuracyNotReached as error:
-        # Axes that are to be found leave the order of the quaternions open.
-        if not find_axes:
-            with suppress(AccuracyNotReached):
-                _flight_fitted(deformation, at, read_w_first(recorded), tolerance, find_axes=False)
-                raise TrajectoryError(f"the recorded base is no flight of this body; {W_FIRST}") from error
-        raise
-    result = _estimated(fit, at, noise, tolerance)
+    measured = None if rates is None else finite_array(rates, "rates", (len(at), 3), unit="rad/s")
+    _check_choices(recorded, measured, noise, rate_noise, attitude, find_bias=find_bias, find_axes=find_axes)
+    least = _Least(deformation, at, recorded, tolerance)
+    if recorded is None:
+        assert measured is not None
+        start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
+        least = replace(least, rates=measured, weight=1.0 / (_size(measured) or 1.0), start=start)
+        least, fit = _fitted_to_rates(least, find_bias)
+    else:
+        fit = _fitted_to_attitudes(least, find_axes=find_axes)
+        least = replace(least, find_axes=find_axes)
+        if measured is not None:
+            least, fit = _weighed(replace(least, find_bias=find_bias is not False), fit, measured, noise, rate_noise)
+    result = _estimated(least, fit, noise, rate_noise)
     if not result.conserved:
         warn_of_drift(result)
     return result
 
 
-def _estimated(fit: _Fitted, times: Array, noise: float | None, tolerance: float) -> RecordedMomentum:
+def _check_choices(
+    recorded: Array | None,
+    rates: Array | None,
+    noise: float | None,
+    rate_noise: float | None,
+    attitude: ArrayLike | None,
+    *,
+    find_bias: bool | None,
+    find_axes: bool,
+) -> None:
+    """Raise ShapeError for levels of noise that are none, and for choices without the data that they belong to."""
+    for name, level, unit in (("noise", noise, "rad"), ("rate_noise", rate_noise, "rad/s")):
+        if level is not None and not number_argument(level, name, unit) > 0.0:
+            raise ShapeError(f"{name}: a positive standard deviation is needed, got {level}")
+    if recorded is None and (noise is not None or find_axes):
+        raise ShapeError("noise and find_axes are for recorded attitudes, and there are rates alone; leave them out")
+    if recorded is not None and attitude is not None:
+        raise ShapeError("attitude: that at the start is fitted to the recorded ones; leave it out")
+    if rates is None and (rate_noise is not None or find_bias):
+        raise ShapeError("rate_noise and find_bias are for recorded rates, and there are none; leave them out")
+    if rates is not None and find_axes:
+        raise ShapeError(
+            "rates are those about the axes of the base, which are to be found: leave the rates out (--names COLUMN=), "
+            "or give the axes: base_axes (--base-axes)"
+        )
+
+
+def _fitted_to_attitudes(least: _Least, *, find_axes: bool) -> _Fitted:
+    """The nearest flight to attitudes. Raises TrajectoryError where it is one in another reading of theirs."""
+    assert least.recorded is not None
+    try:
+        return _flight_fitted(least, find_axes=find_axes)
+    except AccuracyNotReached as error:
+        # Axes that are to be found leave the order of the quaternions open.
+        for other, words in () if find_axes else ((read_w_first, W_FIRST), (so3.transpose, INVERSE)):
+            with suppress(AccuracyNotReached):
+                _flight_fitted(replace(least, recorded=other(least.recorded)), find_axes=False)
+                raise TrajectoryError(f"the recorded base is no flight of this body; {words}") from error
+        raise
+
+
+def _fitted_to_rates(least: _Least, find_bias: bool | None) -> tuple[_Least, _Fitted]:
+    """The nearest flight to rates alone, and what was fitted: with a bias where they determine it."""
+    assert least.rates is not None
+    try:
+        fit = _from_few(least, np.eye(3))
+        _check_near(fit.residuals, least)
+    except AccuracyNotReached as error:
+        in_degrees = replace(least, rates=np.radians(least.rates), weight=np.degrees(least.weight))
+        with suppress(AccuracyNotReached):
+            _check_near(_from_few(in_degrees, np.eye(3)).residuals, in_degrees)
+            raise TrajectoryError(
+                "the recorded rates are no flight of this body; read in deg/s they are: give their unit, "
+                "numpy.radians(rates) (--names 'COLUMN=COLUMN [deg/s]')"
+            ) from error
+        raise
+    if find_bias is False:
+        return least, fit
+    biased = replace(least, find_bias=True)
+    with suppress(AccuracyNotReached, np.linalg.LinAlgError):
+        with_bias = biased.settled(fit.state)
+        if not biased.leaves_open(with_bias, _VAGUE_BIAS):
+            return biased, with_bias
+    if find_bias:
+        raise AccuracyNotReached(
+            "the rates leave their bias open: this flight turns too evenly, or too short; give attitudes beside them, "
+            "or take the bias for zero: find_bias=False"
+        )
+    return least, fit
+
+
+def _weighed(
+    least: _Least, near: _Fitted, rates: Array, noise: float | None, rate_noise: float | None
+) -> tuple[_Least, _Fitted]:
+    """The nearest flight to attitudes and rates, each weighed by its noise, given or as the fit leaves it."""
+    fit, count = near, 3 * len(least.times)
+    off = rates - near.motion.angular_velocity(least.times)
+    bias = off.mean(axis=0) if least.find_bias else np.zeros(3)
+    fit = near._replace(state=near.state._replace(bias=bias))
+    own, others = (
+        _left(near.residuals.ravel(), near.slopes, np.linalg.pinv(near.slopes)),
+        _size(off - bias) / np.sqrt(3.0),
+    )
+    for _ in range(_WEIGHINGS):
+        levels = noise or max(own, least.tolerance), rate_noise or max(others, least.tolerance)
+        least = replace(least, rates=rates, weight=levels[0] / levels[1])
+        fit = least.settled(fit.state)
+        estimator, rows = np.linalg.pinv(fit.slopes), fit.residuals.ravel()
+        own, others = (
+            _left(rows[part], fit.slopes[part], estimator[:, part]) for part in (slice(0, count), slice(count, None))
+        )
+        others /= least.weight
+    return least, fit
+
+
+def _left(residuals: Array, slopes: Array, estimator: Array) -> float:
+    """Standard deviation of residuals (n,) by what a fit with these slopes (n, m) leaves of noise."""
+    return float(np.sqrt((residuals**2).sum() / max(len(residuals) - np.einsum("am,ma->", slopes, estimator), 1.0)))
+
+
+def _estimated(least: _Least, fit: _Fitted, noise: float | None, rate_noise: float | None) -> RecordedMomentum:
     """The fit with the noise and the change of the momentum that its residuals show."""
-    residuals, slopes, motion = fit.residuals, fit.slopes, fit.motion
-    white = np.asarray(np.linalg.inv(slopes.T @ slopes), dtype=np.float64)
-    seen = float(np.sqrt((residuals**2).sum() / (residuals.size - slopes.shape[1])))
+    motion, times, tolerance = fit.state.motion, least.times, least.tolerance
+    estimator = np.asarray(np.linalg.pinv(fit.slopes), dtype=np.float64)
+    count, blocks = len(times), len(fit.residuals) // len(times)
+    # The first of the recorded quantities shows whether the momentum changes.
+    residuals, slopes = fit.residuals[:count], fit.slopes[: 3 * count]
+    slopes = slopes[:, slopes.any(axis=0)]  # a bias of rates moves no attitude
     modes, sure, by_modes = 0, False, np.empty((residuals.size, 0))
     # Residuals near the tolerance of the reconstruction are rounding.
-    if _spread(residuals) > _ROUNDED * tolerance:
-        turned = responses(motion, times, most_modes(len(times)))[:, :, UNKNOWNS:]
-        by_modes = (so3.transpose(motion.attitude(times)) @ turned).reshape(residuals.size, -1)
+    if _size(residuals) > _ROUNDED * tolerance:
+        by_modes = least.slopes_by_modes(motion)
         modes, sure = drift_modes(residuals, slopes, by_modes)
-    left = residual_noise(residuals, np.hstack([slopes, by_modes[:, : 3 * modes]]))
-    covariance = left.covariance(slopes)
-    widening = float(np.sqrt(np.diag(covariance / (left.weights @ left.variances * white))[3:UNKNOWNS].max()))
-    if noise is not None:
-        covariance = covariance + max(noise**2 - seen**2, 0.0) * white
-    momenta, conserved = np.tile(motion.momentum, (len(times), 1)), True
+    covariance, white_covariance = np.zeros((2, *estimator.shape[:1], *estimator.shape[:1]))
+    lefts, seen = [], []
+    for block in range(blocks):
+        rows = slice(3 * count * block, 3 * count * (block + 1))
+        own, part = fit.slopes[rows], estimator[:, rows]
+        parameters = np.hstack([slopes, by_modes[:, : 3 * modes]]) if block == 0 else independent(own)
+        left = residual_noise(fit.residuals[count * block : count * (block + 1)], parameters)
+        white = part @ part.T
+        covariance += left.covariance(part)
+        white_covariance += left.weights @ left.variances * white
+        seen.append(_left(fit.residuals.ravel()[rows], own, part))
+        stated = noise if block == 0 and least.recorded is not None else rate_noise
+        stated = None if stated is None else stated * (least.weight if least.recorded is None or block else 1.0)
+        covariance += 0.0 if stated is None else max(stated**2 - seen[-1] ** 2, 0.0) * white
+        lefts.append(left)
+    fixed = 3 if least.recorded is None else 0  # unknowns of the start, which is given
+    own = slice(3 - fixed, UNKNOWNS - fixed)
+    widening = float(np.sqrt(np.diag(covariance / white_covariance)[own].max()))
+    momenta, conserved = np.tile(motion.momentum, (count, 1)), True
     if modes:
-        seen = float(np.sqrt(left.weights @ left.variances))
-        changes = (left.weights @ left.parameters).reshape(-1, 3)[[1, *range(-modes, 0)]]
+        left = lefts[0]
+        seen[0] = float(np.sqrt(left.weights @ left.variances))
+        changes = (left.weights @ left.parameters).reshape(-1, 3)[[1 - fixed // 3, *range(-modes, 0)]]
         deviations = legendre(times, times, modes) @ changes
-        covariance[3:UNKNOWNS, 3:UNKNOWNS] += held(deviations)
+        covariance[own, own] += held(deviations)
         momenta = momenta + deviations
         _, carried = motion.deformation.description.sample(times)
         turning = np.linalg.norm(motion.momentum) + np.sqrt((carried**2).sum(axis=1).mean())
         conserved = not sure or bool(np.linalg.norm(deviations, axis=1).max() <= _CONSTANT * turning)
-    free = fit.slopes.shape[1] > UNKNOWNS
+    covariance = np.pad(covariance, ((fixed, 0), (fixed, 0)))
+    by_all = np.pad(estimator, ((fixed, 0), (0, 0)))[:UNKNOWNS]
+    by_attitudes, by_rates = np.zeros((2, UNKNOWNS, 3 * count))
+    if least.recorded is not None:
+        by_attitudes = by_all[:, : 3 * count]
+    if least.rates is not None:
+        by_rates = least.weight * by_all[:, -3 * count :]
+        turned = least.rates_by_turns(motion)
+        by_attitudes = by_attitudes + np.einsum("pni,nij->pnj", by_rates.reshape(UNKNOWNS, count, 3), turned).reshape(
+            UNKNOWNS, -1
+        )
+    extra = covariance[UNKNOWNS:, UNKNOWNS:]
     return RecordedMomentum(
         momentum=motion.momentum,
         initial_attitude=motion.initial_attitude,
         momentum_covariance=covariance[3:UNKNOWNS, 3:UNKNOWNS],
         attitude_covariance=covariance[:3, :3],
         covariance=covariance[:UNKNOWNS, :UNKNOWNS],
-        by_attitudes=np.asarray(np.linalg.pinv(slopes)[:UNKNOWNS], dtype=np.float64),
-        noise=seen if noise is None else noise,
-        noise_correlation=left.correlation,
+        by_attitudes=by_attitudes,
+        noise=noise or (0.0 if least.recorded is None else seen[0]),
+        noise_correlation=lefts[0].correlation,
         widening=widening,
-        residuals=residuals,
+        residuals=residuals if least.recorded is not None else np.zeros((0, 3)),
         momenta=momenta,
         conserved=conserved,
         motion=motion,
         times=times,
-        base_axes=fit.axes,
-        axes_covariance=covariance[UNKNOWNS:, UNKNOWNS:] if free else np.zeros((3, 3)),
+        base_axes=fit.state.axes,
+        axes_covariance=extra if least.find_axes else np.zeros((3, 3)),
+        by_rates=by_rates,
+        rate_noise=0.0 if least.rates is None else rate_noise or seen[-1] / least.weight,
+        rate_residuals=np.zeros((0, 3)) if least.rates is None else fit.residuals[-count:] / least.weight,
+        bias=fit.state.bias,
+        bias_covariance=extra if least.find_bias else None,
     )
 
 
@@ -234,36 +400,43 @@ def warn_of_drift(fit: RecordedMomentum) -> None:
     )
 
 
-class _Fitted(NamedTuple):
-    """The nearest motion and axes, (3, 3) base axes to those recorded; what is left, (N, 3), its slopes, (3 N, m)."""
+class _State(NamedTuple):
+    """A motion, axes (3, 3) from base axes to those recorded, and the bias of recorded rates (3,) [rad/s]."""
 
     motion: Motion
     axes: Array
+    bias: Array
+
+
+class _Fitted(NamedTuple):
+    """The nearest state; what is left, (K, 3), and its slopes, (3 K, m), attitudes before weighed rates."""
+
+    state: _State
     residuals: Array
     slopes: Array
 
+    @property
+    def motion(self) -> Motion:
+        """The nearest motion."""
+        return self.state.motion
 
-def _flight_fitted(
-    deformation: Deformation, times: Array, recorded: Array, tolerance: float, *, find_axes: bool
-) -> _Fitted:
+
+def _flight_fitted(least: _Least, *, find_axes: bool) -> _Fitted:
     """The nearest flight; raises AccuracyNotReached where none is near."""
-    if find_axes:
-        fit = _with_axes(deformation, times, recorded, tolerance)
-    else:
-        fit = _fitted(deformation, times, recorded, tolerance, np.eye(3))
-    _check_near(fit.residuals, times)
+    fit = _with_axes(least) if find_axes else _from_few(least, np.eye(3))
+    _check_near(fit.residuals, least)
     return fit
 
 
-def _fitted(deformation: Deformation, times: Array, recorded: Array, tolerance: float, axes: Array) -> _Fitted:
-    """Fit to the first few attitudes, then to more and more, so that a wrong momentum never loses count of turns."""
-    fit = _Least(deformation, times, recorded, tolerance)
-    half = len(times) // 2
+def _from_few(least: _Least, axes: Array) -> _Fitted:
+    """Fit to the first few times, then to more and more, so that a wrong momentum never loses count of turns."""
+    half = len(least.times) // 2
     if half < _FIRST_TIMES:
-        return fit.settled(fit.first_motion(axes), axes)
-    before = _fitted(deformation, times[:half], recorded[:half], tolerance, axes)
-    _check_near(before.residuals, times[:half])
-    return fit.settled(before.motion, axes)
+        return least.settled(least.first_state(axes))
+    first = least.up_to(half)
+    before = _from_few(first, axes)
+    _check_near(before.residuals, first)
+    return least.settled(before.state)
 
 
 def _momenta(deformation: Deformation, times: Array, recorded: Array) -> Array:
@@ -276,23 +449,24 @@ def _momenta(deformation: Deformation, times: Array, recorded: Array) -> Array:
     return so3.apply(seen, so3.apply(inertia, rates) + internal)
 
 
-def _with_axes(deformation: Deformation, times: Array, recorded: Array, tolerance: float) -> _Fitted:
+def _with_axes(least: _Least) -> _Fitted:
     """The nearest fit from each of the likely axes, of which a nearly symmetric body has several."""
+    assert least.recorded is not None
     fits, vague = [], False
-    free = _Least(deformation, times, recorded, tolerance, find_axes=True)
-    for axes in _likely_axes(deformation, times, recorded):
+    free = replace(least, find_axes=True)
+    for axes in _likely_axes(least.deformation, least.times, least.recorded):
         # From unlikely axes a fit may wander about.
         with suppress(AccuracyNotReached):
-            near = _fitted(deformation, times, recorded, tolerance, axes)
-            if free.leaves_axes_open(near):
+            near = _from_few(least, axes)
+            if free.leaves_open(near, _VAGUE_AXES):
                 vague = True
                 continue
-            fits.append(free.settled(near.motion, near.axes))
+            fits.append(free.settled(near.state))
     if vague and not fits:
         raise AccuracyNotReached("the flight leaves the axes of the base open; give them: base_axes (--base-axes)")
     if not fits:
         raise AccuracyNotReached("with no axes of the base the recording comes near to a free flight of this body")
-    return min(fits, key=lambda fit: _spread(fit.residuals))
+    return min(fits, key=lambda fit: _size(fit.residuals))
 
 
 def _likely_axes(deformation: Deformation, times: Array, recorded: Array) -> list[Array]:
@@ -319,65 +493,120 @@ def _likely_axes(deformation: Deformation, times: Array, recorded: Array) -> lis
 
 @dataclass(frozen=True, eq=False)
 class _Least:
-    """Least squares over momentum and start, and the axes where they are to be found.
+    """Least squares over momentum and start, and the axes or the bias where they are to be found.
 
     Attributes
     ----------
-    deformation, tolerance, find_axes : as given
-    times, recorded : (N,), (N, 3, 3) what is fitted
+    deformation, tolerance, find_axes, find_bias : as given
+    times : (N,)
+    recorded, rates : (N, 3, 3) and (N, 3) what is fitted, or None
+    weight : of the rates [rad for each rad/s]; the inverse of their size where there are no attitudes
+    start : (3, 3) attitude at the start, where there are no attitudes
     """
 
     deformation: Deformation
     times: Array
-    recorded: Array
+    recorded: Array | None
     tolerance: float
     find_axes: bool = False
+    rates: Array | None = None
+    weight: float = 1.0
+    start: Array | None = None
+    find_bias: bool = False
 
-    def settled(self, motion: Motion, axes: Array) -> _Fitted:
-        """Fit by steps of Gauss and Newton from a motion and axes, halved where they go too far."""
-        residuals = self._residuals(motion, axes)
+    def up_to(self, count: int) -> Self:
+        """The problem of the first times."""
+        recorded, rates = (None if part is None else part[:count] for part in (self.recorded, self.rates))
+        return replace(self, times=self.times[:count], recorded=recorded, rates=rates)
+
+    def settled(self, state: _State) -> _Fitted:
+        """Fit by steps of Gauss and Newton from a state, halved where they go too far."""
+        residuals = self._residuals(state)
         for number in range(_MOST_ROUNDS):
             if number == _ENOUGH_ROUNDS:
-                _check_near(residuals, self.times)
-            slopes = self._slopes(motion)
+                _check_near(residuals, self)
+            slopes = self._slopes(state.motion)
             step = np.asarray(np.linalg.lstsq(slopes, residuals.ravel(), rcond=None)[0], dtype=np.float64)
-            if self._is_small(step, slopes, motion, residuals):
-                return _Fitted(motion, axes, residuals, slopes)
-            motion, axes, residuals = self._nearer(motion, axes, step, float((residuals**2).sum()))
-        raise AccuracyNotReached(f"the momentum did not settle within {_MOST_ROUNDS} rounds; {_apart(residuals)}")
+            if self._is_small(step, slopes, state.motion, residuals):
+                return _Fitted(state, residuals, slopes)
+            state, residuals = self._nearer(state, step, float((residuals**2).sum()))
+        raise AccuracyNotReached(f"the momentum did not settle within {_MOST_ROUNDS} rounds; {_apart(residuals, self)}")
 
-    def leaves_axes_open(self, near: _Fitted) -> bool:
-        """True where the recording allows other axes, too, by the residuals of a fit to given axes."""
+    def leaves_open(self, near: _Fitted, most: float) -> bool:
+        """True where the recording allows other axes or biases, farther off than `most`, by a fit to given ones."""
         slopes = self._slopes(near.motion)
-        # A turn of the axes that start and momentum undo.
-        ours, others = slopes[:, UNKNOWNS:], slopes[:, :UNKNOWNS]
+        # A change that start and momentum undo.
+        ours, others = slopes[:, -3:], slopes[:, :-3]
         alone = ours - others @ np.linalg.lstsq(others, ours, rcond=None)[0]
         weakest = float(np.linalg.svd(alone, compute_uv=False)[-1])
-        return _spread(near.residuals) > _VAGUE_AXES * weakest
+        return max(_size(near.residuals), self.tolerance) > most * weakest
 
-    def first_motion(self, axes: Array) -> Motion:
-        """Motion with the mean of the momenta by neighbouring attitudes."""
-        momenta = _momenta(self.deformation, self.times, self.recorded @ axes)
-        return self._reconstructed(momenta.mean(axis=0), self.recorded[0] @ axes)
+    def first_state(self, axes: Array) -> _State:
+        """Motion with the mean of the momenta by neighbouring attitudes, or by rates and the turns they make."""
+        if self.recorded is not None:
+            momenta, start = _momenta(self.deformation, self.times, self.recorded @ axes), self.recorded[0] @ axes
+        else:
+            assert self.rates is not None
+            assert self.start is not None
+            start, inertia, internal = self.start, *self.deformation.description.sample(self.times)
+            turns = [start]
+            for turn in so3.exp(0.5 * (self.rates[1:] + self.rates[:-1]) * np.diff(self.times)[:, None]):
+                turns.append(turns[-1] @ turn)
+            momenta = so3.apply(np.array(turns), so3.apply(inertia, self.rates) + internal)
+        return _State(self._reconstructed(momenta.mean(axis=0), start), axes, np.zeros(3))
 
-    def _slopes(self, motion: Motion) -> Array:
-        """The change of all attitudes by start, momentum and, backwards, axes, base axes: (3 N, 6 or 9)."""
-        turns = responses(motion, self.times)
+    def rates_by_turns(self, motion: Motion) -> Array:
+        """Change of the rates by turns of the attitude, both in base axes: (N, 3, 3) [1/s]."""
+        inertia, _ = self.deformation.description.sample(self.times)
+        return inverse_inertia(inertia) @ so3.hat(motion.momentum @ motion.attitude(self.times))
+
+    def slopes_by_modes(self, motion: Motion) -> Array:
+        """Change of the first recorded quantity by a momentum that changes as Legendre polynomials: (3 N, 3 K)."""
+        modes = most_modes(len(self.times))
+        slopes = self._slopes(motion, modes)[: 3 * len(self.times)]
+        return slopes[:, slopes.shape[1] - 3 * modes :]
+
+    def _slopes(self, motion: Motion, modes: int = 0) -> Array:
+        """The change of all that is fitted by start, momentum and, backwards, axes, or bias, and by modes."""
+        count, attitudes = len(self.times), so3.transpose(motion.attitude(self.times))
+        turns = responses(motion, self.times, modes)
         turns[:, :, :3] = turns[:, :, :3] @ motion.initial_attitude
-        slopes = (so3.transpose(motion.attitude(self.times)) @ turns).reshape(-1, UNKNOWNS)
-        return np.hstack([slopes, np.tile(-np.eye(3), (len(self.times), 1))]) if self.find_axes else slopes
+        turned = attitudes @ turns
+        blocks = []
+        if self.recorded is not None:
+            extra = np.tile(-np.eye(3) if self.find_axes else np.zeros((3, 3)), (count, 1, 1))
+            blocks.append((turned, extra))
+        if self.rates is not None:
+            inertia, _ = self.deformation.description.sample(self.times)
+            added = np.zeros_like(turned)
+            polynomials = legendre(self.times, self.times, modes)
+            added[:, :, 3:] = np.einsum("nij,nk->nikj", attitudes, polynomials).reshape(count, 3, -1)
+            by_momentum = self.rates_by_turns(motion) @ turned + inverse_inertia(inertia) @ added
+            blocks.append((self.weight * by_momentum, np.tile(self.weight * np.eye(3), (count, 1, 1))))
+        first = 3 if self.recorded is None else 0
+        rows = []
+        for by_state, extra in blocks:
+            parts = [by_state[:, :, first:UNKNOWNS], *([extra] if self.find_axes or self.find_bias else [])]
+            rows.append(np.concatenate([*parts, by_state[:, :, UNKNOWNS:]], axis=2))
+        whole = np.concatenate(rows)
+        return whole.reshape(3 * len(whole), -1)
 
-    def _nearer(self, motion: Motion, axes: Array, step: Array, before: float) -> tuple[Motion, Array, Array]:
-        trial, turned, residuals = motion, axes, np.empty(0)
+    def _nearer(self, state: _State, step: Array, before: float) -> tuple[_State, Array]:
+        trial, residuals = state, np.empty(0)
+        if self.recorded is None:
+            step = np.append(np.zeros(3), step)
         for halving in range(_MOST_HALVINGS):
             change = step * 0.5**halving
-            start = motion.initial_attitude @ so3.exp(change[:3])
-            trial = self._reconstructed(motion.momentum + change[3:UNKNOWNS], start)
-            turned = axes @ so3.exp(change[UNKNOWNS:]) if self.find_axes else axes
-            residuals = self._residuals(trial, turned)
+            start, extra = state.motion.initial_attitude @ so3.exp(change[:3]), change[UNKNOWNS:]
+            trial = _State(
+                self._reconstructed(state.motion.momentum + change[3:UNKNOWNS], start),
+                state.axes @ so3.exp(extra) if self.find_axes else state.axes,
+                state.bias + extra if self.find_bias else state.bias,
+            )
+            residuals = self._residuals(trial)
             if (residuals**2).sum() <= before:
                 break
-        return trial, turned, residuals
+        return trial, residuals
 
     def _is_small(self, step: Array, slopes: Array, motion: Motion, residuals: Array) -> bool:
         """True where a step is far below the uncertainty of the fit, or rounding."""
@@ -385,32 +614,41 @@ class _Least:
         by_unit = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
         noise = float(np.sqrt((residuals**2).sum() / (residuals.size - unknowns)))
         floor = np.full(unknowns, _NO_STEP)
-        floor[3:UNKNOWNS] *= float(np.linalg.norm(motion.momentum))
+        first = 0 if self.recorded is None else 3
+        floor[first : first + 3] *= float(np.linalg.norm(motion.momentum))
         # The tolerance of the reconstruction also bounds the last step.
         return bool(np.all(np.abs(step) <= (_SMALL_STEP * noise + self.tolerance) * by_unit + floor))
 
     def _reconstructed(self, momentum: Array, attitude: Array) -> Motion:
         return reconstruct(self.deformation, momentum, attitude, tolerance=self.tolerance)
 
-    def _residuals(self, motion: Motion, axes: Array) -> Array:
-        return so3.log(so3.transpose(motion.attitude(self.times)) @ self.recorded @ axes)
+    def _residuals(self, state: _State) -> Array:
+        rows = []
+        if self.recorded is not None:
+            rows.append(so3.log(so3.transpose(state.motion.attitude(self.times)) @ self.recorded @ state.axes))
+        if self.rates is not None:
+            rows.append(self.weight * (self.rates - state.motion.angular_velocity(self.times) - state.bias))
+        return np.concatenate(rows)
 
 
-def _spread(residuals: Array) -> float:
-    """Root mean square of the angles [rad]."""
-    return float(np.sqrt((residuals**2).sum(axis=1).mean()))
+def _size(vectors: Array) -> float:
+    """Root mean square of the lengths."""
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
 
 
-def _check_near(residuals: Array, times: Array) -> None:
-    """Raise AccuracyNotReached where the residuals of attitudes at these times are too large for noise."""
-    if _spread(residuals) > _NO_FLIGHT:
+def _check_near(residuals: Array, least: _Least) -> None:
+    """Raise AccuracyNotReached where residuals are too large for noise."""
+    if _size(residuals) > _NO_FLIGHT:
+        times = least.times
         raise AccuracyNotReached(
-            f"{_apart(residuals)} from {times[0]:.6g} to {times[-1]:.6g} s: no free flight of this body, or the axes "
-            "that were recorded are not those of its base"
+            f"{_apart(residuals, least)} from {times[0]:.6g} to {times[-1]:.6g} s: no free flight of this body, or the "
+            "axes that were recorded are not those of its base"
         )
 
 
-def _apart(residuals: Array) -> str:
+def _apart(residuals: Array, least: _Least) -> str:
     """Distance from reconstruction to recording, in words."""
-    spread = np.degrees(_spread(residuals))
-    return f"the reconstruction stays {spread:.3g} degrees (rms) from {len(residuals)} attitudes"
+    count, spread = len(least.times), _size(residuals)
+    if least.recorded is None:
+        return f"the reconstruction stays {100.0 * spread:.3g} % (rms) from {count} rates"
+    return f"the reconstruction stays {np.degrees(spread):.3g} degrees (rms) from {count} attitudes"

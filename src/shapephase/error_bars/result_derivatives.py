@@ -15,6 +15,7 @@ from ..body.body import Body
 from ..deformation.descriptions import ArticulatedDescription
 from ..display import short_repr
 from ..errors import ShapeError, WrongObjectError
+from ..inertia_tensor import inverse_inertia
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
@@ -252,17 +253,39 @@ def described_by(motion: Motion) -> tuple[Body, ShapePath]:
     return description.body, description.path
 
 
-def fit_by_knots(motion: Motion, times: Array, by_attitudes: Array) -> Array:
-    """Derivative of the fit by the path at its knots: (6, knots n); `by_attitudes` is that of `RecordedMomentum`."""
+def fit_by_knots(motion: Motion, times: Array, by_attitudes: Array, by_rates: Array) -> Array:
+    """Derivative of the fit by the path at its knots: (6, knots n); the last arguments are of `RecordedMomentum`."""
     body_along, along, rows = _by_added_momentum(motion, times, by_attitudes)
     momenta, samples = motion.momentum @ along.attitudes, path_samples(described_by(motion)[1])
-    return body_along.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None])
+    by_knots = body_along.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None])
+    if by_rates.any():
+        body_then, spins, rows = _by_momentum_at_rates(motion, times, by_rates)
+        momenta = motion.momentum @ motion.attitude(times)
+        by_knots = by_knots + body_then.by_knots(samples, spins[:, None], rows[:, None], momenta[:, None])
+    return by_knots
 
 
-def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:
+def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array, by_rates: Array) -> Array:
     """Derivative of the fit by the ten parameters of each frame, in the order of `by_inertias`: (6, 10 (k + 1))."""
     body_along, along, rows = _by_added_momentum(motion, times, by_attitudes)
-    return body_along.by_inertias(along.spins[:, None], rows[:, None])
+    by_inertias = body_along.by_inertias(along.spins[:, None], rows[:, None])
+    if by_rates.any():
+        body_then, spins, rows = _by_momentum_at_rates(motion, times, by_rates)
+        by_inertias = by_inertias + body_then.by_inertias(spins[:, None], rows[:, None])
+    return by_inertias
+
+
+def _by_momentum_at_rates(motion: Motion, times: Array, by_rates: Array) -> tuple[BodyAlong, Array, Array]:
+    """Body and spins at the recorded rates, and the change of the fit by a unit of I omega + L_o there: (N, 6, 3).
+
+    At one attitude the reconstructed rate falls by I^-1 times that change; the recorded one stays.
+    """
+    body, path = described_by(motion)
+    shapes, joint_rates = path.curve(times)
+    inertia, _ = motion.deformation.description.sample(times)
+    by_rate = np.moveaxis(by_rates.reshape(len(by_rates), -1, 3), 1, 0)
+    rows = by_rate @ inverse_inertia(inertia)
+    return BodyAlong(body, times, shapes, joint_rates), motion.angular_velocity(times), rows
 
 
 def _by_added_momentum(motion: Motion, times: Array, by_attitudes: Array) -> tuple[BodyAlong, AlongMotion, Array]:

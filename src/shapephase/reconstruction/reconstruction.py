@@ -18,6 +18,7 @@ from ..arguments import (
     check_object,
     initial_state_arguments,
     made_by,
+    number_argument,
     threads_argument,
     times_argument,
     tolerance_argument,
@@ -27,6 +28,7 @@ from ..deformation.deformation import Deformation, DeformationFamily
 from ..display import short_repr
 from ..errors import ShapeError, WrongObjectError
 from ..inertia_tensor import inverse_inertia
+from ..integrator.driven_attitude import dop853_attitude
 from ..integrator.families import VariantRotations, rotations_of_variants
 from ..integrator.integrate import stepped_rotation
 from ..integrator.interpolant import Interpolant
@@ -43,6 +45,7 @@ if TYPE_CHECKING:
     from .forced_motion import ForcedMotion
 
 _FAMILY_METHODS = ("auto", "spectral")
+_BACKWARD_TOLERANCE = 1e-11  # [rad] of the turn back to the start: a hundredth of the usual one of `reconstruct`
 
 
 @dataclass(frozen=True, eq=False)
@@ -574,19 +577,31 @@ def load_motion(path: str | os.PathLike[str]) -> Motion:
 
 
 def momentum_from_rate(
-    deformation: Deformation | DeformationFamily, angular_velocity: ArrayLike, attitude: ArrayLike | None = None
+    deformation: Deformation | DeformationFamily,
+    angular_velocity: ArrayLike,
+    attitude: ArrayLike | None = None,
+    *,
+    time: float = 0.0,
 ) -> Array:
-    """Return the angular momentum of a body that starts with this angular velocity while its shape moves.
+    """Return the angular momentum of a body whose base has this angular velocity at one time while its shape moves.
 
     Parameters
     ----------
-    deformation : one, or those of a family of N bodies, where leading axes are () or (N,)
-    angular_velocity : (..., 3) of the base at t = 0, base axes [rad/s]
+    deformation : one, or, at the start, those of a family of N bodies, where leading axes are () or (N,)
+    angular_velocity : (..., 3) of the base at that time, base axes [rad/s]
     attitude : (..., 3, 3) at t = 0; None: the identity
+    time : at which the base turns so [s]; from a later one the motion is integrated back to the start
 
     Returns
     -------
     (..., 3) about the centre of mass, inertial axes [kg m^2/s]: R (I omega + L_o)
+
+    Raises
+    ------
+    ShapeError
+        For arrays of the wrong shape, or a family at a later time.
+    TrajectoryError
+        For a time outside the motion.
 
     Notes
     -----
@@ -600,7 +615,29 @@ def momentum_from_rate(
     if not isinstance(deformation, DeformationFamily):
         check_object(deformation, "Deformation", "deformation")
     omega = finite_array(angular_velocity, "angular_velocity", (3,), unit="rad/s")
-    inertia, internal = deformation.inertia(0.0), deformation.internal_momentum(0.0)
+    at = float(times_argument(number_argument(time, "time", "s"), deformation.duration))
+    if at and not isinstance(deformation, Deformation):
+        raise ShapeError(f"time: the rates of a family are those at the start, time=0, got {at:g}")
+    inertia, internal = deformation.inertia(at), deformation.internal_momentum(at)
     common_batch(deformation=inertia.shape[:-2], angular_velocity=omega.shape[:-1])
     body = so3.apply(inertia, omega) + internal
+    if at and isinstance(deformation, Deformation):
+        body = _carried_to_start(deformation, body.reshape(-1, 3), at).reshape(body.shape)
     return body if attitude is None else so3.apply(so3.rotation_argument(attitude, "attitude"), body)
+
+
+def _carried_to_start(deformation: Deformation, momenta: Array, time: float) -> Array:
+    """Momenta in base axes at t = 0 by those at a later time: (B, 3) -> (B, 3).
+
+    Shapes in reverse, with rates and momenta reversed, make a motion, too.
+    """
+    sample, breaks = deformation.description.sample, deformation.breaks
+
+    def backwards(times: Array) -> tuple[Array, Array]:
+        inertia, internal = sample(np.maximum(time - times, 0.0))
+        return inertia, -internal
+
+    passed = np.append(0.0, time - breaks[breaks < time][::-1])
+    turns = [dop853_attitude(backwards, passed, -row, _BACKWARD_TOLERANCE) for row in momenta]
+    starts = np.stack([turn.attitude(np.array([time]))[0] for turn in turns])
+    return so3.apply(so3.transpose(starts), momenta)

@@ -17,6 +17,8 @@ from .reconstruction import Motion
 
 W_FIRST = "read as w x y z instead of x y z w, its quaternions agree: were they written with w first?"
 """Hint for a recorded base that agrees with the motion in the other order of its quaternions."""
+INVERSE = "read as its inverse, it is one: base_inverse=True (--base-inverse), or so3.transpose(attitudes)"
+"""Hint for recorded attitudes that take the recorder's axes to those of the base."""
 _APART = 0.3  # [rad] a smaller difference between orders of quaternions is noise
 _NEARER = 0.1  # of the difference, left over in the other order of quaternions, where that order is the reason
 

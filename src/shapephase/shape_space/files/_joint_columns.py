@@ -17,6 +17,7 @@ from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
 from ...letters import value_text
 from ..interpolation import ball_columns, neighbours_signs
+from ._base_rates import rate_label
 from ._gaps import Gaps
 from .base_columns import HINT, KNOWN, BaseChoices, BaseColumns, BaseMotion, base_names
 from .labels import (
@@ -234,7 +235,7 @@ def _speed_column(table: Table, wheel: str, column: str) -> Label:
 
 def _with_unit(name: str | None, target: str) -> str:
     """Name of a column of the base with the unit of its own label; without such a name the label."""
-    unit = label(target).unit
+    unit = rate_label(target).unit or label(target).unit
     return target if name is None else name if unit is None else f"{name} [{unit}]"
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Collection
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -93,24 +92,21 @@ def evenly_spaced(times: Array, motion: Matched, inside: slice, rate: float) -> 
     start, stop = times[inside][[0, -1]]
     before, past, after = (int((t - start) * rate + ROUNDING) for t in (2.0 * start - times[0], stop, times[-1]))
     at = np.clip(start + np.arange(-before, after + 1) / rate, times[0], times[-1])
-    base = motion.base
-    if base.attitude is not None:
-        turned = RotationSpline(times, Rotation.from_matrix(base.attitude))(at).as_matrix()
-        base = replace(base, attitude=turned)
-    if base.position is not None:
-        base = replace(base, position=CubicSpline(times, base.position)(at))
+    base = motion.base.mapped(
+        lambda values: CubicSpline(times, values)(at),
+        lambda turns: RotationSpline(times, Rotation.from_matrix(turns))(at).as_matrix(),
+    )
     shapes, speeds = (CubicSpline(times, values)(at) for values in (motion.shapes, motion.speeds))
     return at - at[0], motion._replace(shapes=shapes, base=base, speeds=speeds), slice(before, before + past + 1)
 
 
 def low_passed(times: Array, motion: Matched, cut_off: float) -> Matched:
     """The motion with its base filtered: joints are filtered where their path is made."""
-    base = motion.base
-    if base.attitude is not None:
-        base = replace(base, attitude=filtered_attitudes(times, base.attitude, cut_off))
-    if base.position is not None:
-        base = replace(base, position=filtered(times, base.position, cut_off))
-    return motion._replace(base=base)
+    return motion._replace(
+        base=motion.base.mapped(
+            lambda values: filtered(times, values, cut_off), lambda turns: filtered_attitudes(times, turns, cut_off)
+        )
+    )
 
 
 def _steps(motion: Matched, body: Body) -> list[tuple[list[str], str, Array]]:

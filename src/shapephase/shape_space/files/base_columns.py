@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import permutations
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from ... import so3
+from ...arguments import check_flag
 from ...arrays import Array, Integers
 from ...body.link_tree import Joint
 from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import value_text
+from ._base_rates import RATE_NAMES, BaseRates, agreeing, check_speed, in_rad_per_s, rate_label
 from ._gaps import Gaps
 from .labels import NO_UNIT, Label, angles_in_rad, check_range, label, lengths_in_m
 from .recording import OFF_UNIT, Recording, checked_quaternions
 
 ESTIMATE = "estimate"  # axes of the base that a fit determines
-_FOLLOWING = ("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s")  # of `Motion.write_csv`; they follow from the rest
 _VELOCITIES = ("base_vx_m_s", "base_vy_m_s", "base_vz_m_s")  # written by `export_motion`
 _COUNTED = tuple(f"{turn}{error}_rad" for turn in ("somersault", "tilt", "twist") for error in ("", "_error"))
 _LINK_MOMENTUM = "_kg_m2_s"  # ends the labels of momenta, which follow from the rest, too
-_AGREES = 0.1  # median error of turns between samples, relative to the rates: both agree
-_CONTRADICTS = 0.5  # relative to the rates: turns that are off by more contradict them
 _LEAST_SLIDES = 2  # sliding joints that determine the place of the base; with one, the other directions are fixed
 _SAME_AXES = "x y z"
 _OPENSIM_AXES = "x -z y"  # base axes of URDF (x forward, z up) in OpenSim's (x forward, y up, z right)
@@ -35,11 +34,13 @@ PLACE = "place"
 MRP = "mrp"
 VECTOR = "vector"
 EULER = "euler"
+RATE = "rate"
 _KINDS = {
     QUATERNION: ("q", "quat", "quaternion", "orientation", "rotation", "attitude", "rot", "att"),
     PLACE: ("p", "t", "r", "pos", "position", "trans", "translation", "location"),
     MRP: ("sigma", "mrp", "mrps"),
     VECTOR: ("rotvec", "rv", "axisangle"),
+    RATE: ("omega", "w", "gyro", "gyr", "gyroscope"),
 }
 _KIND_OF = {word: kind for kind, words in _KINDS.items() for word in words}
 _EULER = {"roll": "roll", "pitch": "pitch", "yaw": "yaw", "heading": "yaw"}
@@ -47,7 +48,9 @@ _BASE = frozenset(  # words before the kind that name no other part of the body
     ("base", "link", "root", "pelvis", "body", "pose", "odom", "odometry", "state", "states", "transform", "field")
 ) | {"free", "floating", "freeflyer"}
 _FRAME = re.compile(r"[a-z]{1,2}")  # frames between a kind and its component, as in `p_RS_R_x`
-_JOINED = re.compile(r"(q|quat|t|p|r|mrp|sigma|rotvec|pos)([wxyz]|\d)")
+_IMU = frozenset(("imu", "sensor"))  # words that name the base's own sensor of rates
+_JOINED = re.compile(r"(q|quat|t|p|r|mrp|sigma|rotvec|pos)([wxyz]|\d)|(omega|w|gyro|gyr)([xyz])")
+_ANGULAR = re.compile(r"ang(?:ular)?[_ .]?(?:vel(?:ocity)?|rate)")
 _SPLIT = re.compile(r"[/.\s_\[\]()]+")
 CANONICAL = {  # kind -> component -> name of its column
     QUATERNION: {part: f"base_q{part}" for part in "xyzw"},
@@ -55,10 +58,11 @@ CANONICAL = {  # kind -> component -> name of its column
     MRP: {part: f"base_mrp_{part}" for part in "123"},
     VECTOR: {part: f"base_rotvec_{part}" for part in "xyz"},
     EULER: {part: f"base_{part}" for part in ("roll", "pitch", "yaw")},
+    RATE: dict(zip("xyz", RATE_NAMES, strict=True)),
 }
 HINT = (  # in messages about columns of the base
     "columns of the base are base_x, base_y, base_z and base_qx, base_qy, base_qz, base_qw or base_roll, base_pitch, "
-    "base_yaw or base_mrp_1, base_mrp_2, base_mrp_3"
+    "base_yaw or base_mrp_1, base_mrp_2, base_mrp_3; its rates omega_x, omega_y, omega_z"
 )
 
 
@@ -95,7 +99,7 @@ def _groups() -> tuple[_Group, ...]:
 
 
 _GROUPS = _groups()
-KNOWN = frozenset(name for group in _GROUPS for name in group.names)
+KNOWN = frozenset(name for group in _GROUPS for name in group.names) | {*RATE_NAMES}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,11 +108,13 @@ class BaseChoices:
 
     axes : (3, 3) base axes to the axes of the columns, ESTIMATE, or None for the default
     given : these axes as the caller wrote them
+    inverse : True where attitudes take the recorder's axes to the base's; None: as recorded rates show, else False
     """
 
     order: str | None = None
     axes: Array | str | None = None
     given: str | None = None
+    inverse: bool | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,36 +123,48 @@ class BaseMotion:
 
     attitude : (N, 3, 3) base axes to the recorder's, or None; with axes to be estimated, from the columns' own axes
     position : (N, 3) [m] or None
+    rates : (N, 3) angular velocity, base axes [rad/s], or None; with axes to be estimated, in the columns' own axes
     record : what it was read from, ready for JSON, or None
     left_out : label -> why a column was left out
     """
 
     attitude: Array | None
     position: Array | None
+    rates: Array | None
     record: dict[str, Any] | None
     left_out: dict[str, str]
 
     def kept(self, samples: Integers) -> BaseMotion:
         """Some of the samples, by their places."""
-        attitude = None if self.attitude is None else self.attitude[samples]
-        return replace(self, attitude=attitude, position=None if self.position is None else self.position[samples])
+        return self.mapped(lambda values: values[samples], lambda values: values[samples])
+
+    def mapped(self, vectors: Callable[[Array], Array], turns: Callable[[Array], Array]) -> BaseMotion:
+        """The motion with functions of places and rates, and of attitudes."""
+        return replace(
+            self,
+            attitude=None if self.attitude is None else turns(self.attitude),
+            position=None if self.position is None else vectors(self.position),
+            rates=None if self.rates is None else vectors(self.rates),
+        )
 
 
-def base_choices(order: str | None, axes: Any) -> BaseChoices:
-    """Order of angles and axes of the base, checked. Raises TrajectoryError, ShapeError."""
+def base_choices(order: str | None, axes: Any, inverse: bool | None) -> BaseChoices:
+    """Order of angles, axes and direction of the base's attitude, checked. Raises TrajectoryError, ShapeError."""
+    check_flag(inverse, "base_inverse", allow_none=True)
     orders = ["".join(letters) for letters in permutations("xyz")]
     if order is not None and (not isinstance(order, str) or order not in orders):
         raise TrajectoryError(
             f"base_order: the three axes in their order, as 'zxy', are needed, got {value_text(order)}"
         )
     if axes is None or (isinstance(axes, str) and axes == ESTIMATE):
-        return BaseChoices(order=order, axes=axes, given=axes)
+        return BaseChoices(order=order, axes=axes, given=axes, inverse=inverse)
     if isinstance(axes, str):
-        return BaseChoices(order=order, axes=named_axes(axes), given=" ".join(axes.replace(",", " ").split()))
+        words = " ".join(axes.replace(",", " ").split())
+        return BaseChoices(order=order, axes=named_axes(axes), given=words, inverse=inverse)
     matrix = so3.rotation_argument(axes, "base_axes")
     if matrix.shape != (3, 3):
         raise TrajectoryError(f"base_axes: one rotation (3, 3) is needed, got {matrix.shape}")
-    return BaseChoices(order=order, axes=matrix, given=str(matrix.tolist()))
+    return BaseChoices(order=order, axes=matrix, given=str(matrix.tolist()), inverse=inverse)
 
 
 def named_axes(text: str) -> Array:
@@ -177,7 +195,7 @@ class BaseColumns:
     slides: tuple[str, ...] | None  # names of the coordinates of its place there
     way: tuple[Joint, ...] = ()  # joints of the body's file that lead to the base
     columns: dict[str, tuple[str, str | None]] = field(default_factory=dict)  # name -> label and unit
-    rates: dict[str, str] = field(default_factory=dict)
+    rates: dict[str, tuple[str, str | None]] = field(default_factory=dict)  # name -> label and unit
 
     @property
     def own_names(self) -> tuple[str, ...]:
@@ -186,8 +204,12 @@ class BaseColumns:
 
     def take(self, text: str, target: str) -> bool:
         """Keep a column, by its label and its name, and return True if it is one of the base."""
-        if target in _FOLLOWING:
-            self.rates[target] = text
+        rate = rate_label(target)
+        if rate.name in RATE_NAMES:
+            if rate.name in self.rates:
+                self._raise_doubled(self.rates[rate.name][0], text, rate.name)
+            units = self.recording.table.units
+            self.rates[rate.name] = text, rate.unit or units.get(text) or rate_label(text).unit
             return True
         if target in _VELOCITIES or target in _COUNTED or target.endswith(_LINK_MOMENTUM):
             return True
@@ -197,13 +219,16 @@ class BaseColumns:
             return False
         table = self.recording.table
         if parts.name in self.columns:
-            first = self.columns[parts.name][0]
-            raise TrajectoryError(f"{table.where}: columns {first!r} and {text!r} are both {parts.name}; keep one")
+            self._raise_doubled(self.columns[parts.name][0], text, parts.name)
         own = table.units.get(text) or label(text).unit
         if parts.unit and own and parts.unit != own:
             raise TrajectoryError(f"{table.where}: column {text!r} is in {own}, and names says {parts.unit}")
         self.columns[parts.name] = (text, parts.unit or own)
         return True
+
+    def _raise_doubled(self, first: str, second: str, name: str) -> NoReturn:
+        where = self.recording.table.where
+        raise TrajectoryError(f"{where}: columns {first!r} and {second!r} are both {name}; keep one")
 
     def motion(self, *, ignore_extra: bool) -> BaseMotion:
         """The motion of the base. Raises TrajectoryError for missing, doubled, impossible or doubtful columns.
@@ -231,11 +256,11 @@ class BaseColumns:
                             f"{group.names[0]}; leave one out with names={{column: None}} (--names COLUMN=)"
                         )
                     groups[quantity] = group
-        attitude, record = self._attitude(groups.get("attitude"))
+        attitude, rates, record = self._attitude(groups.get("attitude"), self._rates())
         position = self._position(groups.get("position"))
         if position is not None:
             record["position"] = list(self._texts(groups["position"])) if "position" in groups else "base_position"
-        return BaseMotion(attitude=attitude, position=position, record=record or None, left_out=left_out)
+        return BaseMotion(attitude=attitude, position=position, rates=rates, record=record or None, left_out=left_out)
 
     def _groups(self) -> tuple[_Group, ...]:
         """Usual groups of columns and those of the body's own file, whose names come first."""
@@ -273,10 +298,35 @@ class BaseColumns:
         table = self.recording.table
         return table.base_position if quantity == "position" else table.base_quat_xyzw
 
-    def _attitude(self, group: _Group | None) -> tuple[Array | None, dict[str, Any]]:
+    def _rates(self) -> BaseRates | None:
+        """Recorded angular velocity; None without one."""
+        if len(self.rates) < len(RATE_NAMES):
+            return None
+        columns = [self.rates[name] for name in RATE_NAMES]
+        texts = [text for text, _ in columns]
+        self.gaps.joined(self.recording.table, texts)
+        values = np.stack([self.gaps.held(self.recording.table, text) for text in texts], axis=-1)
+        return in_rad_per_s(self.recording, columns, self.gaps.bridged(texts, values))
+
+    def _attitude(
+        self, group: _Group | None, rates: BaseRates | None
+    ) -> tuple[Array | None, Array | None, dict[str, Any]]:
+        """Attitudes and rates, and how they were read."""
         stored, given = self._stored("attitude"), self.choices
+        of_rates: dict[str, Any] = {}
+        if rates is not None:
+            of_rates = {"rates": list(rates.columns), "rate_unit": rates.unit, "rate_unit_said": rates.stated}
         if group is None and stored is None:
-            return None, {}
+            if given.inverse is not None:
+                raise TrajectoryError(
+                    f"{self.recording.table.where}: base_inverse is for recorded attitudes of the base, and there are "
+                    "none; leave it out (--base-inverse)"
+                )
+            if rates is None:
+                return None, None, {}
+            check_speed(self.recording, rates)
+            axes = np.eye(3) if given.axes is None or isinstance(given.axes, str) else given.axes
+            return None, rates.values @ axes, of_rates
         record: dict[str, Any] = {"attitude": "base_quat_xyzw" if group is None else list(self._texts(group))}
         if group is None:
             assert stored is not None
@@ -296,41 +346,25 @@ class BaseColumns:
                 else:
                     turns = so3.exp(_vectors_of_mrps(values) if group.kind == "mrp" else values)
             turns = self.gaps.turned(self._texts(group), turns)
-        if "order" not in record:
-            if group is None or group.kind != "joints":
-                self._check_parts(turns)
-            if given.order is not None:
-                raise TrajectoryError(
-                    f"{self.recording.table.where}: base_order is for angles, and the base's attitude is not given by "
-                    "three"
-                )
+        if "order" not in record and given.order is not None:
+            raise TrajectoryError(
+                f"{self.recording.table.where}: base_order is for angles, and the base's attitude is not given by three"
+            )
+        turns, of_base = so3.transpose(turns) if given.inverse else turns, None
+        if given.inverse is not None:
+            record |= {"inverse": given.inverse, "inverse_by": "as given"}
+        if rates is not None:
+            read = agreeing(self.recording, turns, rates, given.inverse)
+            turns, of_base = read.turns, read.rates
+            if read.inverse:
+                record |= {"inverse": True, "inverse_by": "rates"}
+            record |= of_rates | {"rate_axes": "inertial" if read.inertial else "base"}
         usual = _SAME_AXES if group is None else group.axes
         record |= {"axes": given.given or usual, "axes_said": given.given is not None}
         axes = named_axes(usual) if given.axes is None else given.axes
-        return (turns if isinstance(axes, str) else turns @ axes), record
-
-    def _check_parts(self, turns: Array) -> None:
-        """Raise TrajectoryError where rates beside a quaternion show that its first number is w: (N, 3, 3)."""
-        if len(self.rates) < len(_FOLLOWING) or len(turns) < 2:
-            return
-        rates = np.stack([self.recording.table.columns[self.rates[name]] for name in _FOLLOWING], axis=-1)
-        if not np.isfinite(rates).all():
-            return
-        between = 0.5 * (rates[1:] + rates[:-1])
-        steps = np.diff(self.recording.times)[:, None]
-
-        def error(attitudes: Array) -> float:
-            measured = so3.log(so3.transpose(attitudes[:-1]) @ attitudes[1:]) / steps
-            return float(np.median(np.linalg.norm(measured - between, axis=-1)))
-
-        size = float(np.median(np.linalg.norm(between, axis=-1)))
-        w_first = so3.matrix_from_quat(np.roll(so3.quat_from_matrix(turns), -1, axis=-1))
-        if error(turns) > _CONTRADICTS * size and error(w_first) < _AGREES * size:
-            raise TrajectoryError(
-                f"{self.recording.table.where}: read as x y z w, the quaternion of the base turns otherwise than "
-                f"{', '.join(_FOLLOWING)} say; read as w x y z it turns as they say: write its numbers in the order "
-                "x y z w, or give the columns their names"
-            )
+        if not isinstance(axes, str):
+            turns, of_base = turns @ axes, None if of_base is None else of_base @ axes
+        return turns, of_base, record
 
     def _position(self, group: _Group | None) -> Array | None:
         if group is None:
@@ -412,12 +446,13 @@ def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, st
 
 def _part(target: str) -> tuple[str, tuple[str, ...], str] | None:
     """Kind, words before it and component of a label; None of one that is no part of the base."""
-    plain = label(target).name
+    plain = rate_label(target).name
+    plain = _ANGULAR.sub("omega", (label(target).name if plain == target else plain).lower())
     rooted = "/" in plain or "." in plain
     tokens: list[str] = []
-    for token in filter(None, _SPLIT.split(plain.lower())):
+    for token in filter(None, _SPLIT.split(plain)):
         joined = _JOINED.fullmatch(token)
-        tokens += joined.groups() if joined is not None else (token,)
+        tokens += filter(None, joined.groups()) if joined is not None else (token,)
     if not tokens:
         return None
     *before, last = tokens
@@ -428,8 +463,12 @@ def _part(target: str) -> tuple[str, tuple[str, ...], str] | None:
     for k, word in enumerate(before):
         if word in _KIND_OF and all(map(_FRAME.fullmatch, before[k + 1 :])):
             # `t1` to `t3` may be torques or temperatures; `r_BN_N_1` is a place.
-            if _KIND_OF[word] == PLACE and len(word) == 1 and last.isdigit() and not before[k + 1 :]:
+            loose = _KIND_OF[word] == RATE or (_KIND_OF[word] == PLACE and len(word) == 1)
+            if loose and last.isdigit() and not before[k + 1 :]:
                 return None
+            if _KIND_OF[word] == RATE:
+                owner = [name for name in before[:k] if name not in _IMU]
+                return (RATE, tuple(before), last) if _is_base(owner, rooted) else None
             return (_KIND_OF[word], tuple(before), last) if _is_base(before[:k], rooted) else None
     return (PLACE, tuple(before), last) if last in "xyz" and set(before) <= _BASE else None
 

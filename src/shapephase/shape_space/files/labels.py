@@ -37,6 +37,8 @@ _SPELLINGS = {
     NO_UNIT: ("1",),
 }
 _UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
+_RATE = re.compile(r"(?P<angle>[^\W\d_]+?|°)\s*(?:/\s*s(?:ec)?|[_ .*·]?s(?:ec)?\^?-1|_s)", re.I)
+_OTHER_RATES = {"dps": ANGLES["deg"], "rpm": np.pi / 30.0, "rev/min": np.pi / 30.0}  # unit -> size [rad/s]
 _BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))", re.DOTALL)
 # Any unit may follow an underscore; only whole words follow a blank or a point.
 _SUFFIXED = re.compile(r"(?P<name>.*[^\s_.])(?P<mark>[\s_.]|(?=°))(?P<unit>[^\W\d_]+|°)", re.DOTALL)
@@ -174,6 +176,13 @@ def _at_the_end(text: str, joints: Collection[str]) -> str | None:
 def unit_of(text: str) -> str | None:
     """Unit by one of its spellings, or None."""
     return _UNITS.get(text.strip().lower())
+
+
+def rate_size(text: str) -> float | None:
+    """Unit of an angular velocity, such as `deg/s`, `rad_s`, `dps` or `rpm` [rad/s]; None for another text."""
+    match = _RATE.fullmatch(text.strip())
+    angle = None if match is None else unit_of(match["angle"])
+    return _OTHER_RATES.get(text.strip().lower()) if angle is None else ANGLES.get(angle)
 
 
 def in_square_brackets(text: str) -> str | None:

@@ -46,6 +46,7 @@ class TrajectoryOptions(TypedDict, total=False):
     resample: float | None
     base_order: str | None
     base_axes: ArrayLike | str | None
+    base_inverse: bool | None
     calibration: float | str | None
     length_tolerance: float | None
 
@@ -117,7 +118,7 @@ class Reading:
         given = options.get
         trim, order = trim_argument(given("trim")), given("joint_order")
         flight = flight_choices(given("flight"), given("up"), given("gravity"))
-        base = base_choices(given("base_order"), given("base_axes"))
+        base = base_choices(given("base_order"), given("base_axes"), given("base_inverse"))
         close = close_argument(given("close"))
         if order is not None:
             check_choice(order, "joint_order", WORDS)

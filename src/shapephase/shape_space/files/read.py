@@ -45,6 +45,7 @@ class RecordedMotion:
     times : (N,) of the samples, from 0 [s]
     base_attitude : (N, 3, 3) recorded attitude of the base, base axes to the recorder's axes, or None
     base_position : (N, 3) recorded position of the base [m], or None
+    base_rates : (N, 3) recorded angular velocity of the base, base axes [rad/s], or None
     format : the kind of file
     record : what was read and what was done to it, ready for JSON: the file with its hash, samples and times, columns
         and units of joints, where the others rest, what was left out, smoothed, closed, resampled
@@ -67,6 +68,7 @@ class RecordedMotion:
     flight: Flight | None = None
     segments: SegmentMotion | None = None
     wheel_speeds: Mapping[str, ShapePath] = field(default_factory=dict)
+    base_rates: Array | None = None
 
     __repr__ = short_repr
 
@@ -104,7 +106,10 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     - `.json`: DeepMimic's humanoid, for a body with ball joints and hinges of the same names.
 
     The base in columns: `base_qx,base_qy,base_qz,base_qw` (or `qx` and so on), `base_roll,base_pitch,base_yaw` or
-    OpenSim's `pelvis_tilt,pelvis_list,pelvis_rotation`; and `base_x,base_y,base_z` or `pelvis_tx,pelvis_ty,pelvis_tz`.
+    OpenSim's `pelvis_tilt,pelvis_list,pelvis_rotation`, or modified Rodrigues parameters `sigma_1,sigma_2,sigma_3`,
+    shadow sets included; and `base_x,base_y,base_z` or `pelvis_tx,pelvis_ty,pelvis_tz`. Rates of a gyro in base axes:
+    `omega_x [rad/s]`, `gyro_x [deg/s]`, `wx` and so on. Beside attitudes they decide whether these are the inverse of
+    base axes to the recorder's, and whether they are themselves in the recorder's axes.
 
     Poses of segments, also in columns `SEGMENT_qx,SEGMENT_qy,SEGMENT_qz,SEGMENT_qw` and `SEGMENT_x,SEGMENT_y,SEGMENT_z`
     of a table, and OpenSim's BodyKinematics: segments are links by their names, ball joints take the turn between them,
@@ -160,6 +165,8 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         text such as "x,-z,y", where the x, y and z axis of the base point to; "estimate" leaves them open, for
         `momentum_from_recording` to find; None: the same axes, but "x,-z,y" for `pelvis_tilt` and so on (OpenSim: x
         forward, y up; URDF: x forward, z up)
+    base_inverse : True if recorded attitudes take the recorder's axes to those of the base; None: as the rates beside
+        them show, else False
     flight : the free flight that is kept: "auto", the longest stretch on which the centre of mass falls freely;
         "auto:2", the second of all such stretches in time; its first and last time, as the file gives the time; "all";
         "recorded": as "auto" where the attitude of the base is recorded, all of it where its places are not recorded or
@@ -277,6 +284,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         times=kept_times,
         base_attitude=motion.base.attitude,
         base_position=motion.base.position,
+        base_rates=motion.base.rates,
         format=table.format,
         record=record,
         smoothing=smoothing if samples.smoothed else None,

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ....errors import TrajectoryError, unknown_name
-from ..labels import unit_of
+from ..labels import rate_size, unit_of
 
 COMMENT = re.compile(r'\s*"?(#|%|//)\s*')  # beginning of a comment line
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
@@ -85,8 +85,12 @@ def check_names(names: Sequence[str], where: str) -> None:
 def unit_row(names: Sequence[str], entries: Sequence[str]) -> dict[str, str] | None:
     """Name -> unit, where a row has nothing but units, and at least one; else None."""
     cells = [(name, entry.strip()) for name, entry in zip(names, entries) if entry.strip() not in ("", *_NO_UNIT_CELLS)]
-    units = {name: unit for name, cell in cells if (unit := unit_of(cell.strip("[]() "))) is not None}
+    units = {name: unit for name, cell in cells if (unit := _unit(cell.strip("[]() "))) is not None}
     return units if units and len(units) == len(dict(cells)) else None
+
+
+def _unit(text: str) -> str | None:
+    return text if rate_size(text) is not None else unit_of(text)
 
 
 def _named(names: Sequence[str], skipped: int, rows: Sequence[Sequence[str]], where: str) -> Head:
