@@ -62,6 +62,14 @@ class RotorDescription(UngaugedDescription):
 
     __repr__ = short_repr
 
+    @property
+    def driven_path(self) -> ShapePath:
+        """Path of the joints that are not wheels."""
+        widened = self.route.curve
+        assert isinstance(widened, Widened)
+        names = tuple(self.platform.joint_names[column] for column in widened.columns)
+        return replace(self.route, curve=widened.curve, n_shape=len(names), joint_names=names, scanner=None)
+
     def sample(self, times: Array) -> tuple[Array, Array]:
         shapes, rates = self.route.curve(times)
         inertia, internal = self.platform.sample(shapes, rates)
@@ -205,4 +213,4 @@ def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> Shap
     ordered = path.matched(others, f"{body.name} without {', '.join(left_out)}")
     columns = np.array([body.joint_index(name) for name in others], dtype=int)
     curve = Widened(ordered.curve, columns, body.n_shape)
-    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names, scanner=None, origin=None)
+    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names, scanner=None)

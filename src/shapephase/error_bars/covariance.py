@@ -184,7 +184,7 @@ def sampled_uncertainty(
     """
     check_executor(executor)
     draws, seed = whole_argument(draws, "draws", 2), whole_argument(seed, "seed", 0)
-    body, path = described_by(motion)
+    body, path, _, rotors = described_by(motion)
     inputs, rng = inputs_of(motion, joints, inertias, momentum, attitude, start), np.random.default_rng(seed)
     normal = partial(_drawn, rng, draws)
     paths, bodies, changes = [path] * draws, [body] * draws, np.zeros((draws, UNKNOWNS))
@@ -266,7 +266,7 @@ def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivati
 def _fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
     """Derivatives of fitted attitude and momentum at the start by the path at its knots: (6, knots n)."""
     if inputs.fit is None:
-        _, path = described_by(motion)
+        path = described_by(motion).path
         return np.zeros((UNKNOWNS, path_samples(path).bias.size))
     return fit_by_knots(motion, inputs.fit.times, inputs.fit.by_attitudes)
 
@@ -276,7 +276,7 @@ def _fit_by_links(motion: Motion, inputs: Inputs) -> Array:
     assert inputs.links is not None
     if inputs.fit is None:
         return np.zeros((UNKNOWNS, len(inputs.links)))
-    body, _ = described_by(motion)
+    body = described_by(motion).body
     return by_relative_errors(body, fit_by_inertias(motion, inputs.fit.times, inputs.fit.by_attitudes))
 
 

@@ -86,7 +86,7 @@ def inputs_of(
     start: RecordedMomentum | ArrayLike | None,
 ) -> Inputs:
     """The arguments of `uncertainty`, checked."""
-    body, path = described_by(motion)
+    body, path, _, rotors = described_by(motion)
     if inertias is not None:
         check_object(inertias, "InertiaErrors", "inertias")
     if start is not None and not (momentum is None and attitude is None):

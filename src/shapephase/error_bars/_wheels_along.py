@@ -1,0 +1,111 @@
+"""Wheels along a motion: how the momentum that they store follows from shapes, inertias and the wheels' values.
+
+A wheel of moment J about its axle a that keeps its momentum p takes J a a^T from the inertia and adds p a to the
+momentum, so that the other links move like those of a body whose wheel has no moment about its axle. One at a held
+speed s adds J s a.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .. import so3
+from ..arrays import Array
+from ..body.body import Body
+from ..body.inertial_regressor import PARAMETERS
+from ..body.joint_chain import VOIGT, JointChain
+from ..body.link_motions import link_motions
+from ..deformation.rotors import Rotor
+
+_DOUBLED = np.array([1.0 if i == j else 2.0 for i, j in VOIGT])  # entries that stand twice in a symmetric tensor
+
+
+@dataclass(frozen=True, eq=False)
+class WheelsAlong:
+    """Wheels at N shapes and rates of a body, in which their own joints rest.
+
+    Attributes
+    ----------
+    body : the body with the wheels
+    rotors : the wheels, W of them
+    shapes, rates : (N, n)
+    """
+
+    body: Body
+    rotors: tuple[Rotor, ...]
+    shapes: Array
+    rates: Array
+
+    @cached_property
+    def driven(self) -> list[int]:
+        """Columns of the joints that are not wheels."""
+        wheels = {rotor.joint for rotor in self.rotors}
+        return [column for column, name in enumerate(self.body.joint_names) if name not in wheels]
+
+    @cached_property
+    def axles(self) -> Array:
+        """Unit vectors along the axles: (N, W, 3), base axes."""
+        turns = link_motions(self.body.chain, self.shapes, self.rates).turns[:, self._frames]
+        return so3.apply(turns, self._own_axles)
+
+    @cached_property
+    def stored(self) -> Array:
+        """Momentum that all wheels store: (N, 3), base axes [kg m^2/s]."""
+        return np.einsum("w,nwc->nc", self._along, self.axles)
+
+    def reduced(self, chain: JointChain) -> JointChain:
+        """The chain without the moments of wheels that keep their momentum."""
+        tensors = chain.inertias.copy()
+        for rotor, frame, axle in zip(self.rotors, self._frames, self._own_axles, strict=True):
+            if rotor.is_momentum:
+                tensors[frame] -= rotor.inertia * np.outer(axle, axle)
+        return chain.with_inertias(chain.masses, chain.centres, tensors) if self.rotors else chain
+
+    def by_shape(self, rows: Array) -> Array:
+        """Products of row . d(stored momentum) by the joints that are not wheels: (N, S, r, 3) -> (N, S r, m).
+
+        Zero at odd S, see `BodyAlong.by_knots`.
+        """
+        turned = np.zeros((*rows.shape[:3], len(self.driven)))
+        for place, column in enumerate(self.driven):
+            unit = np.zeros_like(self.rates)
+            unit[:, column] = 1.0
+            turning = link_motions(self.body.chain, self.shapes, unit).spins[:, self._frames]
+            change = np.einsum("w,nwc->nc", self._along, np.cross(turning, self.axles))
+            turned[:, ::2, :, place] = np.einsum("nsrc,nc->nsr", rows[:, ::2], change)
+        return turned.reshape(len(rows), -1, len(self.driven))
+
+    def by_inertias(self, derivative: Array, rows: Array) -> Array:
+        """Derivatives by the ten parameters of each frame, from those with wheels at rest: (S r, 10 (k + 1))."""
+        by_frame, sums = derivative.reshape(len(derivative), -1, PARAMETERS).copy(), self._along_axles(rows)
+        for place, (rotor, frame, axle) in enumerate(zip(self.rotors, self._frames, self._own_axles, strict=True)):
+            about = np.array([axle[i] * axle[j] for i, j in VOIGT])
+            by_moment = -by_frame[:, frame, 4:] @ about if rotor.is_momentum else rotor.value * sums[:, place]
+            by_frame[:, frame, 4:] += by_moment[:, None] * (_DOUBLED * about)
+        return by_frame.reshape(derivative.shape)
+
+    def by_values(self, rows: Array) -> Array:
+        """Sums of products of row . d(stored momentum) by the wheels' values: (N, S, r, 3) -> (S r, W)."""
+        return self._along_axles(rows) * [1.0 if rotor.is_momentum else rotor.inertia for rotor in self.rotors]
+
+    def _along_axles(self, rows: Array) -> Array:
+        sums = np.zeros((*rows.shape[1:3], len(self.rotors)))
+        sums[::2] = np.einsum("nsrc,nwc->srw", rows[:, ::2], self.axles)
+        return sums.reshape(-1, len(self.rotors))
+
+    @property
+    def _along(self) -> Array:
+        """Momentum that each wheel stores along its axle: (W,) [kg m^2/s]."""
+        return np.array([rotor.value * (1.0 if rotor.is_momentum else rotor.inertia) for rotor in self.rotors])
+
+    @property
+    def _frames(self) -> list[int]:
+        return [self.body.chain.names.index(rotor.joint) + 1 for rotor in self.rotors]
+
+    @property
+    def _own_axles(self) -> Array:
+        """Axles in axes of the frames: (W, 3)."""
+        return self.body.chain.axes[[frame - 1 for frame in self._frames]]

@@ -1,0 +1,162 @@
+"""Error bars and exact derivatives of motions with wheels, against motions reconstructed anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shapephase as sp
+from shapephase import so3
+
+# A gyroscope at the end of a hinge and a slide, and a wheel on the base that a motor holds at its speed; what the
+# first wheel's axle is not along, no axis is along.
+_AXLE = np.array([0.48, 0.6, 0.64])
+_NEAR = 1e-6  # of central differences with motions at 1e-12
+_START = so3.exp(np.array([0.2, 0.3, -0.4]))
+_MOMENTUM = np.array([0.15, -0.25, 0.5])
+_TIMES = np.array([0.0, 0.1, 0.25, 0.4, 0.5, 0.65, 0.8, 0.9, 1.0])
+_SAMPLES = 0.4 * np.random.default_rng(5).normal(size=(9, 2))
+_JOINTS = ("slide", "swing")
+_VALUES = {"gyro": 0.4, "fly": 30.0}
+ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation", "wheel_rotation")
+PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
+
+
+def _link(name: str, mass: float, centre: np.ndarray, tensor: np.ndarray) -> str:
+    six = tensor[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]].tolist()
+    entries = " ".join(f'i{k}="{value!r}"' for k, value in zip(("xx", "yy", "zz", "yz", "xz", "xy"), six, strict=True))
+    return (
+        f'<link name="{name}"><inertial><origin xyz="{" ".join(map(repr, centre.tolist()))}"/><mass value="{mass}"/>'
+        f"<inertia {entries}/></inertial></link>"
+    )
+
+
+def _joint(name: str, kind: str, parent: str, child: str, axis: str, xyz: str) -> str:
+    limit = "" if kind == "continuous" else '<limit lower="-3" upper="3" effort="1" velocity="9"/>'
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><axis xyz="{axis}"/>'
+        f'<origin xyz="{xyz}" rpy="0.3 -0.2 0.5"/>{limit}</joint>'
+    )
+
+
+def _wheel(across: float, about: float, axis: np.ndarray) -> np.ndarray:
+    return across * np.eye(3) + (about - across) * np.outer(axis, axis)
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory: pytest.TempPathFactory) -> sp.Body:
+    file = tmp_path_factory.mktemp("body") / "body.urdf"
+    skew = np.array([[0.3, 0.02, 0.01], [0.02, 0.4, -0.03], [0.01, -0.03, 0.5]])
+    parts = [
+        _link("base", 5.0, np.array([0.1, 0.0, -0.1]), skew),
+        _link("arm", 1.0, np.array([0.2, 0.1, 0.0]), 0.1 * skew),
+        _link("boom", 1.5, np.array([0.0, 0.1, 0.3]), 0.2 * skew),
+        _link("rim", 1.0, 0.1 * _AXLE, _wheel(0.03, 0.05, _AXLE)),
+        _link("disc", 0.8, np.array([0.0, 0.05, 0.0]), _wheel(0.006, 0.01, np.array([0.0, 1.0, 0.0]))),
+        _joint("swing", "revolute", "base", "arm", "0 0.6 0.8", "0.3 0.1 0"),
+        _joint("slide", "prismatic", "arm", "boom", "1 0 0", "0.4 0 0.1"),
+        _joint("gyro", "continuous", "boom", "rim", "0.48 0.6 0.64", "0 0.2 0.1"),
+        _joint("fly", "continuous", "base", "disc", "0 1 0", "0 0 0.2"),
+    ]
+    file.write_text(f'<robot name="gyroscope">{"".join(parts)}</robot>')
+    return sp.load_body(file)
+
+
+def motion_of(
+    body: sp.Body,
+    *,
+    samples: np.ndarray = _SAMPLES,
+    values: dict[str, float] = _VALUES,
+    momentum: np.ndarray = _MOMENTUM,
+    start: np.ndarray = _START,
+    kind: str = "spline",
+    tolerance: float = 1e-12,
+) -> sp.Motion:
+    if kind == "periodic":
+        samples = np.concatenate([samples[:-1], samples[:1]])
+    path = sp.ShapePath.spline(_TIMES, samples, periodic=kind == "periodic", joint_names=_JOINTS)
+    wheels = {"rotors": {"gyro": values["gyro"]}, "rotor_speeds": {"fly": values["fly"]}}
+    return sp.reconstruct(sp.articulated(body, path, **wheels), momentum, start, tolerance=tolerance)
+
+
+def difference(motion: Callable[[float], sp.Motion], step: float) -> np.ndarray:
+    ahead, behind = motion(step), motion(-step)
+    parts = sp.split(ahead), sp.split(behind)
+    turns = [so3.log(ahead.final_attitude @ behind.final_attitude.T)]
+    turns += [so3.log(getattr(parts[0], name) @ getattr(parts[1], name).T) for name in ROTATIONS[1:]]
+    return np.concatenate([*turns, [getattr(parts[0], name) - getattr(parts[1], name) for name in PHASES]]) / (2 * step)
+
+
+def column_of(derivative: sp.ResultDerivative, column: int) -> np.ndarray:
+    turns = [getattr(derivative, name)[:, column] for name in ROTATIONS]
+    return np.concatenate([*turns, [getattr(derivative, name)[column] for name in PHASES]])
+
+
+def agree(found: np.ndarray, expected: np.ndarray) -> None:
+    """To rounding of the differences in each rotation and each phase."""
+    for result in np.split(np.arange(len(found)), [3, 6, 9, 12, 15, 16, 17]):
+        assert np.linalg.norm((found - expected)[result]) < _NEAR * np.linalg.norm(expected), result
+
+
+@pytest.mark.parametrize("momentum", [_MOMENTUM, np.zeros(3)])
+def test_by_values_of_wheels_momentum_and_start(body: sp.Body, momentum: np.ndarray):
+    found = sp.derivatives(motion_of(body, momentum=momentum))
+    for column, joint in enumerate(_VALUES):
+
+        def faster(h: float, joint: str = joint) -> sp.Motion:
+            return motion_of(body, momentum=momentum, values=_VALUES | {joint: _VALUES[joint] + h})
+
+        agree(column_of(found.by_rotors, column), difference(faster, 1e-3 * _VALUES[joint]))
+    for axis, unit in enumerate(np.eye(3)):
+        turned = difference(lambda h, e=unit: motion_of(body, momentum=momentum, start=_START @ so3.exp(h * e)), 1e-4)
+        agree(column_of(found.by_attitude, axis), turned)
+        if momentum.any():
+            pushed = difference(lambda h, e=unit: motion_of(body, momentum=momentum + h * e), 1e-4)
+            agree(column_of(found.by_momentum, axis), pushed)
+
+
+@pytest.mark.parametrize("kind", ["spline", "periodic"])
+def test_by_samples(body: sp.Body, kind: str):
+    derived = sp.derivatives(motion_of(body, kind=kind))
+    found, joints = derived.by_samples, derived.path.joint_names
+    assert found.wheel_rotation.shape == (3, 2 * (9 - (kind == "periodic")))
+    for sample, joint in ((0, 0), (1, 1), (4, 0), (7, 1)):
+
+        def moved(h: float, place: tuple[int, int] = (sample, joint)) -> sp.Motion:
+            samples = _SAMPLES.copy()
+            samples[place] += h
+            return motion_of(body, kind=kind, samples=samples)
+
+        column = 2 * sample + joints.index(_JOINTS[joint])
+        agree(column_of(found, column), difference(moved, 1e-4))
+
+
+@pytest.mark.parametrize("link", ["boom", "rim", "disc"])
+def test_by_inertias(body: sp.Body, link: str):
+    """A wheel's own moment counts where it keeps its momentum, too: by what it takes from the inertia."""
+    found = sp.derivatives(motion_of(body)).by_inertias
+    part = next(part for part in body.moving_parts if link in part.links)
+    frame, pose = body.chain.link_frames[link]
+    assert np.abs(pose[:3, :3] - np.eye(3)).max() < 1e-15
+
+    def with_inertia(**given: Any) -> sp.Motion:
+        return motion_of(body.with_inertias(**{name: {link: value} for name, value in given.items()}))
+
+    axle = {"rim": _AXLE, "disc": np.array([0.0, 1.0, 0.0])}.get(link, np.array([0.8, 0.0, 0.6]))
+    columns = [column_of(found, 10 * frame + k) for k in range(10)]
+    mass = 1e-4 * part.mass
+    agree(columns[0], difference(lambda h: with_inertia(masses=part.mass + h), mass))
+    along = difference(lambda h: with_inertia(centres=part.centre + h * axle), 1e-5)
+    agree(part.mass * sum(axle[k] * columns[1 + k] for k in range(3)), along)
+    for tensor in (np.outer(axle, axle), np.eye(3)):
+        six = tensor[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
+        expected = difference(lambda h, e=tensor: with_inertia(inertias=part.inertia + h * e), 1e-4)
+        by_tensor = sum(six[k] * columns[4 + k] for k in range(6))
+        if link == "rim" and tensor[0, 0] != 1.0:
+            # Its momentum is given: the moment that it turns with has no part in anything else.
+            assert np.abs(by_tensor).max() < 1e-10 > np.abs(expected).max()
+        else:
+            agree(by_tensor, expected)
