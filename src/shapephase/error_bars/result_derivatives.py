@@ -74,7 +74,8 @@ class Derivatives:
     Attributes
     ----------
     motion : the motion
-    body, path : its body and path
+    body, path : its body, and its path of the joints that are not wheels
+    rotors : its wheels
 
     Notes
     -----
@@ -84,7 +85,7 @@ class Derivatives:
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
         described = described_by(motion)
-        self.body, self.path = described.body, described.path
+        self.body, self.path, self.rotors = described.body, described.path, described.rotors
         self._along = along_motion(motion, described.route)
         self._body = described.along(self._along)
 
@@ -111,7 +112,7 @@ class Derivatives:
 
     @cached_property
     def by_rotors(self) -> ResultDerivative:
-        """Derivatives by the wheels' values, in the order of `deformation.description.rotors`: m = W.
+        """Derivatives by the values of `rotors`: m = W.
 
         Per kg m^2/s of a momentum that stays, per rad/s of a held speed; for a value in time by a constant that is
         added to it.
@@ -316,6 +317,12 @@ def fit_by_inertias(motion: Motion, times: Array, by_attitudes: Array) -> Array:
     """Derivative of the fit by the ten parameters of each frame, in the order of `by_inertias`: (6, 10 (k + 1))."""
     body_along, along, rows = _by_added_momentum(motion, times, by_attitudes)
     return body_along.by_inertias(along.spins[:, None], rows[:, None])
+
+
+def fit_by_rotors(motion: Motion, times: Array, by_attitudes: Array) -> Array:
+    """Derivative of the fit by the wheels' values: (6, W)."""
+    body_along, _, rows = _by_added_momentum(motion, times, by_attitudes)
+    return body_along.wheels.by_values(rows[:, None])
 
 
 def _by_added_momentum(motion: Motion, times: Array, by_attitudes: Array) -> tuple[BodyAlong, AlongMotion, Array]:
