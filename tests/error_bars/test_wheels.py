@@ -10,6 +10,8 @@ import pytest
 
 import shapephase as sp
 from shapephase import so3
+from shapephase.errors import ShapeError, UnknownNameError
+from support.long_runs import full_but
 
 # A gyroscope at the end of a hinge and a slide, and a wheel on the base that a motor holds at its speed; what the
 # first wheel's axle is not along, no axis is along.
@@ -78,7 +80,9 @@ def motion_of(
     if kind == "periodic":
         samples = np.concatenate([samples[:-1], samples[:1]])
     path = sp.ShapePath.spline(_TIMES, samples, periodic=kind == "periodic", joint_names=_JOINTS)
-    wheels = {"rotors": {"gyro": values["gyro"]}, "rotor_speeds": {"fly": values["fly"]}}
+    # The first wheel's momentum changes in time; what is uncertain is a constant that is added to it.
+    gyro = (_TIMES[::2], values["gyro"] + 0.2 * np.sin(5.0 * _TIMES[::2]))
+    wheels = {"rotors": {"gyro": gyro}, "rotor_speeds": {"fly": values["fly"]}}
     return sp.reconstruct(sp.articulated(body, path, **wheels), momentum, start, tolerance=tolerance)
 
 
@@ -160,3 +164,47 @@ def test_by_inertias(body: sp.Body, link: str):
             assert np.abs(by_tensor).max() < 1e-10 > np.abs(expected).max()
         else:
             agree(by_tensor, expected)
+
+
+_NOISE: dict[str, dict[str, Any]] = {
+    "joints": {"joints": 0.01},
+    "inertias": {"inertias": sp.InertiaErrors(masses=0.03, centres=0.02, inertias=0.03)},
+    "rotors": {"rotors": {"gyro": 0.01, "fly": 0.5}},
+    "all": {
+        "joints": 0.005,
+        "inertias": sp.InertiaErrors(masses=0.02),
+        "momentum": 0.005,
+        "attitude": 0.005,
+        "rotors": {"gyro": 0.01, "fly": 0.5},
+    },
+}
+
+
+@pytest.mark.parametrize(
+    ("source", "draws"),
+    full_but([("inertias", 60), ("all", 60), *((name, 1000) for name in _NOISE)], ("inertias", 60), ("all", 60)),
+)
+def test_bars_are_what_draws_show(body: sp.Body, source: str, draws: int):
+    """Four standard errors of a standard deviation, and 1 % for the second order: of 1,000 draws 10 %."""
+    motion = motion_of(body, tolerance=1e-8)
+    first = sp.uncertainty(motion, **_NOISE[source])
+    drawn = sp.sampled_uncertainty(motion, **_NOISE[source], draws=draws, seed=3)
+    allowed = 4.0 / np.sqrt(2.0 * draws) + 0.01
+    for name in ROTATIONS:
+        bars, expected = (np.sqrt(np.diag(getattr(found, name))) for found in (first, drawn))
+        assert np.abs(bars - expected).max() <= allowed * np.linalg.norm(expected) + 1e-7, name
+    for name in (*PHASES, "total_angle", "holonomy_angle", "wheel_angle"):
+        bar, expected = getattr(first, name), getattr(drawn, name)
+        assert abs(bar - expected) <= allowed * expected + 1e-7, name
+
+
+def test_wheels_that_are_not_there(body: sp.Body):
+    motion = motion_of(body, tolerance=1e-6)
+    with pytest.raises(UnknownNameError, match="swing"):
+        sp.uncertainty(motion, rotors={"swing": 0.1})
+    with pytest.raises(ShapeError, match="not negative"):
+        sp.uncertainty(motion, rotors=-0.1)
+    cat = sp.reconstruct(sp.articulated(sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)), np.zeros(3))
+    with pytest.raises(ShapeError, match="no wheels"):
+        sp.uncertainty(cat, rotors=0.1)
+    assert not sp.uncertainty(cat, momentum=0.001).wheel_rotation.any()

@@ -85,7 +85,8 @@ class AlongMotion:
 
 def along_motion(motion: Motion, path: ShapePath, breaks: Array | None = None) -> AlongMotion:
     """A motion that is no batch, of an articulated body; no piece of the quadrature has one of the breaks within."""
-    edges = _pieces(one_rotation(motion), path.breaks if breaks is None else np.union1d(path.breaks, breaks))
+    known = motion.deformation.breaks
+    edges = _pieces(one_rotation(motion), known if breaks is None else np.union1d(known, breaks))
     along = _at_nodes(motion, path, edges)
     for _ in range(_MOST_HALVINGS):
         rough = _factors(along) > _LARGEST_FACTOR

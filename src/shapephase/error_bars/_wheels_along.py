@@ -25,17 +25,19 @@ _DOUBLED = np.array([1.0 if i == j else 2.0 for i, j in VOIGT])  # entries that 
 
 @dataclass(frozen=True, eq=False)
 class WheelsAlong:
-    """Wheels at N shapes and rates of a body, in which their own joints rest.
+    """Wheels at N times of a motion, in whose shapes their own joints rest.
 
     Attributes
     ----------
     body : the body with the wheels
     rotors : the wheels, W of them
+    times : (N,) [s]
     shapes, rates : (N, n)
     """
 
     body: Body
     rotors: tuple[Rotor, ...]
+    times: Array
     shapes: Array
     rates: Array
 
@@ -54,7 +56,7 @@ class WheelsAlong:
     @cached_property
     def stored(self) -> Array:
         """Momentum that all wheels store: (N, 3), base axes [kg m^2/s]."""
-        return np.einsum("w,nwc->nc", self._along, self.axles)
+        return np.einsum("nw,nwc->nc", self._along, self.axles)
 
     def reduced(self, chain: JointChain) -> JointChain:
         """The chain without the moments of wheels that keep their momentum."""
@@ -74,32 +76,35 @@ class WheelsAlong:
             unit = np.zeros_like(self.rates)
             unit[:, column] = 1.0
             turning = link_motions(self.body.chain, self.shapes, unit).spins[:, self._frames]
-            change = np.einsum("w,nwc->nc", self._along, np.cross(turning, self.axles))
+            change = np.einsum("nw,nwc->nc", self._along, np.cross(turning, self.axles))
             turned[:, ::2, :, place] = np.einsum("nsrc,nc->nsr", rows[:, ::2], change)
         return turned.reshape(len(rows), -1, len(self.driven))
 
     def by_inertias(self, derivative: Array, rows: Array) -> Array:
         """Derivatives by the ten parameters of each frame, from those with wheels at rest: (S r, 10 (k + 1))."""
-        by_frame, sums = derivative.reshape(len(derivative), -1, PARAMETERS).copy(), self._along_axles(rows)
+        by_frame = derivative.reshape(len(derivative), -1, PARAMETERS).copy()
+        sums = self._along_axles(rows, np.stack([rotor.at(self.times)[0] for rotor in self.rotors], axis=-1))
         for place, (rotor, frame, axle) in enumerate(zip(self.rotors, self._frames, self._own_axles, strict=True)):
             about = np.array([axle[i] * axle[j] for i, j in VOIGT])
-            by_moment = -by_frame[:, frame, 4:] @ about if rotor.is_momentum else rotor.value * sums[:, place]
+            by_moment = -by_frame[:, frame, 4:] @ about if rotor.is_momentum else sums[:, place]
             by_frame[:, frame, 4:] += by_moment[:, None] * (_DOUBLED * about)
         return by_frame.reshape(derivative.shape)
 
     def by_values(self, rows: Array) -> Array:
         """Sums of products of row . d(stored momentum) by the wheels' values: (N, S, r, 3) -> (S r, W)."""
-        return self._along_axles(rows) * [1.0 if rotor.is_momentum else rotor.inertia for rotor in self.rotors]
+        units = [1.0 if rotor.is_momentum else rotor.inertia for rotor in self.rotors]
+        return self._along_axles(rows, np.broadcast_to(units, self._along.shape))
 
-    def _along_axles(self, rows: Array) -> Array:
+    def _along_axles(self, rows: Array, along: Array) -> Array:
+        """Sums of products of rows (N, S, r, 3) with axles that are (N, W) long: (S r, W)."""
         sums = np.zeros((*rows.shape[1:3], len(self.rotors)))
-        sums[::2] = np.einsum("nsrc,nwc->srw", rows[:, ::2], self.axles)
+        sums[::2] = np.einsum("nsrc,nwc->srw", rows[:, ::2], along[..., None] * self.axles)
         return sums.reshape(-1, len(self.rotors))
 
-    @property
+    @cached_property
     def _along(self) -> Array:
-        """Momentum that each wheel stores along its axle: (W,) [kg m^2/s]."""
-        return np.array([rotor.value * (1.0 if rotor.is_momentum else rotor.inertia) for rotor in self.rotors])
+        """Momentum that each wheel stores along its axle: (N, W) [kg m^2/s]."""
+        return np.stack([rotor.stored(self.times) for rotor in self.rotors], axis=-1)
 
     @property
     def _frames(self) -> list[int]:

@@ -171,8 +171,8 @@ def sampled_uncertainty(
 
     Parameters
     ----------
-    motion, joints, inertias, momentum, attitude, start, rotors : as for `uncertainty`; errors are normally distributed, and
-        move a fit to first order
+    motion, joints, inertias, momentum, attitude, start, rotors : as for `uncertainty`; errors are normally distributed,
+        and move a fit to first order
     draws : how many, two or more
     seed : of the random numbers
     executor : of `concurrent.futures`, or of a cluster (`distributed.Client.get_executor()`), that reconstructs the
@@ -238,17 +238,22 @@ def _results_of_draw(
     added: Array,
 ) -> tuple[list[Array], list[Array]]:
     """Rotations and phases of one motion, which may be computed in another process."""
-    values = {
-        rotor.joint: (rotor.is_momentum, rotor.value + change) for rotor, change in zip(rotors, added, strict=True)
-    }
-    momenta, speeds = (
-        {joint: value for joint, (is_momentum, value) in values.items() if is_momentum == kind}
-        for kind in (True, False)
-    )
+    momenta: dict[str, float | ShapePath] = {}
+    speeds: dict[str, float | ShapePath] = {}
+    for rotor, change in zip(rotors, added, strict=True):
+        (momenta if rotor.is_momentum else speeds)[rotor.joint] = _shifted(rotor.value, change)
     deformation = articulated(body, path, rotors=momenta, rotor_speeds=speeds)
     drawn = reconstruct(deformation, momentum, start, tolerance=tolerance)
     parts = split(drawn)
     return [_rotation(drawn, parts, name) for name in _ROTATIONS], [getattr(parts, name) for name in _PHASES]
+
+
+def _shifted(value: float | ShapePath, change: float) -> float | ShapePath:
+    """A wheel's value, or its path in time, with a constant added."""
+    if not isinstance(value, ShapePath):
+        return value + change
+    samples = path_samples(value)
+    return samples.path_through(samples.values + change)
 
 
 class _Cause(NamedTuple):

@@ -289,7 +289,7 @@ class Described(NamedTuple):
 
     def along(self, along: AlongMotion) -> BodyAlong:
         """The body at the nodes of a motion."""
-        wheels = WheelsAlong(self.body, self.rotors, along.shapes, along.rates)
+        wheels = WheelsAlong(self.body, self.rotors, along.times, along.shapes, along.rates)
         return BodyAlong(self.body, along.times, along.shapes, along.rates, wheels)
 
 
