@@ -11,11 +11,9 @@ import pytest
 import shapephase as sp
 from shapephase import so3
 from shapephase.errors import ShapeError, UnknownNameError
+from support.gyroscope import AXLE, gyroscope
 from support.long_runs import full_but
 
-# A gyroscope at the end of a hinge and a slide, and a wheel on the base that a motor holds at its speed; what the
-# first wheel's axle is not along, no axis is along.
-_AXLE = np.array([0.48, 0.6, 0.64])
 _NEAR = 1e-6  # of central differences with motions at 1e-12
 _START = so3.exp(np.array([0.2, 0.3, -0.4]))
 _MOMENTUM = np.array([0.15, -0.25, 0.5])
@@ -27,44 +25,9 @@ ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation
 PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
 
 
-def _link(name: str, mass: float, centre: np.ndarray, tensor: np.ndarray) -> str:
-    six = tensor[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]].tolist()
-    entries = " ".join(f'i{k}="{value!r}"' for k, value in zip(("xx", "yy", "zz", "yz", "xz", "xy"), six, strict=True))
-    return (
-        f'<link name="{name}"><inertial><origin xyz="{" ".join(map(repr, centre.tolist()))}"/><mass value="{mass}"/>'
-        f"<inertia {entries}/></inertial></link>"
-    )
-
-
-def _joint(name: str, kind: str, parent: str, child: str, axis: str, xyz: str) -> str:
-    limit = "" if kind == "continuous" else '<limit lower="-3" upper="3" effort="1" velocity="9"/>'
-    return (
-        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><axis xyz="{axis}"/>'
-        f'<origin xyz="{xyz}" rpy="0.3 -0.2 0.5"/>{limit}</joint>'
-    )
-
-
-def _wheel(across: float, about: float, axis: np.ndarray) -> np.ndarray:
-    return across * np.eye(3) + (about - across) * np.outer(axis, axis)
-
-
 @pytest.fixture(scope="module")
 def body(tmp_path_factory: pytest.TempPathFactory) -> sp.Body:
-    file = tmp_path_factory.mktemp("body") / "body.urdf"
-    skew = np.array([[0.3, 0.02, 0.01], [0.02, 0.4, -0.03], [0.01, -0.03, 0.5]])
-    parts = [
-        _link("base", 5.0, np.array([0.1, 0.0, -0.1]), skew),
-        _link("arm", 1.0, np.array([0.2, 0.1, 0.0]), 0.1 * skew),
-        _link("boom", 1.5, np.array([0.0, 0.1, 0.3]), 0.2 * skew),
-        _link("rim", 1.0, 0.1 * _AXLE, _wheel(0.03, 0.05, _AXLE)),
-        _link("disc", 0.8, np.array([0.0, 0.05, 0.0]), _wheel(0.006, 0.01, np.array([0.0, 1.0, 0.0]))),
-        _joint("swing", "revolute", "base", "arm", "0 0.6 0.8", "0.3 0.1 0"),
-        _joint("slide", "prismatic", "arm", "boom", "1 0 0", "0.4 0 0.1"),
-        _joint("gyro", "continuous", "boom", "rim", "0.48 0.6 0.64", "0 0.2 0.1"),
-        _joint("fly", "continuous", "base", "disc", "0 1 0", "0 0 0.2"),
-    ]
-    file.write_text(f'<robot name="gyroscope">{"".join(parts)}</robot>')
-    return sp.load_body(file)
+    return gyroscope(tmp_path_factory.mktemp("body"))
 
 
 def motion_of(
@@ -149,7 +112,7 @@ def test_by_inertias(body: sp.Body, link: str):
     def with_inertia(**given: Any) -> sp.Motion:
         return motion_of(body.with_inertias(**{name: {link: value} for name, value in given.items()}))
 
-    axle = {"rim": _AXLE, "disc": np.array([0.0, 1.0, 0.0])}.get(link, np.array([0.8, 0.0, 0.6]))
+    axle = {"rim": AXLE, "disc": np.array([0.0, 1.0, 0.0])}.get(link, np.array([0.8, 0.0, 0.6]))
     columns = [column_of(found, 10 * frame + k) for k in range(10)]
     mass = 1e-4 * part.mass
     agree(columns[0], difference(lambda h: with_inertia(masses=part.mass + h), mass))

@@ -28,7 +28,7 @@ from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples
 from ..shape_space.shape_path import ShapePath
-from ._wheels_along import WheelsAlong
+from .wheels_along import WheelsAlong, reduced_chain
 
 _NODES = 5  # of Gauss's rule on each piece: its order is ten, that of a step of the motion eight
 _STEPS = 4  # of the motion in one piece, at first
@@ -266,7 +266,8 @@ class BodyAlong:
         (S r, m), from spins (N, S, 3), rows (N, S, r, 3) and momenta I w + J rate (N, S, 3), which are minus the
         derivative by the duration's logarithm where a path is closed. The momenta have what wheels store at even S.
         """
-        chain, closing = self.wheels.reduced(self.body.chain), samples.is_closing(self.times)
+        chain = reduced_chain(self.body.chain, self.wheels.rotors)
+        closing = samples.is_closing(self.times)
         check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
         if self._has_kernels:
             of_all = link_tree.momentum_gradients(chain.rows, self.shapes, self.rates, spins, rows)

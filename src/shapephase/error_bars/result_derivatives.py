@@ -21,7 +21,7 @@ from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
 from ._along_motion import AlongMotion, BodyAlong, along_motion, responses
-from ._wheels_along import WheelsAlong
+from .wheels_along import WheelsAlong
 
 
 @dataclass(frozen=True, eq=False)

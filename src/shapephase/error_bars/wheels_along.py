@@ -56,15 +56,7 @@ class WheelsAlong:
     @cached_property
     def stored(self) -> Array:
         """Momentum that all wheels store: (N, 3), base axes [kg m^2/s]."""
-        return np.einsum("nw,nwc->nc", self._along, self.axles)
-
-    def reduced(self, chain: JointChain) -> JointChain:
-        """The chain without the moments of wheels that keep their momentum."""
-        tensors = chain.inertias.copy()
-        for rotor, frame, axle in zip(self.rotors, self._frames, self._own_axles, strict=True):
-            if rotor.is_momentum:
-                tensors[frame] -= rotor.inertia * np.outer(axle, axle)
-        return chain.with_inertias(chain.masses, chain.centres, tensors) if self.rotors else chain
+        return np.einsum("nw,nwc->nc", self.along, self.axles)
 
     def by_shape(self, rows: Array) -> Array:
         """Products of row . d(stored momentum) by the joints that are not wheels: (N, S, r, 3) -> (N, S r, m).
@@ -76,7 +68,7 @@ class WheelsAlong:
             unit = np.zeros_like(self.rates)
             unit[:, column] = 1.0
             turning = link_motions(self.body.chain, self.shapes, unit).spins[:, self._frames]
-            change = np.einsum("nw,nwc->nc", self._along, np.cross(turning, self.axles))
+            change = np.einsum("nw,nwc->nc", self.along, np.cross(turning, self.axles))
             turned[:, ::2, :, place] = np.einsum("nsrc,nc->nsr", rows[:, ::2], change)
         return turned.reshape(len(rows), -1, len(self.driven))
 
@@ -93,7 +85,7 @@ class WheelsAlong:
     def by_values(self, rows: Array) -> Array:
         """Sums of products of row . d(stored momentum) by the wheels' values: (N, S, r, 3) -> (S r, W)."""
         units = [1.0 if rotor.is_momentum else rotor.inertia for rotor in self.rotors]
-        return self._along_axles(rows, np.broadcast_to(units, self._along.shape))
+        return self._along_axles(rows, np.broadcast_to(units, self.along.shape))
 
     def _along_axles(self, rows: Array, along: Array) -> Array:
         """Sums of products of rows (N, S, r, 3) with axles that are (N, W) long: (S r, W)."""
@@ -102,15 +94,31 @@ class WheelsAlong:
         return sums.reshape(-1, len(self.rotors))
 
     @cached_property
-    def _along(self) -> Array:
+    def along(self) -> Array:
         """Momentum that each wheel stores along its axle: (N, W) [kg m^2/s]."""
         return np.stack([rotor.stored(self.times) for rotor in self.rotors], axis=-1)
 
     @property
     def _frames(self) -> list[int]:
-        return [self.body.chain.names.index(rotor.joint) + 1 for rotor in self.rotors]
+        return wheel_frames(self.body.chain, self.rotors)
 
     @property
     def _own_axles(self) -> Array:
         """Axles in axes of the frames: (W, 3)."""
         return self.body.chain.axes[[frame - 1 for frame in self._frames]]
+
+
+def wheel_frames(chain: JointChain, rotors: tuple[Rotor, ...]) -> list[int]:
+    """Numbers of the wheels' frames in the chain."""
+    return [chain.names.index(rotor.joint) + 1 for rotor in rotors]
+
+
+def reduced_chain(chain: JointChain, rotors: tuple[Rotor, ...]) -> JointChain:
+    """The chain without the moments of wheels that keep their momentum, about their axles."""
+    if not rotors:
+        return chain
+    tensors = chain.inertias.copy()
+    for rotor, frame in zip(rotors, wheel_frames(chain, rotors), strict=True):
+        if rotor.is_momentum:
+            tensors[frame] -= rotor.inertia * np.outer(chain.axes[frame - 1], chain.axes[frame - 1])
+    return chain.with_inertias(chain.masses, chain.centres, tensors)
