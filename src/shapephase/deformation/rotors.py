@@ -18,7 +18,7 @@ from ..display import short_repr
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
-from ..shape_space.curves import Swings, Widened, most_swings
+from ..shape_space.curves import Reordered, Swings, Widened, most_swings
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function, side_by_side
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import ShapePath
@@ -82,6 +82,16 @@ class RotorDescription(UngaugedDescription):
     rotors: tuple[Rotor, ...]
 
     __repr__ = short_repr
+
+    @property
+    def driven_path(self) -> ShapePath:
+        """Path of the joints that are not wheels."""
+        wheels, joints = {rotor.joint for rotor in self.rotors}, self.platform.joint_names
+        columns = np.array([column for column, name in enumerate(joints) if name not in wheels], dtype=int)
+        wide = self.route.curve
+        curve = wide.curve if isinstance(wide, Widened) else Reordered(wide, columns)
+        names = tuple(joints[column] for column in columns)
+        return replace(self.route, curve=curve, n_shape=len(names), joint_names=names, scanner=None)
 
     def sample(self, times: Array) -> tuple[Array, Array]:
         shapes, rates = self.route.curve(times)
@@ -314,4 +324,4 @@ def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> Shap
     ordered = path.matched(others, f"{body.name} without {', '.join(left_out)}")
     columns = np.array([body.joint_index(name) for name in others], dtype=int)
     curve = Widened(ordered.curve, columns, body.n_shape)
-    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names, scanner=None, origin=None)
+    return replace(ordered, curve=curve, n_shape=body.n_shape, joint_names=body.joint_names, scanner=None)

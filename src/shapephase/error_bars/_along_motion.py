@@ -21,12 +21,14 @@ from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..body.inertial_regressor import LinkMotions, by_link_parameters, link_motions
 from ..body.momentum_gradients import by_independent, by_shape_and_rate
+from ..deformation.rotors import RotorDescription
 from ..integrator import link_tree, machine_code
 from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples
 from ..shape_space.shape_path import ShapePath
+from .wheels_along import WheelsAlong, reduced_chain
 
 _NODES = 5  # of Gauss's rule on each piece: its order is ten, that of a step of the motion eight
 _STEPS = 4  # of the motion in one piece, at first
@@ -56,11 +58,14 @@ class AlongMotion:
     ----------
     times, weights : (N,) [s]
     shapes, rates : (N, n)
-    attitudes, lifted : (N, 3, 3) of the motion and of its horizontal lift, base axes to inertial axes
+    attitudes : (N, 3, 3) of the motion, base axes to inertial axes
+    lifted : (N, C, 3, 3) of its horizontal lift and, where there are wheels, of the lift with what they store
     inverse : (N, 3, 3) I^-1 [1/(kg m^2)]
-    spins, lifted_spins : (N, 3) angular velocity of both, base axes [rad/s]
+    spins, lifted_spins : (N, 3), (N, C, 3) angular velocities, base axes [rad/s]
     adjoint : (N, 3, 3) Lambda
     adjoint_at_start : (3, 3)
+    wheels : (N, 3) adjoint of the integral of -Pi . I^-1 h, where wheels store h, by the turn of the attitude
+    wheels_at_start : (3,)
     """
 
     times: Array
@@ -74,11 +79,14 @@ class AlongMotion:
     lifted_spins: Array
     adjoint: Array
     adjoint_at_start: Array
+    wheels: Array
+    wheels_at_start: Array
 
 
 def along_motion(motion: Motion, path: ShapePath, breaks: Array | None = None) -> AlongMotion:
     """A motion that is no batch, of an articulated body; no piece of the quadrature has one of the breaks within."""
-    edges = _pieces(one_rotation(motion), path.breaks if breaks is None else np.union1d(path.breaks, breaks))
+    known = motion.deformation.breaks
+    edges = _pieces(one_rotation(motion), known if breaks is None else np.union1d(known, breaks))
     along = _at_nodes(motion, path, edges)
     for _ in range(_MOST_HALVINGS):
         rough = _factors(along) > _LARGEST_FACTOR
@@ -96,9 +104,15 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
     shapes, rates = path.curve(times)
     inverse, drift = stepped.interpolant.inverse_and_drift(times)
     attitudes = start @ stepped.rotation(times)[0]
-    lifted = start @ motion.horizontal_lift.rotation(times)[0]
+    lifts, drifts = [motion.lift_with_errors], [drift]
+    if isinstance(motion.deformation.description, RotorDescription):
+        lifts.append(motion.lift_without_momentum)
+        drifts.insert(0, lifts[0].interpolant.inverse_and_drift(times)[1])
+    lifted = np.stack([start @ lift.rotation.rotation(times)[0] for lift in lifts], axis=1)
     by_turning = so3.hat(motion.momentum) @ attitudes @ inverse @ so3.transpose(attitudes)
     adjoint, at_start = _adjoint(by_turning.reshape(len(widths), _NODES, 3, 3), widths)
+    by_wheels = np.cross(motion.momentum, so3.apply(attitudes, drifts[-1] - drifts[0]))
+    wheels, wheels_at_start = _sourced(adjoint, at_start, by_wheels.reshape(len(widths), _NODES, 3), widths)
     return AlongMotion(
         times=times,
         weights=(widths[:, None] * _SHARES).ravel(),
@@ -108,17 +122,21 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
         lifted=lifted,
         inverse=inverse,
         spins=(inverse @ (motion.momentum @ attitudes)[..., None])[..., 0] - drift,
-        lifted_spins=-drift,
+        lifted_spins=-np.stack(drifts, axis=1),
         adjoint=adjoint.reshape(-1, 3, 3),
         adjoint_at_start=at_start,
+        wheels=wheels.reshape(-1, 3),
+        wheels_at_start=wheels_at_start,
     )
 
 
 def _factors(along: AlongMotion) -> Array:
     """Ratio of neighbouring Legendre coefficients in each piece, for the integrand where they fall least: (P,)."""
     count = len(along.times)
-    turned = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse, along.lifted @ along.inverse
-    vectors = [*(matrices.reshape(count, 9) for matrices in turned), along.spins, along.lifted_spins]
+    lifted = np.moveaxis(along.lifted @ along.inverse[:, None], 1, 0)
+    turned = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse, *lifted
+    spins = along.spins, *np.moveaxis(along.lifted_spins, 1, 0)
+    vectors = [*(matrices.reshape(count, 9) for matrices in turned), *spins]
     whole = np.concatenate([*vectors, np.cos(along.shapes), np.sin(along.shapes)], axis=1)
     at_nodes = whole.reshape(-1, _NODES, whole.shape[1])
     squares = (_LAST @ at_nodes) ** 2
@@ -206,6 +224,15 @@ def _adjoint(slopes: Array, widths: Array) -> tuple[Array, Array]:
     return inner @ at_left[:, None], right
 
 
+def _sourced(adjoint: Array, at_start: Array, source: Array, widths: Array) -> tuple[Array, Array]:
+    """Solution of x' = slope x - source that ends at zero, by `_adjoint`: (P, m, 3, 3), (3, 3), (P, m, 3), (P,) ->
+    (P, m, 3), (3,)."""
+    turned = widths[:, None, None] * np.linalg.solve(adjoint, source[..., None])[..., 0]
+    onward = np.cumsum(np.einsum("j,pjk->pk", _SHARES, turned)[::-1], axis=0)[::-1]
+    rest = onward[:, None] - np.einsum("ij,pjk->pik", _INTEGRALS, turned)
+    return so3.apply(adjoint, rest), at_start @ onward[0]
+
+
 def _within(scaled: Array, given: Array | None = None) -> Array:
     """X_i - sum_j a_ij scaled_j X_j = given_i at the nodes of each piece; None: one: (P, m, 3, c) -> (P, m, 3, c)."""
     count, m = scaled.shape[:2]
@@ -224,26 +251,35 @@ class BodyAlong:
     body : the body of the path
     times : (N,) [s]
     shapes, rates : (N, n)
+    wheels : those of the motion, whose joints rest in the shapes
     """
 
     body: Body
     times: Array
     shapes: Array
     rates: Array
+    wheels: WheelsAlong
 
     def by_knots(self, samples: PathSamples, spins: Array, rows: Array, momenta: Array) -> Array:
         """Sums of row . d(I w + J rate), w staying, by the path at its knots.
 
         (S r, m), from spins (N, S, 3), rows (N, S, r, 3) and momenta I w + J rate (N, S, 3), which are minus the
-        derivative by the duration's logarithm where a path is closed.
+        derivative by the duration's logarithm where a path is closed. The momenta have what wheels store at even S.
         """
-        chain, closing = self.body.chain, samples.is_closing(self.times)
+        chain = reduced_chain(self.body.chain, self.wheels.rotors)
+        closing = samples.is_closing(self.times)
         check_smooth(chain.follows, "derivatives by a path need", kinks_only=True)
         if self._has_kernels:
             of_all = link_tree.momentum_gradients(chain.rows, self.shapes, self.rates, spins, rows)
             parts = by_independent(chain, *of_all, self.shapes, self.rates)
         else:
             parts = by_shape_and_rate(chain, self._links, self.shapes, self.rates, spins, rows)
+        if self.wheels.rotors:
+            by_shape, by_rate = (derivative[..., self.wheels.driven] for derivative in parts)
+            parts = by_shape + self.wheels.by_shape(rows), by_rate
+            # What wheels store does not grow with the pace.
+            momenta = momenta.copy()
+            momenta[:, ::2] -= self.wheels.stored[:, None]
         by_knots = samples.by_knots(self.times, *parts)
         if closing.any():
             by_duration = -np.einsum("nsrc,nsc->sr", rows[closing], momenta[closing]).ravel()
@@ -255,9 +291,11 @@ class BodyAlong:
         chain = self.body.chain
         if not self._has_kernels:
             pairs = zip(np.moveaxis(rows, 1, 0), np.moveaxis(spins, 1, 0), strict=True)
-            return np.concatenate([by_link_parameters(self._links, row, spin) for row, spin in pairs])
-        sums = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
-        return chain.rows.in_chain_axes(sums).reshape(len(sums), -1)
+            derivative = np.concatenate([by_link_parameters(self._links, row, spin) for row, spin in pairs])
+        else:
+            sums = link_tree.inertial_sums(chain.rows, self.shapes, self.rates, spins, rows)
+            derivative = chain.rows.in_chain_axes(sums).reshape(len(sums), -1)
+        return self.wheels.by_inertias(derivative, rows) if self.wheels.rotors else derivative
 
     @property
     def _has_kernels(self) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +16,7 @@ from ..arguments import check_executor, whole_argument
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..deformation.deformation import articulated
+from ..deformation.rotors import Rotor
 from ..display import short_repr
 from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
@@ -31,11 +32,12 @@ from .result_derivatives import (
     described_by,
     fit_by_inertias,
     fit_by_knots,
+    fit_by_rotors,
 )
 
 _BARS_FROM_THE_ENDS = 5.0  # from an angle to 0 and to 180 degrees, for it to have a bar of its own
 _ROUNDING = 1e-9  # of the largest variance of a rotation: smaller ones about other axes are rounding
-_ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation")
+_ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation", "wheel_rotation")
 _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
 
 
@@ -48,12 +50,12 @@ class Uncertainty:
 
     Attributes
     ----------
-    final_attitude, total_rotation, holonomy, dynamical_rotation : (3, 3) covariances [rad^2]
+    final_attitude, total_rotation, holonomy, dynamical_rotation, wheel_rotation : (3, 3) covariances [rad^2]
     dynamic_phase, solid_angle, montgomery_phase : standard deviations [rad]
     start : (6, 6) covariance of the turn of the start, base axes [rad^2], and of the momentum [(kg m^2/s)^2], with all
         that moves a fit to a recording
-    total_angle, holonomy_angle : standard deviations of the angles of these rotations [rad]; NaN where an angle is
-        less than five of them from 0 or from 180 degrees: one number cannot state it there
+    total_angle, holonomy_angle, wheel_angle : standard deviations of the angles of these rotations [rad]; NaN where an
+        angle is less than five of them from 0 or from 180 degrees: one number cannot state it there
     smoothing_bias : by how much smoothing has shifted the result that it shifts most, as far as that is known, in
         standard deviations of its own, which hold it; 0 where nothing was smoothed or `joints` are exact
     draws : number of motions this was estimated from; 0: by derivatives
@@ -63,12 +65,14 @@ class Uncertainty:
     total_rotation: Array
     holonomy: Array
     dynamical_rotation: Array
+    wheel_rotation: Array
     dynamic_phase: float
     solid_angle: float
     montgomery_phase: float
     start: Array
     total_angle: float
     holonomy_angle: float
+    wheel_angle: float
     smoothing_bias: float = 0.0
     draws: int = 0
 
@@ -84,6 +88,7 @@ def uncertainty(
     momentum: ArrayLike | None = None,
     attitude: ArrayLike | None = None,
     start: RecordedMomentum | ArrayLike | None = None,
+    rotors: float | Mapping[str, float] | None = None,
 ) -> Uncertainty:
     """Error bars of the results of `split`, to first order, from the errors of its inputs.
 
@@ -105,6 +110,8 @@ def uncertainty(
     start : instead of these two the covariance (6, 6) of both, the turn of the start first; or the whole fit of
         `momentum_from_recording`, whose `motion` this is: then errors of `joints` and `inertias` move the fit, too, as
         they do where the recorded attitudes stay what they are
+    rotors : of the wheels' values, one standard deviation for all or one by name of the joint, in the unit of each
+        value [kg m^2/s] or [rad/s]; of a value given in time, of a constant that is added to it
 
     Raises
     ------
@@ -114,7 +121,7 @@ def uncertainty(
         For a batch, for covariances that are not, for the fit of another motion, and for `start` beside `momentum`
         or `attitude`.
     UnknownNameError
-        For a link that the body does not have.
+        For a link that the body does not have, or a joint that turns no wheel.
     TrajectoryError
         For a text that is no amount.
 
@@ -132,7 +139,7 @@ def uncertainty(
     0.000813 rad
     """
     derived = derivatives(motion)
-    inputs = inputs_of(motion, joints, inertias, momentum, attitude, start)
+    inputs = inputs_of(motion, joints, inertias, momentum, attitude, start, rotors)
     covariances = [np.zeros((3, 3)) for _ in _ROTATIONS]
     variances, of_start = np.zeros(len(_PHASES)), np.zeros((UNKNOWNS, UNKNOWNS))
     for cause in _causes(derived, inputs):
@@ -153,6 +160,7 @@ def sampled_uncertainty(
     momentum: ArrayLike | None = None,
     attitude: ArrayLike | None = None,
     start: RecordedMomentum | ArrayLike | None = None,
+    rotors: float | Mapping[str, float] | None = None,
     draws: int = 400,
     seed: int = 0,
     executor: Executor | None = None,
@@ -163,8 +171,8 @@ def sampled_uncertainty(
 
     Parameters
     ----------
-    motion, joints, inertias, momentum, attitude, start : as for `uncertainty`; errors are normally distributed, and
-        move a fit to first order
+    motion, joints, inertias, momentum, attitude, start, rotors : as for `uncertainty`; errors are normally distributed,
+        and move a fit to first order
     draws : how many, two or more
     seed : of the random numbers
     executor : of `concurrent.futures`, or of a cluster (`distributed.Client.get_executor()`), that reconstructs the
@@ -184,8 +192,8 @@ def sampled_uncertainty(
     """
     check_executor(executor)
     draws, seed = whole_argument(draws, "draws", 2), whole_argument(seed, "seed", 0)
-    body, path = described_by(motion)
-    inputs, rng = inputs_of(motion, joints, inertias, momentum, attitude, start), np.random.default_rng(seed)
+    body, path, _, wheels = described_by(motion)
+    inputs, rng = inputs_of(motion, joints, inertias, momentum, attitude, start, rotors), np.random.default_rng(seed)
     normal = partial(_drawn, rng, draws)
     paths, bodies, changes = [path] * draws, [body] * draws, np.zeros((draws, UNKNOWNS))
     if inputs.samples is not None:
@@ -194,7 +202,7 @@ def sampled_uncertainty(
         changes += errors @ samples.by_samples(_fit_by_knots(motion, inputs)).T
     if inputs.links is not None:
         errors = normal(inputs.links)
-        bodies = drawn_bodies(body, errors)
+        bodies = drawn_bodies(body, wheels, errors)
         changes += errors @ _fit_by_links(motion, inputs).T
     if inputs.attitude is not None:
         changes[:, :3] += normal(inputs.attitude)
@@ -202,13 +210,17 @@ def sampled_uncertainty(
         changes[:, 3:] += normal(inputs.momentum)
     if inputs.start is not None:
         changes += normal(inputs.start)
+    added = np.zeros((draws, len(wheels)))
+    if inputs.rotors is not None:
+        added = normal(inputs.rotors)
+        changes += added @ _fit_by_rotors(motion, inputs).T
     starts, momenta = motion.initial_attitude @ so3.exp(changes[:, :3]), motion.momentum + changes[:, 3:]
     middle = split(motion)
     turns, phases = np.empty((len(_ROTATIONS), draws, 3)), np.empty((draws, len(_PHASES)))
     compute = map if executor is None else executor.map
     expected = [_rotation(motion, middle, name) for name in _ROTATIONS]
-    one_draw = partial(_results_of_draw, motion.tolerance)
-    for row, (rotations, angles) in enumerate(compute(one_draw, bodies, paths, momenta, starts)):
+    one_draw = partial(_results_of_draw, motion.tolerance, wheels)
+    for row, (rotations, angles) in enumerate(compute(one_draw, bodies, paths, momenta, starts, added)):
         for which, (rotation, usual) in enumerate(zip(rotations, expected, strict=True)):
             turns[which, row] = so3.log(rotation @ usual.T)
         phases[row] = angles
@@ -217,12 +229,31 @@ def sampled_uncertainty(
 
 
 def _results_of_draw(
-    tolerance: float, body: Body, path: ShapePath, momentum: Array, start: Array
+    tolerance: float,
+    rotors: tuple[Rotor, ...],
+    body: Body,
+    path: ShapePath,
+    momentum: Array,
+    start: Array,
+    added: Array,
 ) -> tuple[list[Array], list[Array]]:
     """Rotations and phases of one motion, which may be computed in another process."""
-    drawn = reconstruct(articulated(body, path), momentum, start, tolerance=tolerance)
+    momenta: dict[str, float | ShapePath] = {}
+    speeds: dict[str, float | ShapePath] = {}
+    for rotor, change in zip(rotors, added, strict=True):
+        (momenta if rotor.is_momentum else speeds)[rotor.joint] = _shifted(rotor.value, change)
+    deformation = articulated(body, path, rotors=momenta, rotor_speeds=speeds)
+    drawn = reconstruct(deformation, momentum, start, tolerance=tolerance)
     parts = split(drawn)
     return [_rotation(drawn, parts, name) for name in _ROTATIONS], [getattr(parts, name) for name in _PHASES]
+
+
+def _shifted(value: float | ShapePath, change: float) -> float | ShapePath:
+    """A wheel's value, or its path in time, with a constant added."""
+    if not isinstance(value, ShapePath):
+        return value + change
+    samples = path_samples(value)
+    return samples.path_through(samples.values + change)
 
 
 class _Cause(NamedTuple):
@@ -248,7 +279,8 @@ def _causes(derived: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
         taken = samples.bias[:, None]
         yield moving_the_fit(derived.at_knots(lambda by_knots: by_knots @ taken), by_fit @ taken, np.ones(1))
     if inputs.links is not None:
-        by_links = _combined(lambda only: by_relative_errors(derived.body, only[0]), derived.by_inertias)
+        by_parameters = partial(by_relative_errors, derived.body, derived.rotors)
+        by_links = _combined(lambda only: by_parameters(only[0]), derived.by_inertias)
         yield moving_the_fit(by_links, _fit_by_links(derived.motion, inputs), inputs.links)
     if inputs.momentum is not None:
         yield _Cause(derived.by_momentum, np.eye(UNKNOWNS)[:, 3:], inputs.momentum)
@@ -256,6 +288,8 @@ def _causes(derived: Derivatives, inputs: Inputs) -> Iterator[_Cause]:
         yield _Cause(derived.by_attitude, np.eye(UNKNOWNS)[:, :3], inputs.attitude)
     if inputs.start is not None:
         yield _Cause(by_start, np.eye(UNKNOWNS), inputs.start)
+    if inputs.rotors is not None:
+        yield moving_the_fit(derived.by_rotors, _fit_by_rotors(derived.motion, inputs), inputs.rotors)
 
 
 def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivative) -> ResultDerivative:
@@ -266,7 +300,7 @@ def _combined(rule: Callable[[tuple[Array, ...]], Array], *parts: ResultDerivati
 def _fit_by_knots(motion: Motion, inputs: Inputs) -> Array:
     """Derivatives of fitted attitude and momentum at the start by the path at its knots: (6, knots n)."""
     if inputs.fit is None:
-        _, path = described_by(motion)
+        path = described_by(motion).path
         return np.zeros((UNKNOWNS, path_samples(path).bias.size))
     return fit_by_knots(motion, inputs.fit.times, inputs.fit.by_attitudes, inputs.fit.by_rates)
 
@@ -276,9 +310,17 @@ def _fit_by_links(motion: Motion, inputs: Inputs) -> Array:
     assert inputs.links is not None
     if inputs.fit is None:
         return np.zeros((UNKNOWNS, len(inputs.links)))
-    body, _ = described_by(motion)
+    described = described_by(motion)
     by_parameters = fit_by_inertias(motion, inputs.fit.times, inputs.fit.by_attitudes, inputs.fit.by_rates)
-    return by_relative_errors(body, by_parameters)
+    return by_relative_errors(described.body, described.rotors, by_parameters)
+
+
+def _fit_by_rotors(motion: Motion, inputs: Inputs) -> Array:
+    """Derivatives of the fit by the wheels' values: (6, W)."""
+    assert inputs.rotors is not None
+    if inputs.fit is None:
+        return np.zeros((UNKNOWNS, len(inputs.rotors)))
+    return fit_by_rotors(motion, inputs.fit.times, inputs.fit.by_attitudes, inputs.fit.by_rates)
 
 
 def _drawn(rng: np.random.Generator, draws: int, covariance: Array) -> Array:
@@ -324,8 +366,8 @@ def _uncertainty(
     draws: int,
     smoothing_bias: float = 0.0,
 ) -> Uncertainty:
-    _, total, holonomy, _ = covariances
-    bars = _bar(parts.total_rotation, total), _bar(parts.holonomy, holonomy)
+    _, total, holonomy, _, wheels = covariances
+    bars = _bar(parts.total_rotation, total), _bar(parts.holonomy, holonomy), _bar(parts.wheel_rotation, wheels)
     numbers: list[Any] = [*covariances, *deviations.tolist(), start, *bars, smoothing_bias, draws]
     return Uncertainty(*numbers)
 

@@ -9,10 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import so3
 from ..arguments import check_object, made_by
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.family import BodyFamily
+from ..deformation.rotors import Rotor
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..letters import value_text
@@ -66,6 +68,7 @@ class Inputs(NamedTuple):
     links : of the relative errors of each frame of the body's chain: mass, centre (3), inertia
     momentum, attitude : (3, 3)
     start : (6, 6) of attitude and momentum together
+    rotors : of the wheels' values
     fit : source of these, which the other errors move, too
     """
 
@@ -74,6 +77,7 @@ class Inputs(NamedTuple):
     momentum: Array | None
     attitude: Array | None
     start: Array | None
+    rotors: Array | None
     fit: RecordedMomentum | None
 
 
@@ -84,19 +88,23 @@ def inputs_of(
     momentum: ArrayLike | None,
     attitude: ArrayLike | None,
     start: RecordedMomentum | ArrayLike | None,
+    rotors: float | Mapping[str, float] | None,
 ) -> Inputs:
     """The arguments of `uncertainty`, checked."""
-    body, path = described_by(motion)
+    body, path, _, wheels = described_by(motion)
     if inertias is not None:
         check_object(inertias, "InertiaErrors", "inertias")
     if start is not None and not (momentum is None and attitude is None):
         raise ShapeError("start: it has the errors of momentum and attitude together; leave momentum and attitude out")
     samples = None
     if joints is not None:
+        spun = [wheel.joint for wheel in wheels]
+        driven = [column for column, name in enumerate(body.joint_names) if name not in spun]
         if isinstance(joints, str):
             # One amount of angles, of lengths, or both.
             by_unit = amounts(joints, "joints")
-            given = np.array([by_unit[joint.unit] for joint in body_summary(body).joints])
+            summary = body_summary(body).joints
+            given = np.array([by_unit[summary[column].unit] for column in driven])
         else:
             given = finite_array(joints, "joints")
         through = path_samples(path)
@@ -105,7 +113,7 @@ def inputs_of(
             deviations = np.array(np.broadcast_to(_deviations(given, "joints"), path.n_shape))
             if given.ndim == 0:
                 # The components of a quaternion change by half its turn.
-                deviations[np.array(body.joint_units, dtype=str) == NO_UNIT] *= 0.5
+                deviations[np.array(body.joint_units, dtype=str)[driven] == NO_UNIT] *= 0.5
             if given.ndim == 0 or isinstance(joints, str):
                 deviations[columns_without_samples(path)] = 0.0
             samples = np.tile(deviations**2, through.count)
@@ -123,7 +131,8 @@ def inputs_of(
     elif start is not None:
         together = _covariance(finite_array(start, "start"), "start", UNKNOWNS)
     single = _of_vector(momentum, "momentum"), _of_vector(attitude, "attitude")
-    return Inputs(samples, links, *single, start=together, fit=fit)
+    of_rotors = None if rotors is None else _rotor_variances(wheels, rotors)
+    return Inputs(samples, links, *single, start=together, rotors=of_rotors, fit=fit)
 
 
 def _of_vector(given: ArrayLike | None, name: str) -> Array | None:
@@ -169,30 +178,52 @@ def _link_variances(body: Body, errors: InertiaErrors) -> Array:
     return (deviations**2).ravel()
 
 
-def by_relative_errors(body: Body, derivative: Array) -> Array:
+def _rotor_variances(wheels: tuple[Rotor, ...], errors: float | Mapping[str, float]) -> Array:
+    """Variances of the values of all wheels: (W,)."""
+    names = [wheel.joint for wheel in wheels]
+    if not names:
+        raise ShapeError("rotors: the motion has no wheels; name them in articulated(..., rotors=, rotor_speeds=)")
+    if not isinstance(errors, Mapping):
+        return np.full(len(names), _deviations(finite_array(errors, "rotors", ()), "rotors") ** 2)
+    for joint in errors:
+        if joint not in names:
+            raise unknown_name("wheel of the motion", joint, names)
+    given = [finite_array(errors.get(name, 0.0), f"rotors, {name}", ()) for name in names]
+    return _deviations(np.array(given), "rotors") ** 2
+
+
+def by_relative_errors(body: Body, wheels: tuple[Rotor, ...], derivative: Array) -> Array:
     """Derivatives by the five relative errors of each frame, from those by its ten parameters (r, 10 (k + 1))."""
     chain = body.chain
     jacobian = np.zeros((len(chain.masses), 10, _OF_A_LINK))
     entries = chain.inertias[:, [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
     jacobian[:, 0, 0], jacobian[:, 4:, 0] = chain.masses, entries
-    for axis in range(3):
-        jacobian[:, 1 + axis, 1 + axis] = chain.masses * _gyration(body)
+    jacobian[:, 1:4, 1:4] = chain.masses[:, None, None] * _shifts(body, wheels)
     jacobian[:, 4:, 4] = entries
     by_frame = derivative.reshape(*derivative.shape[:-1], len(chain.masses), 10)
     return np.einsum("...kp,kpe->...ke", by_frame, jacobian).reshape(*derivative.shape[:-1], -1)
 
 
-def _gyration(body: Body) -> Array:
-    """The radius of gyration of each frame's mass: (k + 1,) [m]."""
-    masses, traces = body.chain.masses, np.trace(body.chain.inertias, axis1=1, axis2=2)
-    return np.sqrt(np.divide(0.5 * traces, masses, out=np.zeros_like(masses), where=masses > 0.0))
+def _shifts(body: Body, wheels: tuple[Rotor, ...]) -> Array:
+    """Shifts of the centre of each frame's mass by unit errors, its radius of gyration: (k + 1, 3, 3) [m].
+
+    Wheels are balanced: their centres stay on their axles.
+    """
+    chain = body.chain
+    masses, traces = chain.masses, np.trace(chain.inertias, axis1=1, axis2=2)
+    gyration = np.sqrt(np.divide(0.5 * traces, masses, out=np.zeros_like(masses), where=masses > 0.0))
+    shifts = gyration[:, None, None] * np.eye(3)
+    for wheel in wheels:
+        place = chain.names.index(wheel.joint)
+        shifts[place + 1] @= np.outer(chain.axes[place], chain.axes[place])
+    return shifts
 
 
-def drawn_bodies(body: Body, errors: Array) -> BodyFamily:
+def drawn_bodies(body: Body, wheels: tuple[Rotor, ...], errors: Array) -> BodyFamily:
     """One body for each row of relative errors (draws, 5 (k + 1))."""
     chain = body.chain
     by_link = errors.reshape(len(errors), -1, _OF_A_LINK)
     growth = np.maximum(1.0 + by_link[..., 0], _LEAST_SHARE)
     tensors = (growth * np.maximum(1.0 + by_link[..., 4], _LEAST_SHARE))[..., None, None] * chain.inertias
-    centres = chain.centres + _gyration(body)[:, None] * by_link[..., 1:4]
+    centres = chain.centres + so3.apply(_shifts(body, wheels), by_link[..., 1:4])
     return BodyFamily(body, growth * chain.masses, centres, tensors)

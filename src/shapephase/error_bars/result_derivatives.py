@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..body.body import Body
 from ..deformation.descriptions import ArticulatedDescription
+from ..deformation.rotors import Rotor, RotorDescription
 from ..display import short_repr
 from ..errors import ShapeError, WrongObjectError
 from ..inertia_tensor import inverse_inertia
@@ -20,6 +22,7 @@ from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
 from ._along_motion import AlongMotion, BodyAlong, along_motion, responses
+from .wheels_along import WheelsAlong
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +35,7 @@ class ResultDerivative:
 
     Attributes
     ----------
-    final_attitude, total_rotation, holonomy, dynamical_rotation : (3, m) [rad per unit]
+    final_attitude, total_rotation, holonomy, dynamical_rotation, wheel_rotation : (3, m) [rad per unit]
     dynamic_phase, solid_angle, montgomery_phase : (m,) in the horizontal gauge [rad per unit]; without momentum zero
     """
 
@@ -40,6 +43,7 @@ class ResultDerivative:
     total_rotation: Array
     holonomy: Array
     dynamical_rotation: Array
+    wheel_rotation: Array
     dynamic_phase: Array
     solid_angle: Array
     montgomery_phase: Array
@@ -50,7 +54,12 @@ class ResultDerivative:
 
 @dataclass(frozen=True, eq=False)
 class _Changes:
-    """Derivatives by m numbers: of the ends of motion and lift (3, m), inertial axes, and of l . G l (m,)."""
+    """Derivatives by m numbers, inertial axes.
+
+    end : (3, m) of the end of the motion
+    lifted : (C, 3, m) of the ends of its lifts, see `AlongMotion`
+    action : (m,) of the integral of Pi . (omega - that of the lift)
+    """
 
     end: Array
     lifted: Array
@@ -66,7 +75,8 @@ class Derivatives:
     Attributes
     ----------
     motion : the motion
-    body, path : its body and path
+    body, path : its body, and its path of the joints that are not wheels
+    rotors : its wheels
 
     Notes
     -----
@@ -75,8 +85,10 @@ class Derivatives:
 
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
-        self.body, self.path = described_by(motion)
-        self._along = along_motion(motion, self.path)
+        described = described_by(motion)
+        self.body, self.path, self.rotors = described.body, described.path, described.rotors
+        self._along = along_motion(motion, described.route)
+        self._body = described.at(self._along.times, self._along.shapes, self._along.rates)
 
     @cached_property
     def by_momentum(self) -> ResultDerivative:
@@ -84,7 +96,10 @@ class Derivatives:
         along = self._along
         turning = along.attitudes @ along.inverse @ so3.transpose(along.attitudes)
         end = np.einsum("n,nba,nbc->ac", along.weights, along.adjoint, turning)
-        return self._results(_Changes(end, np.zeros((3, 3)), 2.0 * self.motion.momentum @ end), by_momentum=True)
+        stored = so3.apply(along.attitudes, along.lifted_spins[:, 0] - along.lifted_spins[:, -1])
+        by_wheels = along.weights @ (so3.apply(so3.transpose(turning), along.wheels) - stored)
+        action = 2.0 * self.motion.momentum @ end + by_wheels
+        return self._results(_Changes(end, np.zeros((along.lifted.shape[1], 3, 3)), action), by_momentum=True)
 
     @cached_property
     def by_attitude(self) -> ResultDerivative:
@@ -92,8 +107,19 @@ class Derivatives:
         start = self.motion.initial_attitude
         end = self._along.adjoint_at_start.T @ start
         momentum = self.motion.momentum
-        action = 2.0 * momentum @ (end - start)
-        return self._results(_Changes(end, start, action), turned_start=start)
+        action = 2.0 * momentum @ (end - start) + self._along.wheels_at_start @ start
+        lifted = np.broadcast_to(start, (self._along.lifted.shape[1], 3, 3))
+        return self._results(_Changes(end, lifted, action), turned_start=start)
+
+    @cached_property
+    def by_rotors(self) -> ResultDerivative:
+        """Derivatives by the values of `rotors`: m = W.
+
+        Per kg m^2/s of a momentum that stays, per rad/s of a held speed; for a value in time by a constant that is
+        added to it.
+        """
+        _, rows = self._weights
+        return self._results(_changes(self._body.wheels.by_values(rows)))
 
     @cached_property
     def by_samples(self) -> ResultDerivative:
@@ -111,7 +137,8 @@ class Derivatives:
     @cached_property
     def by_knots(self) -> ResultDerivative:
         """Derivatives by the values of the path at its knots, for a periodic path without the last."""
-        momenta = np.zeros((len(self._along.times), 2, 3))
+        spins, _ = self._weights
+        momenta = np.zeros_like(spins)
         momenta[:, 0] = self.motion.momentum @ self._along.attitudes
         return self._results(_changes(self._body.by_knots(self._samples, *self._weights, momenta)))
 
@@ -136,41 +163,41 @@ class Derivatives:
         return path_samples(self.path)
 
     @cached_property
-    def _body(self) -> BodyAlong:
-        return BodyAlong(self.body, self._along.times, self._along.shapes, self._along.rates)
-
-    @cached_property
     def _weights(self) -> tuple[Array, Array]:
-        """Spins of motion and lift at each node (N, 2, 3), and changes of both ends and of the action by a unit
-        of angular momentum added to either, base axes (N, 2, 4, 3)."""
+        """Spins of motion and lifts at each node (N, 1 + C, 3), and changes of their ends and of the action by a unit
+        of angular momentum added to each, base axes (N, 1 + C, 4, 3)."""
         along = self._along
         turned = -along.weights[:, None, None] * along.inverse
-        ends = so3.transpose(along.adjoint) @ along.attitudes @ turned, along.lifted @ turned
-        weighted = along.weights[:, None] * (along.spins - along.lifted_spins)
-        rows = np.empty((len(weighted), 2, 4, 3))
-        rows[:, 0, :3], rows[:, 1, :3] = ends
+        end = so3.transpose(along.adjoint) @ along.attitudes @ turned
+        weighted = along.weights[:, None] * (along.spins - along.lifted_spins[:, -1])
+        spins = np.concatenate([along.spins[:, None], along.lifted_spins], axis=1)
+        rows = np.zeros((*spins.shape[:2], 4, 3))
+        rows[:, 0, :3], rows[:, 1:, :3] = end, along.lifted @ turned[:, None]
         # The action is quadratic in the difference of both: half of its change goes with each.
-        rows[:, 0, 3] = 2.0 * (self.motion.momentum @ ends[0]) + weighted
+        by_wheels = (along.wheels[:, None] @ along.attitudes @ turned)[:, 0]
+        rows[:, 0, 3] = 2.0 * (self.motion.momentum @ end) + by_wheels + weighted
         rows[:, 1, 3] = weighted
-        return np.stack([along.spins, along.lifted_spins], axis=1), rows
+        return spins, rows
 
     def _results(
         self, changes: _Changes, *, by_momentum: bool = False, turned_start: Array | None = None
     ) -> ResultDerivative:
-        """Derivatives of all results, from the turns of both ends.
+        """Derivatives of all results, from the turns of the ends.
 
         by_momentum: whether the numbers are the components of the momentum
         turned_start: (3, m) turns of the start, inertial axes
         """
-        total, holonomy, dynamical = self._rotations
-        of_total, of_holonomy = changes.end, changes.lifted
+        total, holonomy, dynamical, wheels = self._rotations
+        of_total, of_holonomy = changes.end, changes.lifted[0]
+        # Without wheels there is one lift, and exactly no such turn.
+        of_wheels = changes.lifted[-1] - wheels @ of_holonomy if len(changes.lifted) > 1 else 0.0 * of_holonomy
         if turned_start is not None:
             of_total, of_holonomy = of_total - total @ turned_start, of_holonomy - holonomy @ turned_start
         momentum = self.motion.momentum
         magnitude = float(np.linalg.norm(momentum))
         if not magnitude:
             none = np.zeros(changes.action.shape)
-            return ResultDerivative(changes.end, of_total, of_holonomy, 0.0 * of_total, none, none, none)
+            return ResultDerivative(changes.end, of_total, of_holonomy, of_wheels, of_wheels, none, none, none)
         of_dynamical = of_total - dynamical @ of_holonomy
         axis = momentum / magnitude
         by_turn, by_axis = self._twist_slopes
@@ -179,17 +206,19 @@ class Derivatives:
             dynamic = dynamic - self._dynamic_phase * axis / magnitude
             montgomery = montgomery + (by_axis - (by_axis @ axis) * axis) / magnitude
         phases = dynamic, dynamic - montgomery, montgomery
-        return ResultDerivative(changes.end, of_total, of_holonomy, of_dynamical, *phases)
+        return ResultDerivative(changes.end, of_total, of_holonomy, of_dynamical, of_wheels, *phases)
 
     @cached_property
-    def _rotations(self) -> tuple[Array, Array, Array]:
-        """The total rotation, the holonomy and the dynamical rotation."""
+    def _rotations(self) -> tuple[Array, Array, Array, Array]:
+        """The total rotation, the holonomy, the dynamical rotation and that by wheels alone."""
         motion = self.motion
         start = motion.initial_attitude
         closure = np.eye(3) if motion.deformation.closure is None else motion.deformation.closure
         total = motion.final_attitude @ closure @ start.T
         holonomy = start @ motion.horizontal_lift.end[0] @ closure @ start.T
-        return total, holonomy, total @ holonomy.T
+        lifts = (lift.end for lift in (motion.lift_without_momentum, motion.lift_with_errors))
+        alone, by_shape = (start @ end for end in lifts)
+        return total, holonomy, total @ holonomy.T, alone @ by_shape.T
 
     @cached_property
     def _twist_slopes(self) -> tuple[Array, Array]:
@@ -208,14 +237,15 @@ class Derivatives:
     def _dynamic_phase(self) -> float:
         """Dynamic phase in the horizontal gauge [rad]."""
         along, momentum = self._along, self.motion.momentum
-        relative = along.spins - along.lifted_spins
+        relative = along.spins - along.lifted_spins[:, 0]
         body_momentum = so3.apply(so3.transpose(along.attitudes), momentum)
         return float(along.weights @ (relative * body_momentum).sum(axis=-1) / np.linalg.norm(momentum))
 
 
 def _changes(sums: Array) -> _Changes:
-    """Changes from the sums of products with `Derivatives._weights`: (8, m)."""
-    return _Changes(sums[:3], sums[4:7], sums[3] + sums[7])
+    """Changes from the sums of products with `Derivatives._weights`: (4 (1 + C), m)."""
+    by_curve = sums.reshape(-1, 4, sums.shape[1])
+    return _Changes(by_curve[0, :3], by_curve[1:, :3], by_curve[:, 3].sum(axis=0))
 
 
 def derivatives(motion: Motion) -> Derivatives:
@@ -242,21 +272,44 @@ def derivatives(motion: Motion) -> Derivatives:
     return Derivatives(motion)
 
 
-def described_by(motion: Motion) -> tuple[Body, ShapePath]:
-    """The body and the path of a motion; WrongObjectError and ShapeError as for `derivatives`."""
+class Described(NamedTuple):
+    """What a motion of a body with joints is made of.
+
+    Attributes
+    ----------
+    body : with the wheels
+    path : of the joints that are not wheels
+    route : the path with columns for all joints
+    rotors : wheels
+    """
+
+    body: Body
+    path: ShapePath
+    route: ShapePath
+    rotors: tuple[Rotor, ...]
+
+    def at(self, times: Array, shapes: Array, rates: Array) -> BodyAlong:
+        """The body at times (N,), with the shapes and rates of the route there, (N, n) each."""
+        return BodyAlong(self.body, times, shapes, rates, WheelsAlong(self.body, self.rotors, times, shapes, rates))
+
+
+def described_by(motion: Motion) -> Described:
+    """What a motion is made of; WrongObjectError and ShapeError as for `derivatives`."""
     check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"derivatives are those of one motion, this is a batch of {motion.batch}; reconstruct one")
     description = motion.deformation.description
+    if isinstance(description, RotorDescription):
+        return Described(description.platform, description.driven_path, description.route, description.rotors)
     if not isinstance(description, ArticulatedDescription):
         raise WrongObjectError("derivatives by path and inertias need an articulated body, made by `articulated`")
-    return description.body, description.path
+    return Described(description.body, description.path, description.path, ())
 
 
 def fit_by_knots(motion: Motion, times: Array, by_attitudes: Array, by_rates: Array) -> Array:
     """Derivative of the fit by the path at its knots: (6, knots n); the last arguments are of `RecordedMomentum`."""
     body_along, along, rows = _by_added_momentum(motion, times, by_attitudes)
-    momenta, samples = motion.momentum @ along.attitudes, path_samples(described_by(motion)[1])
+    momenta, samples = motion.momentum @ along.attitudes, path_samples(described_by(motion).path)
     by_knots = body_along.by_knots(samples, along.spins[:, None], rows[:, None], momenta[:, None])
     if by_rates.any():
         body_then, spins, rows = _by_momentum_at_rates(motion, times, by_rates)
@@ -280,12 +333,21 @@ def _by_momentum_at_rates(motion: Motion, times: Array, by_rates: Array) -> tupl
 
     At one attitude the reconstructed rate falls by I^-1 times that change; the recorded one stays.
     """
-    body, path = described_by(motion)
-    shapes, joint_rates = path.curve(times)
+    described = described_by(motion)
     inertia, _ = motion.deformation.description.sample(times)
     by_rate = np.moveaxis(by_rates.reshape(len(by_rates), -1, 3), 1, 0)
     rows = by_rate @ inverse_inertia(inertia)
-    return BodyAlong(body, times, shapes, joint_rates), motion.angular_velocity(times), rows
+    return described.at(times, *described.route.curve(times)), motion.angular_velocity(times), rows
+
+
+def fit_by_rotors(motion: Motion, times: Array, by_attitudes: Array, by_rates: Array) -> Array:
+    """Derivative of the fit by the wheels' values: (6, W)."""
+    body_along, _, rows = _by_added_momentum(motion, times, by_attitudes)
+    by_rotors = body_along.wheels.by_values(rows[:, None])
+    if by_rates.any():
+        body_then, _, rows = _by_momentum_at_rates(motion, times, by_rates)
+        by_rotors = by_rotors + body_then.wheels.by_values(rows[:, None])
+    return by_rotors
 
 
 def _by_added_momentum(motion: Motion, times: Array, by_attitudes: Array) -> tuple[BodyAlong, AlongMotion, Array]:
@@ -294,8 +356,8 @@ def _by_added_momentum(motion: Motion, times: Array, by_attitudes: Array) -> tup
     A change turns the attitude at each recorded time by eta(t_k) of `_along_motion`. The recording stays, so that the
     fit moves like one to attitudes turned by -eta(t_k).
     """
-    body, path = described_by(motion)
-    along = along_motion(motion, path, times)
+    described = described_by(motion)
+    along = along_motion(motion, described.route, times)
     # Turns at the recorded times from the turn at the end by an equal change.
     from_end = np.linalg.inv(along.adjoint_at_start.T)
     at_times = responses(motion, times)[:, :, :3] @ from_end
@@ -305,4 +367,4 @@ def _by_added_momentum(motion: Motion, times: Array, by_attitudes: Array) -> tup
     later = np.concatenate([np.cumsum(by_end[::-1], axis=0)[::-1], np.zeros((1, *by_end.shape[1:]))])
     carried = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse
     rows = along.weights[:, None, None] * (later[np.searchsorted(times, along.times)] @ carried)
-    return BodyAlong(body, along.times, along.shapes, along.rates), along, rows
+    return described.at(along.times, along.shapes, along.rates), along, rows

@@ -20,7 +20,10 @@ from ..arrays import Array, Integers, lock_arrays
 from ..body.body import Body
 from ..body.link_motions import link_motions
 from ..deformation.deformation import Deformation
+from ..deformation.descriptions import ArticulatedDescription
+from ..deformation.rotors import Rotor, RotorDescription
 from ..display import short_repr
+from ..error_bars.wheels_along import WheelsAlong, reduced_chain, wheel_frames
 from ..errors import AccuracyNotReached, ChartPoleError, WrongObjectError
 from ..integrator.stepped import SteppedRotation
 from ..reconstruction.attitude_angles import EulerAngles, continued_angles
@@ -69,6 +72,8 @@ class LinkChart:
         body, path = articulated_parts(motion.deformation)
         body.link_pose(body.shape(), link)
         frame, pose = body.chain.link_frames[link]
+        if frame in wheel_frames(body.chain, rotors_of(motion.deformation)):
+            raise WrongObjectError(f"link: {link} is a wheel, whose angle no path gives; take the link that carries it")
         if not of_athlete:
             return cls(link, frame, pose[:3, :3], np.eye(3), np.eye(3))
 
@@ -144,15 +149,30 @@ def _base_attitudes(motion: Motion, times: Array) -> Array:
 
 
 def articulated_parts(deformation: Deformation) -> tuple[Body, ShapePath]:
-    """Body and path of a deformation. Raises WrongObjectError for one without joints, with wheels, or in a gauge."""
+    """Body and path of a deformation, on which wheels rest. Raises WrongObjectError without joints or in a gauge."""
     known = deformation.description
-    body, path = getattr(known, "body", None), getattr(known, "path", None)
-    if not isinstance(body, Body) or not isinstance(path, ShapePath) or deformation.has_wheels or not body.n_shape:
-        raise WrongObjectError(
-            f"motion: shares are those of joints, and {deformation.label} has none on a path; reconstruct "
-            "articulated(body, path), without wheels and gauge"
-        )
-    return body, path
+    if isinstance(known, RotorDescription):
+        return known.platform, known.route
+    if isinstance(known, ArticulatedDescription) and known.body.n_shape:
+        return known.body, known.path
+    raise WrongObjectError(
+        f"motion: shares are those of joints, and {deformation.label} has none on a path; reconstruct "
+        "articulated(body, path), without gauge"
+    )
+
+
+def rotors_of(deformation: Deformation) -> tuple[Rotor, ...]:
+    """Wheels of a deformation."""
+    known = deformation.description
+    return known.rotors if isinstance(known, RotorDescription) else ()
+
+
+def reduced_body(body: Body, rotors: tuple[Rotor, ...]) -> Body:
+    """The body without the moments of wheels that keep their momentum, about their axles."""
+    if not rotors:
+        return body
+    chain = reduced_chain(body.chain, rotors)
+    return body.with_frame_inertias(chain.masses, chain.centres, chain.inertias)
 
 
 def _turns(body: Body, shapes: Array, rates: Array, frame: int) -> Array:
@@ -166,7 +186,7 @@ class DirectShares:
     Attributes
     ----------
     times : (N,) [s]
-    sources : "momentum" and the J joints; the axes of one joint are one source
+    sources : "momentum" and the J joints; the axes of one joint are one source, and a wheel does what its momentum does
     shares : (N, J + 1) of each up to each time; their sum is the angle less that at the start [rad]
     angle : (N,) the angle itself, followed in time, from 0 at the start [rad]
     error : (N,) estimate of the difference of sum and angle [rad]
@@ -215,8 +235,9 @@ class DirectRates:
 
     @cached_property
     def parts(self) -> tuple[Body, ShapePath]:
-        """Body and path."""
-        return articulated_parts(self.motion.deformation)
+        """Body, its wheels reduced, and path."""
+        body, path = articulated_parts(self.motion.deformation)
+        return reduced_body(body, rotors_of(self.motion.deformation)), path
 
     def __call__(self, times: Array) -> tuple[Array, Array, Array]:
         """Rates by source, how fast an attitude error of one changes their sum, and the sine of the tilt.
@@ -229,7 +250,12 @@ class DirectRates:
         for joint, columns in enumerate(self.joints.values()):
             members[list(columns), joint] = 1.0
         inertia = body.locked_inertia(shapes)
-        carried = (body.momentum_matrix(shapes) * rates[:, None]) @ members
+        columns, rotors = body.momentum_matrix(shapes) * rates[:, None], rotors_of(self.motion.deformation)
+        if rotors:
+            wheels = WheelsAlong(body, rotors, times, shapes, rates)
+            turned = [body.joint_index(rotor.joint) for rotor in rotors]
+            columns[:, :, turned] = np.swapaxes(wheels.along[..., None] * wheels.axles, 1, 2)
+        carried = columns @ members
         momentum = self.motion.body_momentum(times)
         turning = np.linalg.solve(inertia, np.concatenate([momentum[:, :, None], -carried], axis=-1))
         axes = np.broadcast_to(self.chart.pose, (len(times), 3, 3))

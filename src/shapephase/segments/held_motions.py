@@ -13,7 +13,9 @@ from numpy.typing import ArrayLike
 from .. import so3
 from ..arrays import Array, Integers, Mask, finite_array
 from ..body.body import Body
-from ..deformation.deformation import deformation_along
+from ..deformation.deformation import Deformation, deformation_along
+from ..deformation.rotors import Rotor, rotors_argument
+from ..error_bars.wheels_along import WheelsAlong
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..integrator.families import many_inverted, rotations_of_variants
 from ..integrator.machine_code import expect_work
@@ -24,12 +26,13 @@ from ..reconstruction.reconstruction import Motion
 from ..shape_space.body_path import channels_at
 from ..shape_space.curves import Curve, Swings, most_swings, swings_of
 from ..shape_space.shape_path import ShapePath
-from .direct_shares import articulated_parts
+from .direct_shares import articulated_parts, reduced_body, rotors_of
+from .limbs import WHEELS
 
 MIRRORED = "mirrored"
 BASELINES = ("first", "neutral", MIRRORED)
 _SAME = 1e-9  # relative difference of two trials that counts as none: files are written with ten digits or more
-_COMPARED = 257  # times at which joints of two trials are compared
+_FRACTIONS = np.linspace(0.0, 1.0, 257)  # of the duration, at which joints and wheels of two trials are compared
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +74,17 @@ class _MixedVariants:
     path: ShapePath
     baseline: ShapePath
     own: Mask
+    rotors: tuple[Rotor, ...]
 
     def __len__(self) -> int:
         return len(self.own)
 
     @cached_property
     def smoothness(self) -> Smoothness | None:
-        """Smoothness of every mixture; None where a path is a function, whose mixtures are scanned one by one."""
+        """Smoothness of every mixture; None where a path is a function, whose mixtures are scanned one by one, and with
+        wheels, whose momentum may change in time."""
+        if self.rotors:
+            return None
         if isinstance(self.baseline.curve, _Still):
             return self.path.smoothness
         most = most_swings([self.path.swings.most, self.baseline.swings.most])
@@ -100,12 +107,22 @@ class _MixedVariants:
     def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
         shapes, rates = self._mixtures(self.own[rows], times)
         flat = shapes.reshape(-1, shapes.shape[-1]), rates.reshape(-1, shapes.shape[-1])
-        values = channels_at(self.body, *flat)
+        values = None if self.rotors else channels_at(self.body, *flat)
         if values is not None:
             return values.reshape(len(rows), len(times), 9), np.ones(len(rows), dtype=bool)
-        inertia, momentum = self.body.sample(*flat)
+        inertia, momentum = self._reduced.sample(*flat)
+        if self.rotors:
+            momentum = momentum + WheelsAlong(self.body, self.rotors, np.tile(times, len(rows)), *flat).stored
         batch = (len(rows), len(times))
         return many_inverted(inertia.reshape(*batch, 3, 3), momentum.reshape(*batch, 3), times)
+
+    @cached_property
+    def _reduced(self) -> Body:
+        return reduced_body(self.body, self.rotors)
+
+    def deformation(self, own: Mask) -> Deformation:
+        """The deformation along the mixed path, with the wheels."""
+        return deformation_along(self.body, self.mixed_path(own), self.rotors)
 
     def _mixtures(self, own: Mask, times: Array) -> tuple[Array, Array]:
         (shapes, rates), (others, slopes) = self.path.at_samples(times), self.baseline.at_samples(times)
@@ -114,7 +131,7 @@ class _MixedVariants:
 
     def _sampler(self, own: Mask) -> Sampler:
         if self.smoothness is None:
-            return deformation_along(self.body, self.mixed_path(own)).sampler()
+            return self.deformation(own).sampler()
 
         def mixed(times: Array) -> tuple[Array, Array]:
             shapes, rates = self._mixtures(own[None], times)
@@ -150,19 +167,28 @@ class HeldMotions:
         self.motion, self._other = motion, motion
         self.body, path = articulated_parts(motion.deformation)
         self._paths = path, _still_path(self.body, path, baseline)
+        wheels = rotors_of(motion.deformation)
+        self._rotors = wheels, tuple(replace(wheel, value=0.0) for wheel in wheels)
         self._shared: list[int] = [*set(range(self.body.n_shape)) - {c for own in columns.values() for c in own}]
         if isinstance(baseline, Motion):
             self._other = baseline
             differing = self._differing(conditions, tuple(rest))
-        elif conditions:
+        else:
+            differing = self._wheels_alone(conditions)
+        self.columns, self.conditions = dict(columns), differing
+        self.names = (*columns, *differing)
+
+    def _wheels_alone(self, conditions: Iterable[str] | None) -> tuple[str, ...]:
+        """The group of wheels against a posture, where they store nothing. Raises ShapeError for other conditions."""
+        if conditions is None:
+            return (WHEELS,) if self.motion.deformation.has_wheels else ()
+        other = [name for name in conditions if name != WHEELS]
+        if other:
             raise ShapeError(
-                f"groups: {', '.join(conditions)} can be groups where another motion is the baseline; give it: "
+                f"groups: {', '.join(other)} can be groups where another motion is the baseline; give it: "
                 "baseline=motion (--baseline FILE)"
             )
-        else:
-            differing = ()
-        self.columns = dict(columns)
-        self.names = (*columns, *differing)
+        return tuple(conditions)
 
     def _differing(self, conditions: Iterable[str] | None, rest: tuple[str, ...]) -> tuple[str, ...]:
         """Conditions that are groups. Raises ShapeError where something else differs."""
@@ -176,10 +202,15 @@ class HeldMotions:
                 f"{', '.join(self.body.joint_names)}, {other_body.name} has {', '.join(other_body.joint_names)}"
             )  # fmt: skip
         own, others = self.body.chain, other_body.chain
+        self._rotors = self._rotors[0], _same_wheels(self._rotors[0], rotors_of(second.deformation))
         differences = {
             "momentum": _apart(first.momentum, second.momentum),
             "attitude": _apart(first.initial_attitude, second.initial_attitude),
             "duration": _apart(np.array(first.duration), np.array(second.duration)),
+            WHEELS: any(
+                _apart(wheel.at(_FRACTIONS * first.duration)[0], other.at(_FRACTIONS * second.duration)[0])
+                for wheel, other in zip(*self._rotors, strict=True)
+            ),
             "body": len(own.masses) != len(others.masses)
             or any(
                 _apart(getattr(own, name), getattr(others, name))
@@ -196,9 +227,8 @@ class HeldMotions:
                     f"the motions differ in {', '.join(left)}, in no group; make each one a group: "
                     f"groups={{..., {left[0]!r}: ()}} (--groups ... {left[0]})"
                 )
-        fractions = np.linspace(0.0, 1.0, _COMPARED)
-        shapes = self._paths[0].shape(fractions * first.duration)
-        gaps = np.abs(shapes - other_path.shape(fractions * second.duration)).max(axis=0)
+        shapes = self._paths[0].shape(_FRACTIONS * first.duration)
+        gaps = np.abs(shapes - other_path.shape(_FRACTIONS * second.duration)).max(axis=0)
         apart = [self.body.joint_names[column] for column in self._shared if gaps[column] > _SAME]
         if apart:
             raise ShapeError(
@@ -206,6 +236,11 @@ class HeldMotions:
                 f"{', '.join(rest)}); put them in a group"
             )
         return chosen
+
+    @property
+    def compares_posture(self) -> bool:
+        """True where the baseline is no other motion."""
+        return self._other is self.motion
 
     @property
     def whole(self) -> int:
@@ -219,13 +254,13 @@ class HeldMotions:
         """
         made: dict[int, Motion] = {}
 
-        def alike(subset: int) -> tuple[bool, bool]:
-            return self._follows("body", subset), self._follows("duration", subset)
+        def alike(subset: int) -> tuple[bool, ...]:
+            return tuple(self._follows(name, subset) for name in ("body", "duration", WHEELS))
 
         expect_work(momenta=len(subsets))
-        for (own_body, own_duration), some in groupby(sorted(subsets, key=alike), key=alike):
+        for (own_body, own_duration, own_wheels), some in groupby(sorted(subsets, key=alike), key=alike):
             masks = list(some)
-            variants = self._variants(masks, own_body=own_body, own_duration=own_duration)
+            variants = self._variants(masks, own_body=own_body, own_duration=own_duration, own_wheels=own_wheels)
             sources = [
                 [self.motion if self._follows(name, mask) else self._other for mask in masks]
                 for name in ("momentum", "attitude")
@@ -236,7 +271,7 @@ class HeldMotions:
             rotations = rotations_of_variants(variants, at_start, self.motion.tolerance)
             for row, mask in enumerate(masks):
                 made[mask] = Motion(
-                    deformation=deformation_along(variants.body, variants.mixed_path(variants.own[row])),
+                    deformation=variants.deformation(variants.own[row]),
                     momentum=momenta[row],
                     initial_attitude=starts[row],
                     tolerance=self.motion.tolerance,
@@ -247,12 +282,12 @@ class HeldMotions:
         return made
 
     def _follows(self, name: str, subset: int) -> bool:
-        return name not in self.names or bool(subset >> self.names.index(name) & 1)
+        return name not in self.conditions or bool(subset >> self.names.index(name) & 1)
 
-    def _variants(self, masks: list[int], *, own_body: bool, own_duration: bool) -> _MixedVariants:
+    def _variants(self, masks: list[int], *, own_body: bool, own_duration: bool, own_wheels: bool) -> _MixedVariants:
         moving, baseline = self._paths
-        body = self.body
-        if self._other is not self.motion:
+        body, rotors = self.body, self._rotors[0 if own_wheels else 1]
+        if not self.compares_posture:
             other_body, baseline = articulated_parts(self._other.deformation)
             body = body if own_body else other_body
             duration = self.motion.duration if own_duration else self._other.duration
@@ -268,7 +303,36 @@ class HeldMotions:
         own[:, self._shared] = True
         for place, columns in enumerate(self.columns.values()):
             own[:, list(columns)] |= (np.array([mask >> place & 1 for mask in masks]) > 0)[:, None]
-        return _MixedVariants(body, moving, baseline, own)
+        return _MixedVariants(body, moving, baseline, own, _wheels_of(body, rotors, moving.duration))
+
+
+def _same_wheels(wheels: tuple[Rotor, ...], others: tuple[Rotor, ...]) -> tuple[Rotor, ...]:
+    """Another motion's wheels in the order of the first. Raises WrongObjectError where they are not those."""
+    known = {(other.joint, other.is_momentum): other for other in others}
+    kinds = [(wheel.joint, wheel.is_momentum) for wheel in wheels]
+    if {*known} != {*kinds}:
+        raise WrongObjectError(
+            "baseline: a Motion with the same wheels is needed, by momentum or by speed alike: the motion has "
+            f"{_wheel_names(wheels)}, the baseline {_wheel_names(others)}"
+        )
+    return tuple(known[kind] for kind in kinds)
+
+
+def _wheel_names(wheels: tuple[Rotor, ...]) -> str:
+    named = (f"{wheel.joint} by its {'momentum' if wheel.is_momentum else 'speed'}" for wheel in wheels)
+    return ", ".join(named) or "none"
+
+
+def _wheels_of(body: Body, rotors: tuple[Rotor, ...], duration: float) -> tuple[Rotor, ...]:
+    """Wheels of a body, with the values of given ones, which last as long as the path."""
+    momenta: dict[str, float | ShapePath] = {}
+    speeds: dict[str, float | ShapePath] = {}
+    for rotor in rotors:
+        value = rotor.value
+        if isinstance(value, ShapePath) and value.duration != duration:
+            value = value.stretched(duration / value.duration)
+        (momenta if rotor.is_momentum else speeds)[rotor.joint] = value
+    return rotors_argument(body, momenta, speeds, duration)
 
 
 def _apart(first: Array, second: Array) -> bool:

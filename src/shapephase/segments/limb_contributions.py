@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import check_keywords, check_object, number_argument, times_argument, vector_argument, whole_argument
 from ..arrays import Array, lock_arrays, read_only
+from ..body.body import Body
 from ..display import number_with_bar, short_repr
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..letters import value_text
@@ -23,9 +24,18 @@ from ..reconstruction.reconstruction import Motion
 from ..shape_space.connection import curvature
 from ..shape_space.shape_path import CLOSED
 from .coalitions import sampled_orders, shapley_interactions, shapley_weights
-from .direct_shares import ANGLES, STEEP, DirectRates, DirectShares, LinkChart, articulated_parts, direct_shares
+from .direct_shares import (
+    ANGLES,
+    STEEP,
+    DirectRates,
+    DirectShares,
+    LinkChart,
+    articulated_parts,
+    direct_shares,
+    rotors_of,
+)
 from .held_motions import MIRRORED, HeldMotions
-from .limbs import CONDITIONS, JointGroups, SegmentTree, joint_groups
+from .limbs import CONDITIONS, WHEELS, JointGroups, SegmentTree, joint_groups
 from .mirrored_motion import mirrored_motion
 
 MOST_EXACT = 10  # groups of which all subsets are computed: 1,024 motions
@@ -249,7 +259,9 @@ def contributions(
     of : "twist" or "somersault" (counts, followed in time), "tilt" (at the time `at`), "rotation" (turn about `about`),
         "phase" (Montgomery's, horizontal gauge), or a function of a Motion that returns a number
     groups : "limbs", "joints", or patterns of joint names by group, {"arms": ["left_*", "right_*"]}; where another
-        motion is the baseline also "momentum", "attitude", "duration" and "body", with an empty pattern
+        motion is the baseline also "momentum", "attitude", "duration" and "body", with an empty pattern. What wheels
+        store is the group "wheels" of the first two, and with an empty pattern beside others; without it they store
+        nothing, or as much as in the other motion
     baseline : "first" posture, "neutral" posture, a shape (n,), another motion of the same joints, or "mirrored", the
         motion with left and right exchanged
     at : time of the tilt [s], or "mid-twist", when the motion has done half of its twist
@@ -283,12 +295,18 @@ def contributions(
     if motion.batch:
         raise ShapeError(f"motion: one motion is needed, this is a batch of {motion.batch}")
     body, _ = articulated_parts(motion.deformation)
-    tree = SegmentTree(body)
+    tree, wheels = SegmentTree(body), tuple(rotor.joint for rotor in rotors_of(motion.deformation))
     conditions, chosen = _conditions(groups)
-    grouped = joint_groups(body, chosen)
+    if conditions is not None and WHEELS in conditions and not wheels:
+        raise ShapeError(f"groups: the motion has no wheels; leave {WHEELS} out, or give their momentum (rotors=)")
+    grouped = _without_wheels(joint_groups(body, chosen), body, wheels)
     is_mirrored = isinstance(baseline, str) and baseline == MIRRORED
     compared = mirrored_motion(motion, **axes) if is_mirrored else baseline
     held = HeldMotions(motion, grouped.columns, compared, conditions, grouped.rest)
+    if WHEELS in held.conditions:
+        grouped = replace(grouped, joints=grouped.joints | {WHEELS: wheels})
+    else:
+        grouped = replace(grouped, rest=(*grouped.rest, *wheels))
     if not held.names:
         raise ShapeError("groups: one group at least is needed, such as {'arms': ['left_*', 'right_*']}, or 'limbs'")
     whole_argument(orders, "orders", 2)
@@ -355,12 +373,14 @@ def _shares(values: _Values, grouped: JointGroups, direct: DirectShares | None, 
         "as in the mirrored motion" if isinstance(baseline, str) and baseline == MIRRORED else
         f"held at the {baseline} posture" if isinstance(baseline, str) else "held at the given posture"
     )  # fmt: skip
+    if WHEELS in held.conditions and held.compares_posture:
+        named += ", wheels without momentum"
     return Contributions(
         of=choice.of,
         unit=choice.unit,
         link=choice.chart.link if choice.chart is not None else held.body.link_names[0],
         at=choice.at,
-        groups=grouped.joints | {name: () for name in names if name not in grouped.joints},
+        groups={name: grouped.joints.get(name, ()) for name in names},
         rest=grouped.rest,
         baseline=named,
         whole=results[whole][0],
@@ -441,8 +461,23 @@ def _conditions(groups: Any) -> tuple[list[str] | None, Any]:
     """Conditions among the groups, and the groups of joints; None where none were chosen by name."""
     if not isinstance(groups, Mapping):
         return None, groups
-    conditions = [name for name, patterns in groups.items() if name in CONDITIONS and not patterns]
+    known = (*CONDITIONS, WHEELS)
+    conditions = [name for name, patterns in groups.items() if name in known and not patterns]
     return conditions, {name: patterns for name, patterns in groups.items() if name not in conditions}
+
+
+def _without_wheels(grouped: JointGroups, body: Body, wheels: tuple[str, ...]) -> JointGroups:
+    """Groups without the joints of wheels, which have a group of their own."""
+    turned = {body.joint_index(name) for name in wheels}
+    joints = {group: tuple(name for name in names if name not in wheels) for group, names in grouped.joints.items()}
+    columns = {group: tuple(c for c in own if c not in turned) for group, own in grouped.columns.items()}
+    left = {group for group, own in columns.items() if own}
+    return JointGroups(
+        columns={group: own for group, own in columns.items() if group in left},
+        joints={group: names for group, names in joints.items() if group in left},
+        rest=tuple(name for name in grouped.rest if name not in wheels),
+        pairs={both: pair for both, pair in grouped.pairs.items() if left.issuperset(pair) and both != WHEELS},
+    )
 
 
 def _axis(motion: Motion, about: ArrayLike | None) -> Array:
@@ -477,7 +512,13 @@ def _small_loop(held: HeldMotions, choice: _Choice) -> Array | None:
     motion, chart = held.motion, choice.chart
     body, path = articulated_parts(motion.deformation)
     closes = float(np.abs(path.gap).max(initial=0.0)) <= CLOSED and not motion.momentum.any()
-    if not closes or not isinstance(choice.baseline, str) or choice.baseline != "first" or chart is None:
+    if (
+        held.conditions
+        or not closes
+        or not isinstance(choice.baseline, str)
+        or choice.baseline != "first"
+        or chart is None
+    ):
         return None
     if choice.of not in ("twist", "somersault") or body.ball_joints:
         return None

@@ -25,6 +25,7 @@ _BRANCH = (
 )
 _MIRRORED = 0.01  # difference of masses and distances of two limbs, relative: left and right of measured models
 GROUPINGS = ("limbs", "joints")
+WHEELS = "wheels"  # the group of the momentum that wheels store
 CONDITIONS = ("momentum", "attitude", "duration", "body")  # in which two motions can differ besides their joints
 _KINDS = {
     "leg": re.compile(r"(?i)leg|thigh|shank|femur|tibia|foot|hip|knee|ankle|cuisse|jambe|calf|hind"),
@@ -389,10 +390,10 @@ def groups_of_words(words: Iterable[str]) -> str | dict[str, tuple[str, ...]]:
     for word in several:
         name, _, patterns = word.partition("=")
         parts = tuple(filter(None, (pattern.strip() for pattern in patterns.split(","))))
-        if not name.strip() or name.strip() in groups or not (parts or word in CONDITIONS):
+        if not name.strip() or name.strip() in groups or not (parts or word in (*CONDITIONS, WHEELS)):
             raise ShapeError(
                 f"--groups: limbs, joints, or words such as arms=left_*,right_* are needed, each group once; with "
-                f"--baseline FILE also {', '.join(CONDITIONS)}; got {word!r:.60}"
+                f"--baseline FILE also {', '.join(CONDITIONS)}, with wheels {WHEELS}; got {word!r:.60}"
             )
         groups[name.strip()] = parts
     return groups

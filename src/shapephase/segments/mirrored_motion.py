@@ -16,7 +16,7 @@ from ..deformation.deformation import articulated
 from ..errors import ShapeError
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.curves import Curve, Swings, swings_of
-from .direct_shares import articulated_parts
+from .direct_shares import articulated_parts, rotors_of
 
 _NEAR = 0.05  # of the body's extent, and of an axis of length one: left and right of measured models differ by 1 to 3 %
 
@@ -44,6 +44,8 @@ def mirrored_motion(motion: Motion, **axes: Any) -> Motion:
     Raises ShapeError for a body with a joint that has no mirror image.
     """
     body, path = articulated_parts(motion.deformation)
+    if rotors_of(motion.deformation):
+        raise ShapeError("baseline: a body with wheels has no mirrored motion; give another motion, or a posture")
     lateral = motion.athlete_axes(**{key: value for key, value in axes.items() if value is not None}).lateral
     images, signs = _mirror_images(body, lateral)
     mirrored = replace(path, curve=_Exchanged(path.curve, images, signs), scanner=None, origin=None)
