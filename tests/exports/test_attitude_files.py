@@ -178,6 +178,31 @@ def test_a_message_has_the_attitude_within_the_stated_error_at_10_000_times(requ
     assert apart(between_records(epochs, records.astype(float), times), motion.attitude(times)) < error
 
 
+def burst():
+    """Joints that move for 0.4 s of 600 s, between the first records that are tried."""
+    knots, shapes = [0.0, 300.1, 300.3, 300.5, 600.0], np.zeros((5, 3))
+    shapes[2] = 1.0, 0.3, 0.5
+    cat = body_of("cat_two_halves")
+    path = sp.ShapePath.waypoints(knots, shapes, joint_names=cat.joint_names)
+    return sp.reconstruct(sp.articulated(cat, path), [0.0, 0.0, 1e-5]), np.linspace(300.0, 300.6, 2000)
+
+
+def whole_turns():
+    """A spin that is back at the first records that are tried, and at quarters between them."""
+    spin = 2.0 * np.pi * 64.0 / 10.0
+    motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 10.0), [0.0, 0.0, 2.5 * spin])
+    return motion, np.linspace(0.0, 10.0, 2000)
+
+
+@pytest.mark.parametrize("case", [burst, whole_turns])
+def test_records_miss_no_motion_between_the_first_that_are_tried(spice, tmp_path, case):
+    motion, times = case()
+    written = sp.exports.write_spice_ck(motion, tmp_path / "attitude.bc", error=1e-5)
+    for file in (written.clock, written.attitude):
+        spice.furnsh(str(file))
+    assert apart(np.array([spice.pxform(written.frame, "J2000", t) for t in times]), motion.attitude(times)) < 1e-5
+
+
 def test_without_an_error_it_is_a_thousandth_of_the_noise_that_joints_were_smoothed_for(satellite, tmp_path):
     """A stored motion keeps that noise."""
     cat, rng, times = body_of("cat_two_halves"), np.random.default_rng(87), np.linspace(0.0, 1.0, 101)

@@ -7,7 +7,7 @@ from scipy.ndimage import minimum_filter1d
 
 from .. import so3
 from ..arguments import positive_argument
-from ..arrays import Array, Integers
+from ..arrays import Array, Integers, Mask
 from ..dynamics.moving_body import check_motion
 from ..errors import AccuracyNotReached
 from ..reconstruction.forced_motion import ForcedMotion
@@ -19,7 +19,8 @@ _SMOOTHED = 1e-3  # of the joints' noise, default error after smoothing: it leav
 WINDOW = 8  # records that polynomials go through: degree 7, two records at least on both sides but at the ends
 _MOST_RECORDS = 2_000_000  # of a file: 100 to 200 bytes each
 _USED = 0.5  # of the error, where it is measured: between these places it may be larger
-_PLACES = np.array([0.25, 0.5, 0.75])  # between two records, where errors are measured
+_PLACES = np.array([np.sqrt(5.0) - 2.0, 0.5, 3.0 - np.sqrt(5.0)])  # of a step: no spin turns whole times to all
+_EVEN = 257  # times of a motion with a torque, whose steps are unknown, where errors are measured as well
 _SHORTEST = 64  # last digits of the duration between two records, or their rounding shows
 
 
@@ -36,23 +37,23 @@ def error_argument(motion: Motion | ForcedMotion, error: float | None) -> float:
 def record_times(motion: Motion | ForcedMotion, error: float) -> Array:
     """Times whose quaternions, by polynomials through `WINDOW` of them, are within an error: (N,) [s].
 
-    Steps are halved where the error requires it, and a step is at most twice as long as those in its window. At the
-    ends readers take fewer records (SPICE) or more on the inner side (Lagrange): both are within the error.
+    Steps are halved where the error requires it, measured between records and at the steps of the motion's solution. A
+    step is at most twice as long as those in its window. At the ends readers take fewer records (SPICE) or more on the
+    inner side (Lagrange): both are within the error.
 
     Raises ShapeError if the motion is a batch; AccuracyNotReached if that takes millions of records, or steps of a few
     last digits of their times.
     """
     checked_times(motion, [0.0])
+    if isinstance(motion, ForcedMotion):
+        own = np.union1d(np.linspace(0.0, motion.duration, _EVEN), motion.breaks)
+    else:
+        own = np.union1d(motion.solution.times, motion.deformation.breaks)
     times = np.linspace(0.0, motion.duration, 2 * WINDOW + 1)
     while True:
-        quaternions = continued_quaternions(base_attitude(motion, times))
-        between = (times[:-1, None] + np.diff(times)[:, None] * _PLACES).ravel()
-        truth = base_attitude(motion, between)
-        off = np.zeros(len(between))
-        for shifted in (True, False):
-            found = so3.matrix_from_quat(_interpolated(times, quaternions, between, shifted=shifted))
-            off = np.maximum(off, so3.angle(so3.transpose(truth) @ found))
-        halved = off.reshape(-1, len(_PLACES)).max(axis=1) > _USED * error
+        halved = _missed(motion, times, (times[:-1, None] + np.diff(times)[:, None] * _PLACES).ravel(), error)
+        if not halved.any():
+            halved = _missed(motion, times, own, error)
         if not halved.any():
             return times
         while True:
@@ -68,12 +69,26 @@ def record_times(motion: Motion | ForcedMotion, error: float) -> Array:
         times = np.union1d(times, 0.5 * (times[:-1] + times[1:])[halved])
 
 
-def _interpolated(times: Array, quaternions: Array, between: Array, *, shifted: bool) -> Array:
+def _missed(motion: Motion | ForcedMotion, times: Array, between: Array, error: float) -> Mask:
+    """Steps in which the polynomials miss the motion at one of some times: (N,), (M,) -> (N - 1,)."""
+    quaternions = continued_quaternions(base_attitude(motion, times))
+    backwards = so3.transpose(base_attitude(motion, between))
+    step = np.clip(np.searchsorted(times, between, side="right") - 1, 0, len(times) - 2)
+    missed = np.zeros(len(times) - 1, dtype=bool)
+    for shifted in (True, False):
+        found = so3.matrix_from_quat(_interpolated(times, quaternions, between, step, shifted=shifted))
+        missed[step[so3.angle(backwards @ found) > _USED * error]] = True
+    return missed
+
+
+def _interpolated(times: Array, quaternions: Array, between: Array, step: Integers, *, shifted: bool) -> Array:
     """Quaternions of length 1 by Lagrange's polynomials through the nearest records: (N,), (N, 4), (M,) -> (M, 4).
+
+    step : (M,) between which records each time is
 
     shifted : True for windows of `WINDOW` records at the ends, too; False for those of them that exist
     """
-    first: Integers = np.searchsorted(times, between, side="right") - WINDOW // 2
+    first = step - WINDOW // 2 + 1
     nodes = np.clip(first, 0, len(times) - WINDOW)[:, None] + np.arange(WINDOW)
     used = shifted | ((nodes >= first[:, None]) & (nodes < first[:, None] + WINDOW))
     at = times[nodes]
