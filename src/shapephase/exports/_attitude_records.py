@@ -9,6 +9,7 @@ from .. import so3
 from ..arguments import positive_argument
 from ..arrays import Array, Integers, Mask
 from ..dynamics.moving_body import check_motion
+from ..dynamics.wheels import solution_times
 from ..errors import AccuracyNotReached
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
@@ -20,7 +21,6 @@ WINDOW = 8  # records that polynomials go through: degree 7, two records at leas
 _MOST_RECORDS = 2_000_000  # of a file: 100 to 200 bytes each
 _USED = 0.5  # of the error, where it is measured: between these places it may be larger
 _PLACES = np.array([np.sqrt(5.0) - 2.0, 0.5, 3.0 - np.sqrt(5.0)])  # of a step: no spin turns whole times to all
-_EVEN = 257  # times of a motion with a torque, whose steps are unknown, where errors are measured as well
 _SHORTEST = 64  # last digits of the duration between two records, or their rounding shows
 
 
@@ -45,15 +45,11 @@ def record_times(motion: Motion | ForcedMotion, error: float) -> Array:
     last digits of their times.
     """
     checked_times(motion, [0.0])
-    if isinstance(motion, ForcedMotion):
-        own = np.union1d(np.linspace(0.0, motion.duration, _EVEN), motion.breaks)
-    else:
-        own = np.union1d(motion.solution.times, motion.deformation.breaks)
     times = np.linspace(0.0, motion.duration, 2 * WINDOW + 1)
     while True:
         halved = _missed(motion, times, (times[:-1, None] + np.diff(times)[:, None] * _PLACES).ravel(), error)
         if not halved.any():
-            halved = _missed(motion, times, own, error)
+            halved = _missed(motion, times, solution_times(motion), error)
         if not halved.any():
             return times
         while True:
