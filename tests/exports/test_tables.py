@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.errors import MissingExtraError, ShapeError, UnknownNameError
@@ -166,3 +167,15 @@ def test_what_cannot_be_written_is_refused(motion, tmp_path, monkeypatch):
             with pytest.raises(MissingExtraError, match="pip"):
                 sp.export_motion(motion, tmp_path / f"motion{ending}")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_modified_rodrigues_parameters_stand_instead_of_quaternions_and_are_read(motion, tmp_path):
+    sp.export_motion(motion, tmp_path / "motion.csv", TIMES, mrp=True)
+    header = (tmp_path / "motion.csv").read_text().splitlines()[0].split(",")
+    assert header[1:4] == ["base_mrp_1", "base_mrp_2", "base_mrp_3"]
+    assert "qw" not in header
+    columns = np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1)
+    found = Rotation.from_mrp(columns[:, 1:4]).as_matrix()
+    np.testing.assert_allclose(found, motion.attitude(TIMES), rtol=0, atol=1e-14)
+    recorded = sp.read_recorded_motion(tmp_path / "motion.csv", body_of("satellite"))
+    np.testing.assert_allclose(recorded.base_attitude, motion.attitude(TIMES), rtol=0, atol=1e-14)

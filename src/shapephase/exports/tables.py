@@ -27,6 +27,7 @@ from ._whole_motion import Fall, checked_times, continued_quaternions, whole_mot
 
 _AXES = ("x", "y", "z")
 _QUATERNION = ("qx", "qy", "qz", "qw")
+_MRP = ("base_mrp_1", "base_mrp_2", "base_mrp_3")
 _TURNS = ("somersault", "tilt", "twist")
 _MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
 _MATLAB_TEXT = 116  # bytes of text at the beginning of a MATLAB file
@@ -38,6 +39,7 @@ class _Samples(dict[str, tuple[Array, str, str]]):
     joint_names: tuple[str, ...] = ()
     joint_units: tuple[str, ...] = ()
     link_axes: tuple[str, ...] = ()
+    wheels: tuple[str, ...] = ()
     attributes: dict[str, Any]
 
 
@@ -46,7 +48,8 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 
     Variables have their units as attributes. `base_quat_xyzw` (time, quaternion), `base_position` and, where the body
     has joints along a path, `base_velocity` (time, axis) are in inertial axes, `angular_velocity` (time, axis) in base
-    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints. Where somersaults are counted
+    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints, wheels from an angle of zero at
+    the start; `wheel_speeds` (time, wheel) those of wheels left out of the path. Where somersaults are counted
     (`Motion.counted_axes`), `turns` and `turn_errors` (time, turn) are somersault, tilt and twist.
 
     Parameters
@@ -68,7 +71,7 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     [2. 2.] rad/s
     """
     check_keywords(fall, motion_dataset)
-    return _dataset(_samples(motion, times, fall))
+    return _dataset(_samples(motion, times, fall, links=False, mrp=False))
 
 
 def export_motion(
@@ -77,6 +80,7 @@ def export_motion(
     times: ArrayLike | None = None,
     *,
     links: bool = False,
+    mrp: bool = False,
     **fall: ArrayLike,
 ) -> None:
     """Write samples of one motion, base and joints, to a file in the format of its ending.
@@ -93,6 +97,7 @@ def export_motion(
     motion : a single one
     times : (N,) [s]; None: 201 even times
     links : True to write the angular momentum of each link about the centre of mass, too, inertial axes
+    mrp : True to write modified Rodrigues parameters of the base instead of quaternions, see `so3.mrp_from_quat`
     fall : start, velocity, gravity as in `Motion.base_position`
 
     Raises
@@ -110,11 +115,12 @@ def export_motion(
     """
     check_file_name(path, "path")
     check_flag(links, "links")
+    check_flag(mrp, "mrp")
     check_keywords(fall, export_motion)
     where = Path(path)
     if where.suffix.lower() not in ENDINGS:
         raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)
-    content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall, links=links))
+    content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall, links=links, mrp=mrp))
     write_whole(where, lambda stream: stream.write(content))
 
 
@@ -126,7 +132,7 @@ def _extra(name: str, needed: str, extra: str = "data") -> Any:
 
 
 def _samples(
-    motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike], *, links: bool = False
+    motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike], *, links: bool, mrp: bool
 ) -> _Samples:
     at, falling, samples = checked_times(motion, times), Fall.of(**fall), _Samples()
     samples["time"] = at, "", "s"
@@ -146,6 +152,12 @@ def _samples(
         samples["base_velocity"] = whole.world_velocity, "axis", "m/s"
         samples["shapes"] = whole.shapes, "joint", "rad" * angles
         samples["shape_rates"] = whole.shape_rates, "joint", "rad/s" * angles
+        if whole.wheels:
+            columns = [whole.body.joint_index(wheel) for wheel in whole.wheels]
+            samples.wheels = whole.wheels
+            samples["wheel_speeds"] = whole.shape_rates[:, columns], "wheel", "rad/s"
+    if mrp:
+        samples["base_mrp"] = so3.mrp_from_quat(samples.pop("base_quat_xyzw")[0]), "mrp", ""
     if isinstance(motion, Motion) and motion.counted_axes() is not None:
         samples["turns"] = np.stack(motion.somersault_tilt_twist(at), axis=-1), "turn", "rad"
         samples["turn_errors"] = np.stack(motion.somersault_errors(at), axis=-1), "turn", "rad"
@@ -173,6 +185,8 @@ def _dataset(samples: _Samples) -> Any:
         "joint": samples.joint_names,
         "turn": _TURNS,
         "link_axis": samples.link_axes,
+        "wheel": samples.wheels,
+        "mrp": _MRP,
     }
     variables = {
         name: (("time", dimension), values, {"units": unit} if unit else {})
@@ -194,10 +208,12 @@ def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
     """Columns of a table by their names, with their units."""
     labels = {
         "base_quat_xyzw": _QUATERNION,
+        "base_mrp": _MRP,
         "angular_velocity": [f"omega_{axis}_rad_s" for axis in _AXES],
         "base_position": [f"base_{axis}_m" for axis in _AXES],
         "base_velocity": [f"base_v{axis}_m_s" for axis in _AXES],
         "shapes": samples.joint_names,
+        "wheel_speeds": [f"{wheel}_speed_rad_s" for wheel in samples.wheels],
         "turns": [f"{turn}_rad" for turn in _TURNS],
         "turn_errors": [f"{turn}_error_rad" for turn in _TURNS],
         "link_momentum": [f"{label}_kg_m2_s" for label in samples.link_axes],
