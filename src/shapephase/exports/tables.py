@@ -1,4 +1,4 @@
-"""A motion as a data set of xarray, and in files of tables and arrays: CSV, Parquet, NetCDF, MATLAB, HDF5."""
+"""A motion as a data set of xarray, and in files of samples: CSV, Parquet, NetCDF, MATLAB, HDF5, MCAP."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from .. import so3
 from ..arguments import check_file_name, check_flag, check_keywords, check_object
 from ..arrays import Array
 from ..dynamics.moving_body import body_and_path
-from ..errors import MissingExtraError, unknown_name
+from ..errors import MissingExtraError, ShapeError, unknown_name
 from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
+from ._ros_bag import mcap_bag, whole_nanoseconds
 from ._whole_motion import Fall, checked_times, continued_quaternions, whole_motion
 
 _AXES = ("x", "y", "z")
@@ -40,6 +41,7 @@ class _Samples(dict[str, tuple[Array, str, str]]):
     joint_units: tuple[str, ...] = ()
     link_axes: tuple[str, ...] = ()
     wheels: tuple[str, ...] = ()
+    base_link: str = "base_link"
     attributes: dict[str, Any]
 
 
@@ -88,22 +90,25 @@ def export_motion(
     - `.csv`, `.parquet`: one row a sample; labels of joints contain their units, in Parquet as metadata `unit`.
     - `.nc`: the data set of `Motion.to_xarray` as NetCDF.
     - `.mat`, `.h5`: the same as arrays by their names, with `joint_names`.
+    - `.mcap`: a bag of ROS 2 with the topics /joint_states, /base_pose and /tf (world to the base's link), at times
+      rounded to nanoseconds.
 
-    All hold every digit, and all but `.nc` are read by `read_recorded_motion`. `Motion.save` keeps
-    the whole motion, to be evaluated at any time.
+    All hold every digit, and all but `.nc` are read by `read_recorded_motion`, `.mcap` without the base. `Motion.save`
+    keeps the whole motion, to be evaluated at any time.
 
     Parameters
     ----------
     motion : a single one
     times : (N,) [s]; None: 201 even times
     links : True to write the angular momentum of each link about the centre of mass, too, inertial axes
-    mrp : True to write modified Rodrigues parameters of the base instead of quaternions, see `so3.mrp_from_quat`
+    mrp : True to write modified Rodrigues parameters of the base instead of quaternions, see `so3.mrp_from_quat`; not
+        for `.mcap`
     fall : start, velocity, gravity as in `Motion.base_position`
 
     Raises
     ------
     MissingExtraError
-        Without xarray, pyarrow or h5py, for the formats that need them.
+        Without xarray, pyarrow, h5py or rosbags, for the formats that need them.
 
     Examples
     --------
@@ -120,6 +125,10 @@ def export_motion(
     where = Path(path)
     if where.suffix.lower() not in ENDINGS:
         raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)
+    if where.suffix.lower() == ".mcap":
+        if mrp or links:
+            raise ShapeError("mrp, links: messages of ROS have quaternions, and no momenta of links; write a table")
+        times = whole_nanoseconds(checked_times(motion, times), motion.duration)
     content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall, links=links, mrp=mrp))
     write_whole(where, lambda stream: stream.write(content))
 
@@ -145,6 +154,7 @@ def _samples(
     else:
         whole = whole_motion(motion, at, falling)
         samples.joint_names, samples.joint_units = whole.body.joint_names, whole.body.joint_units
+        samples.base_link = whole.body.link_names[0]
         angles = set(samples.joint_units) == {"rad"}
         samples["base_quat_xyzw"] = whole.quat_xyzw, "quaternion", ""
         samples["angular_velocity"] = whole.angular_velocity, "axis", "rad/s"
@@ -287,11 +297,18 @@ def _hdf5(samples: _Samples) -> bytes:
     return stream.getvalue()
 
 
+def _mcap(samples: _Samples) -> bytes:
+    arrays = {name: values for name, (values, _, _) in samples.items()}
+    joints = (samples.joint_names, arrays["shapes"], arrays["shape_rates"]) if samples.joint_names else None
+    return mcap_bag(arrays["time"], arrays["base_quat_xyzw"], arrays["base_position"], samples.base_link, joints)
+
+
 _WRITERS: dict[str, Callable[[_Samples], bytes]] = {
     ".csv": _csv,
     ".parquet": _parquet,
     ".nc": _netcdf,
     ".mat": _matlab,
     ".h5": _hdf5,
+    ".mcap": _mcap,
 }
 ENDINGS = tuple(_WRITERS)  # of the files that `export_motion` writes
