@@ -251,3 +251,19 @@ def test_a_users_quaternion(rng):
     for bad in (np.zeros(4), 1.0015 * quat, 1.1 * quat, np.full(4, np.nan), np.eye(3)):
         with pytest.raises(ShapeError, match="attitude"):
             so3.quat_argument(bad, "attitude")
+
+
+def test_modified_rodrigues_parameters_are_scipys_of_both_sets():
+    """Half turns, the identity and small angles among them; a shadow is the same rotation."""
+    turns = Rotation.concatenate(
+        [Rotation.random(200, rng=8), Rotation.from_rotvec([[0.0, 0.0, np.pi], [0.0, 0.0, 0.0], [1e-9, 0.0, -2e-9]])]
+    )
+    quaternions = turns.as_quat()
+    found = so3.mrp_from_quat(quaternions)
+    np.testing.assert_allclose(found, turns.as_mrp(), rtol=0, atol=1e-15)
+    assert np.linalg.norm(found, axis=-1).max() <= 1.0
+    shadows = -found[:200] / (found[:200] ** 2).sum(axis=-1, keepdims=True)
+    for parameters in (found[:200], shadows):
+        back = so3.matrix_from_quat(so3.quat_from_mrp(parameters))
+        np.testing.assert_allclose(back, turns[:200].as_matrix(), rtol=0, atol=1e-14)
+    assert (so3.quat_from_mrp(shadows)[:, 3] >= 0.0).all()

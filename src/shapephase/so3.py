@@ -356,6 +356,35 @@ def matrix_from_quat(quat_xyzw: Array) -> Array:
     return matrix
 
 
+def mrp_from_quat(quat_xyzw: Array) -> Array:
+    """Modified Rodrigues parameters e tan(angle/4) of a unit quaternion xyzw: (..., 4) -> (..., 3).
+
+    Of the two sets of a rotation the one of length 1 or less, which jumps to its shadow -sigma/|sigma|^2 where a motion
+    passes half a turn. Those of an attitude here belong to the turn that takes inertial axes to the base's: `sigma_BN`.
+
+    Source: Schaub and Junkins, Analytical Mechanics of Space Systems, section 3.6.
+
+    Examples
+    --------
+    >>> sp.so3.mrp_from_quat(np.array([0.0, 0.0, -1.0, 0.0])).tolist()  # half a turn about z
+    [0.0, 0.0, -1.0]
+    """
+    whole = np.where(quat_xyzw[..., 3:] < 0.0, -quat_xyzw, quat_xyzw)
+    return whole[..., :3] / (1.0 + whole[..., 3:])
+
+
+def quat_from_mrp(mrp: Array) -> Array:
+    """xyzw with w >= 0 of modified Rodrigues parameters, of either set: (..., 3) -> (..., 4).
+
+    Examples
+    --------
+    >>> sp.so3.quat_from_mrp(np.array([[0.0, 0.0, 0.5], [0.0, 0.0, -2.0]])).tolist()  # shadows of each other
+    [[0.0, 0.0, 0.8, 0.6], [0.0, 0.0, 0.8, 0.6]]
+    """
+    square = np.sum(mrp * mrp, axis=-1, keepdims=True)
+    return positive_scalar(np.concatenate([2.0 * mrp, 1.0 - square], axis=-1) / (1.0 + square))
+
+
 def matrix_from_euler(angles: Array, axes: str) -> Array:
     """Turns about coordinate axes, each about its axis as those before have turned it: (..., k) -> (..., 3, 3).
 

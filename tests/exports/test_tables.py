@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import shapephase as sp
 from shapephase.errors import MissingExtraError, ShapeError, UnknownNameError
@@ -166,3 +167,49 @@ def test_what_cannot_be_written_is_refused(motion, tmp_path, monkeypatch):
             with pytest.raises(MissingExtraError, match="pip"):
                 sp.export_motion(motion, tmp_path / f"motion{ending}")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_modified_rodrigues_parameters_stand_instead_of_quaternions_and_are_read(motion, tmp_path):
+    sp.export_motion(motion, tmp_path / "motion.csv", TIMES, mrp=True)
+    header = (tmp_path / "motion.csv").read_text().splitlines()[0].split(",")
+    assert header[1:4] == ["base_mrp_1", "base_mrp_2", "base_mrp_3"]
+    assert "qw" not in header
+    columns = np.loadtxt(tmp_path / "motion.csv", delimiter=",", skiprows=1)
+    found = Rotation.from_mrp(columns[:, 1:4]).as_matrix()
+    np.testing.assert_allclose(found, motion.attitude(TIMES), rtol=0, atol=1e-14)
+    recorded = sp.read_recorded_motion(tmp_path / "motion.csv", body_of("satellite"))
+    np.testing.assert_allclose(recorded.base_attitude, motion.attitude(TIMES), rtol=0, atol=1e-14)
+
+
+def test_a_bag_has_joints_pose_and_transform_at_whole_nanoseconds(motion, tmp_path):
+    """Read by rosbags; our reader takes its joints."""
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import Reader
+    from rosbags.typesys import Stores, get_typestore
+
+    file, store = tmp_path / "motion.mcap", get_typestore(Stores.ROS2_HUMBLE)
+    sp.export_motion(motion, file, TIMES, **FALL)
+    whole = np.round(TIMES * 1e9) / 1e9
+    expected = sp.exports.pinocchio_arrays(motion, whole, **FALL)
+    shapes = motion.deformation.description.path.curve(whole)
+    found = {"/base_pose": [], "/tf": [], "/joint_states": []}
+    with Reader(file) as bag:
+        for connection, stamp, data in bag.messages():
+            found[connection.topic].append((stamp, store.deserialize_cdr(data, connection.msgtype)))
+    for topic, messages in found.items():
+        assert [stamp for stamp, _ in messages] == np.round(TIMES * 1e9).astype(int).tolist(), topic
+    for row, (_, message) in enumerate(found["/base_pose"]):
+        turned, place = message.pose.orientation, message.pose.position
+        pose = [place.x, place.y, place.z, turned.x, turned.y, turned.z, turned.w]
+        np.testing.assert_allclose(pose, expected.q[row, :7], rtol=0, atol=1e-14)
+        (frame,) = found["/tf"][row][1].transforms
+        assert (frame.header.frame_id, frame.child_frame_id) == ("world", body_of("satellite").link_names[0])
+        assert (frame.transform.rotation.w, frame.transform.translation.z) == (turned.w, place.z)
+        state = found["/joint_states"][row][1]
+        assert tuple(state.name) == body_of("satellite").joint_names
+        np.testing.assert_allclose(state.position, shapes[0][row], rtol=0, atol=1e-15)
+        np.testing.assert_allclose(state.velocity, shapes[1][row], rtol=0, atol=1e-14)
+    read = sp.read_shape_path(file, body_of("satellite"))
+    np.testing.assert_allclose(read.shape(whole - whole[0]), shapes[0], rtol=0, atol=1e-9)
+    with pytest.raises(ShapeError, match="quaternions"):
+        sp.export_motion(motion, file, TIMES, mrp=True)

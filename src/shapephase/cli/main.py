@@ -25,6 +25,7 @@ from .audit import audit_command
 from .check import check_command
 from .contributions import contributions_command
 from .ctrl_c import forget, was_pressed
+from .export import export_command
 from .installation import compile_command, doctor_command, robots_command
 from .momentum import momentum_command
 from .options import HELP_ALL, SHOWS_ALL
@@ -67,6 +68,7 @@ for _name, _command in {
     "contributions": contributions_command,
     "momentum": momentum_command,
     "torques": torques_command,
+    "export": export_command,
     "view": view_command,
     "plot": plot_app,
     "explore": explore_command,

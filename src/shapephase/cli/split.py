@@ -48,8 +48,8 @@ def split_command(
     samples: Annotated[
         Path | None,
         rare(
-            "Write base and joints at 201 even times to this file (.csv, .parquet, .nc, .mat, .h5), in SI units; for "
-            "example `--samples fall.nc`.",
+            "Write base and joints at 201 even times to this file (.csv, .parquet, .nc, .mat, .h5, .mcap), in SI "
+            "units; for example `--samples fall.nc`.",
         ),
     ] = None,
     link_momenta: Annotated[

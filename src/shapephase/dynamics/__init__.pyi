@@ -1,8 +1,8 @@
 from .loads import JointLoads
-from .moving_body import wheel_speeds
 from .swinging import FreeHinges, free_hinges
 from .torque_noise import LoadErrors, TorqueErrors, load_errors, torque_errors
 from .torques import JointTorques, joint_torques
+from .wheels import wheel_speeds
 
 __all__ = [
     "FreeHinges",

@@ -17,6 +17,7 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..refinement import halved, settled
 from .moving_body import BY_JOINTS, drive, needed_body_and_path
+from .wheels import solution_times
 
 _POINTS = 10  # Gauss points of a panel
 _LOOKS = 65  # places of a panel where peaks are searched: a smooth torque hides at most 1e-4 of itself between two
@@ -170,8 +171,7 @@ class _Panels:
 def joint_loads(motion: Motion | ForcedMotion) -> JointLoads:
     """The loads over a whole motion, on its steps, which are halved until the work no longer changes."""
     body, _ = needed_body_and_path(motion, BY_JOINTS)
-    breaks = motion.breaks if isinstance(motion, ForcedMotion) else motion.deformation.breaks
-    edges = np.union1d(motion.solution.times, breaks)
+    edges = solution_times(motion)
     edges = edges[np.append(True, np.diff(edges) > 1e-12 * motion.duration)]
     edges[-1] = motion.duration
     finest: list[_Panels] = []

@@ -1,23 +1,22 @@
-"""An articulated body along its motion: second derivatives of joints and base, the efforts behind them, its wheels."""
+"""An articulated body along its motion: second derivatives of joints and base, and the efforts behind them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, times_argument
+from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.inverse_dynamics import falling_efforts
-from ..deformation.rotors import RotorDescription
 from ..errors import WrongObjectError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
+from .wheels import base_momenta, ungauged, wheels_of, with_free_wheels, with_wheels
 
 BY_JOINTS = "the torques of joints need"  # begins the message for a body without joints
 
@@ -62,10 +61,14 @@ class Drive:
 
 
 def body_and_path(motion: Motion | ForcedMotion) -> tuple[Body, ShapePath] | None:
-    """Body and path of a motion of an articulated body, in any gauge; None for another motion."""
-    description: object = motion.deformation.description
-    while hasattr(description, "original"):
-        description = description.original  # pyright: ignore[reportAttributeAccessIssue]
+    """Body and path of a motion of an articulated body, in any gauge; None for another motion.
+
+    Wheels rest in the path; `with_wheels` has their speeds.
+    """
+    wheels = wheels_of(motion)
+    if wheels is not None:
+        return wheels.platform, wheels.route
+    description = ungauged(motion)
     body, path = getattr(description, "body", None), getattr(description, "path", None)
     return (body, path) if isinstance(body, Body) and isinstance(path, ShapePath) else None
 
@@ -109,17 +112,22 @@ def moving_body(
         shapes, rates, accelerations = shapes + moved[0], rates + moved[1], accelerations + moved[2]
     inertia, matrix, inertia_rate, matrix_rate = body.sample_rates(shapes, rates)
     inverse = inverse_inertia(inertia, times)
-    internal = so3.apply(matrix, rates)
-    internal_rate = so3.apply(matrix_rate, rates) + so3.apply(matrix, accelerations)
-    momenta = so3.apply(so3.transpose(motion.deformation.frame(times)), motion.body_momentum(times))
-    momenta = momenta.reshape(-1, len(times), 3)
+    momenta = base_momenta(motion, times)
     if turned is not None:
         momenta = so3.apply(so3.transpose(so3.exp(turned)), momenta)
+    wheels = wheels_of(motion)
+    if wheels is not None:
+        rates, accelerations = with_wheels(wheels, times, momenta, rates, accelerations)
+    internal = so3.apply(matrix, rates)
+    internal_rate = so3.apply(matrix_rate, rates) + so3.apply(matrix, accelerations)
     push = np.zeros((len(times), 3))
     if isinstance(motion, ForcedMotion):
         push = so3.apply(so3.transpose(motion.deformation.frame(times)), motion.torque(times))
     spins = so3.apply(inverse, momenta - internal)
     slopes = so3.apply(inverse, np.cross(momenta, spins) + push - so3.apply(inertia_rate, spins) - internal_rate)
+    if wheels is not None:
+        joints = shapes, rates, accelerations
+        accelerations, slopes = with_free_wheels(wheels, joints, (spins, slopes), matrix, inverse)
     return MovingBody(
         shapes=shapes, rates=rates, accelerations=accelerations, spins=spins, spin_rates=slopes, push=push
     )
@@ -146,46 +154,3 @@ def drive(
         energies.append(body.kinetic_energy(moving.shapes, moving.rates, spins))
     speeds = body.joint_rates(moving.shapes, moving.rates)
     return Drive(torque=np.array(torques), rate=speeds, wrench=np.array(wrenches), energy=np.array(energies))
-
-
-def wheel_speeds(motion: Motion | ForcedMotion, t: ArrayLike) -> Array:
-    """The speeds of wheels on their axles, in the order in which `articulated` was given them, speeds held last.
-
-    Parameters
-    ----------
-    motion : of a deformation made by `articulated(..., rotors=, rotor_speeds=)`
-    t : times (...) [s]
-
-    Returns
-    -------
-    batch + t.shape + (wheels,) [rad/s]
-
-    Raises
-    ------
-    WrongObjectError
-        If the body has no such wheels, or is seen in a gauge.
-
-    Notes
-    -----
-    Equation :eq:`routh` of the documentation.
-
-    Examples
-    --------
-    >>> satellite = sp.load_body("satellite")
-    >>> rest = [name for name in satellite.joint_names if name != "wheel_spin"]
-    >>> still = sp.ShapePath.waypoints([0.0, 1.0], np.zeros((2, len(rest))), joint_names=rest)
-    >>> deformation = sp.articulated(satellite, still, rotor_speeds={"wheel_spin": 100.0})
-    >>> print(sp.dynamics.wheel_speeds(sp.reconstruct(deformation, [0.0, 0.0, 1.0]), 0.5))
-    [100.]
-    """
-    check_motion(motion)
-    description = motion.deformation.description
-    if not isinstance(description, RotorDescription):
-        raise WrongObjectError(
-            "motion: the speeds of wheels need a body with wheels, made by `articulated(..., rotors=)`; this is: "
-            f"{motion.deformation.label}"
-        )
-    times = times_argument(t, motion.duration)
-    omega = motion.angular_velocity(times).reshape(-1, times.size, 3)
-    speeds = description.spins(times.ravel(), omega)
-    return np.reshape(speeds, (*motion.batch, *times.shape, len(description.rotors)))

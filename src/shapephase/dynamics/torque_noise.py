@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object
 from ..arrays import Array, lock_arrays
 from ..display import short_repr
-from ..errors import ShapeError
+from ..errors import ShapeError, WrongObjectError
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_noise import path_errors, summed_errors
@@ -19,6 +19,7 @@ from ..shape_space.shape_path import ShapePath
 from .loads import JointLoads
 from .moving_body import BY_JOINTS, drive, needed_body_and_path
 from .torques import JointTorques
+from .wheels import wheels_of
 
 # Steps of shapes [rad or m], rates and accelerations: torques are quadratic in rates and linear in accelerations.
 _STEPS = (1e-5, 1.0, 1.0)
@@ -90,7 +91,7 @@ def torque_errors(torques: JointTorques, joints: ArrayLike | None = None) -> Tor
     ShapeError
         For a batch, and as `path_errors`.
     WrongObjectError
-        For a path that is not through samples, see `path_errors`.
+        For a path that is not through samples, see `path_errors`, or a body with wheels.
 
     Examples
     --------
@@ -145,6 +146,8 @@ def _path_of(motion: Motion | ForcedMotion) -> ShapePath:
     """Path of a single motion of an articulated body."""
     if motion.batch:
         raise ShapeError(f"error bars are those of one motion, this is a batch of {motion.batch}")
+    if wheels_of(motion) is not None:
+        raise WrongObjectError("error bars of torques are not known for a body with wheels")
     return needed_body_and_path(motion, BY_JOINTS)[1]
 
 

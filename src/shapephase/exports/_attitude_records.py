@@ -3,93 +3,95 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from .. import so3
-from ..arrays import Array
+from ..arguments import positive_argument
+from ..arrays import Array, Integers, Mask
+from ..dynamics.moving_body import check_motion
+from ..dynamics.wheels import solution_times
 from ..errors import AccuracyNotReached
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ._whole_motion import base_attitude, checked_times, continued_quaternions
 
+_EXACT = 1e-8  # [rad] default error of the records
+_SMOOTHED = 1e-3  # of the joints' noise, default error after smoothing: it leaves 0.03 to 0.3 of it in attitudes
+WINDOW = 8  # records that polynomials go through: degree 7, two records at least on both sides but at the ends
 _MOST_RECORDS = 2_000_000  # of a file: 100 to 200 bytes each
 _USED = 0.5  # of the error, where it is measured: between these places it may be larger
-# between two records, where errors are measured; a constant rate is farthest off in the middle
-_PLACES = np.array([0.25, 0.5, 0.75])
-_PARTS = 4  # records of the first guess for a piece of the motion's own solution
-_EVEN = 257  # records of the first guess for a motion with a torque, whose steps are unknown
-WINDOW = 8  # records that polynomials go through: degree 7, two records at least on both sides but at the ends
+_PLACES = np.array([np.sqrt(5.0) - 2.0, 0.5, 3.0 - np.sqrt(5.0)])  # of a step: no spin turns whole times to all
+_SHORTEST = 64  # last digits of the duration between two records, or their rounding shows
 
 
-def slerp_times(motion: Motion | ForcedMotion, error: float) -> Array:
-    """Times between which a turn at a constant rate is within an error of the motion: (N,) [s].
+def error_argument(motion: Motion | ForcedMotion, error: float | None) -> float:
+    """The error of the records [rad]; None: 1e-8, or for joints smoothed for noise 1e-3 of it. Raises ShapeError."""
+    check_motion(motion)
+    if error is not None:
+        return positive_argument(error, "error", "an angle in rad")
+    recording = motion.deformation.made_from.get("recording") or {}
+    noise = recording.get("smooth") or (recording.get("lowpass") or {}).get("noise") or {}
+    return max(_EXACT, _SMOOTHED * min((level for level in noise.values() if level > 0.0), default=0.0))
 
-    Raises ShapeError if the motion is a batch; AccuracyNotReached if that takes millions of records.
+
+def record_times(motion: Motion | ForcedMotion, error: float) -> Array:
+    """Times whose quaternions, by polynomials through `WINDOW` of them, are within an error: (N,) [s].
+
+    Steps are halved where the error requires it, measured between records and at the steps of the motion's solution. A
+    step is at most twice as long as those in its window. At the ends readers take fewer records (SPICE) or more on the
+    inner side (Lagrange): both are within the error.
+
+    Raises ShapeError if the motion is a batch; AccuracyNotReached if that takes millions of records, or steps of a few
+    last digits of their times.
     """
     checked_times(motion, [0.0])
-    if isinstance(motion, ForcedMotion):
-        ends = np.union1d(np.linspace(0.0, motion.duration, _EVEN), motion.breaks)
-    else:
-        ends = np.union1d(motion.solution.times, motion.deformation.breaks)
-    times = np.append((ends[:-1, None] + np.diff(ends)[:, None] * np.arange(_PARTS) / _PARTS).ravel(), ends[-1])
+    times = np.linspace(0.0, motion.duration, 2 * WINDOW + 1)
     while True:
-        off = _off_at_constant_rate(motion, times)
-        # Off by the square of the step.
-        parts = np.ceil(np.sqrt(off / (_USED * error))).astype(np.int64).clip(1)
-        if np.all(parts == 1):
+        halved = _missed(motion, times, (times[:-1, None] + np.diff(times)[:, None] * _PLACES).ravel(), error)
+        if not halved.any():
+            halved = _missed(motion, times, solution_times(motion), error)
+        if not halved.any():
             return times
-        _check_count(int(parts.sum()) + 1, error)
-        begin, step = np.repeat(times[:-1], parts), np.repeat(np.diff(times) / parts, parts)
-        inside = np.arange(len(begin)) - np.repeat(np.cumsum(parts) - parts, parts)
-        times = np.append(begin + inside * step, times[-1])
+        while True:
+            steps = np.diff(times) / np.where(halved, 2.0, 1.0)
+            uneven = steps > 2.5 * minimum_filter1d(steps, WINDOW - 1)
+            if not uneven.any():
+                break
+            halved |= uneven
+        if steps.min() < _SHORTEST * np.spacing(motion.duration) or len(times) + halved.sum() > _MOST_RECORDS:
+            raise AccuracyNotReached(
+                f"error: no {_MOST_RECORDS} records are within {error:g} rad of the motion; allow a larger error"
+            )
+        times = np.union1d(times, 0.5 * (times[:-1] + times[1:])[halved])
 
 
-def even_times(motion: Motion | ForcedMotion, error: float) -> Array:
-    """Even times whose quaternions, by polynomials through `WINDOW` of them, are within an error: (N,) [s].
+def _missed(motion: Motion | ForcedMotion, times: Array, between: Array, error: float) -> Mask:
+    """Steps in which the polynomials miss the motion at one of some times: (N,), (M,) -> (N - 1,)."""
+    quaternions = continued_quaternions(base_attitude(motion, times))
+    backwards = so3.transpose(base_attitude(motion, between))
+    step = np.clip(np.searchsorted(times, between, side="right") - 1, 0, len(times) - 2)
+    missed = np.zeros(len(times) - 1, dtype=bool)
+    for shifted in (True, False):
+        found = so3.matrix_from_quat(_interpolated(times, quaternions, between, step, shifted=shifted))
+        missed[step[so3.angle(backwards @ found) > _USED * error]] = True
+    return missed
 
-    Raises as `slerp_times`.
+
+def _interpolated(times: Array, quaternions: Array, between: Array, step: Integers, *, shifted: bool) -> Array:
+    """Quaternions of length 1 by Lagrange's polynomials through the nearest records: (N,), (N, 4), (M,) -> (M, 4).
+
+    step : (M,) between which records each time is
+
+    shifted : True for windows of `WINDOW` records at the ends, too; False for those of them that exist
     """
-    checked_times(motion, [0.0])
-    count = 2 * WINDOW
-    while True:
-        times = np.linspace(0.0, motion.duration, count + 1)
-        quaternions = continued_quaternions(base_attitude(motion, times))
-        place = (np.arange(count, dtype=np.float64)[:, None] + _PLACES).ravel()
-        between = interpolated(quaternions, place)
-        truth = base_attitude(motion, place * (motion.duration / count))
-        if so3.angle(so3.transpose(truth) @ so3.matrix_from_quat(between)).max() <= _USED * error:
-            return times
-        count *= 2
-        _check_count(count, error)
-
-
-def interpolated(quaternions: Array, place: Array) -> Array:
-    """Quaternions of length 1 between even records, by Lagrange's polynomials: (N, 4), (M,) -> (M, 4).
-
-    place : in steps from the first record
-    """
-    first = np.clip(np.floor(place).astype(np.int64) - WINDOW // 2 + 1, 0, len(quaternions) - WINDOW)
-    nodes = np.arange(WINDOW)
-    at = (place - first)[:, None]
-    weights = np.ones((len(place), WINDOW))
-    for k in nodes:
-        others = nodes[nodes != k]
-        weights[:, k] = np.prod((at - others) / (k - others), axis=1)
-    between = np.einsum("mk,mkd->md", weights, quaternions[first[:, None] + nodes])
-    return between / np.linalg.norm(between, axis=1, keepdims=True)
-
-
-def _off_at_constant_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
-    """Largest distance of a turn at a constant rate from the motion, in each step: (N - 1,) [rad]."""
-    ends = base_attitude(motion, times)
-    turns = so3.log(so3.transpose(ends[:-1]) @ ends[1:])
-    inside = times[:-1, None] + np.diff(times)[:, None] * _PLACES
-    truth = base_attitude(motion, inside.ravel()).reshape(*inside.shape, 3, 3)
-    turned = ends[:-1, None] @ so3.exp(turns[:, None] * _PLACES[:, None])
-    return so3.angle(so3.transpose(truth) @ turned).max(axis=1)
-
-
-def _check_count(count: int, error: float) -> None:
-    if count > _MOST_RECORDS:
-        raise AccuracyNotReached(
-            f"error: no {_MOST_RECORDS} records are within {error:g} rad of the motion; allow a larger error"
-        )
+    first = step - WINDOW // 2 + 1
+    nodes = np.clip(first, 0, len(times) - WINDOW)[:, None] + np.arange(WINDOW)
+    used = shifted | ((nodes >= first[:, None]) & (nodes < first[:, None] + WINDOW))
+    at = times[nodes]
+    weights = np.empty(nodes.shape)
+    for k in range(WINDOW):
+        others = used & (np.arange(WINDOW) != k)
+        apart = np.where(others, at[:, [k]] - at, 1.0)
+        weights[:, k] = used[:, k] * np.prod(np.where(others, between[:, None] - at, 1.0) / apart, axis=1)
+    found = np.einsum("mk,mkd->md", weights, quaternions[nodes])
+    return found / np.linalg.norm(found, axis=1, keepdims=True)

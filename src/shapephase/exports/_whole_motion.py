@@ -14,6 +14,7 @@ from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.inverse_dynamics import floating_states, floating_velocities
 from ..dynamics.moving_body import body_and_path, check_motion, moving_body, needed_body_and_path
+from ..dynamics.wheels import base_momenta, wheel_angles, wheel_columns, wheels_of, with_wheels
 from ..errors import ShapeError, UnknownNameError
 from ..inertia_tensor import inverse_inertia
 from ..reconstruction.forced_motion import ForcedMotion
@@ -56,7 +57,8 @@ class WholeMotion:
     velocities : (N, nv) of it: linear and angular of the base, base axes, then the joints
     names : of all k joints, those that follow others included
     joints, rates : (N, k) [rad or m], a second
-    shapes, shape_rates : (N, n) of the independent joints
+    shapes, shape_rates : (N, n) of the independent joints; wheels have turned by zero at the start
+    wheels : joints that are wheels, left out of the path
     """
 
     body: Body
@@ -69,6 +71,7 @@ class WholeMotion:
     rates: Array
     shapes: Array
     shape_rates: Array
+    wheels: tuple[str, ...]
 
     @property
     def position(self) -> Array:
@@ -115,9 +118,12 @@ def whole_motion(motion: Motion | ForcedMotion, times: Array, fall: Fall) -> Who
 
     Raises WrongObjectError if the body has no joints along a path.
     """
-    body, path = needed_body_and_path(motion, "this export needs")
-    shapes, rates = path.curve(times)
-    spins = _spins(motion, body, times, shapes, rates)
+    body, _ = needed_body_and_path(motion, "this export needs")
+    shapes, rates, spins = _joints_and_spins(motion, times)
+    wheels = wheels_of(motion)
+    if wheels is not None:
+        shapes = shapes.copy()
+        shapes[:, wheel_columns(wheels)] = wheel_angles(motion, wheels, times)
     configurations, velocities = floating_velocities(body, shapes, rates, spins)
     attitude = base_attitude(motion, times)
     configurations[:, :3] = fall.centre(times) - so3.apply(attitude, body.centre_of_mass(shapes))
@@ -135,6 +141,7 @@ def whole_motion(motion: Motion | ForcedMotion, times: Array, fall: Fall) -> Who
         rates=joint_rates,
         shapes=shapes,
         shape_rates=rates,
+        wheels=() if wheels is None else tuple(rotor.joint for rotor in wheels.rotors),
     )
 
 
@@ -145,7 +152,7 @@ def whole_accelerations(motion: Motion | ForcedMotion, whole: WholeMotion, fall:
     """
     body, path = needed_body_and_path(motion, "this export needs")
     moving = moving_body(motion, body, path, whole.times)
-    shapes, rates, spins = moving.shapes, moving.rates, moving.spins[0]
+    shapes, rates, spins = whole.shapes, moving.rates, moving.spins[0]
     accelerations = floating_states(body, shapes, rates, moving.accelerations, spins, moving.spin_rates[0])[2]
     backwards = so3.transpose(whole.attitude)
     speed = so3.apply(backwards, fall.speed(whole.times))
@@ -157,11 +164,17 @@ def whole_accelerations(motion: Motion | ForcedMotion, whole: WholeMotion, fall:
     return accelerations, slopes
 
 
-def _spins(motion: Motion | ForcedMotion, body: Body, times: Array, shapes: Array, rates: Array) -> Array:
-    """Angular velocity of the base, base axes: (N, 3) [rad/s]."""
+def _joints_and_spins(motion: Motion | ForcedMotion, times: Array) -> tuple[Array, Array, Array]:
+    """Shapes and rates, those of wheels included, and the base's angular velocity in its axes: (N, n), (N, n), (N, 3).
+
+    Wheels are at angle zero.
+    """
+    body, path = needed_body_and_path(motion, "this export needs")
+    (shapes, rates), momenta, wheels = path.curve(times), base_momenta(motion, times), wheels_of(motion)
+    if wheels is not None:
+        rates, _ = with_wheels(wheels, times, momenta, rates, np.zeros_like(rates))
     inertia, internal = body.sample(shapes, rates)
-    momenta = so3.apply(so3.transpose(motion.deformation.frame(times)), motion.body_momentum(times))
-    return so3.apply(inverse_inertia(inertia, times), momenta - internal)
+    return shapes, rates, so3.apply(inverse_inertia(inertia, times), momenta[0] - internal)
 
 
 def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
@@ -172,10 +185,7 @@ def base_attitude(motion: Motion | ForcedMotion, times: Array) -> Array:
 
 def base_rate(motion: Motion | ForcedMotion, times: Array) -> Array:
     """Angular velocity of the base of the body, base axes, in whatever gauge the motion is: (N,) -> (N, 3) [rad/s]."""
-    pair = body_and_path(motion)
-    if pair is None:
-        return motion.angular_velocity(times)
-    return _spins(motion, pair[0], times, *pair[1].curve(times))
+    return motion.angular_velocity(times) if body_and_path(motion) is None else _joints_and_spins(motion, times)[2]
 
 
 def continued_quaternions(attitudes: Array) -> Array:

@@ -9,7 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from .. import __version__
-from ..arguments import check_choice, check_file_name, check_text, positive_argument
+from ..arguments import check_choice, check_file_name, check_text
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import UnknownNameError
@@ -17,7 +17,7 @@ from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._attitude_records import WINDOW, even_times
+from ._attitude_records import WINDOW, error_argument, record_times
 from ._whole_motion import base_attitude, continued_quaternions
 
 TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")  # of the epochs of a message
@@ -33,7 +33,7 @@ class AttitudeMessage:
     Attributes
     ----------
     file : that holds it
-    records : attitudes at even times
+    records : attitudes
     error : stated, of the attitude between them by polynomials of `degree` [rad]
     degree : of the polynomials of each part of the quaternion, through the records nearest to a time
     """
@@ -50,7 +50,7 @@ def write_aem(
     motion: Motion | ForcedMotion,
     path: str | os.PathLike[str],
     *,
-    error: float = 1e-8,
+    error: float | None = None,
     epoch: str = "2000-01-01T12:00:00",
     time_system: str = "TDB",
     object_name: str = "SHAPEPHASE",
@@ -59,14 +59,15 @@ def write_aem(
 ) -> AttitudeMessage:
     """Write the attitude of the base as an Attitude Ephemeris Message (CCSDS 504.0-B-1), in keywords and values.
 
-    Quaternions turn the inertial axes into those of the base, scalar part last, every digit kept. Records are at even
-    times, near enough for the error where a reader interpolates as the message states: each part of the quaternion by
-    Lagrange's polynomial of degree 7 through the eight records nearest to a time.
+    Quaternions turn the inertial axes into those of the base, scalar part last, every digit kept. Records are as
+    near to each other as the error requires where a reader interpolates as the message states: each part of the
+    quaternion by Lagrange's polynomial of degree 7 through the eight records nearest to a time.
 
     Parameters
     ----------
     motion : a single one, in any gauge
-    error : the largest of the attitude between records [rad], beside the motion's own
+    error : the largest of the attitude between records [rad], beside the motion's own; None: 1e-8, or a thousandth of
+        the noise that the joints were smoothed for, if that is larger
     epoch : of the motion's start, as "2026-11-23T10:00:00.5"
     time_system : of the epochs, one of "TDB", "TT", "TAI", "GPS", "UTC"; no second is inserted
     object_name, object_id : of the body
@@ -92,8 +93,8 @@ def write_aem(
     """
     check_file_name(path, "path")
     check_choice(time_system, "time system", TIME_SYSTEMS)
-    begin, goal = _epoch(epoch), positive_argument(error, "error", "an angle in rad")
-    times = even_times(motion, goal)
+    begin, goal = _epoch(epoch), error_argument(motion, error)
+    times = record_times(motion, goal)
     quaternions = continued_quaternions(base_attitude(motion, times))
     epochs = _epochs(begin, times)
     made = str(provenance()["date"])[:19]

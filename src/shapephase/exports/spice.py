@@ -1,4 +1,4 @@
-"""Attitudes as kernels of SPICE: a C-kernel of type 3, with a clock and a frame."""
+"""Attitudes as kernels of SPICE: a C-kernel of type 5, with a clock and a frame."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .. import so3
-from ..arguments import check_file_name, check_text, number_argument, positive_argument, whole_argument
+from ..arguments import check_file_name, check_text, number_argument, whole_argument
 from ..arrays import Array
 from ..display import short_repr
 from ..errors import AccuracyNotReached, MissingExtraError, OutputFileError, UnknownNameError
@@ -21,12 +21,13 @@ from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
-from ._attitude_records import slerp_times
+from ._attitude_records import WINDOW, error_argument, record_times
 from ._whole_motion import base_attitude, base_rate, check_ending, continued_quaternions
 
 _TICKS = 10**9  # of the clock in a second
 _LONGEST = 10**6  # [s] that the clock counts
 _OF_A_CLOCK = 1000  # SPICE numbers the instruments of clock N from -1000 N on
+_LAGRANGE_WITH_RATES = 3  # subtype of C-kernels of type 5
 _COMMENT = 100  # characters of a line; SPICE takes up to 255
 _SEGMENT = "shapephase"
 _CLOCK = """\
@@ -87,7 +88,7 @@ def write_spice_ck(
     motion: Motion | ForcedMotion,
     path: str | os.PathLike[str],
     *,
-    error: float = 1e-8,
+    error: float | None = None,
     epoch: float = 0.0,
     reference: str = "J2000",
     instrument: int = -999001,
@@ -95,14 +96,15 @@ def write_spice_ck(
 ) -> SpiceKernels:
     """Write the attitude of the base as a C-kernel (`.bc`), and beside it clock and frame as a text kernel (`.tsc`).
 
-    The C-kernel is of type 3: SPICE turns at a constant rate from one record to the next. Records are as near to each
-    other as the error requires. The angular velocities are those of the records, and linear between them.
+    The C-kernel is of type 5, subtype 3: SPICE takes polynomials of degree 7 through the eight records nearest to a
+    time, of the quaternions and of the angular velocities. Records are as near to each other as the error requires.
 
     Parameters
     ----------
     motion : a single one, in any gauge
     path : of the C-kernel
-    error : the largest of the attitude between records [rad], beside the motion's own
+    error : the largest of the attitude between records [rad], beside the motion's own; None: 1e-8, or a thousandth of
+        the noise that the joints were smoothed for, if that is larger
     epoch : of the motion's start, TDB seconds past J2000 as `spiceypy.str2et` gives them. Such times are floating-point
         numbers, in this year to 1e-7 s, within which a fast body turns
     reference : SPICE's name of the inertial axes
@@ -127,7 +129,7 @@ def write_spice_ck(
     check_file_name(path, "path")
     where, goal, start = (
         Path(path),
-        positive_argument(error, "error", "an angle in rad"),
+        error_argument(motion, error),
         number_argument(epoch, "epoch", "s"),
     )
     check_ending(where, "a C-kernel", ".bc")
@@ -140,7 +142,7 @@ def write_spice_ck(
         raise MissingExtraError(
             "SPICE kernels need spiceypy; install it with: pip install 'shapephase[data]'"
         ) from None
-    times = slerp_times(motion, goal)
+    times = record_times(motion, goal)
     _check_epoch(motion, times, start, goal)
     clock = -number // _OF_A_CLOCK
     text = _CLOCK.format(
@@ -185,17 +187,16 @@ def _c_kernel(spiceypy: Any, motion: Motion | ForcedMotion, times: Array, instru
     attitude = base_attitude(motion, times)
     # The quaternion of the inverse, w first.
     inverse = continued_quaternions(attitude)[:, [3, 0, 1, 2]] * [1.0, -1.0, -1.0, -1.0]
-    quaternions = np.ascontiguousarray(inverse)
-    rates = np.ascontiguousarray(so3.apply(attitude, base_rate(motion, times)))
+    packets = np.hstack([inverse, so3.apply(attitude, base_rate(motion, times))])
     ticks = times * _TICKS
     comments = textwrap.wrap(json.dumps(provenance(motion.deformation.made_from)), _COMMENT)
     with tempfile.TemporaryDirectory() as folder:
         file = str(Path(folder) / "attitude.bc")
         try:
             handle = spiceypy.ckopn(file, _SEGMENT, 0)
-            spiceypy.ckw03(
-                handle, ticks[0], ticks[-1], instrument, reference, True, _SEGMENT, len(ticks), ticks, quaternions,
-                rates, 1, ticks[:1],
+            spiceypy.ckw05(
+                handle, _LAGRANGE_WITH_RATES, WINDOW - 1, ticks[0], ticks[-1], instrument, reference, True, _SEGMENT,
+                ticks, packets, 1.0 / _TICKS, 1, ticks[:1],
             )  # fmt: skip
             spiceypy.dafac(handle, comments)
             spiceypy.ckcls(handle)

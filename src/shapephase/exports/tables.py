@@ -1,4 +1,4 @@
-"""A motion as a data set of xarray, and in files of tables and arrays: CSV, Parquet, NetCDF, MATLAB, HDF5."""
+"""A motion as a data set of xarray, and in files of samples: CSV, Parquet, NetCDF, MATLAB, HDF5, MCAP."""
 
 from __future__ import annotations
 
@@ -18,15 +18,17 @@ from .. import so3
 from ..arguments import check_file_name, check_flag, check_keywords, check_object
 from ..arrays import Array
 from ..dynamics.moving_body import body_and_path
-from ..errors import MissingExtraError, unknown_name
+from ..errors import MissingExtraError, ShapeError, unknown_name
 from ..files import write_whole
 from ..provenance import provenance
 from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
+from ._ros_bag import mcap_bag, whole_nanoseconds
 from ._whole_motion import Fall, checked_times, continued_quaternions, whole_motion
 
 _AXES = ("x", "y", "z")
 _QUATERNION = ("qx", "qy", "qz", "qw")
+_MRP = ("base_mrp_1", "base_mrp_2", "base_mrp_3")
 _TURNS = ("somersault", "tilt", "twist")
 _MATLAB = "MATLAB 5.0 MAT-file, a motion written by shapephase"
 _MATLAB_TEXT = 116  # bytes of text at the beginning of a MATLAB file
@@ -38,6 +40,8 @@ class _Samples(dict[str, tuple[Array, str, str]]):
     joint_names: tuple[str, ...] = ()
     joint_units: tuple[str, ...] = ()
     link_axes: tuple[str, ...] = ()
+    wheels: tuple[str, ...] = ()
+    base_link: str = "base_link"
     attributes: dict[str, Any]
 
 
@@ -46,7 +50,8 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
 
     Variables have their units as attributes. `base_quat_xyzw` (time, quaternion), `base_position` and, where the body
     has joints along a path, `base_velocity` (time, axis) are in inertial axes, `angular_velocity` (time, axis) in base
-    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints. Where somersaults are counted
+    axes; `shapes` and `shape_rates` (time, joint) are those of the independent joints, wheels from an angle of zero at
+    the start; `wheel_speeds` (time, wheel) those of wheels left out of the path. Where somersaults are counted
     (`Motion.counted_axes`), `turns` and `turn_errors` (time, turn) are somersault, tilt and twist.
 
     Parameters
@@ -68,7 +73,7 @@ def motion_dataset(motion: Motion | ForcedMotion, times: ArrayLike | None = None
     [2. 2.] rad/s
     """
     check_keywords(fall, motion_dataset)
-    return _dataset(_samples(motion, times, fall))
+    return _dataset(_samples(motion, times, fall, links=False, mrp=False))
 
 
 def export_motion(
@@ -77,6 +82,7 @@ def export_motion(
     times: ArrayLike | None = None,
     *,
     links: bool = False,
+    mrp: bool = False,
     **fall: ArrayLike,
 ) -> None:
     """Write samples of one motion, base and joints, to a file in the format of its ending.
@@ -84,21 +90,25 @@ def export_motion(
     - `.csv`, `.parquet`: one row a sample; labels of joints contain their units, in Parquet as metadata `unit`.
     - `.nc`: the data set of `Motion.to_xarray` as NetCDF.
     - `.mat`, `.h5`: the same as arrays by their names, with `joint_names`.
+    - `.mcap`: a bag of ROS 2 with the topics /joint_states, /base_pose and /tf (world to the base's link), at times
+      rounded to nanoseconds.
 
-    All hold every digit, and all but `.nc` are read by `read_recorded_motion`. `Motion.save` keeps
-    the whole motion, to be evaluated at any time.
+    All hold every digit, and all but `.nc` are read by `read_recorded_motion`, `.mcap` without the base. `Motion.save`
+    keeps the whole motion, to be evaluated at any time.
 
     Parameters
     ----------
     motion : a single one
     times : (N,) [s]; None: 201 even times
     links : True to write the angular momentum of each link about the centre of mass, too, inertial axes
+    mrp : True to write modified Rodrigues parameters of the base instead of quaternions, see `so3.mrp_from_quat`; not
+        for `.mcap`
     fall : start, velocity, gravity as in `Motion.base_position`
 
     Raises
     ------
     MissingExtraError
-        Without xarray, pyarrow or h5py, for the formats that need them.
+        Without xarray, pyarrow, h5py or rosbags, for the formats that need them.
 
     Examples
     --------
@@ -110,11 +120,16 @@ def export_motion(
     """
     check_file_name(path, "path")
     check_flag(links, "links")
+    check_flag(mrp, "mrp")
     check_keywords(fall, export_motion)
     where = Path(path)
     if where.suffix.lower() not in ENDINGS:
         raise unknown_name(f"ending of the file {where}:", where.suffix, ENDINGS)
-    content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall, links=links))
+    if where.suffix.lower() == ".mcap":
+        if mrp or links:
+            raise ShapeError("mrp, links: messages of ROS have quaternions, and no momenta of links; write a table")
+        times = whole_nanoseconds(checked_times(motion, times), motion.duration)
+    content = _WRITERS[where.suffix.lower()](_samples(motion, times, fall, links=links, mrp=mrp))
     write_whole(where, lambda stream: stream.write(content))
 
 
@@ -126,7 +141,7 @@ def _extra(name: str, needed: str, extra: str = "data") -> Any:
 
 
 def _samples(
-    motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike], *, links: bool = False
+    motion: Motion | ForcedMotion, times: ArrayLike | None, fall: dict[str, ArrayLike], *, links: bool, mrp: bool
 ) -> _Samples:
     at, falling, samples = checked_times(motion, times), Fall.of(**fall), _Samples()
     samples["time"] = at, "", "s"
@@ -139,6 +154,7 @@ def _samples(
     else:
         whole = whole_motion(motion, at, falling)
         samples.joint_names, samples.joint_units = whole.body.joint_names, whole.body.joint_units
+        samples.base_link = whole.body.link_names[0]
         angles = set(samples.joint_units) == {"rad"}
         samples["base_quat_xyzw"] = whole.quat_xyzw, "quaternion", ""
         samples["angular_velocity"] = whole.angular_velocity, "axis", "rad/s"
@@ -146,6 +162,12 @@ def _samples(
         samples["base_velocity"] = whole.world_velocity, "axis", "m/s"
         samples["shapes"] = whole.shapes, "joint", "rad" * angles
         samples["shape_rates"] = whole.shape_rates, "joint", "rad/s" * angles
+        if whole.wheels:
+            columns = [whole.body.joint_index(wheel) for wheel in whole.wheels]
+            samples.wheels = whole.wheels
+            samples["wheel_speeds"] = whole.shape_rates[:, columns], "wheel", "rad/s"
+    if mrp:
+        samples["base_mrp"] = so3.mrp_from_quat(samples.pop("base_quat_xyzw")[0]), "mrp", ""
     if isinstance(motion, Motion) and motion.counted_axes() is not None:
         samples["turns"] = np.stack(motion.somersault_tilt_twist(at), axis=-1), "turn", "rad"
         samples["turn_errors"] = np.stack(motion.somersault_errors(at), axis=-1), "turn", "rad"
@@ -173,6 +195,8 @@ def _dataset(samples: _Samples) -> Any:
         "joint": samples.joint_names,
         "turn": _TURNS,
         "link_axis": samples.link_axes,
+        "wheel": samples.wheels,
+        "mrp": _MRP,
     }
     variables = {
         name: (("time", dimension), values, {"units": unit} if unit else {})
@@ -194,10 +218,12 @@ def _columns(samples: _Samples) -> dict[str, tuple[Array, str]]:
     """Columns of a table by their names, with their units."""
     labels = {
         "base_quat_xyzw": _QUATERNION,
+        "base_mrp": _MRP,
         "angular_velocity": [f"omega_{axis}_rad_s" for axis in _AXES],
         "base_position": [f"base_{axis}_m" for axis in _AXES],
         "base_velocity": [f"base_v{axis}_m_s" for axis in _AXES],
         "shapes": samples.joint_names,
+        "wheel_speeds": [f"{wheel}_speed_rad_s" for wheel in samples.wheels],
         "turns": [f"{turn}_rad" for turn in _TURNS],
         "turn_errors": [f"{turn}_error_rad" for turn in _TURNS],
         "link_momentum": [f"{label}_kg_m2_s" for label in samples.link_axes],
@@ -271,11 +297,18 @@ def _hdf5(samples: _Samples) -> bytes:
     return stream.getvalue()
 
 
+def _mcap(samples: _Samples) -> bytes:
+    arrays = {name: values for name, (values, _, _) in samples.items()}
+    joints = (samples.joint_names, arrays["shapes"], arrays["shape_rates"]) if samples.joint_names else None
+    return mcap_bag(arrays["time"], arrays["base_quat_xyzw"], arrays["base_position"], samples.base_link, joints)
+
+
 _WRITERS: dict[str, Callable[[_Samples], bytes]] = {
     ".csv": _csv,
     ".parquet": _parquet,
     ".nc": _netcdf,
     ".mat": _matlab,
     ".h5": _hdf5,
+    ".mcap": _mcap,
 }
 ENDINGS = tuple(_WRITERS)  # of the files that `export_motion` writes

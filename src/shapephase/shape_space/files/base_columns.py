@@ -25,7 +25,7 @@ from .recording import OFF_UNIT, Recording, checked_quaternions
 ESTIMATE = "estimate"  # axes of the base that a fit determines
 _VELOCITIES = ("base_vx_m_s", "base_vy_m_s", "base_vz_m_s")  # written by `export_motion`
 _COUNTED = tuple(f"{turn}{error}_rad" for turn in ("somersault", "tilt", "twist") for error in ("", "_error"))
-_LINK_MOMENTUM = "_kg_m2_s"  # ends the labels of momenta, which follow from the rest, too
+_FOLLOWS = ("_kg_m2_s", "_speed_rad_s")  # end the labels of momenta and speeds of wheels, which follow, too
 _LEAST_SLIDES = 2  # sliding joints that determine the place of the base; with one, the other directions are fixed
 _SAME_AXES = "x y z"
 _OPENSIM_AXES = "x -z y"  # base axes of URDF (x forward, z up) in OpenSim's (x forward, y up, z right)
@@ -211,7 +211,7 @@ class BaseColumns:
             units = self.recording.table.units
             self.rates[rate.name] = text, rate.unit or units.get(text) or rate_label(text).unit
             return True
-        if target in _VELOCITIES or target in _COUNTED or target.endswith(_LINK_MOMENTUM):
+        if target in _VELOCITIES or target in _COUNTED or target.endswith(_FOLLOWS):
             return True
         known = {*KNOWN, *self.own_names}
         parts = Label(target, None) if target in known else label(target)
@@ -344,7 +344,7 @@ class BaseColumns:
                     turns = so3.matrix_from_euler(values[:, [group.parts.index(axis) for axis in order]], order)
                     record |= {"order": order, "order_said": given.order is not None}
                 else:
-                    turns = so3.exp(_vectors_of_mrps(values) if group.kind == "mrp" else values)
+                    turns = so3.matrix_from_quat(so3.quat_from_mrp(values)) if group.kind == "mrp" else so3.exp(values)
             turns = self.gaps.turned(self._texts(group), turns)
         if "order" not in record and given.order is not None:
             raise TrajectoryError(
@@ -413,17 +413,6 @@ class BaseColumns:
             values = angles_in_rad(self.recording, text, values, unit, self.degrees)
         check_range(self.recording, f"column {text!r}", values, "rad or m")
         return values
-
-
-def _vectors_of_mrps(parameters: Array) -> Array:
-    """Rotation vectors (N, 3) of modified Rodrigues parameters, tan(angle / 4) about the axis, or of their shadows.
-
-    Source: Schaub and Junkins, Analytical Mechanics of Space Systems, section 3.6: the parameters of the body's axes
-    relative to the inertial ones, sigma_B/N, belong to the turn that takes the inertial axes to the body's.
-    """
-    sizes = np.linalg.norm(parameters, axis=-1, keepdims=True)
-    tiny = sizes < np.finfo(np.float64).tiny
-    return parameters * np.where(tiny, 4.0, 4.0 * np.arctan(sizes) / np.where(tiny, 1.0, sizes))
 
 
 def base_names(targets: Mapping[str, str], own: Collection[str]) -> dict[str, str]:
