@@ -44,6 +44,7 @@ class RecordedMotion:
     times : (N,) of the samples, from 0 [s]
     base_attitude : (N, 3, 3) recorded attitude of the base, base axes to the recorder's axes, or None
     base_position : (N, 3) recorded position of the base [m], or None
+    momentum : (3,) about the centre of mass, where the file is one of `Motion.save` [kg m^2/s], or None
     format : the kind of file
     record : what was read and what was done to it, ready for JSON: the file with its hash, samples and times, columns
         and units of joints, where the others rest, what was left out, smoothed, closed, resampled
@@ -64,6 +65,7 @@ class RecordedMotion:
     closing: Closing | None = None
     flight: Flight | None = None
     segments: SegmentMotion | None = None
+    momentum: Array | None = None
 
     __repr__ = short_repr
 
@@ -93,6 +95,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     - `.npz` with `qpos` and `time` or `timestep`, or `.npy` with the argument `timestep`: MuJoCo. With a free joint,
       the first seven columns are x y z and the quaternion w x y z; then one column for each joint, by the array
       `joint_names` or, without it, in the order in which MuJoCo compiles the body's file, or the one of `joint_order`.
+    - `.npz` of `Motion.save`: joints, base and momentum.
     - `.npz` with `q`: Pinocchio's (N, 7 + n), place, quaternion x y z w, joints, or Drake's, quaternion w x y z, place,
       joints, whichever has quaternions of length one; of a bioMod, or as `Q`, the coordinates of biorbd and bioptim,
       those of the root first. These and `qpos` may be transposed, and columns `q_0`, `q[1]`, ... of a table.
@@ -270,6 +273,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         closing=closing,
         flight=flight,
         segments=table.segments,
+        momentum=table.momentum,
     )
 
 
