@@ -13,7 +13,7 @@ from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._spline_basis import SplineBasis
 from .plan_options import Limits
-from .task import Reorientation, limits_of_joints
+from .task import FARTHEST, Reorientation, limits_of_joints
 
 TIMES = 4001  # least number of even times at which efforts are compared with their limits
 LIMIT_SLACK = 1e-7  # share by which the solver may exceed limits
@@ -108,9 +108,10 @@ def motion_shares(task: Reorientation, limits: Limits, motion: Motion, route: Sh
     bends = route.acceleration(times)
     apart = np.diff(times) > _TOGETHER * motion.duration
     jerks = np.diff(bends, axis=0)[apart] / np.diff(times)[apart, None]
-    lower, upper = body.joint_limits.T
+    bounded = np.isfinite(body.joint_limits).any(axis=1) & limits.joint_limits
+    lower, upper = np.clip(body.joint_limits, -FARTHEST, FARTHEST).T
     bounds = {
-        "position": (shapes - 0.5 * (lower + upper), 0.5 * (upper - lower) if limits.joint_limits else None),
+        "position": (shapes - 0.5 * (lower + upper), np.where(bounded, 0.5 * (upper - lower), np.inf)),
         "rate": (rates, limits.rate_limits),
         "acceleration": (bends, limits.acceleration_limits),
         "jerk": (jerks, limits.jerk_limits),

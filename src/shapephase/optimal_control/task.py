@@ -21,7 +21,7 @@ from .plan_options import RATES_AT_ENDS, Goal, Limits, Waypoint, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "effort", "time")
 
-_FARTHEST = 1e3  # [rad or m] from the start, of joints without limits: keeps guesses and solver finite
+FARTHEST = 1e3  # [rad or m] from the start, of joints without limits: keeps guesses and solver finite
 
 _MOST_NAMED = 8  # joints in an error
 _RIGHT_ANGLE_TOLERANCE = 1e-9  # cosine of momentum and twist axis: rounding of user input
@@ -410,7 +410,7 @@ def _coupling(
 
 def _coordinate_limits(coupling: Array, factors: Array, start: Array, bounds: Array) -> tuple[Array, Array]:
     """Lower and upper limits of the coordinates (m,): the tightest of all joints that follow each."""
-    lower, upper = start - _FARTHEST, start + _FARTHEST
+    lower, upper = start - FARTHEST, start + FARTHEST
     for joint in np.flatnonzero(coupling.any(axis=1)):
         column = int(np.argmax(coupling[joint] != 0.0))
         low, high = np.sort(bounds[joint] / factors[joint])

@@ -12,11 +12,10 @@ import numpy as np
 from .. import so3
 from ..arguments import check_object, positive_argument
 from ..arrays import Array
-from ..body.body import Body
 from ..deformation.deformation import articulated
 from ..display import Card, card_html, card_text, numbers
 from ..dynamics.moving_body import needed_body_and_path
-from ..errors import PlanNotFound, ShapeError, WrongObjectError
+from ..errors import PlanNotFound, ShapeError
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import ProgressCallback
 from ..shape_space.shape_path import ShapePath
@@ -91,11 +90,13 @@ class Undo:
     ----------
     backwards : the recording played backwards
     plan : the cheapest motion that was found; None where none was, and playing backwards undoes within the limits
+    status : of the search, as `Plan.status`
     failure : why there is no plan; empty with one
     """
 
     backwards: WayBack
     plan: WayBack | None
+    status: str = "found"
     failure: str = ""
 
     __repr__, _repr_html_ = card_text, card_html
@@ -207,5 +208,5 @@ def undo(
     except PlanNotFound as failure:
         if not (backwards.undoes and backwards.keeps_limits):
             raise
-        return Undo(backwards, None, str(failure))
-    return Undo(backwards, way("plan", plan.path, plan))
+        return Undo(backwards, None, getattr(failure.best, "status", "not found"), str(failure))
+    return Undo(backwards, way("plan", plan.path, plan), plan.status)
