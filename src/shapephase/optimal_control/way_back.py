@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -139,7 +139,8 @@ def undo(
     ----------
     motion : of an articulated body: `reconstruct`, or `motion_from_recording(...).motion`
     duration : of the way back [s]; for cost "time" the longest allowed; None: that of the motion. Needed with momentum
-    cost, joints, symmetric, limits, search, progress, executor : as for `plan_reorientation`
+    cost, joints, symmetric, limits, search, progress, executor : as for `plan_reorientation`; without momentum one more
+        search starts from the motion played backwards
 
     Raises
     ------
@@ -203,8 +204,11 @@ def undo(
         )
 
     backwards = way("backwards", back)
+    chosen = Search() if search is None else search
+    if chosen.guess is None and not tumbling:
+        chosen = replace(chosen, guess=back)
     try:
-        plan = plan_reorientation(body, goal, **options, search=search, progress=progress, executor=executor)
+        plan = plan_reorientation(body, goal, **options, search=chosen, progress=progress, executor=executor)
     except PlanNotFound as failure:
         if not (backwards.undoes and backwards.keeps_limits):
             raise
