@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import shapephase as sp
-from shapephase.errors import InputFileNotFoundError, ResultFileError, ShapeError
+from shapephase.errors import InputFileNotFoundError, ResultFileError, ShapeError, TrajectoryError
+from support.bodies import random_loop as random_path
 from support.independent import BODIES, apart, body_of, random_loop, random_rotation, random_vector
 
 TIMES = np.linspace(0.0, 2.0, 101)
@@ -261,8 +262,35 @@ def test_every_array_is_needed(saved: Path, tmp_path):
         if name == "closure":  # without it the shape is open
             assert not sp.split(sp.load_motion(where)).is_loop
             continue
+        if name in ("time", "shapes", "joint_names", "base_quat_xyzw"):  # those of the recording
+            assert sp.load_motion(where).duration == 2.0
+            with pytest.raises(TrajectoryError, match=r"less\.npz.*path of its joints"):
+                sp.read_recorded_motion(where, body_of("cat_two_halves"))
+            continue
         with pytest.raises(ResultFileError, match=r"less\.npz"):
             sp.load_motion(where)
+
+
+@pytest.mark.parametrize("size", [0.0, 1.0])
+@pytest.mark.parametrize("name", ["cat", "satellite"])
+def test_a_stored_motion_is_a_recording(name: str, size: float, tmp_path):
+    """The joints come back to 1e-9 rad, the momentum exactly, so that the motion is the stored one."""
+    body, where = body_of(name), tmp_path / "motion.npz"
+    path = random_path(body, np.random.default_rng(1), duration=2.0)
+    motion = sp.reconstruct(sp.articulated(body, path), random_vector(1, size * BODIES[name]), random_rotation(1))
+    motion.save(where)
+    recorded = sp.read_recorded_motion(where, body)
+    assert np.abs(recorded.path.shape(TIMES) - path.shape(TIMES)).max() < 2e-9
+    assert apart(recorded.base_attitude[-1], motion.final_attitude) < 1e-14
+    again = sp.motion_from_recording(body, recorded).motion
+    assert np.array_equal(again.momentum, motion.momentum)
+    assert apart(again.final_attitude, motion.final_attitude) < 1e-8
+
+
+def test_a_batch_is_no_recording(tmp_path):
+    batch_motion().save(tmp_path / "batch.npz")
+    with pytest.raises(TrajectoryError, match=r"batch\.npz.*a batch"):
+        sp.read_recorded_motion(tmp_path / "batch.npz", body_of("satellite"))
 
 
 def odd_entry(value):

@@ -61,7 +61,7 @@ def motion_from_recording(
     Parameters
     ----------
     recorded : as `read_recorded_motion` gives it; with its flight="recorded" only what is a flight
-    momentum : (3,) the recorder's axes [kg m^2/s]; None: as the recorded base shows, or zero
+    momentum : (3,) the recorder's axes [kg m^2/s]; None: as the file states or the recorded base shows, or zero
     rate : (3,) angular velocity of the base at one time instead, base axes [rad/s]
     rate_time : that time, since the first sample kept [s]
     attitude : (3, 3) or quaternion (4,) x y z w of the start, beside a momentum or rate; None: as recorded, or the
@@ -99,6 +99,8 @@ def motion_from_recording(
         momentum = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     if momentum is not None and rate is not None:
         raise ShapeError("rate and momentum: either states how the body turns; leave one of them out")
+    if momentum is None and rate is None:
+        momentum = recorded.momentum
     deformation, attitudes = articulated(body, recorded.path), recorded.base_attitude
     given = momentum is not None or rate is not None
     if not given and attitudes is not None and (recorded.flight is not None or turns(attitudes)):

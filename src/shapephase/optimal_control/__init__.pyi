@@ -8,6 +8,7 @@ from .plan import Plan, Start
 from .plan_options import Goal, Limits, Search, Waypoint
 from .planning import plan_reorientation
 from .symbolic import SymbolicBody, symbolic_body
+from .way_back import Undo, WayBack, undo
 
 __all__ = [
     "ConjugateTime",
@@ -20,6 +21,8 @@ __all__ = [
     "Search",
     "Start",
     "SymbolicBody",
+    "Undo",
+    "WayBack",
     "Waypoint",
     "WongFit",
     "conjugate_times",
@@ -30,5 +33,6 @@ __all__ = [
     "plan_reorientation",
     "shoot",
     "symbolic_body",
+    "undo",
     "wong_residual",
 ]

@@ -10,7 +10,9 @@ from .. import so3
 from ..arguments import check_choice, check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..dynamics.torques import joint_torques
 from ..errors import AccuracyNotReached
+from ..reconstruction.reconstruction import Motion
 from ..shape_space.body_path import route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
@@ -57,13 +59,33 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     )
 
 
+def motion_cost(motion: Motion, body: Body, route: ShapePath, cost: str, effort_measure: Array) -> float:
+    """Cost of a motion along a route in the order of the body's joints, by any of the costs of `plan_reorientation`.
+
+    effort_measure : (n,) units of efforts for the cost "effort" [N m or N]
+    """
+    if cost in ("kinetic", "rate"):
+        return path_cost(body, route, cost)
+    if cost == "time":
+        return route.duration
+    times, weights = _gauss(route, 1)
+    if cost == "acceleration":
+        return float(0.5 * weights @ np.sum(route.acceleration(times) ** 2, axis=1))
+    return float(weights @ np.sum((joint_torques(motion, times).torque / effort_measure) ** 2, axis=1))
+
+
 def _quadrature(body: Body, route: ShapePath, cost: str, panels: int) -> float:
     """Integral of the cost's density over the path, with so many panels between two breaks."""
+    times, weights = _gauss(route, panels)
+    return float(weights @ cost_density(body, cost, *route.curve(times)))
+
+
+def _gauss(route: ShapePath, panels: int) -> tuple[Array, Array]:
+    """Times and weights of a quadrature with so many panels between two breaks: (N,), (N,)."""
     inside, weights, _ = gauss_tableau(_NODES)
     ends = np.concatenate([np.linspace(a, b, panels + 1)[:-1] for a, b in pairwise(route.breaks)] + [route.breaks[-1:]])
     steps = np.diff(ends)
-    curve = route.curve((ends[:-1, None] + steps[:, None] * inside).ravel())
-    return float((steps[:, None] * weights).ravel() @ cost_density(body, cost, *curve))
+    return (ends[:-1, None] + steps[:, None] * inside).ravel(), (steps[:, None] * weights).ravel()
 
 
 def cost_density(body: Body, cost: str, shapes: Array, rates: Array) -> Array:

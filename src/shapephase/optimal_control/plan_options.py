@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import number_argument, positive_argument
+from ..arguments import check_object, number_argument, positive_argument
 from ..arrays import Array, finite_array, real_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..letters import value_text
+from ..shape_space.shape_path import ShapePath
 
 RATES_AT_ENDS = ("zero", "periodic", "free")
 LIMIT_UNITS = {
@@ -236,10 +237,11 @@ class Search:
         motion of many strokes has six or more for each, at most this number
     iterations : largest number for each start
     time_limit : longest duration of the search [s], checked after each iteration; None: no limit
+    guess : path of the joints, at any pace, from which one more search starts; None: none
 
     Raises
     ------
-    ShapeError
+    ShapeError, WrongObjectError
         For counts that are not whole numbers, too small or too large.
 
     Examples
@@ -253,11 +255,14 @@ class Search:
     pieces: int | None = None
     iterations: int = 300
     time_limit: float | None = None
+    guess: ShapePath | None = None
 
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check what is given."""
+        if self.guess is not None:
+            check_object(self.guess, "ShapePath", "guess")
         if self.pieces is not None:
             _check_count(self.pieces, "pieces", _LEAST_PIECES, _MOST_PIECES)
         _check_count(self.starts, "starts", 1, _MOST_STARTS)

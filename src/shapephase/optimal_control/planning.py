@@ -28,7 +28,7 @@ from ._polish import GAUSS_NODES
 from ._reachable_turns import check_reachable
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
-from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guesses
+from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guess_of_path, guesses
 from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
 from .plan import Plan
@@ -197,7 +197,7 @@ def _searches(
     near, far = [], []
     for task in tasks:
         beyond = float(np.linalg.norm(task.turn_to_goal())) > _ROUNDS_OF_LOOPS * most_of_a_loop(task)
-        (far if beyond else near).append(task)
+        (far if beyond and search.guess is None else near).append(task)
     if near:
         yield _searched_by_loops(near, search, monitor, executor)
     yield chain.from_iterable(_searched_by_strokes(task, search, monitor) for task in tasks)
@@ -233,6 +233,8 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonito
         if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate") and task.equal_points == 1:
             pieces = _PIECES_OF_FEW
         basis = SplineBasis(int(search.pieces or pieces))
+        guess = None if search.guess is None else guess_of_path(task, basis, search.guess)
+        first.extend([] if guess is None else [(task, basis, guess)])
         for jobs, starts in zip((first, spare), _starting_points(task, basis, search, monitor), strict=True):
             jobs.extend((task, basis, guess) for guess in starts)
     return first, spare

@@ -21,7 +21,7 @@ from .plan_options import RATES_AT_ENDS, Goal, Limits, Waypoint, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "effort", "time")
 
-_FARTHEST = 1e3  # [rad or m] from the start, of joints without limits: keeps guesses and solver finite
+FARTHEST = 1e3  # [rad or m] from the start, of joints without limits: keeps guesses and solver finite
 
 _MOST_NAMED = 8  # joints in an error
 _RIGHT_ANGLE_TOLERANCE = 1e-9  # cosine of momentum and twist axis: rounding of user input
@@ -208,7 +208,7 @@ def reorientation(
     if rates_at_ends == "periodic" and (last is None or not np.array_equal(first, last)):
         raise TrajectoryError("rates_at_ends='periodic' is for loops: leave end out, or give the shape of the start")
     rates, *further = (
-        _joint_limits(body, getattr(within, name), name, body.rate_limits)
+        limits_of_joints(body, getattr(within, name), name, body.rate_limits)
         for name in ("rate_limits", "acceleration_limits", "jerk_limits")
     )
     measure = _effort_measure(body, cost, within)
@@ -335,7 +335,7 @@ def _shape(body: Body, value: ArrayLike, name: str) -> Array:
     return shape
 
 
-def _joint_limits(body: Body, given: ArrayLike | str | None, name: str, stated: Array) -> Array:
+def limits_of_joints(body: Body, given: ArrayLike | str | None, name: str, stated: Array) -> Array:
     """Limit of each joint, infinite where there is none: (n,)."""
     if given is None:
         return np.full(body.n_shape, np.inf)
@@ -353,7 +353,7 @@ def _joint_limits(body: Body, given: ArrayLike | str | None, name: str, stated: 
 def _effort_measure(body: Body, cost: str, limits: Limits) -> Array:
     """Units of efforts, infinite where there are none: (n,)."""
     measured_by = "body" if cost == "effort" and limits.effort_limits is None else limits.effort_limits
-    measure = _joint_limits(body, measured_by, "effort_limits", body.effort_limits)
+    measure = limits_of_joints(body, measured_by, "effort_limits", body.effort_limits)
     if measured_by is not None and not body.chain.follows.is_linear:
         raise ShapeError(
             f"effort_limits: {body.name} has ball joints, or joints that follow others along curves, whose efforts "
@@ -410,7 +410,7 @@ def _coupling(
 
 def _coordinate_limits(coupling: Array, factors: Array, start: Array, bounds: Array) -> tuple[Array, Array]:
     """Lower and upper limits of the coordinates (m,): the tightest of all joints that follow each."""
-    lower, upper = start - _FARTHEST, start + _FARTHEST
+    lower, upper = start - FARTHEST, start + FARTHEST
     for joint in np.flatnonzero(coupling.any(axis=1)):
         column = int(np.argmax(coupling[joint] != 0.0))
         low, high = np.sort(bounds[joint] / factors[joint])

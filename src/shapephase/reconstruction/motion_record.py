@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,14 +16,16 @@ from ..arrays import Array
 from ..chebyshev import nodes_on, values_to_coefficients
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import SampledDescription
-from ..errors import ResultFileError
+from ..errors import ResultFileError, TrajectoryError
 from ..files import no_such_file, npz_arrays, write_whole
 from ..integrator.interpolant import Interpolant
 from ..integrator.many_rotations import GroupedRotations, RotationPart
 from ..integrator.samples import Perturbed
 from ..integrator.stepped import SteppedRotation
 from ..provenance import provenance
+from ..shape_space.shape_path import ShapePath
 from ._stored_arrays import check_deformation, check_rotation, check_rows, check_start
+from .attitude_angles import continuous
 
 if TYPE_CHECKING:
     from .reconstruction import Motion
@@ -75,7 +78,33 @@ def write_motion_record(motion: Motion, path: str | os.PathLike[str]) -> None:
         arrays.update(_steps(solution))
     if deformation.closure is not None:
         arrays["closure"] = deformation.closure
+    arrays.update(_joints(motion))
     write_whole(path, lambda stream: np.savez(stream, **arrays))
+
+
+def joint_path(deformation: Deformation) -> ShapePath | None:
+    """Path of the joints behind a deformation, in any gauge; None without one."""
+    description: Any = deformation.description
+    while hasattr(description, "original"):
+        description = description.original
+    path = getattr(description, "path", None)
+    return path if isinstance(path, ShapePath) else None
+
+
+def _joints(motion: Motion) -> dict[str, Array]:
+    """Joints and base at `ShapePath.sample_times`, for `read_recorded_motion`; empty for batches and without a path."""
+    path = joint_path(motion.deformation)
+    if path is None or motion.batch or not path.n_shape:
+        return {}
+    with suppress(TrajectoryError):  # a path that needs more than a million rows
+        times = path.sample_times
+        return {
+            "time": times,
+            "shapes": path.shape(times),
+            "joint_names": np.array(motion.deformation.made_from["joints"]),
+            "base_quat_xyzw": continuous(motion.quat_xyzw(times)),
+        }
+    return {}
 
 
 def read_motion_record(path: str | os.PathLike[str]) -> dict[str, Any]:

@@ -293,7 +293,7 @@ class Motion(MotionViews):
         return self.stepped.solid_angle(times.ravel()).reshape((*self.batch, *times.shape))[()]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the motion to an NPZ file that `load_motion` reads, without need of the body."""
+        """Write the motion to an NPZ file that `load_motion` reads, and with a body, as its recording, `split`."""
         check_file_name(path, "path")
         write_motion_record(self, path)
 

@@ -33,7 +33,7 @@ class JointOptions:
     to: Annotated[tuple[str, ...], option(several=True)] = ()
     """Posture at the end, as --from (last row of a file), or free; default: that of the start. For example
     `--to free`."""
-    via: Annotated[tuple[str, ...], option(negative_iterable="")] = ()
+    via: Annotated[tuple[str, ...], rare(negative_iterable="")] = ()
     """Posture passed without stopping: JOINT=VALUE with commas between them, with or without @ and a time in s; or
     FILE@TIME. Repeat for more, in this order. For example `--via waist_pitch=60deg@0.4`."""
     joints: Annotated[str | None, option(allow_leading_hyphen=True)] = None

@@ -23,6 +23,9 @@ _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 class GoalOptions:
     """What the motion reaches."""
 
+    undo: Annotated[str | None, option()] = None
+    """Motion to undo, a file or a name: back to its first posture and attitude; with momentum give --duration. For
+    example `--undo drift.npz`."""
     turn: Annotated[tuple[str, ...], option(negative_iterable="", allow_leading_hyphen=True)] = ()
     """Turn at the end: degrees, and an axis of the base at the start (x, y, z, or three numbers with commas between
     them); of several the cheapest. For example `--turn "90 about y"`."""
@@ -31,24 +34,43 @@ class GoalOptions:
     about it is free. For example `--point "dish 0 0 1" "0 1 0"`."""
     somersaults: Annotated[float | None, option()] = None
     """Turns about the momentum; for example `--somersaults 1.5 --momentum 0 40 0`."""
-    half_twists: Annotated[float | None, option()] = None
+    half_twists: Annotated[float | None, rare()] = None
     """Half turns about the base's z axis, with --somersaults; for example `--half-twists 2`."""
     symmetry: Annotated[str | None, rare(allow_leading_hyphen=True)] = None
     """Symmetry of the body, or of the link of --point: how often it repeats about an axis of the base, or an axis alone
     for all turns about it. For example `--symmetry "4 about x"`."""
 
-    def goal(self) -> Goal:
-        """Return the goal. Raises ShapeError for options that exclude or need one another, or not finite numbers."""
+    match: Annotated[str | None, rare()] = None
+    """Posture and attitude of a motion file at its end, or at a time in s behind @; for example `--match pose.npz@2.5`.
+    The body starts with the attitude of --attitude, in the same inertial axes."""
+
+    @property
+    def recorded(self) -> str | None:
+        """Option whose motion is read; None where the goal is given by numbers."""
+        return "--undo" if self.undo is not None else "--match" if self.match is not None else None
+
+    def goal(self) -> Goal | None:
+        """Return the goal, None for that of a recording.
+
+        Raises ShapeError for options that exclude or need one another, or not finite numbers.
+        """
         from ...optimal_control.plan_options import Goal
 
         winding = {"--somersaults": self.somersaults, "--half-twists": self.half_twists}
         windings = [name for name, value in winding.items() if value is not None]
-        goals = {"--turn": self.turn, "--point": self.point}
+        goals = {"--turn": self.turn, "--point": self.point, "--undo": self.undo, "--match": self.match}
         given = [name for name, value in goals.items() if value] + windings[:1]
         if not given:
-            raise ShapeError('give --turn "90 about y", --point AXIS DIRECTION, or --somersaults and --half-twists')
+            raise ShapeError(
+                'give --turn "90 about y", --point AXIS DIRECTION, --undo MOTION, --match FILE, or --somersaults and '
+                "--half-twists"
+            )
         if len(given) > 1:
             raise ShapeError(f"{given[0]} and {given[1]} are two goals; give one of them")
+        if self.recorded and self.symmetry is not None:
+            raise ShapeError(f"--symmetry: goes with --turn or --point, not with {self.recorded}")
+        if self.recorded:
+            return None
         if windings:
             if self.symmetry is not None:
                 raise ShapeError("--symmetry: goes with --turn or --point, none of which is given")

@@ -7,15 +7,23 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
+from cyclopts import Parameter
+
 from ...errors import PlanNotFound, ShapeError
 from ..options import (
     BODY_DEFAULTS,
+    ERROR_DEFAULTS,
     PRINT_DEFAULTS,
+    RARE,
+    RECORDING_DEFAULTS,
+    START_DEFAULTS,
     BodyArgument,
     BodyOptions,
-    GivenMomentum,
+    ErrorOptions,
     PrintOptions,
+    RecordingOptions,
     ReportFile,
+    StartOptions,
     option,
     rare,
 )
@@ -44,11 +52,14 @@ def plan_command(
     /,
     *,
     goal: GoalOptions = _NO_GOAL,
-    momentum: GivenMomentum = (0.0, 0.0, 0.0),
+    start: StartOptions = START_DEFAULTS,
     duration: Annotated[
-        float,
-        option("Duration, in s; with --cost time the longest. For example `--duration 0.8`."),
-    ] = 1.0,
+        float | None,
+        option(
+            "Duration, in s; with --cost time the longest; default: 1, or as long as --undo. For example "
+            "`--duration 0.8`."
+        ),
+    ] = None,
     joints: JointOptions = _ALL_JOINTS,
     cost: Annotated[
         str,
@@ -70,6 +81,8 @@ def plan_command(
         Path | None, option("Write the joint motion to this CSV file; for example `--out plan.csv`.")
     ] = None,
     html: ReportFile = None,
+    recording: Annotated[RecordingOptions, Parameter(name="*", group=RARE)] = RECORDING_DEFAULTS,
+    errors: Annotated[ErrorOptions, Parameter(name="*", group=RARE)] = ERROR_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
@@ -80,57 +93,92 @@ def plan_command(
     """
     from ...body.loading import load_body
     from ...optimal_control.planning import plan_reorientation
+    from ...optimal_control.way_back import undo
     from ...shape_space.files.write import write_shape_path
-    from ..texts.plan_text import plan_comment, plan_data, plan_lines, plan_purpose
+    from ..texts.error_bar_text import error_bar_data, error_bars
+    from ..texts.plan_text import (
+        end_bar_lines,
+        plan_comment,
+        plan_data,
+        plan_lines,
+        plan_purpose,
+        undo_data,
+        undo_lines,
+        undo_purpose,
+    )
+    from ..texts.recording_text import recording_data
+    from .from_motion import check_without_motion, matched, undone
 
     target, settings = goal.goal(), searching.search()
-    if not 0.0 < duration < math.inf:
+    if duration is not None and not 0.0 < duration < math.inf:
         raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
+    if goal.recorded is None:
+        check_without_motion(start, recording)
     aside = any([check_writable(out, "--out", ".csv"), check_writable(html, "--html", ".html")])
     with steps(3 if html else 2) as work:
         work.begin("loading")
         loaded = load_body(body, **floating.loading)
-        arguments, within = joints.arguments(loaded), limits.limits(loaded)
+        within, arguments = limits.limits(loaded), joints.arguments(loaded)
+        flown, ways, plan = None, None, None
+        if goal.undo is not None:
+            flown = undone(body, goal.undo, start, recording, floating, joints, rates_at_ends)
+            loaded = flown.body
+        elif goal.match is not None:
+            target, more = matched(body, goal.match, start, recording, floating)
+            arguments |= more
+        else:
+            arguments["momentum"] = (0.0, 0.0, 0.0) if start.momentum is None else start.momentum
         work.begin("searching")
         with running_search(searching, work) as (search, executor):
+            shared = {
+                "cost": cost,
+                "limits": within,
+                "search": settings,
+                "progress": search.report,
+                "executor": executor,
+            }
             try:
-                plan = plan_reorientation(
-                    loaded,
-                    target,
-                    momentum=momentum,
-                    duration=duration,
-                    cost=cost,
-                    rates_at_ends=rates_at_ends,
-                    limits=within,
-                    search=settings,
-                    progress=search.report,
-                    executor=executor,
-                    **arguments,
-                )
+                if flown is not None:
+                    moving = {name: arguments[name] for name in ("joints", "symmetric")}
+                    ways = undo(flown.motion, duration=duration, **shared, **moving)
+                else:
+                    length = 1.0 if duration is None else duration
+                    plan = plan_reorientation(
+                        loaded, target, duration=length, rates_at_ends=rates_at_ends, **shared, **arguments
+                    )
             except PlanNotFound as failure:
                 if failure.best is None:
                     raise
                 plan = cast("Plan", failure.best)
                 warnings.warn(str(failure), stacklevel=2)
-        write_file(out, lambda file: write_shape_path(plan.path, file, comment=plan_comment(loaded, plan)))
+        shown = plan if ways is None else ways.best
+        bars = error_bars(shown.motion, errors, None)
+        purpose = plan_purpose(plan) if ways is None else undo_purpose(ways)
+        comment = plan_comment(loaded, plan) if ways is None else f"shapephase plan, {loaded.name}: {purpose}"
+        write_file(out, lambda file: write_shape_path(shown.path, file, comment=comment))
         if html is not None:
             work.begin("making the report")
             from ...phases.phases import split
             from ...plots.report_page import report
 
             page = report(
-                plan.motion,
-                split(plan.motion),
-                shape_path=plan.path,
+                shown.motion,
+                split(shown.motion),
+                shape_path=shown.path,
                 title=f"{loaded.name} turns itself",
-                purpose=plan_purpose(plan),
+                purpose=purpose,
                 progress=work.watch,
             )
             write_file(html, page.write)
+    if ways is None:
+        lines, data, code = plan_lines(loaded, plan), plan_data(loaded, plan), _CODES[plan.status]
+    else:
+        lines, data = undo_lines(loaded, flown, ways), undo_data(loaded, ways) | recording_data(flown.recorded)
+        code = ExitCode.DONE if ways.status == "not found" else _CODES[ways.status]
     return Outcome(
-        "\n".join(plan_lines(loaded, plan)),
-        plan_data(loaded, plan),
-        code=_CODES[plan.status],
+        "\n".join([*lines, *end_bar_lines(bars)]),
+        data | error_bar_data(bars),
+        code=code,
         aside=aside,
-        made_from=plan.motion.deformation.made_from,
+        made_from=shown.motion.deformation.made_from,
     )

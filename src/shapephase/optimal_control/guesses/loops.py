@@ -13,6 +13,7 @@ from ...errors import PlanNotFound, ShapePhaseError
 from ...reconstruction.reconstruction import Motion, reconstruct
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import curvature, mechanical_connection
+from ...shape_space.shape_path import ShapePath
 from .._spline_basis import SplineBasis
 from .._via_points import bent_through, nearest_places
 from ..symbolic import symbolic_body
@@ -178,6 +179,15 @@ def guess_of(task: Reorientation, basis: SplineBasis, curve: Array) -> Guess | N
     at = nearest_places(task, curve, PLACES)
     curve = bent_through(task, curve, PLACES, at)
     return guess_of_control(task, basis, basis.fitted(np.clip(curve, task.lower, task.upper), PLACES), at)
+
+
+def guess_of_path(task: Reorientation, basis: SplineBasis, path: ShapePath) -> Guess | None:
+    """Return the guess of a path, at the pace of the task; None as `guess_of`, and for a body with ball joints."""
+    route = route_along(task.body, path)
+    if task.body.ball_joints:
+        return None
+    away = route.shape(PLACES * route.duration) - task.offset
+    return guess_of(task, basis, np.linalg.lstsq(task.coupling, away.T, rcond=None)[0].T)
 
 
 def guess_of_control(

@@ -46,6 +46,7 @@ class RecordedMotion:
     base_attitude : (N, 3, 3) recorded attitude of the base, base axes to the recorder's axes, or None
     base_position : (N, 3) recorded position of the base [m], or None
     base_rates : (N, 3) recorded angular velocity of the base, base axes [rad/s], or None
+    momentum : (3,) about the centre of mass, where the file is one of `Motion.save` [kg m^2/s], or None
     format : the kind of file
     record : what was read and what was done to it, ready for JSON: the file with its hash, samples and times, columns
         and units of joints, where the others rest, what was left out, smoothed, closed, resampled
@@ -69,6 +70,7 @@ class RecordedMotion:
     segments: SegmentMotion | None = None
     wheel_speeds: Mapping[str, ShapePath] = field(default_factory=dict)
     base_rates: Array | None = None
+    momentum: Array | None = None
 
     __repr__ = short_repr
 
@@ -98,6 +100,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     - `.npz` with `qpos` and `time` or `timestep`, or `.npy` with the argument `timestep`: MuJoCo. With a free joint,
       the first seven columns are x y z and the quaternion w x y z; then one column for each joint, by the array
       `joint_names` or, without it, in the order in which MuJoCo compiles the body's file, or the one of `joint_order`.
+    - `.npz` of `Motion.save`: joints, base and momentum.
     - `.npz` with `q`: Pinocchio's (N, 7 + n), place, quaternion x y z w, joints, or Drake's, quaternion w x y z, place,
       joints, whichever has quaternions of length one; of a bioMod, or as `Q`, the coordinates of biorbd and bioptim,
       those of the root first. These and `qpos` may be transposed, and columns `q_0`, `q[1]`, ... of a table.
@@ -292,6 +295,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         flight=flight,
         segments=table.segments,
         wheel_speeds=wheel_speeds,
+        momentum=table.momentum,
     )
 
 

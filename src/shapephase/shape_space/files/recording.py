@@ -94,6 +94,7 @@ class Table:
     faults : label -> sample -> entry that is no number, for the first of them
     base_quat_xyzw : (N, 4) as recorded, or None
     base_position : (N, 3) [m] or None
+    momentum : (3,) that the file states [kg m^2/s], or None
     up : the axis that the kind of file has upwards; None: it has none
     unread : name -> kind, of arrays and other entries of the file that are no columns
     left_out : label -> why it was left out, of columns without motion
@@ -119,6 +120,7 @@ class Table:
     faults: Mapping[str, Mapping[int, str]] = field(default_factory=dict)
     base_quat_xyzw: Array | None = None
     base_position: Array | None = None
+    momentum: Array | None = None
     up: str | None = None
     unread: Mapping[str, str] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)

@@ -25,6 +25,7 @@ _SCALAR_FIRST = [1, 2, 3, 0]  # places of x, y, z, w in a quaternion w x y z
 # TUM RGB-D benchmark: pose behind the time, in trajectories of visual odometry
 _TUM = ("base_x", "base_y", "base_z", "base_qx", "base_qy", "base_qz", "base_qw")
 _FREE = ("base_x", "base_y", "base_z", "base_qw", "base_qx", "base_qy", "base_qz")  # MuJoCo's free joint
+_STORED = ("time", "shapes", "joint_names", "base_quat_xyzw")  # joints and base of a file of `Motion.save`
 _READ = (  # arrays with a meaning
     *("time", "timestep", "fps", "shapes", "qpos", "qvel", "q", "v", "qdot", "Q", "Qdot", "joint_names", "provenance"),
     *("joint_pos", "joint_vel", "body_pos_w", "body_quat_w", "body_ang_vel_w"),
@@ -60,8 +61,18 @@ def arrays_motion(
     With `qpos`, `q` or `Q` it is a simulator's or an optimiser's (see `floating_motion`), with `joint_pos` Isaac
     Lab's: the base is the first of `body_pos_w` (N, b, 3) and `body_quat_w` (N, b, 4), and unnamed orders, of joints
     and of a quaternion's numbers, are those in which the links lie at `body_pos_w` and turn as `body_ang_vel_w`. With
-    `shapes` there are `time` and `joint_names`, too; else vectors by name are the joints.
+    `shapes` there are `time` and `joint_names`, too; else vectors by name are the joints. In a file of `Motion.save`
+    these stand beside what else it holds, and its momentum.
     """
+    momentum = None
+    if "spatial_momentum" in arrays:
+        if not set(_STORED) <= set(arrays):
+            raise TrajectoryError(
+                f"{where}: this motion is stored without the path of its joints: it is a batch, no path of a body's "
+                "joints, or of an earlier version; store it anew (shapephase split BODY MOTION --out FILE)"
+            )
+        momentum = _array(arrays["spatial_momentum"], where, "spatial_momentum", (3,), "kg m^2/s")
+        arrays = {name: arrays[name] for name in _STORED}
     try:
         both = {"qpos", "q", "Q"} & set(arrays)
         if "shapes" in arrays and both:
@@ -87,7 +98,7 @@ def arrays_motion(
     }
     table = arrays_table(where, kind, entries, None)
     # Our own files are in radians and metres; other people's by name may be in degrees.
-    return replace(table, by_format=kind == _NPZ and "shapes" in arrays), timestep
+    return replace(table, by_format=kind == _NPZ and "shapes" in arrays, momentum=momentum), timestep
 
 
 def of_numbered_columns(table: Table, body: Body, order: str | None) -> Table:
