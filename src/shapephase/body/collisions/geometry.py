@@ -120,6 +120,12 @@ class CollisionGeometry:
         return np.array([_sphere(solid)[1] for solid in self.solids])
 
     @cached_property
+    def extents(self) -> Array:
+        """Largest distances of points of the solids from the origins of their frames: (s,) [m]."""
+        middles = [pose[:3, :3] @ _sphere(solid)[0] + pose[:3, 3] for solid, pose in zip(self.solids, self.poses)]
+        return np.linalg.norm(middles, axis=1) + self.radii
+
+    @cached_property
     def poses(self) -> Array:
         """Poses of the solids in the axes of their frames: (s, 4, 4)."""
         return np.array([self.chain.link_frames[solid.link][1] @ solid.pose for solid in self.solids])
