@@ -86,6 +86,7 @@ from .rigid_body.euler_top import EulerTop
 from .rigid_body.gyrostat import Gyrostat
 from .segments.limb_contributions import Contributions, contributions
 from .segments.momentum import SegmentMomentum, segment_momentum
+from .shape_space.closest_approach import clearance
 from .shape_space.connection import (
     HorizontalLift,
     curvature,
@@ -168,6 +169,7 @@ __all__ = [
     "body",
     "body_summary",
     "bounds",
+    "clearance",
     "closed_orbits",
     "compile_steps",
     "continued_orbits",

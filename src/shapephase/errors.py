@@ -95,6 +95,13 @@ class ModelFileError(ShapePhaseError, ValueError):
     """
 
 
+class NoCollisionGeometryError(ModelFileError):
+    """A body has no shapes to compute the distances of its links with.
+
+    Remedy: load it from a URDF or MJCF file with <collision> or <visual> elements.
+    """
+
+
 class UnphysicalInertiaError(ModelFileError):
     """A link has a mass or an inertia that no body can have.
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
+from typing import Annotated
 
-from ..errors import ImplausibleBodyWarning, TrajectoryWarning
+from ..errors import ImplausibleBodyWarning, ShapeError, TrajectoryWarning
 from .options import (
     BODY_DEFAULTS,
     PRINT_DEFAULTS,
@@ -14,8 +16,10 @@ from .options import (
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    option,
+    rare,
 )
-from .outcome import Outcome
+from .outcome import ExitCode, Outcome
 
 
 def check_command(
@@ -23,18 +27,37 @@ def check_command(
     motion: MotionArgument | None = None,
     /,
     *,
+    clearance: Annotated[
+        str | None,
+        option(
+            "List pairs of links that come closer than this along the motion, in m or with a unit; the exit code is "
+            "then 4. Shapes are those of <collision>, else those that are drawn; meshes count as their convex hulls. "
+            "For example `--clearance 0.02` or `--clearance 2cm`."
+        ),
+    ] = None,
+    srdf: Annotated[
+        Path | None,
+        rare("Pairs of links that --clearance leaves out: an SRDF file; for example `--srdf robot.srdf`."),
+    ] = None,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
 ) -> Outcome:
     """Check a body, and a joint motion for it: what was read, what looks unlikely, and whether it can be used."""
+    from ..body.collisions.geometry import collision_geometry
     from ..body.plausibility import implausible, person_height
+    from ..shape_space.closest_approach import clearance as clearance_along
     from ..shape_space.summaries import body_summary, path_summary
+    from .joint_values import value_in_si
     from .motion import body_argument, joint_motion
+    from .texts.clearance_text import clearance_data, clearance_lines, nearest_pair
     from .texts.recording_text import flight_lines, flights_in, recording_data, recording_lines
     from .texts.result_text import body_lines, path_data, path_lines, plain, record_data, too_fast
 
-    loaded = body_argument(body, floating)
+    if motion is None and clearance is not None:
+        raise ShapeError("--clearance: a motion is needed, as in `shapephase check cat cat_righting --clearance 0.02`")
+    distance = None if clearance is None else value_in_si(clearance, "m", "--clearance")
+    code, loaded = ExitCode.DONE, body_argument(body, floating)
     for doubt in implausible(loaded):
         warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=2)
     summary = body_summary(loaded)
@@ -54,5 +77,13 @@ def check_command(
             flights = flights_in(loaded, recorded, recording)
             lines += flight_lines(flights, recorded)
             data["motion"]["flights"] = flights
+        if distance is not None:
+            geometry = collision_geometry(loaded, srdf=srdf)
+            result = clearance_along(loaded, path, below=distance, geometry=geometry)
+            lines += ["", *clearance_lines(result, distance)]
+            data["motion"]["clearance"] = clearance_data(result, distance)
+            if result.approaches:
+                code = ExitCode.TRAJECTORY
+                warnings.warn(nearest_pair(result), TrajectoryWarning, stacklevel=2)
     made_from = {} if motion is None else {"joints": list(loaded.joint_names)}
-    return Outcome("\n".join(lines), data, with_verdict=True, made_from=made_from)
+    return Outcome("\n".join(lines), data, with_verdict=True, code=code, made_from=made_from)

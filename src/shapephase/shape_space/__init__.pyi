@@ -1,4 +1,5 @@
 from . import files, reach
+from .closest_approach import Clearance, ClosestApproach, clearance
 from .connection import (
     HorizontalLift,
     connection_slopes,
@@ -16,6 +17,8 @@ from .summaries import BodySummary, JointSummary, PartSummary, PathSummary, body
 
 __all__ = [
     "BodySummary",
+    "Clearance",
+    "ClosestApproach",
     "FinalAttitudes",
     "HorizontalLift",
     "JointSummary",
@@ -24,6 +27,7 @@ __all__ = [
     "PathSummary",
     "ShapePath",
     "body_summary",
+    "clearance",
     "connection_slopes",
     "curvature",
     "curvature_on_plane",

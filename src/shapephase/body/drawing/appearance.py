@@ -61,9 +61,19 @@ def drawn_shapes(body: Body) -> tuple[list[Visual], list[str], set[str]]:
     reading = _Drawing(body)
     root = reading.root()
     if root is not None:
-        reading.read_mjcf() if root.tag == "mujoco" else reading.read_urdf(root)
+        reading.read(root)
     shapes, simplified = within_limits(reading.shapes)
     return shapes, reading.doubts + simplified, reading.incomplete
+
+
+def collision_shapes(body: Body) -> tuple[list[Visual], list[str], set[str]]:
+    """Return `drawn_shapes` of what collides, unsimplified: <collision> or colliding geoms, else what is drawn."""
+    reading = _Drawing(body)
+    root = reading.root()
+    for collision in (True, False):
+        if root is not None and not reading.shapes and not reading.incomplete:
+            reading.read(root, collision=collision)
+    return reading.shapes, reading.doubts, reading.incomplete
 
 
 class _Drawing:
@@ -97,8 +107,15 @@ class _Drawing:
             self.doubts.append(str(error))
             return None
 
-    def read_urdf(self, root: Node) -> None:
-        """Add the <visual> elements; a faulty one is left out and reported."""
+    def read(self, root: Node, *, collision: bool = False) -> None:
+        """Add the shapes of a URDF or MJCF file that are drawn, or those that collide."""
+        if root.tag == "mujoco":
+            self._read_mjcf(collision=collision)
+        else:
+            self._read_urdf(root, "collision" if collision else "visual")
+
+    def _read_urdf(self, root: Node, tag: str) -> None:
+        """Add the elements of this tag; a faulty one is left out and reported."""
         named = [(material, material.get("name")) for node in root.walk() for material in node.all("material")]
         materials = {name: material for material, name in named if name and material.all("color")}
         for link in root.all("link"):
@@ -106,7 +123,7 @@ class _Drawing:
             if link.get("name") not in self.links:
                 continue
             link.own(f"link {link.name()!r}")
-            for node in link.all("visual"):
+            for node in link.all(tag):
                 try:
                     self.shapes += self._urdf_shape(link.name(), node, materials)
                 except ModelFileError as error:
@@ -136,11 +153,12 @@ class _Drawing:
             raise shape.fault(f"<{kind}> of size {sizes}; sizes are above zero")
         return [Visual(name, kind, tuple(sizes), pose, colour or PLAIN)]
 
-    def read_mjcf(self) -> None:
-        """Add the geoms that MuJoCo's viewer would show; for a link without any of those, its other geoms."""
+    def _read_mjcf(self, *, collision: bool) -> None:
+        """Add the geoms that MuJoCo's viewer would show, for a link without any of those its others; or all that
+        collide."""
         assert self.body.file is not None
         try:
-            drawn = engine_shapes(self.body.file, MJCF)
+            drawn = engine_shapes(self.body.file, MJCF, collision=collision)
         except (ModelFileError, MissingExtraError) as error:
             self.doubts.append(str(error))
             return

@@ -63,7 +63,7 @@ def _with_fewer_faces(shapes: list[Visual], most: int) -> tuple[list[Visual], li
         # Visuals of one file share their arrays.
         if id(shape.vertices) not in hulls:
             hulls[id(shape.vertices)] = hull(outermost(shape.vertices))
-        result[place] = _as_hull(shape, shape.vertices, hulls[id(shape.vertices)])
+        result[place] = as_hull(shape, shape.vertices, hulls[id(shape.vertices)])
         left += len(result[place].faces) - int(counts[place])
         simplified += 1
     sentence = (
@@ -84,7 +84,7 @@ def _with_fewer_shapes(shapes: list[Visual], most: int) -> tuple[list[Visual], l
         if left <= most or len(own) == 1:
             break
         corners = np.concatenate([shape.corners @ shape.pose[:3, :3].T + shape.pose[:3, 3] for shape in own])
-        by_link[link] = [_as_hull(replace(own[0], pose=np.eye(4), mesh=None), corners, hull(outermost(corners)))]
+        by_link[link] = [as_hull(replace(own[0], pose=np.eye(4), mesh=None), corners, hull(outermost(corners)))]
         left += 1 - len(own)
         simplified.append(link)
     sentence = (
@@ -94,7 +94,7 @@ def _with_fewer_shapes(shapes: list[Visual], most: int) -> tuple[list[Visual], l
     return [shape for own in by_link.values() for shape in own], [sentence]
 
 
-def _as_hull(shape: Visual, points: Array, convex: tuple[Array, Array] | None) -> Visual:
+def as_hull(shape: Visual, points: Array, convex: tuple[Array, Array] | None) -> Visual:
     """The shape replaced by the hull of points in its axes; by a thin box where they lie in a plane."""
     if convex is not None:
         return replace(shape, kind="mesh", dimensions=(1.0, 1.0, 1.0), vertices=convex[0], faces=convex[1])

@@ -41,9 +41,9 @@ def expanded(path: Path, packages: Sequence[str], arguments: Mapping[str, str]) 
     return xml_tree(_result(path, XACRO, TEXT, options).encode(), f"{path} (expanded)")
 
 
-def engine_shapes(path: Path, name: str) -> dict[str, Any]:
-    """Shapes to draw of such a file, as plain numbers. Raises what `engine_tree` raises."""
-    return _result(path, name, SHAPES)
+def engine_shapes(path: Path, name: str, *, collision: bool) -> dict[str, Any]:
+    """Shapes of such a file to draw, or that collide, as plain numbers. Raises what `engine_tree` raises."""
+    return _result(path, name, SHAPES, json.dumps({"collision": collision}))
 
 
 def _result(path: Path, name: str, *words: str) -> Any:

@@ -1,4 +1,4 @@
-"""Geoms and meshes that MuJoCo's own viewer would show of a body, as plain numbers."""
+"""Geoms and meshes of a body that MuJoCo's own viewer would show, or that collide, as plain numbers."""
 
 from __future__ import annotations
 
@@ -25,14 +25,15 @@ _SHOWN_GROUPS = (0, 1, 2)  # of geoms in MuJoCo's viewer; the others are for col
 _GREY = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)  # of a geom without a colour: its material's counts
 
 
-def shapes_of(path: str) -> dict[str, Any]:
-    """The geoms to be drawn, and the meshes that they name by number.
+def shapes_of(path: str, *, collision: bool) -> dict[str, Any]:
+    """The geoms to be drawn, or those that collide, and the meshes that they name by number.
 
     Vertices are float32 [m] and faces int32, each in Base64.
     """
-    compiled = compiled_model(path, drawn=True)
+    compiled = compiled_model(path, drawn=not collision)
     model = compiled.model
-    drawn = [geom for body in range(1, model.nbody) for geom in _drawn(compiled, body)]
+    chosen = _colliding if collision else _drawn
+    drawn = [geom for body in range(1, model.nbody) for geom in chosen(compiled, body)]
     meshes = sorted({int(model.geom_dataid[geom]) for geom in drawn if _kind(model, geom) == "mesh"})
     return {
         "shapes": [_shape(compiled, geom) for geom in drawn],
@@ -43,12 +44,21 @@ def shapes_of(path: str) -> dict[str, Any]:
 
 def _drawn(compiled: Compiled, body: int) -> list[int]:
     """The geoms of a body that the viewer shows, or all if it shows none."""
+    solid = _solid(compiled, body)
+    return [geom for geom in solid if int(compiled.model.geom_group[geom]) in _SHOWN_GROUPS] or solid
+
+
+def _colliding(compiled: Compiled, body: int) -> list[int]:
+    model = compiled.model
+    return [geom for geom in _solid(compiled, body) if model.geom_contype[geom] or model.geom_conaffinity[geom]]
+
+
+def _solid(compiled: Compiled, body: int) -> list[int]:
+    """The geoms of a body whose shape is known."""
     model = compiled.model
     first = int(model.body_geomadr[body])
     geoms = range(first, first + int(model.body_geomnum[body]))
-    known = (geom for geom in geoms if geom not in compiled.shapeless)
-    solid = [geom for geom in known if int(model.geom_type[geom]) in _KINDS]
-    return [geom for geom in solid if int(model.geom_group[geom]) in _SHOWN_GROUPS] or solid
+    return [geom for geom in geoms if geom not in compiled.shapeless and int(model.geom_type[geom]) in _KINDS]
 
 
 def _kind(model: Any, geom: int) -> str:

@@ -16,7 +16,7 @@ from .formats import FORMATS, Format
 
 BODY = "body"  # request for links and joints
 TEXT = "text"  # request for the URDF that a file expands to
-SHAPES = "shapes"  # request for what can be drawn
+SHAPES = "shapes"  # request for what can be drawn, or collides
 NO_MEMORY = 3  # exit code: out of memory
 MISSING = 4  # exit code: the engine is not installed
 REFUSED = 5  # exit code: the file is unusable, for the reason on standard output
@@ -26,7 +26,7 @@ MEMORY = 2**30  # [bytes] beyond the imports; the largest public models take a t
 def read_in_this_process() -> None:
     """Read the file of the first argument in the format of the second, and end the process.
 
-    The third is `BODY` or `TEXT`, followed by options as JSON, or it is `SHAPES`.
+    The third is `BODY`, `TEXT` or `SHAPES`, followed by options as JSON.
     """
     path, name, what, *options = sys.argv[1:]
     known = FORMATS[name]
@@ -53,8 +53,8 @@ def _write(path: str, known: Format, what: str, options: list[str], output: Text
         if what == BODY:
             text = reader.chain_of(path, **json.loads(*options)).to_json()
         else:
-            result = reader.text_of(path, **json.loads(*options)) if what == TEXT else reader.shapes_of(path)
-            text = json.dumps(result)
+            result = reader.text_of if what == TEXT else reader.shapes_of
+            text = json.dumps(result(path, **json.loads(*options)))
     except MemoryError:
         return NO_MEMORY
     except UnusableModelError as error:

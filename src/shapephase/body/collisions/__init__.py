@@ -1,0 +1,1 @@
+"""Collision geometry of a body's links, and the distances between them."""
