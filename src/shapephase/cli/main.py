@@ -26,6 +26,7 @@ from .check import check_command
 from .contributions import contributions_command
 from .ctrl_c import forget, was_pressed
 from .installation import compile_command, doctor_command, robots_command
+from .loop import loop_command
 from .momentum import momentum_command
 from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
@@ -73,6 +74,7 @@ for _name, _command in {
     "plan": plan_command,
     "conjugate": conjugate_command,
     "reach": reach_command,
+    "loop": loop_command,
     "rigid": rigid_command,
     "check": check_command,
     "audit": audit_command,

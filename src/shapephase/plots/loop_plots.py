@@ -41,8 +41,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 PRINCIPAL = "principal"
+HEIGHT = 5.2  # [in] of a figure one column wide whose map is about square
 _AT_REST = 1e-9  # [rad or m] range of a joint that does not move
-_PANELS = 64  # of a loop, on which the flux is integrated by Gauss: 1e-9 for the motions of the library
+_PANELS = 128  # of a loop, on which the flux is integrated by Gauss: 1e-7 rad for the motions of the library
 _RULES = ((3, 8), (4, 12))  # Gauss nodes along the loop and the rays; the difference of both is the error
 _ARROWS = 11  # of the vector field along each axis
 _POSTURE = 0.45  # [in] height of a posture
@@ -164,14 +165,19 @@ def plot_loop(
     >>> cat, loop = sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, 0.5)
     >>> ax = sp.plots.plot_loop(sp.plots.column_axes(4.4), cat, loop)
     >>> print(ax.get_legend().get_title().get_text())
-    one round turns the body about x by −65.3°
+    one round turns the body about x by −63.3°
     = −64.4° flux in this plane (cone of all joints −64.4°)
-    +0.0° by the other joints, −1.0° by the order of the turns
+    +0.0° by the other joints, +1.1° by the order of the turns
     """
     flux = loop_flux(body, path, joints)
     count = whole_argument(postures, "postures", 0)
     draw_loop_flux(ax, body, path, flux, axis, count)
     return ax
+
+
+def loop_axes(flux: LoopFlux) -> Axes:
+    """Return axes of a new figure for a loop whose flux is known."""
+    return style.column_axes(HEIGHT, projection=None if len(flux.joints) == 2 else "3d")
 
 
 def draw_loop_flux(

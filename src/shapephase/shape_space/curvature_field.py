@@ -262,9 +262,7 @@ class _Cone:
         flat = (len(times) * len(along), self._body.n_shape)
         places, outward, sideways = (part.reshape(flat) for part in (shapes, directions, changes))
         try:
-            field, turning, scale = curvature_along(
-                self._body, places, outward, sideways, np.repeat(times, len(along))
-            )
+            field, turning, scale = curvature_along(self._body, places, outward, sideways, np.repeat(times, len(along)))
         except SingularInertiaError as error:
             raise SingularInertiaError(
                 f"on the ray from the centre to the shape of that time: {error}; or choose another centre"
