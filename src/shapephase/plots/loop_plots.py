@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 PRINCIPAL = "principal"
 HEIGHT = 5.2  # [in] of a figure one column wide whose map is about square
 _AT_REST = 1e-9  # [rad or m] range of a joint that does not move
+_NO_TURN = 1e-6  # [rad] turns of less have no axis: whole turns are then about that of the flux
 _PANELS = 128  # of a loop, on which the flux is integrated by Gauss: 1e-7 rad for the motions of the library
 _RULES = ((3, 8), (4, 12))  # Gauss nodes along the loop and the rays; the difference of both is the error
 _ARROWS = 11  # of the vector field along each axis
@@ -117,7 +118,7 @@ def loop_flux(body: Body, path: ShapePath, joints: Sequence[str | int] | str | N
     names, units, directions = _drawn_axes(body, shapes, centre, joints)
     whole, plane = (_flux(body, route, edges, centre, onto) for onto in (None, directions))
     vector = so3.log(lift.end)
-    axis = so3.normalised(vector) if vector.any() else vector
+    axis = so3.normalised(vector if np.linalg.norm(vector) > _NO_TURN else whole[0] + _NO_TURN)
     vector = vector + 2.0 * np.pi * np.round((whole[0] - vector) @ axis / (2.0 * np.pi)) * axis
     error = max(whole[1], plane[1], lift.error_estimate)
     points = (shapes - centre * (units[0] == "principal")) @ directions.T
