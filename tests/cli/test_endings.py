@@ -41,7 +41,7 @@ COMMANDS = {
     "momentum": ("momentum", "cat", "cat_righting"),
 }
 ALL_COMMANDS = (
-    *(*COMMANDS, "plan", "view", "explore", "plot", "compile", "reach", "audit", "contributions", "export"),
+    *(*COMMANDS, "plan", "view", "explore", "plot", "compile", "reach", "loop", "audit", "contributions", "export"),
     *("sweep", "sweep status", "sweep export", "plot sweep"),
 )
 

@@ -711,7 +711,7 @@ def test_the_plane_of_two_joints(satellite):
     # The sweep's own formula: 0.9 (1 - cos) m against 1.2 sin rad.
     assert ((loop[:, 0] / 0.9 - 1.0) ** 2 + (loop[:, 1] / 1.2) ** 2) == pytest.approx(np.ones(len(loop)), abs=1e-12)
     assert marked(ax, "*", GREEN) == pytest.approx(np.zeros((1, 2)), abs=1e-12)
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("boom_extension [m]", "arm_1 [rad]")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("boom_extension [m]", "arm_1 [deg]")
     heads = [text for text in ax.texts if hasattr(text, "arrow_patch")]
     assert len(heads) == 4
     for head in heads:
@@ -742,9 +742,9 @@ def test_the_curvature_is_that_of_small_loops(cat):
         square = np.array([-u - v, u - v, u + v, -u + v, -u - v]) / 2.0 + centre
         path = sp.ShapePath.waypoints(np.arange(5.0), square, joint_names=cat.joint_names)
         turn = so3.log(sp.holonomy(cat, path, tolerance=1e-12))
-        assert -turn[0] / side**2 == pytest.approx(values[j, i], rel=1e-2, abs=2e-3)
-    assert "x component\n[rad/rad²]" in ax.figure.axes[1].get_ylabel()
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("waist_pitch [rad]", "waist_yaw [rad]")
+        assert -np.degrees(turn[0]) / side**2 == pytest.approx(values[j, i], rel=1e-2, abs=0.1)
+    assert "x component\n[deg/rad²]" in ax.figure.axes[1].get_ylabel()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("waist_pitch [deg]", "waist_yaw [deg]")
 
 
 def test_contours_of_the_curvature_tell_its_sign_without_colours(cat):
@@ -780,9 +780,9 @@ def test_small_curvatures_have_their_power_of_ten_in_the_unit(satellite):
     grid = np.asarray(ax.collections[0].get_coordinates())
     field = sp.curvature_on_plane(satellite, joints, grid[0, :, 0], grid[:, 0, 1])
     values = np.asarray(ax.collections[0].get_array()).reshape(grid.shape[:2])
-    assert values == pytest.approx((field[..., 0] + field[..., 2]).T / np.sqrt(2.0) * 1e5, abs=1e-9)
+    assert values == pytest.approx((field[..., 0] + field[..., 2]).T / np.sqrt(2.0) * np.degrees(1e3), abs=1e-9)
     label = ax.figure.axes[1].get_ylabel()
-    assert label == "curvature, along (0.71, 0, 0.71)\n[10⁻⁵ rad/(m rad)]"
+    assert label == "curvature, along (0.71, 0, 0.71)\n[10⁻³ deg/(m rad)]"
     limits = satellite.joint_limits[satellite.joint_index("boom_extension")]
     assert ax.get_xlim() == pytest.approx(tuple(limits))
 

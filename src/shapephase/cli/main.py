@@ -27,6 +27,7 @@ from .contributions import contributions_command
 from .ctrl_c import forget, was_pressed
 from .export import export_command
 from .installation import compile_command, doctor_command, robots_command
+from .loop import loop_command
 from .momentum import momentum_command
 from .options import HELP_ALL, SHOWS_ALL
 from .orbits import orbits_command
@@ -75,6 +76,7 @@ for _name, _command in {
     "plan": plan_command,
     "conjugate": conjugate_command,
     "reach": reach_command,
+    "loop": loop_command,
     "rigid": rigid_command,
     "check": check_command,
     "audit": audit_command,

@@ -2,6 +2,7 @@ from ._moving_scene import MovingScene, moving_scene
 from .contribution_plots import contributions_figure, plot_direct_shares, plot_shares
 from .explorer import explore
 from .geodesic_plots import plot_caustic, plot_conjugate_locus, plot_ellipsoid_locus
+from .loop_plots import plot_loop
 from .momentum_plots import plot_fixed_points, plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
 from .named_figures import FIGURES, Figure, write_figure
@@ -44,6 +45,7 @@ __all__ = [
     "plot_herpolhode",
     "plot_inertia",
     "plot_internal_momentum",
+    "plot_loop",
     "plot_momentum_curve",
     "plot_phases",
     "plot_polhodes",

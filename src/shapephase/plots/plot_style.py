@@ -37,6 +37,9 @@ ORANGE = "#E69F00"
 GREEN = "#009E73"
 PURPLE = "#CC79A7"
 GREY = "#999999"  # not of that palette: background
+# Ends of the colours of a curvature in figures and pages; lines and text on them can be read.
+POSITIVE_CURVATURE = "#4C8CC0"
+NEGATIVE_CURVATURE = "#D08838"
 SMALL = 8  # [pt] readable in a figure one column wide
 COLUMN = 3.4  # [in] one column of most journals
 SERIES: tuple[dict[str, Any], ...] = (
@@ -285,6 +288,18 @@ def degrees_first(ax: Any, label: str, *, radians: bool = True) -> None:
     else:
         ax.tick_params(axis="y", left=False, labelleft=False)
         ax.set_ylabel("")
+
+
+def ticks_in_degrees(axis: Any) -> None:
+    """Put ticks of an axis whose data are in radians at round numbers of degrees."""
+    from matplotlib.ticker import AutoLocator
+
+    class DegreeLocator(AutoLocator):
+        def tick_values(self, vmin: float, vmax: float) -> Array:
+            return np.radians(super().tick_values(np.degrees(vmin), np.degrees(vmax)))
+
+    axis.set_major_locator(DegreeLocator())
+    axis.set_major_formatter(lambda value, _: f"{round(np.degrees(value), 6):g}".replace("-", "−"))
 
 
 def inset_where_free(ax: Any, extent: tuple[float, float], room: tuple[float, float, float]) -> Any | None:

@@ -11,23 +11,20 @@ from numpy.typing import ArrayLike
 from ..arguments import check_object, whole_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..errors import ShapeError, unknown_name
+from ..errors import ShapeError
 from ..letters import value_text
 from ..shape_space.body_path import in_joint_order
 from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
 from . import plot_style as style
+from ._curvature_map import component_of, draw_loop, draw_map, even_row, name_axes, row_around, squared_unit, two_joints
 from ._joint_styles import MAX_NAMED, both_sides, joint_place, joint_styles, plain_text, plot_joints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _AT_REST = 1e-9  # [rad or m] range of a joint that does not move
-_LEVELS = 8  # about so many lines of equal curvature
-_COUNT = 61  # points along each joint: smooth under shading, a second of computation
-_MARGIN = 0.25  # of the range of a path: room around it in the plane
-_ZERO_LEVEL = 1e-9  # of the largest value: rounding
 _SHOWN = {"rad": "deg", "m": "m", "1": "1", "rad or m": "rad or m"}  # units in the legend
 _NEAR_LIMIT = 0.3  # of the joints' range: farther limits are not in the figure
 _BAND = 0.035  # of the figure's height: a band beyond a limit
@@ -127,11 +124,9 @@ def plot_shape_plane(
     style.check_flat_axes(ax)
     t = style.even_times(path, times)
     route, names, units = _named(path, body)
-    i, j = _pair(joints, names)
-    points = route.shape(t)[:, [i, j]]
-    _loop(ax, points)
-    ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=style.SMALL)
-    ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=style.SMALL)
+    places = two_joints(joints, names)
+    draw_loop(ax, route.shape(t)[:, places])
+    name_axes(ax, [names[k] for k in places], [units[k] for k in places])
     style.finish(ax, ncols=3)
     return ax
 
@@ -149,15 +144,17 @@ def plot_curvature(
 ) -> Axes:
     """One component of the curvature over the plane of two joints, with a path of shapes on it.
 
-    Violet is positive and orange negative; lines of equal curvature are labelled, solid where positive, dashed where
-    negative, thick where zero. A small counterclockwise loop turns the body by minus the curvature times its area.
+    Blue is positive and orange negative; lines of equal curvature are labelled, solid where positive, dashed where
+    negative, thick where zero. A small counterclockwise loop turns the body by minus the curvature times its area. The
+    axes are in radians with ticks in degrees, or in metres.
 
     Parameters
     ----------
     ax : flat axes; a scale of colours is added to their figure
     joints : the names or indices of the two; the first is the abscissa
     first, second : (A,), (B,) where to evaluate, ascending [rad or m]; None: around the path, or the joints' limits
-    axis : "x", "y", "z", or the direction (3,) whose component is drawn, base axes; None: that of the largest component
+    axis : "x", "y", "z", "norm", or the direction (3,) whose component is drawn, base axes; None: that of the largest
+        component
     shape : (n,) positions of the other joints; None: neutral
     path : to be drawn; its other joints may move
 
@@ -166,40 +163,27 @@ def plot_curvature(
     >>> ax = sp.plots.column_axes()
     >>> cat = sp.load_body("cat_two_halves")
     >>> sp.plots.plot_curvature(ax, cat, ("waist_pitch", "waist_yaw"), axis="x").get_xlabel()
-    'waist_pitch [rad]'
+    'waist_pitch [deg]'
     """
     if path is not None:
         check_object(path, "ShapePath", "path")
     check_object(body, "Body", "body")
     style.check_flat_axes(ax)
-    names, units = body.joint_names, body.joint_units
-    i, j = _pair(joints, names)
+    places = two_joints(joints, body.joint_names)
     points = None
     if path is not None:
-        points = in_joint_order(body, path).shape(style.even_times(path, None))[:, [i, j]]
+        points = in_joint_order(body, path).shape(style.even_times(path, None))[:, places]
     rows = [
         _row(values, body, k, None if points is None else points[:, n], label)
-        for n, (values, k, label) in enumerate(((first, i, "first"), (second, j, "second")))
+        for n, (values, k, label) in enumerate(zip((first, second), places, ("first", "second")))
     ]
-    field = curvature_on_plane(body, (i, j), rows[0], rows[1], shape)
-    direction, name = _direction(axis, field)
-    values = (field @ direction).T
-    power, scale = style.power_of_ten(float(np.abs(values).max()))
-    values = values * 10.0**-power
-    largest = float(np.abs(values).max()) or 1.0
-    mesh = _coloured(ax, rows, values, largest)
-    _contours(ax, rows, values, largest)
+    field = curvature_on_plane(body, places, *rows, shape)
+    units = [body.joint_units[k] for k in places]
+    draw_map(ax, rows, field, *component_of(axis, field), squared_unit(*units))
     if points is not None:
-        _loop(ax, points)
+        draw_loop(ax, points)
         style.finish(ax, ncols=3)
-    ax.set(xlim=(rows[0][0], rows[0][-1]), ylim=(rows[1][0], rows[1][-1]))
-    ax.set_xlabel(f"{plain_text(names[i])} [{units[i]}]", fontsize=style.SMALL)
-    ax.set_ylabel(f"{plain_text(names[j])} [{units[j]}]", fontsize=style.SMALL)
-    ax.tick_params(labelsize=style.SMALL)
-    bar = ax.figure.colorbar(mesh, ax=ax)
-    per = f"{units[i]}²" if units[i] == units[j] else f"({units[i]} {units[j]})"
-    bar.set_label(f"curvature, {name}\n[{scale}rad/{per}]", fontsize=style.SMALL)
-    bar.ax.tick_params(labelsize=style.SMALL)
+    name_axes(ax, [body.joint_names[k] for k in places], units)
     return ax
 
 
@@ -288,58 +272,6 @@ def _band_patch() -> Any:
     return Patch(facecolor=style.GREY, alpha=0.5, linewidth=0.0)
 
 
-def _loop(ax: Any, points: Array) -> None:
-    """Draw a path in a plane with its start, and arrowheads along it."""
-    ax.plot(*points.T, color=style.BLACK, linewidth=1.6, label="path")
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points / _extent(points), axis=0), axis=1))])
-    for k in np.searchsorted(length, length[-1] * np.array([0.15, 0.4, 0.65, 0.9])):
-        after = min(k + 1, len(points) - 1)
-        if length[after] > length[after - 1]:
-            arrow = {"arrowstyle": "-|>", "color": style.BLACK, "mutation_scale": 10.0, "linewidth": 0.0}
-            ax.annotate("", points[after], points[after - 1], arrowprops=arrow)
-    start = {"marker": "*", "color": style.GREEN, "markersize": 10.0, "markeredgecolor": "white", "linestyle": "none"}
-    ax.plot(*points[:1].T, label="start", **start)
-    if np.abs(points[-1] - points[0]).max() > _AT_REST:
-        ax.plot(*points[-1:].T, marker="s", color=style.BLUE, markersize=5.0, linestyle="none", label="end")
-
-
-def _coloured(ax: Any, rows: list[Array], values: Array, largest: float) -> Any:
-    from matplotlib.colors import LinearSegmentedColormap
-
-    # Neither end is so dark that lines and text on it could not be read.
-    colours = LinearSegmentedColormap.from_list("orange to violet", ["#C8701A", "#F7F7F7", "#7F6FB0"])
-    look = {"cmap": colours, "vmin": -largest, "vmax": largest, "shading": "gouraud", "rasterized": True}
-    return ax.pcolormesh(*rows, values, **look)
-
-
-def _contours(ax: Any, rows: list[Array], values: Array, largest: float) -> None:
-    """Draw lines of equal values at round numbers, if there are any in the range."""
-    from matplotlib.ticker import MaxNLocator
-
-    levels = MaxNLocator(nbins=_LEVELS, symmetric=True).tick_values(-largest, largest)
-    levels = levels[(levels > values.min()) & (levels < values.max())]
-    if len(levels):
-        styles = ["-" if level >= 0.0 else "--" for level in levels]
-        widths = [1.5 if abs(level) < _ZERO_LEVEL * largest else 0.7 for level in levels]
-        lines = ax.contour(*rows, values, levels=levels, colors="#333333", linestyles=styles, linewidths=widths)
-        ax.clabel(lines, fmt=lambda level: f"{level:.2g}".replace("-", "−"), fontsize=style.SMALL - 2, inline_spacing=2)
-
-
-def _direction(axis: str | ArrayLike | None, field: Array) -> tuple[Array, str]:
-    if axis is None:
-        axis = _AXES[int(np.argmax(np.abs(field).max(axis=(0, 1))))]
-    if isinstance(axis, str):
-        if axis not in _AXES or len(axis) != 1:
-            raise unknown_name("axis", axis, _AXES)
-        return np.eye(3)[_AXES.index(axis)], f"{axis} component"
-    direction = finite_array(axis, "axis", (3,))
-    norm = float(np.linalg.norm(direction))
-    if direction.ndim != 1 or not norm:
-        raise ShapeError(f"axis: one direction (3,), not zero, is needed, got {value_text(direction)}")
-    unit = direction / norm
-    return unit, "along ({:.2g}, {:.2g}, {:.2g})".format(*unit).replace("-", "−")
-
-
 def _row(values: ArrayLike | None, body: Body, joint: int, points: Array | None, name: str) -> Array:
     if values is not None:
         row = finite_array(values, name)
@@ -348,11 +280,8 @@ def _row(values: ArrayLike | None, body: Body, joint: int, points: Array | None,
         return row
     low, high = body.joint_limits[joint]
     if points is not None:
-        room = _MARGIN * (float(np.ptp(points)) or 1.0)
-        low, high = float(points.min()) - room, float(points.max()) + room
-    elif not (np.isfinite(low) and np.isfinite(high)):
-        low, high = -np.pi, np.pi
-    return np.linspace(low, high, _COUNT)
+        return row_around(points)
+    return even_row(low, high) if np.isfinite(low) and np.isfinite(high) else even_row(-np.pi, np.pi)
 
 
 def _named(path: ShapePath, body: Body | None) -> tuple[ShapePath, tuple[str, ...], tuple[str, ...]]:
@@ -361,17 +290,3 @@ def _named(path: ShapePath, body: Body | None) -> tuple[ShapePath, tuple[str, ..
         return in_joint_order(body, path), body.joint_names, body.joint_units
     names = path.joint_names or tuple(f"joint {k}" for k in range(path.n_shape))
     return path, names, ("rad or m",) * path.n_shape
-
-
-def _pair(joints: Sequence[str | int], names: Sequence[str]) -> tuple[int, int]:
-    if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) != 2:
-        raise ShapeError(f"joints: two joints are needed, got {value_text(joints)}")
-    i, j = (joint_place(joint, names) for joint in joints)
-    if i == j:
-        raise ShapeError(f"joints: two different joints are needed, got {names[i]} twice")
-    return i, j
-
-
-def _extent(points: Array) -> Array:
-    span = np.ptp(points, axis=0)
-    return np.where(span > 0.0, span, 1.0)

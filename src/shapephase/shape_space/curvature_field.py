@@ -123,7 +123,7 @@ def curvature_on_plane(
     shapes[:, :, i], shapes[:, :, j] = across[:, None], along
     rows = shapes.reshape(-1, body.n_shape)
     unit = np.eye(body.n_shape)
-    field, _, _ = _curvature_along(body, rows, *(np.broadcast_to(unit[k], rows.shape) for k in (i, j)))
+    field, _, _ = curvature_along(body, rows, *(np.broadcast_to(unit[k], rows.shape) for k in (i, j)))
     return field.reshape(len(across), len(along), 3)
 
 
@@ -262,9 +262,7 @@ class _Cone:
         flat = (len(times) * len(along), self._body.n_shape)
         places, outward, sideways = (part.reshape(flat) for part in (shapes, directions, changes))
         try:
-            field, turning, scale = _curvature_along(
-                self._body, places, outward, sideways, np.repeat(times, len(along))
-            )
+            field, turning, scale = curvature_along(self._body, places, outward, sideways, np.repeat(times, len(along)))
         except SingularInertiaError as error:
             raise SingularInertiaError(
                 f"on the ray from the centre to the shape of that time: {error}; or choose another centre"
@@ -285,7 +283,7 @@ class _Cone:
         return density, lift, scale.reshape(len(times), -1).mean(axis=1)
 
 
-def _curvature_along(
+def curvature_along(
     body: Body | ParticleBody, shapes: Array, first: Array, second: Array, times: Array | None = None
 ) -> tuple[Array, Array, Array]:
     """F(u, v) for two directions at each shape, A u, and the magnitude of the terms of F.
