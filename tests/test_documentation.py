@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import doctest
 import importlib
 import inspect
@@ -10,6 +11,7 @@ import re
 import shlex
 import sys
 import types
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -252,3 +254,30 @@ def test_every_exported_function_and_class_has_an_example():
     lacking = {name: thing for name, thing in lacking.items() if not (inspect.isclass(thing) and _is_raised(thing))}
     made = {name: re.search(r"Made by `([\w.]+)`", inspect.getdoc(thing) or "") for name, thing in lacking.items()}
     assert not [name for name, thing in lacking.items() if not inspect.isclass(thing) or made[name] is None]
+
+
+ANSWERS = re.findall(r"^```text\n(shapephase [^\n]*)\n(.*?)```", (DOCS / "howto" / "faq.md").read_text(), re.M | re.S)
+QUICK_ANSWERS = 3  # the others take a second each, or many
+
+
+@pytest.mark.parametrize(
+    ("command", "shown"),
+    [*ANSWERS[:QUICK_ANSWERS], *(pytest.param(*answer, marks=pytest.mark.full) for answer in ANSWERS[QUICK_ANSWERS:])],
+)
+def test_answers_show_what_their_commands_print(command, shown, tmp_path, monkeypatch, capsys):
+    from shapephase.cli.main import main
+
+    (tmp_path / "robots").symlink_to(ROOT / "robots")
+    monkeypatch.chdir(tmp_path)
+    with warnings.catch_warnings(), contextlib.suppress(SystemExit):
+        warnings.simplefilter("default")
+        main(shlex.split(command)[1:])
+    printed = " ".join("".join(capsys.readouterr()).split())
+    for line in shown.splitlines():
+        assert " ".join(line.split()) in printed, line
+
+
+def test_there_are_25_questions_each_with_a_command():
+    questions = re.findall(r"^### ([^\n]*)\n(.*?)(?=^###? |\Z)", (DOCS / "howto" / "faq.md").read_text(), re.M | re.S)
+    assert len(questions) >= 25
+    assert not [title for title, answer in questions if "```text\nshapephase " not in answer]
