@@ -16,9 +16,10 @@ from .. import so3
 from ..arrays import Array
 from ..body.body import Body
 from ..body.inertial_regressor import PARAMETERS
-from ..body.joint_chain import VOIGT, JointChain
+from ..body.joint_chain import JointChain
 from ..body.link_motions import link_motions
 from ..deformation.rotors import Rotor
+from ..inertia_tensor import VOIGT
 
 _DOUBLED = np.array([1.0 if i == j else 2.0 for i, j in VOIGT])  # entries that stand twice in a symmetric tensor
 
