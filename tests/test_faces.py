@@ -66,3 +66,9 @@ def test_the_rigid_body_shows_all_its_functions_and_classes():
 def test_a_name_that_does_not_exist_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no_such_name"):
         _ = sp.no_such_name
+
+
+def test_a_misspelt_name_gets_the_nearest():
+    with pytest.raises(AttributeError, match="no 'holonmy'; did you mean holonomy"):
+        sp.holonmy  # noqa: B018
+    assert not hasattr(sp, "frobnicate")

@@ -9,13 +9,16 @@ names that most scripts use; every public name of a room is an attribute of that
 first used.
 """
 
+from difflib import get_close_matches
+from typing import Any
+
 from lazy_loader import attach_stub
 
 from .offers import offer
 
 __version__ = "0.1.0"
 
-__getattr__, _, __all__ = attach_stub(__name__, __file__)
+_loaded, _, __all__ = attach_stub(__name__, __file__)
 
 _SHOWN = """
 auditing body bounds deformation dynamics error_bars errors examples exports optimal_control phases plots reconstruction
@@ -25,6 +28,14 @@ load_body load_motion mechanical_connection particle_body plan_reorientation
 reachable read_recorded_motion read_shape_path read_trajectory reconstruct rigid robot_names segment_momentum split
 uncertainty
 """.split()  # noqa: SIM905
+
+
+def __getattr__(name: str) -> Any:
+    if name in __all__ or name.startswith("_"):
+        return _loaded(name)
+    near = get_close_matches(name, __all__, 1)
+    hint = f"; did you mean {near[0]}?" if near else "; dir(shapephase) lists the names"
+    raise AttributeError(f"shapephase has no {name!r}{hint}", name=name)
 
 
 def __dir__() -> list[str]:
