@@ -129,6 +129,7 @@ def momentum_command(
         as_recorded = (
             recorded is not None and recorded.base_attitude is not None and start.momentum is None and not fitted
         )
+        as_recorded = as_recorded and not spinning.names
         made_from: dict[str, object] = {}
         moving = None
         options = {"axes": chosen, "normalise": normalise, "stature": stature, "speed": speed}
