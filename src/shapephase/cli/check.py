@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -11,11 +12,13 @@ from .options import (
     BODY_DEFAULTS,
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    WheelOptions,
     option,
     rare,
 )
@@ -39,6 +42,7 @@ def check_command(
         Path | None,
         rare("Pairs of links that --clearance leaves out: an SRDF file; for example `--srdf robot.srdf`."),
     ] = None,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -49,15 +53,17 @@ def check_command(
     from ..shape_space.closest_approach import clearance as clearance_along
     from ..shape_space.summaries import body_summary, path_summary
     from .joint_values import value_in_si
-    from .motion import body_argument, joint_motion
+    from .motion import body_argument, joint_motion, whole_path
     from .texts.clearance_text import clearance_data, clearance_lines, nearest_pair
     from .texts.recording_text import flight_lines, flights_in, recording_data, recording_lines
     from .texts.result_text import body_lines, path_data, path_lines, plain, record_data, too_fast
+    from .wheels import wheel_lines, with_wheels
 
     if motion is None and clearance is not None:
         raise ShapeError("--clearance: a motion is needed, as in `shapephase check cat cat_righting --clearance 0.02`")
     distance = None if clearance is None else value_in_si(clearance, "m", "--clearance")
-    code, loaded = ExitCode.DONE, body_argument(body, floating)
+    code, own = ExitCode.DONE, body_argument(body, floating)
+    loaded, spinning = with_wheels(own, wheels)
     for doubt in implausible(loaded):
         warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=2)
     summary = body_summary(loaded)
@@ -67,14 +73,17 @@ def check_command(
         lines.insert(1, f"{'height':24}{height:.2f} m, of the person, by the bones")
         data["body"]["person_height_m"] = height
     if motion is not None:
-        path, recorded = joint_motion(motion, loaded, recording)
+        path, recorded = joint_motion(motion, own, recording, spinning)
+        deformation = spinning.deformation(loaded, path, recorded)
+        path = whole_path(deformation, path)
         moved = path_summary(loaded, path)
         if moved.joints_beyond_rates:
             warnings.warn(too_fast(loaded, moved), TrajectoryWarning, stacklevel=2)
-        lines += ["", *path_lines(loaded, motion, moved, recorded), *recording_lines(loaded, recorded)]
-        data["motion"] = path_data(moved) | record_data(loaded, recorded) | recording_data(recorded)
+        lines += ["", *path_lines(loaded, motion, moved, recorded, spinning.names), *wheel_lines(deformation)]
+        lines += recording_lines(loaded, recorded)
+        data["motion"] = path_data(moved) | record_data(recorded) | recording_data(recorded)
         if recorded is not None and recorded.flight is None:
-            flights = flights_in(loaded, recorded, recording)
+            flights = flights_in(loaded, replace(recorded, path=path), recording)
             lines += flight_lines(flights, recorded)
             data["motion"]["flights"] = flights
         if distance is not None:

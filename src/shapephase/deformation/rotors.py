@@ -19,6 +19,7 @@ from ..errors import ShapeError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
 from ..shape_space.curves import Reordered, Swings, Widened, most_swings
+from ..shape_space.path_series import joint_extremes
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function, side_by_side
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import ShapePath
@@ -61,6 +62,15 @@ class Rotor:
             return np.full(len(times), self.value), np.zeros(len(times))
         values, rates = self.value.curve(times)
         return values[:, 0], rates[:, 0]
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Value in SI units, its least and largest where it is given in time, ready for JSON."""
+        kind = "momentum_kg_m2_s" if self.is_momentum else "speed_rad_s"
+        if not isinstance(self.value, ShapePath):
+            return {kind: self.value, "inertia_kg_m2": self.inertia}
+        least, largest, _ = joint_extremes(self.value)
+        return {kind: [float(least[0]), float(largest[0])], "in_time": True, "inertia_kg_m2": self.inertia}
 
     def stored(self, times: Array) -> Array:
         """Momentum along the axle that no rate of the shape carries, p or J spin: (N,) -> (N,) [kg m^2/s]."""

@@ -14,7 +14,7 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
-from ..curves import Reordered
+from ..body_path import without_joints
 from ..shape_path import ShapePath
 from ._joint_columns import JointChoices, Matched, matched
 from ._sample_origins import resampled
@@ -41,7 +41,7 @@ class RecordedMotion:
     Attributes
     ----------
     path : the joints of the body, in its order, but those of `without`; it carries the SHA-256 of the file
-    residual : (n,) rms of the samples minus the path [rad or m]; zero where it goes through all of them, or is without
+    residual : (n,) rms of the samples minus the path [rad or m]; zero where it goes through all of them
     times : (N,) of the samples, from 0 [s]
     base_attitude : (N, 3, 3) recorded attitude of the base, base axes to the recorder's axes, or None
     base_position : (N, 3) recorded position of the base [m], or None
@@ -272,6 +272,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         "trim": how.trim,
         **_record(recording, motion),
         "without": list(joints.without),
+        "wheel_speeds": {name: column._asdict() for name, column in motion.speed_columns.items()},
         "smooth": dict(zip(body.joint_names, noise.tolist(), strict=True)) if noise.any() else None,
         "lowpass": None if how.cut_off is None else smoothing.filter_record(body.joint_names),
         "smoothing": smoothing.spline_record(body.joint_names) if noise.any() else None,
@@ -279,8 +280,8 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         "flight": None if flight is None else flight.record,
         "resampled_to_hz": None if how.rate is None else (len(path.breaks) - 1) / path.duration,
     }
-    if joints.without:
-        path = _some_columns(path, [name for name in body.joint_names if name not in joints.without])
+    residual = residual[[name not in joints.without for name in body.joint_names]]
+    path = without_joints(path, joints.without)
     return RecordedMotion(
         path=replace(path, sha256=given.sha256, record=record),
         residual=residual,
@@ -326,14 +327,7 @@ def _speed_paths(samples: Recorded, motion: Matched, smooth: Any) -> dict[str, S
     noise = np.array([amounts(levels.get(name, 0.0), f"smooth, wheel {name}")["rad"] for name in names])
     samples = replace(samples, noise=noise, joint_names=names)
     path, _ = prepared_path(samples, periodic=samples.meets)
-    return {name: _some_columns(path, [name]) for name in names}
-
-
-def _some_columns(path: ShapePath, names: list[str]) -> ShapePath:
-    """The path of some of its joints."""
-    assert path.joint_names is not None
-    order = np.array([path.joint_names.index(name) for name in names], dtype=int)
-    return replace(path, curve=Reordered(path.curve, order), n_shape=len(names), joint_names=tuple(names), origin=None)
+    return {name: without_joints(path, {*names} - {name}) for name in names}
 
 
 def _names_of_columns(names: Mapping[str, str | None], how: Reading, table: Table) -> dict[str, str | None]:
