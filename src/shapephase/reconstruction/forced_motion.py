@@ -230,7 +230,7 @@ def _shapes(deformation: Deformation) -> Callable[[Array], Array]:
     description: Any = deformation.description
     while hasattr(description, "original"):
         description = description.original
-    path = getattr(description, "path", None)
+    path = getattr(description, "path", None) or getattr(description, "route", None)
     if path is None:
         return lambda t: np.zeros((len(t), 0))
     return lambda t: path.curve(t)[0]
