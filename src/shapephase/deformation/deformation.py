@@ -384,6 +384,8 @@ def deformation_along(body: Body, route: ShapePath, wheels: tuple[Rotor, ...] = 
         made_from["path"] = {"sha256": route.sha256}
     if route.record is not None:
         made_from["recording"] = dict(route.record)
+    if wheels:
+        made_from["wheels"] = {wheel.joint: wheel.record for wheel in wheels}
     return Deformation(description, route.duration, breaks, closure, gap, label, loops, inputs, made_from)
 
 

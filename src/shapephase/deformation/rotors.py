@@ -19,6 +19,7 @@ from ..errors import ShapeError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
 from ..shape_space.curves import Reordered, Swings, Widened, most_swings
+from ..shape_space.path_series import joint_extremes
 from ..shape_space.scan.function_scan import FunctionScan, ScannedFunction, path_function, side_by_side
 from ..shape_space.scan.scanning import scanned
 from ..shape_space.shape_path import ShapePath
@@ -61,6 +62,15 @@ class Rotor:
             return np.full(len(times), self.value), np.zeros(len(times))
         values, rates = self.value.curve(times)
         return values[:, 0], rates[:, 0]
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """Value in SI units, its least and largest where it is given in time, ready for JSON."""
+        kind = "momentum_kg_m2_s" if self.is_momentum else "speed_rad_s"
+        if not isinstance(self.value, ShapePath):
+            return {kind: self.value, "inertia_kg_m2": self.inertia}
+        least, largest, _ = joint_extremes(self.value)
+        return {kind: [float(least[0]), float(largest[0])], "in_time": True, "inertia_kg_m2": self.inertia}
 
     def stored(self, times: Array) -> Array:
         """Momentum along the axle that no rate of the shape carries, p or J spin: (N,) -> (N,) [kg m^2/s]."""
@@ -310,6 +320,12 @@ def widened_path(body: Body, path: ShapePath, left_out: tuple[str, ...]) -> Shap
     check_object(body, "Body", "body")
     check_object(path, "ShapePath", "path")
     others = [name for name in body.joint_names if name not in left_out]
+    twice = [name for name in left_out if name in (path.joint_names or ())]
+    if twice:
+        raise TrajectoryError(
+            f"the path has {', '.join(twice)}, which a wheel or a free hinge gives here; leave it out of the path: "
+            f"read_shape_path(..., without={twice})"
+        )
     if path.joint_names is None and path.n_shape != len(others):
         raise TrajectoryError(
             f"the path has {path.n_shape} joints, {body.name} without {', '.join(left_out)} has {len(others)}: "
