@@ -40,6 +40,7 @@ from .dynamics.torque_noise import TorqueErrors, torque_errors
 from .dynamics.torques import JointTorques, joint_torques
 from .error_bars.covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_bars.error_sources import InertiaErrors
+from .error_bars.forced_covariance import ForcedUncertainty
 from .error_bars.recorded_flight import RecordedFlight, motion_from_recording
 from .error_bars.recorded_momentum import RecordedMomentum, momentum_from_recording
 from .error_bars.result_derivatives import Derivatives, ResultDerivative, derivatives
@@ -127,6 +128,7 @@ __all__ = [
     "FloatingTrajectory",
     "ForcedMotion",
     "ForcedSplit",
+    "ForcedUncertainty",
     "FreeHinges",
     "Gyrostat",
     "HorizontalLift",

@@ -1,11 +1,13 @@
 from .covariance import Uncertainty, sampled_uncertainty, uncertainty
 from .error_sources import InertiaErrors
+from .forced_covariance import ForcedUncertainty
 from .recorded_flight import RecordedFlight, motion_from_recording
 from .recorded_momentum import RecordedMomentum, momentum_from_recording
 from .result_derivatives import Derivatives, ResultDerivative, derivatives
 
 __all__ = [
     "Derivatives",
+    "ForcedUncertainty",
     "InertiaErrors",
     "RecordedFlight",
     "RecordedMomentum",

@@ -10,21 +10,25 @@ Lambda = 1 at the end, makes one integral of every change: eta(T) = integral of 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from .. import so3
-from ..arrays import Array
+from ..arrays import Array, Integers
 from ..body.body import Body
 from ..body.couplings.coordinate_map import check_smooth
 from ..body.inertial_regressor import LinkMotions, by_link_parameters, link_motions
 from ..body.momentum_gradients import by_independent, by_shape_and_rate
 from ..deformation.rotors import RotorDescription
+from ..inertia_tensor import inverse_inertia
 from ..integrator import link_tree, machine_code
 from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples
 from ..shape_space.shape_path import ShapePath
@@ -82,24 +86,60 @@ class AlongMotion:
     wheels: Array
     wheels_at_start: Array
 
+    @property
+    def integrands(self) -> list[Array]:
+        """See `_AtNodes`."""
+        lifted = np.moveaxis(self.lifted @ self.inverse[:, None], 1, 0)
+        turned = so3.transpose(self.adjoint) @ self.attitudes @ self.inverse, *lifted
+        spins = self.spins, *np.moveaxis(self.lifted_spins, 1, 0)
+        return [*(matrices.reshape(len(self.times), 9) for matrices in turned), *spins]
+
 
 def along_motion(motion: Motion, path: ShapePath, breaks: Array | None = None) -> AlongMotion:
     """A motion that is no batch, of an articulated body; no piece of the quadrature has one of the breaks within."""
     known = motion.deformation.breaks
-    edges = _pieces(one_rotation(motion), known if breaks is None else np.union1d(known, breaks))
-    along = _at_nodes(motion, path, edges)
+    stepped = one_rotation(motion)
+    edges = _pieces(stepped.times, stepped.panel, known if breaks is None else np.union1d(known, breaks))
+    return _resolved(lambda edges: _at_nodes(motion, path, edges), edges)
+
+
+class _AtNodes(Protocol):
+    """What is known at the nodes of a quadrature."""
+
+    @property
+    def shapes(self) -> Array:
+        """(N, n)."""
+        ...
+
+    @property
+    def integrands(self) -> list[Array]:
+        """Parts of all integrands beside the shapes, each of which counts by its length: (N, c) each."""
+        ...
+
+
+_A = TypeVar("_A", bound=_AtNodes)
+
+
+def _resolved(at_nodes: Callable[[Array], _A], edges: Array) -> _A:
+    """What is at the nodes on pieces that are halved until the integrands are resolved."""
+    along = at_nodes(edges)
     for _ in range(_MOST_HALVINGS):
         rough = _factors(along) > _LARGEST_FACTOR
         if not rough.any():
             break
         edges = np.sort(np.append(edges, 0.5 * (edges[:-1] + edges[1:])[rough]))
-        along = _at_nodes(motion, path, edges)
+        along = at_nodes(edges)
     return along
 
 
-def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
+def _nodes(edges: Array) -> tuple[Array, Array, Array]:
+    """Widths of the pieces, nodes and weights of the quadrature: (P,), (N,), (N,) [s]."""
     widths = np.diff(edges)
-    times = (edges[:-1, None] + widths[:, None] * _PLACES).ravel()
+    return widths, (edges[:-1, None] + widths[:, None] * _PLACES).ravel(), (widths[:, None] * _SHARES).ravel()
+
+
+def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
+    widths, times, weights = _nodes(edges)
     stepped, start = one_rotation(motion), motion.initial_attitude
     shapes, rates = path.curve(times)
     inverse, drift = stepped.interpolant.inverse_and_drift(times)
@@ -115,7 +155,7 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
     wheels, wheels_at_start = _sourced(adjoint, at_start, by_wheels.reshape(len(widths), _NODES, 3), widths)
     return AlongMotion(
         times=times,
-        weights=(widths[:, None] * _SHARES).ravel(),
+        weights=weights,
         shapes=shapes,
         rates=rates,
         attitudes=attitudes,
@@ -130,13 +170,9 @@ def _at_nodes(motion: Motion, path: ShapePath, edges: Array) -> AlongMotion:
     )
 
 
-def _factors(along: AlongMotion) -> Array:
+def _factors(along: _AtNodes) -> Array:
     """Ratio of neighbouring Legendre coefficients in each piece, for the integrand where they fall least: (P,)."""
-    count = len(along.times)
-    lifted = np.moveaxis(along.lifted @ along.inverse[:, None], 1, 0)
-    turned = so3.transpose(along.adjoint) @ along.attitudes @ along.inverse, *lifted
-    spins = along.spins, *np.moveaxis(along.lifted_spins, 1, 0)
-    vectors = [*(matrices.reshape(count, 9) for matrices in turned), *spins]
+    vectors = along.integrands
     whole = np.concatenate([*vectors, np.cos(along.shapes), np.sin(along.shapes)], axis=1)
     at_nodes = whole.reshape(-1, _NODES, whole.shape[1])
     squares = (_LAST @ at_nodes) ** 2
@@ -163,7 +199,7 @@ def responses(motion: Motion, times: Array, modes: int = 0) -> Array:
     three more by one that changes like the next Legendre polynomial from the first to the last of the times.
     """
     stepped = one_rotation(motion)
-    edges = _pieces(stepped, np.union1d(motion.deformation.breaks, times))
+    edges = _pieces(stepped.times, stepped.panel, np.union1d(motion.deformation.breaks, times))
     widths = np.diff(edges)
     at = (edges[:-1, None] + widths[:, None] * _PLACES).ravel()
     inverse, _ = stepped.interpolant.inverse_and_drift(at)
@@ -195,30 +231,33 @@ def legendre(at: Array, times: Array, modes: int) -> Array:
     return np.polynomial.legendre.legvander(np.clip(since, -1.0, 1.0), modes)
 
 
-def _pieces(stepped: SteppedRotation, breaks: Array) -> Array:
-    """Edges of the pieces for Gauss's rule: a few steps each, without a break inside."""
-    first = np.flatnonzero(np.diff(stepped.panel, prepend=-1))
-    counts = np.diff(first, append=len(stepped.panel))
-    within = np.arange(len(stepped.panel)) - np.repeat(first, counts)
-    chosen = stepped.times[:-1][within % _STEPS == 0]
-    edges = np.union1d(np.append(chosen, stepped.times[-1]), breaks)
+def _pieces(times: Array, panel: Integers, breaks: Array) -> Array:
+    """Edges of the pieces for Gauss's rule: a few steps of one panel each, without a break inside.
+
+    times, panel : (K + 1,), (K,) ends of the steps, and their panels
+    """
+    first = np.flatnonzero(np.diff(panel, prepend=-1))
+    counts = np.diff(first, append=len(panel))
+    within = np.arange(len(panel)) - np.repeat(first, counts)
+    chosen = times[:-1][within % _STEPS == 0]
+    edges = np.union1d(np.append(chosen, times[-1]), breaks)
     # Ends of loops and breaks that differ by rounding are one.
     apart = np.diff(edges) > 8.0 * np.finfo(float).eps * edges[-1]
     return np.append(edges[0], edges[1:][apart])
 
 
 def _adjoint(slopes: Array, widths: Array) -> tuple[Array, Array]:
-    """Lambda' = slope Lambda backwards from one at the end: pieces (P, m, 3, 3), (P,) -> (P, m, 3, 3), (3, 3).
+    """Lambda' = slope Lambda backwards from one at the end: pieces (P, m, c, c), (P,) -> (P, m, c, c), (c, c).
 
     By Gauss collocation, whose end values are of order 2 m.
     """
-    count = len(slopes)
+    count, _, size, _ = slopes.shape
     scaled = widths[:, None, None, None] * slopes
     inner = _within(scaled)
-    across = np.eye(3) + np.einsum("j,pjab,pjbc->pac", _SHARES, scaled, inner)
+    across = np.eye(size) + np.einsum("j,pjab,pjbc->pac", _SHARES, scaled, inner)
     onward = np.linalg.inv(across)
-    at_left = np.empty((count, 3, 3))
-    right = np.eye(3)
+    at_left = np.empty((count, size, size))
+    right = np.eye(size)
     for piece in range(count - 1, -1, -1):
         right = np.matmul(onward[piece], right, out=at_left[piece])
     return inner @ at_left[:, None], right
@@ -234,12 +273,87 @@ def _sourced(adjoint: Array, at_start: Array, source: Array, widths: Array) -> t
 
 
 def _within(scaled: Array, given: Array | None = None) -> Array:
-    """X_i - sum_j a_ij scaled_j X_j = given_i at the nodes of each piece; None: one: (P, m, 3, c) -> (P, m, 3, c)."""
-    count, m = scaled.shape[:2]
+    """X_i - sum_j a_ij scaled_j X_j = given_i at the nodes of each piece; None: one: (P, m, s, c) -> (P, m, s, c)."""
+    count, m, size, _ = scaled.shape
     # Rows count nodes and components.
-    system = -np.einsum("ij,pjab->piajb", _INTEGRALS, scaled).reshape(count, 3 * m, 3 * m) + np.eye(3 * m)
-    right = np.tile(np.eye(3), (m, 1)) if given is None else given.reshape(count, 3 * m, -1)
-    return np.linalg.solve(system, right).reshape(count, m, 3, -1)
+    system = -np.einsum("ij,pjab->piajb", _INTEGRALS, scaled).reshape(count, size * m, size * m) + np.eye(size * m)
+    right = np.tile(np.eye(size), (m, 1)) if given is None else given.reshape(count, size * m, -1)
+    return np.linalg.solve(system, right).reshape(count, m, size, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class ForcedAlong:
+    """A motion under a torque that is a function of time, at N nodes.
+
+    With k = the change of the momentum, inertial axes, and f the torque there,
+
+        eta' = G (l x eta + k + s),  k' = eta x f for a torque in base axes, 0 for one in inertial axes.
+
+    Attributes
+    ----------
+    times, weights : (N,) [s]
+    shapes, rates : (N, n)
+    attitudes : (N, 3, 3) base axes to inertial axes
+    momenta : (N, 3) inertial axes [kg m^2/s]
+    inverse : (N, 3, 3) I^-1 [1/(kg m^2)]
+    spins : (N, 3) base axes [rad/s]
+    adjoint : (N, 6, 6) of turn and momentum together, one at the end
+    adjoint_at_start : (6, 6)
+    """
+
+    times: Array
+    weights: Array
+    shapes: Array
+    rates: Array
+    attitudes: Array
+    momenta: Array
+    inverse: Array
+    spins: Array
+    adjoint: Array
+    adjoint_at_start: Array
+
+    @property
+    def integrands(self) -> list[Array]:
+        """See `_AtNodes`."""
+        turned = so3.transpose(self.adjoint[:, :3, :3]) @ self.attitudes @ self.inverse
+        pushed = so3.transpose(self.adjoint[:, :3, 3:]) @ self.attitudes @ self.inverse
+        return [turned.reshape(-1, 9), pushed.reshape(-1, 9), self.spins]
+
+    @property
+    def rows(self) -> Array:
+        """Changes of turn and momentum at the end by a unit of internal momentum, base axes: (N, 6, 3)."""
+        carried = so3.transpose(self.adjoint[:, :3]) @ self.attitudes @ self.inverse
+        return -self.weights[:, None, None] * carried
+
+
+def forced_along(motion: ForcedMotion, path: ShapePath) -> ForcedAlong:
+    """A motion under a torque that is a function of time, of an articulated body."""
+    times = motion.solution.times
+    edges = _pieces(times, np.searchsorted(motion.breaks, times[:-1], side="right"), motion.breaks)
+    return _resolved(lambda edges: _forced_at_nodes(motion, path, edges), edges)
+
+
+def _forced_at_nodes(motion: ForcedMotion, path: ShapePath, edges: Array) -> ForcedAlong:
+    widths, times, weights = _nodes(edges)
+    attitudes, momenta = motion.attitude(times), motion.momentum(times)
+    inverse = inverse_inertia(motion.deformation.description.sample(times)[0], times)
+    turning = attitudes @ inverse @ so3.transpose(attitudes)
+    slopes = np.zeros((len(times), 6, 6))
+    slopes[:, :3, :3], slopes[:, :3, 3:] = turning @ so3.hat(momenta), turning
+    if motion.torque_law.axes == "body":
+        slopes[:, 3:, :3] = -so3.hat(so3.apply(attitudes, motion.torque(times)))
+    adjoint, at_start = _adjoint(-so3.transpose(slopes).reshape(len(widths), _NODES, 6, 6), widths)
+    return ForcedAlong(
+        times=times,
+        weights=weights,
+        attitudes=attitudes,
+        momenta=momenta,
+        inverse=inverse,
+        spins=motion.angular_velocity(times),
+        adjoint=adjoint.reshape(-1, 6, 6),
+        adjoint_at_start=at_start,
+        **dict(zip(("shapes", "rates"), path.curve(times), strict=True)),
+    )
 
 
 @dataclass(frozen=True, eq=False)

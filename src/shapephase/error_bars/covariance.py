@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,10 +20,13 @@ from ..deformation.rotors import Rotor
 from ..display import short_repr
 from ..phases.phase_split import PhaseSplit
 from ..phases.phases import split
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..shape_space.path_samples import path_samples
 from ..shape_space.shape_path import ShapePath
+from ._propagation import angle_bar, carried
 from .error_sources import InertiaErrors, Inputs, by_relative_errors, drawn_bodies, inputs_of
+from .forced_covariance import ForcedUncertainty, forced_uncertainty
 from .recorded_momentum import UNKNOWNS, RecordedMomentum
 from .result_derivatives import (
     Derivatives,
@@ -35,7 +38,6 @@ from .result_derivatives import (
     fit_by_rotors,
 )
 
-_BARS_FROM_THE_ENDS = 5.0  # from an angle to 0 and to 180 degrees, for it to have a bar of its own
 _ROUNDING = 1e-9  # of the largest variance of a rotation: smaller ones about other axes are rounding
 _ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation", "wheel_rotation")
 _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
@@ -80,6 +82,7 @@ class Uncertainty:
     __repr__ = short_repr
 
 
+@overload
 def uncertainty(
     motion: Motion,
     *,
@@ -89,7 +92,32 @@ def uncertainty(
     attitude: ArrayLike | None = None,
     start: RecordedMomentum | ArrayLike | None = None,
     rotors: float | Mapping[str, float] | None = None,
-) -> Uncertainty:
+) -> Uncertainty: ...
+
+
+@overload
+def uncertainty(
+    motion: ForcedMotion,
+    *,
+    joints: ArrayLike | str | None = None,
+    inertias: InertiaErrors | None = None,
+    momentum: ArrayLike | None = None,
+    attitude: ArrayLike | None = None,
+    start: ArrayLike | None = None,
+    rotors: float | Mapping[str, float] | None = None,
+) -> ForcedUncertainty: ...
+
+
+def uncertainty(
+    motion: Motion | ForcedMotion,
+    *,
+    joints: ArrayLike | str | None = None,
+    inertias: InertiaErrors | None = None,
+    momentum: ArrayLike | None = None,
+    attitude: ArrayLike | None = None,
+    start: RecordedMomentum | ArrayLike | None = None,
+    rotors: float | Mapping[str, float] | None = None,
+) -> Uncertainty | ForcedUncertainty:
     """Error bars of the results of `split`, to first order, from the errors of its inputs.
 
     Sources are independent of each other; inputs without errors are exact. The cost is that of a few reconstructions,
@@ -97,7 +125,8 @@ def uncertainty(
 
     Parameters
     ----------
-    motion : of an articulated body
+    motion : of an articulated body; under a torque that is a function of time alone, whose bars are those of the state
+        at the end
     joints : of the samples that the path is made of: the standard deviation of white noise, one or one for each
         joint (n,) [rad or m], or a text such as "0.3deg" or "0.3deg,1mm"; or the covariance (N n, N n) of all samples,
         row by row; for a periodic path without the last, which is the first. For a recording that was closed, smoothed
@@ -116,7 +145,8 @@ def uncertainty(
     Raises
     ------
     WrongObjectError
-        If the motion is not one of an articulated body, or, with `joints`, its path not one through samples.
+        If the motion is not one of an articulated body, or, with `joints`, its path not one through samples; for a
+        torque that depends on the state.
     ShapeError
         For a batch, for covariances that are not, for the fit of another motion, and for `start` beside `momentum`
         or `attitude`.
@@ -138,15 +168,17 @@ def uncertainty(
     >>> print(f"{bars.dynamic_phase:.6f} rad")
     0.000813 rad
     """
-    derived = derivatives(motion)
     inputs = inputs_of(motion, joints, inertias, momentum, attitude, start, rotors)
+    if isinstance(motion, ForcedMotion):
+        return forced_uncertainty(motion, inputs)
+    derived = derivatives(motion)
     covariances = [np.zeros((3, 3)) for _ in _ROTATIONS]
     variances, of_start = np.zeros(len(_PHASES)), np.zeros((UNKNOWNS, UNKNOWNS))
     for cause in _causes(derived, inputs):
         for total, name in zip(covariances, _ROTATIONS, strict=True):
-            total += _carried(getattr(cause.derivative, name), cause.covariance)
-        variances += [_carried(getattr(cause.derivative, name)[None], cause.covariance)[0, 0] for name in _PHASES]
-        of_start += _carried(cause.start, cause.covariance)
+            total += carried(getattr(cause.derivative, name), cause.covariance)
+        variances += [carried(getattr(cause.derivative, name)[None], cause.covariance)[0, 0] for name in _PHASES]
+        of_start += carried(cause.start, cause.covariance)
     deviations = np.sqrt(variances)
     bias = 0.0 if inputs.samples is None else _smoothing_bias(derived, covariances, deviations)
     return _uncertainty(split(motion), covariances, deviations, of_start, smoothing_bias=bias, draws=0)
@@ -331,11 +363,6 @@ def _drawn(rng: np.random.Generator, draws: int, covariance: Array) -> Array:
     return (rng.normal(size=(draws, len(values))) * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
 
 
-def _carried(derivative: Array, covariance: Array) -> Array:
-    """The covariance of derivative @ errors: (r, m), (m,) or (m, m) -> (r, r)."""
-    return (derivative * covariance if covariance.ndim == 1 else derivative @ covariance) @ derivative.T
-
-
 def _smoothing_bias(derived: Derivatives, covariances: list[Array], deviations: Array) -> float:
     """The largest shift of a result by smoothing, in standard deviations: of a rotation about its worst axis."""
     taken = path_samples(derived.path).bias
@@ -367,18 +394,10 @@ def _uncertainty(
     smoothing_bias: float = 0.0,
 ) -> Uncertainty:
     _, total, holonomy, _, wheels = covariances
-    bars = _bar(parts.total_rotation, total), _bar(parts.holonomy, holonomy), _bar(parts.wheel_rotation, wheels)
+    bars = (
+        angle_bar(parts.total_rotation, total),
+        angle_bar(parts.holonomy, holonomy),
+        angle_bar(parts.wheel_rotation, wheels),
+    )
     numbers: list[Any] = [*covariances, *deviations.tolist(), start, *bars, smoothing_bias, draws]
     return Uncertainty(*numbers)
-
-
-def _bar(rotation: Array, covariance: Array) -> float:
-    """The standard deviation of a rotation's angle, along its axis [rad]; NaN near 0 and 180 degrees."""
-    vector = so3.log(rotation)
-    angle = float(np.linalg.norm(vector))
-    # Across the axis the angle of a small rotation only grows: the widest direction decides.
-    widest = float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))
-    if _BARS_FROM_THE_ENDS * widest >= min(angle, np.pi - angle):
-        return np.nan
-    axis = vector / angle
-    return float(np.sqrt(max(axis @ covariance @ axis, 0.0)))

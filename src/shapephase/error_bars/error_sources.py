@@ -18,6 +18,7 @@ from ..deformation.rotors import Rotor
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
 from ..letters import value_text
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.files.labels import NO_UNIT, amounts
 from ..shape_space.path_samples import columns_without_samples, path_samples
@@ -82,7 +83,7 @@ class Inputs(NamedTuple):
 
 
 def inputs_of(
-    motion: Motion,
+    motion: Motion | ForcedMotion,
     joints: ArrayLike | str | None,
     inertias: InertiaErrors | None,
     momentum: ArrayLike | None,

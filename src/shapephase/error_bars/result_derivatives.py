@@ -18,10 +18,11 @@ from ..deformation.rotors import Rotor, RotorDescription
 from ..display import short_repr
 from ..errors import ShapeError, WrongObjectError
 from ..inertia_tensor import inverse_inertia
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
-from ._along_motion import AlongMotion, BodyAlong, along_motion, responses
+from ._along_motion import AlongMotion, BodyAlong, ForcedAlong, along_motion, responses
 from .wheels_along import WheelsAlong
 
 
@@ -84,6 +85,7 @@ class Derivatives:
     """
 
     def __init__(self, motion: Motion) -> None:
+        check_object(motion, "Motion", "motion")
         self.motion = motion
         described = described_by(motion)
         self.body, self.path, self.rotors = described.body, described.path, described.rotors
@@ -293,9 +295,10 @@ class Described(NamedTuple):
         return BodyAlong(self.body, times, shapes, rates, WheelsAlong(self.body, self.rotors, times, shapes, rates))
 
 
-def described_by(motion: Motion) -> Described:
+def described_by(motion: Motion | ForcedMotion) -> Described:
     """What a motion is made of; WrongObjectError and ShapeError as for `derivatives`."""
-    check_object(motion, "Motion", "motion")
+    if not isinstance(motion, ForcedMotion):
+        check_object(motion, "Motion", "motion")
     if motion.batch:
         raise ShapeError(f"derivatives are those of one motion, this is a batch of {motion.batch}; reconstruct one")
     description = motion.deformation.description

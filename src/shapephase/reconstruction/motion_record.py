@@ -83,25 +83,37 @@ def write_motion_record(motion: Motion, path: str | os.PathLike[str]) -> None:
 
 
 def joint_path(deformation: Deformation) -> ShapePath | None:
-    """Path of the joints behind a deformation, in any gauge; None without one."""
-    description: Any = deformation.description
-    while hasattr(description, "original"):
-        description = description.original
-    path = getattr(description, "path", None)
+    """Path of all joints behind a deformation, in any gauge, with wheels at zero; None without one."""
+    description = _original(deformation)
+    path = getattr(description, "path", None) or getattr(description, "route", None)
     return path if isinstance(path, ShapePath) else None
 
 
+def _original(deformation: Deformation) -> Any:
+    """The description behind gauges."""
+    description: Any = deformation.description
+    while hasattr(description, "original"):
+        description = description.original
+    return description
+
+
 def _joints(motion: Motion) -> dict[str, Array]:
-    """Joints and base at `ShapePath.sample_times`, for `read_recorded_motion`; empty for batches and without a path."""
+    """Joints, wheels left out, and base at `ShapePath.sample_times`, for `read_recorded_motion`.
+
+    Empty for batches and without a path.
+    """
     path = joint_path(motion.deformation)
     if path is None or motion.batch or not path.n_shape:
         return {}
+    wheels = {rotor.joint for rotor in getattr(_original(motion.deformation), "rotors", ())}
+    names = motion.deformation.made_from["joints"]
+    driven = [column for column, name in enumerate(names) if name not in wheels]
     with suppress(TrajectoryError):  # a path that needs more than a million rows
         times = path.sample_times
         return {
             "time": times,
-            "shapes": path.shape(times),
-            "joint_names": np.array(motion.deformation.made_from["joints"]),
+            "shapes": path.shape(times)[:, driven],
+            "joint_names": np.array([names[column] for column in driven]),
             "base_quat_xyzw": continuous(motion.quat_xyzw(times)),
         }
     return {}
