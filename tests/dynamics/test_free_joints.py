@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -13,31 +11,9 @@ from shapephase import so3
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
 from support.bodies import joint, link, urdf
 from support.independent import FourierLoop, apart, quaternion_rate, random_rotation, random_vector
-from support.random_chains import random_chain
+from support.random_chains import random_chain, wheel_chain
 
 TIMES = np.linspace(0.0, 1.5, 7)
-
-
-def wheel_chain(seed):
-    """A chain of four links with two moving joints, and a wheel at its end."""
-    chain = random_chain(seed)
-    rng = np.random.default_rng([7, seed])
-    axis = np.array([0.48, 0.6, 0.64])
-    inertias, centres = chain.inertias[:4].copy(), chain.centres[:4].copy()
-    inertias[3] = 0.03 * np.eye(3) + 0.02 * np.outer(axis, axis)
-    centres[3] = 0.1 * axis
-    return replace(
-        chain,
-        parents=(0, 1, 2),
-        kinds=("revolute", "prismatic", "continuous"),
-        axes=np.array([*chain.axes[:2], axis]),
-        places=chain.places[:3],
-        turns=rng.uniform(-1.0, 1.0, (3, 3)),
-        masses=chain.masses[:4],
-        centres=centres,
-        inertias=inertias,
-        factor=None,
-    )
 
 
 def mujoco_swing(chain, loop, driven, free, start, momentum, attitude):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -105,6 +105,28 @@ def random_chain(seed: int) -> Chain:
         centres=rng.uniform(-0.2, 0.2, (count + 1, 3)),
         inertias=np.einsum("kij,kj,klj->kil", frames, principal, frames),
         factor=float(rng.uniform(-1.5, 1.5)) if seed % 2 == 0 else None,
+    )
+
+
+def wheel_chain(seed: int) -> Chain:
+    """A chain of four links with two moving joints, and a wheel at its end."""
+    chain = random_chain(seed)
+    rng = np.random.default_rng([7, seed])
+    axis = np.array([0.48, 0.6, 0.64])
+    inertias, centres = chain.inertias[:4].copy(), chain.centres[:4].copy()
+    inertias[3] = 0.03 * np.eye(3) + 0.02 * np.outer(axis, axis)
+    centres[3] = 0.1 * axis
+    return replace(
+        chain,
+        parents=(0, 1, 2),
+        kinds=("revolute", "prismatic", "continuous"),
+        axes=np.array([*chain.axes[:2], axis]),
+        places=chain.places[:3],
+        turns=rng.uniform(-1.0, 1.0, (3, 3)),
+        masses=chain.masses[:4],
+        centres=centres,
+        inertias=inertias,
+        factor=None,
     )
 
 
