@@ -359,8 +359,8 @@ def matrix_from_quat(quat_xyzw: Array) -> Array:
 def mrp_from_quat(quat_xyzw: Array) -> Array:
     """Modified Rodrigues parameters e tan(angle/4) of a unit quaternion xyzw: (..., 4) -> (..., 3).
 
-    Of the two sets of a rotation the one of length 1 or less, which jumps to its shadow -sigma/|sigma|^2 where a motion
-    passes half a turn. Those of an attitude here belong to the turn that takes inertial axes to the base's: `sigma_BN`.
+    A rotation has two sets. This is the one of length 1 or less, which jumps to its shadow -sigma/|sigma|^2 where a
+    motion passes half a turn. For attitudes it is that of the turn from inertial axes to those of the base: `sigma_BN`.
 
     Source: Schaub and Junkins, Analytical Mechanics of Space Systems, section 3.6.
 
@@ -378,8 +378,8 @@ def quat_from_mrp(mrp: Array) -> Array:
 
     Examples
     --------
-    >>> sp.so3.quat_from_mrp(np.array([[0.0, 0.0, 0.5], [0.0, 0.0, -2.0]])).tolist()  # shadows of each other
-    [[0.0, 0.0, 0.8, 0.6], [0.0, 0.0, 0.8, 0.6]]
+    >>> sp.so3.quat_from_mrp(np.array([0.0, 0.0, 0.5])).tolist()
+    [0.0, 0.0, 0.8, 0.6]
     """
     square = np.sum(mrp * mrp, axis=-1, keepdims=True)
     return positive_scalar(np.concatenate([2.0 * mrp, 1.0 - square], axis=-1) / (1.0 + square))

@@ -11,7 +11,7 @@ import shapephase as sp
 from shapephase.errors import IgnoredElementWarning, ShapeError, WrongObjectError
 from support.bodies import joint, link, urdf
 from support.independent import FourierLoop, random_rotation, random_vector
-from support.random_chains import random_chain
+from support.random_chains import random_chain, wheel_chain
 
 EPS = float(np.finfo(float).eps)
 SEEDS = [seed if seed < 3 else pytest.param(seed, marks=pytest.mark.full) for seed in range(50)]
@@ -215,3 +215,62 @@ def test_a_negative_effort_is_read_as_its_size_with_a_warning(load):
     with pytest.warns(IgnoredElementWarning, match="effort"):
         body = load(urdf(link("a", 1.0, (1.0, 1.0, 1.0)), link("b", 1.0, (1.0, 1.0, 1.0)), element))
     assert body.effort_limits.tolist() == [7.0]
+
+
+@pytest.mark.parametrize(("kind", "value"), [("rotors", 1.3), ("rotor_speeds", 9.0)])
+@pytest.mark.parametrize("seed", [2, *(pytest.param(seed, marks=pytest.mark.full) for seed in range(3, 20))])
+def test_torques_with_a_spinning_wheel_are_those_of_mujoco(load, seed, kind, value):
+    """The wheel is a hinge there, its acceleration the slope of its speed; no motor turns it where it is free."""
+    chain = wheel_chain(seed)
+    body, loop, driven = load(chain.urdf), loop_of(seed, 2), ["j0", "j1"]
+    momentum = random_vector(seed, 0.5)
+    path = sp.ShapePath.fourier(loop.mean, loop.cosines, loop.sines, loop.duration, joint_names=driven)
+    deformation = sp.articulated(body, path, **{kind: {"j2": value}})
+    motion = sp.reconstruct(deformation, momentum, random_rotation(seed), tolerance=1e-12)
+    times = loop.duration * np.array([0.1, 0.31, 0.77, 0.9])
+    found = sp.joint_torques(motion, times)
+    order = [body.joint_names.index(name) for name in chain.names]
+    h = 1e-3 * loop.duration
+    ahead, behind, far, back = (
+        sp.dynamics.wheel_speeds(motion, times + k * h)[:, 0] for k in (1, -1, 2, -2)
+    )  # fmt: skip
+    slopes = (8.0 * (ahead - behind) - (far - back)) / (12.0 * h)
+    for row, t in enumerate(times):
+        spun = sp.dynamics.wheel_speeds(motion, t)[0]
+        efforts, left, carried = mujoco_efforts(
+            chain, motion.attitude(t), motion.angular_velocity(t), np.append(loop.shape(t), 0.7),
+            np.append(loop.rate(t), spun), np.append(loop.acceleration(t), slopes[row]),
+        )  # fmt: skip
+        size = np.abs(efforts).max()
+        assert np.abs(left).max() < 1e-10 * size, "the oracle's base is free"
+        np.testing.assert_allclose(carried, momentum, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(found.torque[row][order], efforts, rtol=0, atol=1e-8 * size)
+        assert (kind == "rotors") == (abs(found.torque[row, order[2]]) < 1e-12 * size)
+    assert np.abs(found.base_wrench).max() < 1e-10 * np.abs(found.torque).max()
+    assert found.loads.energy_defect < 1e-9
+    seen = sp.joint_torques(sp.reconstruct(sp.horizontal_gauge(deformation), momentum, motion.initial_attitude), times)
+    np.testing.assert_allclose(seen.torque, found.torque, rtol=0, atol=1e-6 * np.abs(found.torque).max())
+
+
+def test_a_wheel_at_a_held_speed_is_the_joint_turning_evenly_and_batches_of_free_ones_are_refused(load):
+    body, loop = load(wheel_chain(8).urdf), loop_of(8, 2)
+    driven = sp.ShapePath.fourier(loop.mean, loop.cosines, loop.sines, loop.duration, joint_names=["j0", "j1"])
+
+    def every(times):
+        shapes, rates = loop.at(times)
+        order = [("j0", "j1", "j2").index(name) for name in body.joint_names]
+        shape = np.column_stack([shapes, 9.0 * times])
+        return shape[:, order], np.column_stack([rates, np.full(len(times), 9.0)])[:, order]
+
+    turning = sp.ShapePath.function(every, loop.duration, joint_names=body.joint_names)
+    batch = np.array([[0.1, -0.2, 0.3], [0.0, 0.4, 0.1]])
+    held = sp.articulated(body, driven, rotor_speeds={"j2": 9.0})
+    times = loop.duration * np.array([0.2, 0.6])
+    found, whole = (sp.joint_torques(sp.reconstruct(d, batch), times) for d in (held, sp.articulated(body, turning)))
+    assert found.torque.shape == (2, 2, 3)
+    np.testing.assert_allclose(found.torque, whole.torque, rtol=0, atol=1e-6 * np.abs(whole.torque).max())
+    np.testing.assert_allclose(found.rate, whole.rate, rtol=0, atol=1e-12)
+    with pytest.raises(ShapeError, match="2 motions"):
+        sp.joint_torques(sp.reconstruct(sp.articulated(body, driven, rotors={"j2": 1.0}), batch), times)
+    with pytest.raises(WrongObjectError, match="wheels"):
+        sp.torque_errors(sp.joint_torques(sp.reconstruct(held, batch[0]), times), joints=1e-3)
