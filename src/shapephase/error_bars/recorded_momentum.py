@@ -38,6 +38,7 @@ _WEIGHINGS = 3  # of attitudes against rates: the third changes their noise by l
 _FIRST_TIMES = 6  # attitudes that are fitted first, or up to twice as many
 _NO_FLIGHT = 0.5  # [rad] rms from every motion of the body, beyond which a recording is none of its flights
 _RIGHT = 0.5  # of what is left in another reading: in the right unit, order or direction it was less than a quarter
+_DOUBTFUL = 2.0  # widening of the bars by correlation: inverse attitudes of an uneven flight had 4
 _ROUNDED = 10.0  # tolerances of the reconstruction: smaller residuals are rounding
 _CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller change is not reported
 
@@ -206,9 +207,9 @@ def momentum_from_recording(
         if measured is not None:
             least, fit = _weighed(replace(least, find_bias=find_bias is not False), fit, measured, noise, rate_noise)
     result = _estimated(least, fit, noise, rate_noise)
+    if (not result.conserved or result.widening > _DOUBTFUL) and measured is None and not find_axes:
+        _check_readings(least, _RIGHT * _size(fit.residuals))
     if not result.conserved:
-        if measured is None and not find_axes:
-            _check_readings(least, _RIGHT * _size(fit.residuals))
         warn_of_drift(result)
     return result
 
