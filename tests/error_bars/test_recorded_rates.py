@@ -153,8 +153,10 @@ def test_a_momentum_that_changes_shows_in_rates_alone():
 
 def test_what_is_wrong_is_named(flight: sp.Motion):
     given = recorded(flight, "rates", 2)
+    slow = sp.reconstruct(SOMERSAULT, _MOMENTUM / 20.0).angular_velocity(_TIMES) + 0.01
+    sp.momentum_from_recording(SOMERSAULT, _TIMES, rates=slow)
     with pytest.raises(TrajectoryError, match=r"in deg/s they are: .*--names 'COLUMN=COLUMN \[deg/s\]'"):
-        sp.momentum_from_recording(SOMERSAULT, _TIMES, rates=np.degrees(given["rates"]))
+        sp.momentum_from_recording(SOMERSAULT, _TIMES, rates=np.degrees(slow))
     with pytest.raises(TrajectoryError, match=r"read as its inverse, it is one: base_inverse=True \(--base-inverse\)"):
         sp.momentum_from_recording(SOMERSAULT, _TIMES, so3.transpose(flight.attitude(_TIMES)))
     for wrong, words in (

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_flag, check_object
+from ..arguments import check_flag, check_object, initial_state_arguments
 from ..arrays import finite_array
 from ..body.body import Body
 from ..deformation.deformation import Deformation, articulated
@@ -30,8 +30,8 @@ class RecordedFlight:
     Attributes
     ----------
     motion : of the body along the recorded path
-    momentum_by : "fit" to the recorded attitudes of the base, "given", or "nothing": it is zero, as the base was not
-        recorded, or has one attitude in every sample, and none is given
+    momentum_by : "fit" to the recorded attitudes and rates of the base, "given", or "nothing": it is
+        zero, as the base was not recorded, or has one attitude in every sample, and none is given
     fitted : the fit, where there is one
     """
 
@@ -58,9 +58,9 @@ def motion_from_recording(
 ) -> RecordedFlight:
     """The motion of a recorded body, as every command makes it.
 
-    Where the attitude of the base was recorded, the momentum is fitted to it. A momentum that is given wins; the motion
-    then starts at the recorded attitude. Zero is taken only where nothing of the base was recorded, or one attitude in
-    every sample, as of a base that was held fixed.
+    Where attitudes or rates of the base were recorded, the momentum is fitted to them. A momentum that is given wins;
+    the motion then starts at the recorded attitude. Zero is taken only where nothing of the base was recorded, or one
+    attitude in every sample, as of a base that was held fixed.
 
     Parameters
     ----------
@@ -68,8 +68,8 @@ def motion_from_recording(
     momentum : (3,) the recorder's axes [kg m^2/s]; None: as the file states or the recorded base shows, or zero
     rate : (3,) angular velocity of the base at one time instead, base axes [rad/s]
     rate_time : that time, since the first sample kept [s]
-    attitude : (3, 3) or quaternion (4,) x y z w of the start, beside a momentum or rate; None: as recorded, or the
-        identity
+    attitude : (3, 3) or quaternion (4,) x y z w of the start, beside a momentum or rate, or of rates without attitudes;
+        None: as recorded, or the identity
     tolerance : of the attitude [rad]
     find_axes : as for `momentum_from_recording`
     progress : called while it is reconstructed
@@ -108,14 +108,16 @@ def motion_from_recording(
         momentum = recorded.momentum
     speeds = {**recorded.wheel_speeds, **mapping_of_joints(rotor_speeds, "rotor_speeds")}
     deformation = articulated(body, recorded.path, rotors=rotors, rotor_speeds=speeds)
-    attitudes, given = recorded.base_attitude, momentum is not None or rate is not None
-    if not given and attitudes is not None and (recorded.flight is not None or turns(attitudes)):
-        if attitude is not None:
+    attitudes, rates = recorded.base_attitude, recorded.base_rates
+    given = momentum is not None or rate is not None
+    is_turning = turns(attitudes) or (rates is not None and bool(rates.any()))
+    if not given and (recorded.flight is not None or is_turning) and (attitudes is not None or rates is not None):
+        if attitude is not None and attitudes is not None:
             raise ShapeError(
                 "the attitude at the start is fitted to the recorded base, with the momentum; leave it out "
                 "(--attitude), or give the momentum, too (--momentum)"
             )
-        fitted = _fit(deformation, recorded, tolerance, find_axes=find_axes)
+        fitted = _fit(deformation, recorded, attitude, tolerance, find_axes=find_axes)
         return RecordedFlight(fitted.motion, "fit", fitted)
     if find_axes:
         raise ShapeError(
@@ -131,14 +133,27 @@ def motion_from_recording(
     return RecordedFlight(moved, "given" if given else "nothing")
 
 
-def _fit(deformation: Deformation, recorded: RecordedMotion, tolerance: float, *, find_axes: bool) -> RecordedMomentum:
-    flight, attitudes = recorded.flight, recorded.base_attitude
-    assert attitudes is not None
+def _fit(
+    deformation: Deformation,
+    recorded: RecordedMotion,
+    attitude: ArrayLike | None,
+    tolerance: float,
+    *,
+    find_axes: bool,
+) -> RecordedMomentum:
+    flight = recorded.flight
+    start = None if attitude is None else initial_state_arguments(np.zeros(3), attitude)[1]
     assumed = flight is None or not flight.requested
     try:
         with quiet(category=TrajectoryWarning):
             fitted = momentum_from_recording(
-                deformation, recorded.times, attitudes, tolerance=tolerance, find_axes=find_axes
+                deformation,
+                recorded.times,
+                recorded.base_attitude,
+                rates=recorded.base_rates,
+                attitude=start,
+                tolerance=tolerance,
+                find_axes=find_axes,
             )
     except (AccuracyNotReached, TrajectoryError) as error:
         if assumed:
@@ -157,7 +172,7 @@ def _fit(deformation: Deformation, recorded: RecordedMotion, tolerance: float, *
 
 def _no_flight(recorded: RecordedMotion, why: str) -> TrajectoryError:
     return TrajectoryError(
-        f"{recorded.record['file']}: the attitude of the base is recorded, and no momentum is given, but no free "
+        f"{recorded.record['file']}: the base is recorded, and no momentum is given, but no free "
         f"flight with one momentum is found: {why}. Give the times of the flight: flight=(first, last) (--flight FIRST "
         "LAST); or flight='all' (--flight all), if the body is free all the time; or momentum=[0, 0, 0] "
         "(--momentum 0 0 0), if the recorded base is not to count"

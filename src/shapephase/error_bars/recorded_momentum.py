@@ -37,6 +37,8 @@ _VAGUE_BIAS = 0.1  # of the rates: a bias that is less certain is not fitted to 
 _WEIGHINGS = 3  # of attitudes against rates: the third changes their noise by less than 1e-3
 _FIRST_TIMES = 6  # attitudes that are fitted first, or up to twice as many
 _NO_FLIGHT = 0.5  # [rad] rms from every motion of the body, beyond which a recording is none of its flights
+_RIGHT = 0.5  # of what is left in another reading: in the right unit, order or direction it was less than a quarter
+_DOUBTFUL = 2.0  # widening of the bars by correlation: inverse attitudes of an uneven flight had 4
 _ROUNDED = 10.0  # tolerances of the reconstruction: smaller residuals are rounding
 _CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller change is not reported
 
@@ -205,6 +207,8 @@ def momentum_from_recording(
         if measured is not None:
             least, fit = _weighed(replace(least, find_bias=find_bias is not False), fit, measured, noise, rate_noise)
     result = _estimated(least, fit, noise, rate_noise)
+    if (not result.conserved or result.widening > _DOUBTFUL) and measured is None and not find_axes:
+        _check_readings(least, _RIGHT * _size(fit.residuals))
     if not result.conserved:
         warn_of_drift(result)
     return result
@@ -244,28 +248,44 @@ def _fitted_to_attitudes(least: _Least, *, find_axes: bool) -> _Fitted:
         return _flight_fitted(least, find_axes=find_axes)
     except AccuracyNotReached as error:
         # Axes that are to be found leave the order of the quaternions open.
-        for other, words in () if find_axes else ((read_w_first, W_FIRST), (so3.transpose, INVERSE)):
-            with suppress(AccuracyNotReached):
-                _flight_fitted(replace(least, recorded=other(least.recorded)), find_axes=False)
-                raise TrajectoryError(f"the recorded base is no flight of this body; {words}") from error
+        if not find_axes:
+            _check_readings(least, np.inf, error)
         raise
+
+
+def _check_readings(least: _Least, off: float, cause: Exception | None = None) -> None:
+    """Raise TrajectoryError where attitudes are nearer to a flight with w first, or as their inverse.
+
+    off : rms angle that the fit leaves [rad]
+    """
+    assert least.recorded is not None
+    for other, words in ((read_w_first, W_FIRST), (so3.transpose, INVERSE)):
+        with suppress(AccuracyNotReached):
+            if _size(_flight_fitted(replace(least, recorded=other(least.recorded)), find_axes=False).residuals) < off:
+                raise TrajectoryError(f"the recorded base is no flight of this body; {words}") from cause
 
 
 def _fitted_to_rates(least: _Least, find_bias: bool | None) -> tuple[_Least, _Fitted]:
     """The nearest flight to rates alone, and what was fitted: with a bias where they determine it."""
     assert least.rates is not None
+    fit, failure = None, None
     try:
         fit = _from_few(least, np.eye(3))
         _check_near(fit.residuals, least)
     except AccuracyNotReached as error:
+        failure = error
+    off = 1.0 if fit is None else _size(fit.residuals)
+    if off > _ROUNDED * least.tolerance:
         in_degrees = replace(least, rates=np.radians(least.rates), weight=np.degrees(least.weight))
-        with suppress(AccuracyNotReached):
-            _check_near(_from_few(in_degrees, np.eye(3)).residuals, in_degrees)
-            raise TrajectoryError(
-                "the recorded rates are no flight of this body; read in deg/s they are: give their unit, "
-                "numpy.radians(rates) (--names 'COLUMN=COLUMN [deg/s]')"
-            ) from error
-        raise
+        with suppress(AccuracyNotReached, np.linalg.LinAlgError):
+            if _size(_from_few(in_degrees, np.eye(3)).residuals) < _RIGHT * off:
+                raise TrajectoryError(
+                    "the recorded rates are no flight of this body; read in deg/s they are: give their unit, "
+                    "numpy.radians(rates) (--names 'COLUMN=COLUMN [deg/s]')"
+                ) from failure
+    if fit is None or failure is not None:
+        assert failure is not None
+        raise failure
     if find_bias is False:
         return least, fit
     biased = replace(least, find_bias=True)

@@ -22,7 +22,7 @@ from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ..shape_space.path_samples import PathSamples, path_samples
 from ..shape_space.shape_path import ShapePath
-from ._along_motion import AlongMotion, BodyAlong, ForcedAlong, along_motion, responses
+from ._along_motion import AlongMotion, BodyAlong, along_motion, responses
 from .wheels_along import WheelsAlong
 
 

@@ -62,14 +62,16 @@ def fit_lines(fitted: RecordedMomentum, errors: Uncertainty) -> list[str]:
     bars = np.sqrt(np.diag(errors.start)[3:])
     digits = max(_BAR_DIGITS - 1 - math.floor(math.log10(float(bars.min()))), 0) if bars.all() else _BAR_DIGITS
     momentum = ", ".join(f"{v:.{digits}f} ± {bar:.{digits}f}" for v, bar in zip(fitted.momentum, bars, strict=True))
-    angles, noise = np.degrees(fitted.angles), np.degrees(fitted.noise)
-    worst = int(np.argmax(angles))
+    angles, gyro = np.degrees(fitted.angles), np.degrees(np.linalg.norm(fitted.rate_residuals, axis=1))
+    noises = [f"{len(angles)} attitudes with {np.degrees(fitted.noise):.3g} deg"] if len(angles) else []
+    noises += [f"{len(gyro)} rates with {np.degrees(fitted.rate_noise):.3g} deg/s"] if len(gyro) else []
     lines = [
         "",
         f"{'momentum, fitted':24}{momentum}   kg m^2/s",
-        f"{'to the recorded base':24}{len(angles)} attitudes with {noise:.3g} deg of noise about each axis"
-        f"{_correlated(fitted)}",
+        f"{'to the recorded base':24}{' and '.join(noises)} of noise about each axis{_correlated(fitted)}",
     ]
+    if len(gyro):
+        lines.append(f"{'  bias of the rates':24}{_bias_text(fitted)}")
     if not fitted.conserved:
         first, last = (", ".join(f"{v:.{digits}f}" for v in fitted.momenta[row]) for row in (0, -1))
         lines.append(f"{'  not constant':24}from {first} to {last}   kg m^2/s; the bars hold it at every time")
@@ -79,22 +81,31 @@ def fit_lines(fitted: RecordedMomentum, errors: Uncertainty) -> list[str]:
         lines.append(
             f"{'its axes, fitted':24}quaternion {turned} (xyzw) from the axes of the body's base, ± {off:.2g} deg"
         )
+    off, unit = (angles, "deg") if len(angles) else (gyro, "deg/s")
+    worst = int(np.argmax(off))
     lines.append(
-        f"{'base as recorded':24}{_rms(angles):.3g} deg rms from this one, {angles[worst]:.3g} deg at most, at "
+        f"{'base as recorded':24}{_rms(off):.3g} {unit} rms from this one, {off[worst]:.3g} {unit} at most, at "
         f"{fitted.times[worst]:.6g} s"
     )
-    parts = np.array_split(np.arange(len(angles)), min(_MOST_PARTS, len(angles)))
+    parts = np.array_split(np.arange(len(off)), min(_MOST_PARTS, len(off)))
     times = "".join(f" {fitted.times[part].mean():7.3g}" for part in parts)
     return [
         *lines,
         f"{'  time [s]':24}{times}",
-        f"{'  off, rms [deg]':24}{''.join(f' {_rms(angles[part]):7.2g}' for part in parts)}",
+        f"{f'  off, rms [{unit}]':24}{''.join(f' {_rms(off[part]):7.2g}' for part in parts)}",
     ]
+
+
+def _bias_text(fitted: RecordedMomentum) -> str:
+    """Return the bias of the rates with its bars, or that it is taken for zero."""
+    if fitted.bias_covariance is None:
+        return "zero, not fitted: these rates do not determine it"
+    bars = np.degrees(np.sqrt(np.diag(fitted.bias_covariance)))
+    return ", ".join(f"{v:.3g} ± {bar:.2g}" for v, bar in zip(np.degrees(fitted.bias), bars, strict=True)) + "   deg/s"
 
 
 def fit_data(fitted: RecordedMomentum) -> dict[str, Any]:
     """Return the fit for programs, under `momentum_fit`."""
-    worst = int(np.argmax(fitted.angles))
     found = {
         "momentum_covariance": fitted.momentum_covariance.tolist(),
         "initial_attitude_quat_xyzw": so3.quat_from_matrix(fitted.initial_attitude).tolist(),
@@ -109,6 +120,13 @@ def fit_data(fitted: RecordedMomentum) -> dict[str, Any]:
         "times_s": fitted.times.tolist(),
         "recorded_base_difference_rotation_vector_rad": fitted.residuals.tolist(),
     }
+    if len(fitted.rate_residuals):
+        bars = None if fitted.bias_covariance is None else fitted.bias_covariance.tolist()
+        found |= {"rate_noise_rad_s": fitted.rate_noise, "rate_bias_rad_s": fitted.bias.tolist()}
+        found |= {"rate_bias_covariance_rad2_s2": bars, "rate_difference_rad_s": fitted.rate_residuals.tolist()}
+    if not len(fitted.angles):
+        return {"momentum_fit": found}
+    worst = int(np.argmax(fitted.angles))
     return {
         "momentum_fit": found,
         "recorded_base_difference_rad": float(fitted.angles[worst]),
@@ -172,8 +190,16 @@ def _base_lines(record: Any) -> list[str]:
         lines.append(
             f"{'base':24}{', '.join(base['attitude'])}, turning in the order {' '.join(base['order'])}; {said}"
         )
-    elif any(not text.startswith("base_") for text in _columns_of(base, "attitude")):
-        lines.append(f"{'attitude of the base':24}{', '.join(_columns_of(base, 'attitude'))}")
+    elif "inverse" in base or any(not text.startswith("base_") for text in _columns_of(base, "attitude")):
+        taken = "the inverse of base axes" if base.get("inverse") else "base axes"
+        by_rates = "by the rates" if "rates" in base else "--base-inverse for the inverse"
+        said = f"to the recorder's, {'as given' if base.get('inverse_by') == 'as given' else by_rates}"
+        names = ", ".join(_columns_of(base, "attitude")) or base["attitude"]
+        lines.append(f"{'attitude of the base':24}{names}: {taken} {said}")
+    if "rates" in base:
+        unit = base["rate_unit"] if base["rate_unit_said"] else f"{base['rate_unit']}, as no unit is stated"
+        axes = "the recorder's axes, by the attitudes" if base.get("rate_axes") == "inertial" else "base axes"
+        lines.append(f"{'rates of the base':24}{', '.join(base['rates'])}, read in {unit}; in {axes}")
     if any(not text.startswith("base_") for text in _columns_of(base, "position")):
         lines.append(f"{'place of the base':24}{', '.join(_columns_of(base, 'position'))}")
     if "axes" in base and (base["axes_said"] or base["axes"] != "x y z"):

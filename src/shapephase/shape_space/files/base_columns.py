@@ -205,6 +205,7 @@ class BaseColumns:
     def take(self, text: str, target: str) -> bool:
         """Keep a column, by its label and its name, and return True if it is one of the base."""
         rate = rate_label(target)
+        rate = rate if rate.unit else label(target)
         if rate.name in RATE_NAMES:
             if rate.name in self.rates:
                 self._raise_doubled(self.rates[rate.name][0], text, rate.name)
@@ -300,8 +301,14 @@ class BaseColumns:
 
     def _rates(self) -> BaseRates | None:
         """Recorded angular velocity; None without one."""
-        if len(self.rates) < len(RATE_NAMES):
+        if not self.rates:
             return None
+        lacking = [name for name in RATE_NAMES if name not in self.rates]
+        if lacking:
+            raise TrajectoryError(
+                f"{self.recording.table.where}: rates of the base with {', '.join(self.rates)}, without "
+                f"{', '.join(lacking)}; add it, or leave them out: names={{column: None}} (--names COLUMN=)"
+            )
         columns = [self.rates[name] for name in RATE_NAMES]
         texts = [text for text, _ in columns]
         self.gaps.joined(self.recording.table, texts)

@@ -120,7 +120,7 @@ def in_flight(
     request, where, base = choices.request, recording.table.where, motion.base
     if request is None or (request == RECORDED and not turns(base.attitude)):
         return recording, motion, None
-    if base.attitude is None and not isinstance(request, tuple):
+    if base.attitude is None and not (isinstance(request, tuple) or (request == ALL and base.rates is not None)):
         raise TrajectoryError(
             f"{where}: a flight is fitted to the recorded attitude of the base, and there is none; columns such as "
             "base_qx base_qy base_qz base_qw or pelvis_tilt pelvis_list pelvis_rotation are needed. Or give the "
