@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Array
 from ..dynamics.torques import joint_torques
 from ..errors import ShapePhaseError
+from ..shape_space.closest_approach import ClosestApproach
 from ._path_cost import path_cost
 from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
 from ._polish import GAUSS_NODES, GOAL_TOLERANCE, PolishedPath, polish
@@ -20,6 +21,7 @@ from ._spline_basis import SplineBasis
 from ._via_points import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control
+from .nodes.node_distances import Margins, closest_links, widened
 from .plan import Start
 from .plan_options import Search
 from .solver_callback import IterationCallback
@@ -43,6 +45,7 @@ class Attempt:
     cost : cost of the corrected path; infinite where there is none
     reaches_goal : whether the corrected path reaches the goal within the limits
     basis : spline of the path
+    closest : pairs of links that come near the clearance, the nearest first
     """
 
     task: Reorientation
@@ -51,6 +54,7 @@ class Attempt:
     cost: float
     reaches_goal: bool
     basis: SplineBasis
+    closest: tuple[ClosestApproach, ...] = ()
 
     def rank(self) -> tuple[bool, bool, float]:
         """Sorting key: first local optima, then paths that reach the goal by cost, then others by error."""
@@ -114,42 +118,63 @@ class LocalSearch:
     def _on(self, program: CollocationProgram, guess: Guess, callback: IterationCallback) -> tuple[Attempt, Array]:
         """Return the attempt of a program, with the iterations of all rounds, and the solver's control points.
 
-        Where efforts exceed their limits between the nodes, they get less room there in a further round.
+        Where efforts exceed their limits between the nodes, or links come too near, these get less room in a further
+        round.
         """
-        task, basis, began, room, iterations = self.task, program.basis, time.perf_counter(), None, 0
+        task, basis, began, iterations = self.task, program.basis, time.perf_counter(), 0
         control, duration, attitudes = guess.control, task.duration, guessed_attitudes(task, guess)
         options: dict[str, Any] = {
             "iterations": self.iterations,
             "via_places": guess.via_places,
             "iteration_callback": callback,
             "settles": self.settles,
+            "room": None,
+            "margins": {},
         }
         rounds = 0
         while True:
             solution = program.solve(control, duration, attitudes, **options)
             iterations += solution.iterations
             attempt = corrected_attempt(task, basis, replace(solution, iterations=iterations), began)
-            if rounds == _TIGHTENINGS or not task.efforts_limited or attempt.polished is None or not solution.converged:
+            if rounds == _TIGHTENINGS or attempt.polished is None or not solution.converged:
                 break
-            shares = effort_shares(task, basis, attempt.polished.motion)
+            tighter = _tightened(attempt, options["room"], options["margins"], rounds)
             again = guess_of_control(task, basis, solution.control)
-            if shares.max() <= 1.0 + LIMIT_SLACK or again is None:
+            if tighter is None or again is None:
                 break
-            room = tightened(room, shares, STAGES, rounds)
-            options |= {"room": room, "via_places": solution.via_places}
+            room, margins = tighter
+            if set(margins) != set(options["margins"]):
+                program = CollocationProgram(task, basis, margins)
+            options |= {"room": room, "margins": margins, "via_places": solution.via_places}
             control, duration, attitudes = solution.control, solution.duration, guessed_attitudes(task, again)
             rounds += 1
         return attempt, solution.control
 
 
+def _tightened(
+    attempt: Attempt, room: Array | None, margins: Margins, rounds: int
+) -> tuple[Array | None, Margins] | None:
+    """Return room for efforts and margins of distances with which a path will keep its limits; None where it does."""
+    task, basis, tighter = attempt.task, attempt.basis, False
+    if task.efforts_limited and attempt.polished is not None:
+        shares = effort_shares(task, basis, attempt.polished.motion)
+        if shares.max() > 1.0 + LIMIT_SLACK:
+            room, tighter = tightened(room, shares, STAGES, rounds), True
+    if task.clearance is not None and attempt.closest and attempt.closest[0].distance < task.clearance:
+        margins, tighter = widened(margins, attempt.closest, task.clearance), True
+    return (room, margins) if tighter else None
+
+
 def corrected_attempt(task: Reorientation, basis: SplineBasis, solution: NlpSolution, began: float) -> Attempt:
     """Correct a solver's path, the result of a search that began at a time [s], to reach the goal."""
-    polished, cost, reaches_goal = None, np.inf, False
+    polished, cost, reaches_goal, closest = None, np.inf, False, ()
     with suppress(ShapePhaseError):  # where the path has no motion
         polished = polish(task, basis, solution.control, solution.duration, solution.via_places)
     if polished is not None:
         cost = _cost(task, basis, polished)
+        closest = closest_links(task, polished.path)
         reaches_goal = polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
+        reaches_goal = reaches_goal and (not closest or closest[0].distance >= (task.clearance or 0.0))
     report = Start(
         status=solution.status,
         converged=solution.converged and reaches_goal,
@@ -161,7 +186,7 @@ def corrected_attempt(task: Reorientation, basis: SplineBasis, solution: NlpSolu
         seconds=time.perf_counter() - began,
         second_order=solution.second_order,
     )
-    return Attempt(task=task, report=report, polished=polished, cost=cost, reaches_goal=reaches_goal, basis=basis)
+    return Attempt(task, report, polished, cost, reaches_goal, basis, closest)
 
 
 def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
@@ -216,7 +241,14 @@ def failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Atte
         shares = limit_shares(best.task, best.basis, best.polished.control, best.polished.motion)
         near = [name for name, share in shares.items() if share > _NEARLY]
     more = "more iterations or starts (Search(starts=8), --starts 8)"
-    if task.cost == "time":
+    closest = best.closest if best is not None else ()
+    if closest and task.clearance is not None and closest[0].distance < task.clearance:
+        (one, other), nearest = closest[0].links, closest[0]
+        way_out = (
+            f"links {one} and {other} come within {nearest.distance:.4g} m of each other at {nearest.time:.4g} s, "
+            f"nearer than the clearance of {task.clearance:g} m: give a smaller distance (--avoid), more joints or {more}"
+        )
+    elif task.cost == "time":
         way_out = f"it may take longer than {task.duration:.6g} s: give a longer duration (--duration), or {more}"
     elif near:
         way_out = (

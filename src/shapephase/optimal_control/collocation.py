@@ -13,6 +13,7 @@ from ..arrays import Array
 from ._polish import end_conditions
 from ._spline_basis import SplineBasis, gauss_tableau
 from ._via_points import open_points, symbolic_via_rows
+from .nodes.node_distances import DistanceTerms, Margins
 from .nodes.node_efforts import EffortTerms
 from .nodes.node_functions import node_arguments, node_functions, scipy_sparse, sparse_matrix
 from .solver_callback import BestIterate, IterationCallback, ipopt_callback
@@ -84,9 +85,13 @@ class CollocationProgram:
     places : places of the nodes
     program : x, p, f and g as CasADi's `nlpsol` takes them
     derivatives : Jacobian of g and Hessian of the Lagrangian, as functions that `nlpsol` takes
+
+    Parameters
+    ----------
+    margins : pairs of links whose distance is bounded at the nodes
     """
 
-    def __init__(self, task: Reorientation, basis: SplineBasis) -> None:
+    def __init__(self, task: Reorientation, basis: SplineBasis, margins: Margins | None = None) -> None:
         import casadi
 
         self._task, self.basis = task, basis
@@ -117,18 +122,22 @@ class CollocationProgram:
         effort_rows, effort_jacobian = (
             (casadi.MX(0, 1), casadi.MX(0, unknown.shape[0])) if efforts is None else (efforts.values, efforts.jacobian)
         )
+        distances = DistanceTerms(task, basis, self.places, margins, unknown) if margins else None
         # Rows of no particular structure, which CasADi differentiates itself.
         others = casadi.vertcat(end, via, bends)
         groups = [linear @ unknown - from_turning @ casadi.vec(turning), others, effort_rows]
+        if distances is not None:
+            groups.append(distances.values)
         rows = casadi.vertcat(*groups)
         slopes = casadi.diagcat(*casadi.horzsplit(node.jacobian.map(count)(at_node), width))
         jacobian = casadi.vertcat(
             linear - from_turning @ (slopes @ arguments),
             casadi.jacobian(others, unknown),
             effort_jacobian,
+            *([] if distances is None else [distances.jacobian]),
         )
         multipliers, cost_factor = casadi.MX.sym("multipliers", rows.shape[0]), casadi.MX.sym("cost_factor")
-        of_linear, of_others, of_efforts = casadi.vertsplit(
+        of_linear, of_others, of_efforts, *of_distances = casadi.vertsplit(
             multipliers, np.cumsum([0, *(group.shape[0] for group in groups)]).tolist()
         )
         turning_multipliers = casadi.reshape(-from_turning.T @ of_linear, 4, count)
@@ -137,6 +146,8 @@ class CollocationProgram:
         hessian = arguments.T @ (casadi.diagcat(*casadi.horzsplit(blocks, width)) @ arguments)
         if efforts is not None:
             hessian = hessian + efforts.hessian(of_efforts, cost_factor)
+        if distances is not None:
+            hessian = hessian + distances.hessian(*of_distances)
         lagrangian = casadi.dot(others, of_others)
         if task.cost == "time":
             cost = unknown[duration_place]
@@ -157,6 +168,7 @@ class CollocationProgram:
         }
         # The third row of a pointed axis is a cosine, which only has to be positive.
         final_high = np.zeros(3) if task.target is not None else np.array([0.0, 0.0, np.inf])
+        self._distances = distances
         room = np.ones(bends.shape[0] + effort_rows.shape[0])
         self._low = np.concatenate([low, np.zeros(3), via_low, -room])
         self._high = np.concatenate([high, final_high, via_high, room])
@@ -217,6 +229,7 @@ class CollocationProgram:
         via_places: Array | None = None,
         settles: bool = False,
         room: Array | None = None,
+        margins: Margins | None = None,
         iteration_callback: IterationCallback | None = None,
     ) -> NlpSolution:
         """Return the local optimum from a guess: control points (k, m), T, attitudes at places (N,) -> (N, 4).
@@ -226,13 +239,14 @@ class CollocationProgram:
         via_places : (v,) guessed places of waypoints
         settles : whether the search may end where the cost changes no more
         room : shares of their limits for efforts at the nodes and the ends of pieces, (places, l); None: 1
+        margins : of the program's pairs of links
         """
         at = np.zeros(len(self._task.via)) if via_places is None else via_places
         attitudes = [quaternions(self.places).ravel(), quaternions(self.basis.nodes).ravel()]
         guess = np.concatenate([control.ravel(), [duration], *attitudes, at[open_points(self._task)]])
         still = np.concatenate([guess[: control.size + 1], np.zeros(len(guess) - control.size - 1)])
         cost = float(self._cost_function(still))
-        return self._optimum(guess, cost, iteration_callback, iterations, tolerance, settles, room)
+        return self._optimum(guess, cost, iteration_callback, iterations, tolerance, settles, room, margins)
 
     def _optimum(
         self,
@@ -243,6 +257,7 @@ class CollocationProgram:
         tolerance: float = _TOLERANCE,
         settles: bool = False,
         room: Array | None = None,
+        margins: Margins | None = None,
     ) -> NlpSolution:
         """Return IPOPT's optimum from a guess of the unknowns, whose cost is the unit of costs unless it is 0."""
         import casadi
@@ -251,6 +266,9 @@ class CollocationProgram:
         rows_low, rows_high = self._low.copy(), self._high.copy()
         if room is not None:
             rows_low[-room.size :], rows_high[-room.size :] = -room.ravel(), room.ravel()
+        if self._distances is not None and margins:
+            least = self._distances.bounds(margins)
+            rows_low, rows_high = np.append(rows_low, least), np.append(rows_high, np.full(len(least), np.inf))
         settled = {
             "acceptable_tol": _SETTLED_TOLERANCE,
             "acceptable_constr_viol_tol": _SETTLED_TOLERANCE,
@@ -274,6 +292,8 @@ class CollocationProgram:
         # The local name keeps it alive: CasADi does not.
         callback = ipopt_callback(best, len(guess), rows_low, rows_high)
         given = {"ipopt": options, "print_time": False, "iteration_callback": callback, **self.derivatives}
+        # Distances have no derivatives of CasADi's own.
+        given["no_nlp_grad"] = True
         solver = casadi.nlpsol("plan", "ipopt", self.program, given)
         low, high = self._bounds()
         result = solver(x0=np.clip(guess, low, high), lbx=low, ubx=high, lbg=rows_low, ubg=rows_high)

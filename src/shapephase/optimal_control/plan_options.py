@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -140,6 +141,8 @@ class Limits:
         [rad/s^3 or m/s^3]; with jerk limits joints start from rest without acceleration
     effort_limits : likewise for the torque or force of every motor, also of held joints [N m or N]; "body": those of
         the body's file, if any. With cost "effort" they are the units of efforts; None: no limit, units of the file
+    clearance : least distance between links [m], see `collision_geometry`; None: they may pass through each other
+    srdf : file with pairs of links to which that does not apply
 
     Raises
     ------
@@ -157,6 +160,8 @@ class Limits:
     acceleration_limits: ArrayLike | None = None
     jerk_limits: ArrayLike | None = None
     effort_limits: ArrayLike | str | None = None
+    clearance: float | None = None
+    srdf: str | Path | None = None
 
     __repr__ = short_repr
 
@@ -164,6 +169,8 @@ class Limits:
         """Check what is given and keep it as read-only arrays."""
         if not isinstance(self.joint_limits, bool | np.bool_):
             raise ShapeError(f"joint_limits: True or False is needed, got {value_text(self.joint_limits)}")
+        if self.clearance is not None:
+            object.__setattr__(self, "clearance", positive_argument(self.clearance, "clearance", "a distance in m"))
         for name, (unit, stated) in LIMIT_UNITS.items():
             given, words = getattr(self, name), ("body",) if stated else ()
             if given is None or (isinstance(given, str) and given in words):

@@ -13,6 +13,8 @@ from .. import so3
 from ..arguments import check_choice, check_mapping, names_argument, positive_argument
 from ..arrays import Array, Mask, check_reach, finite_array
 from ..body.body import Body
+from ..body.collisions.distances import link_distances
+from ..body.collisions.geometry import CollisionGeometry, collision_geometry
 from ..body.couplings.coordinate_map import check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
 from ._ball_chart import BallChart
@@ -53,6 +55,7 @@ class Reorientation:
     rates_at_ends : one of `RATES_AT_ENDS`
     coupling, offset : (n, m) and (n,), each joint from the coordinates
     via : what it passes through, in its order
+    clearance, geometry : least distance between links [m], and their solids; None: links may touch
     """
 
     body: Body
@@ -77,6 +80,8 @@ class Reorientation:
     coupling: Array
     offset: Array
     via: tuple[ViaPoint, ...] = ()
+    clearance: float | None = None
+    geometry: CollisionGeometry | None = None
 
     def shapes(self, coordinates: Array) -> Array:
         """Shape at coordinates: (..., m) -> (..., n)."""
@@ -267,7 +272,29 @@ def reorientation(
         coupling=coupling,
         offset=offset,
         via=points,
+        clearance=within.clearance,
+        geometry=_geometry(body, within, first, last),
     )
+
+
+def _geometry(body: Body, limits: Limits, first: Array, last: Array | None) -> CollisionGeometry | None:
+    """Return the solids of links that keep a distance, which they have at both ends; None where they may touch."""
+    if limits.clearance is None:
+        return None
+    geometry = collision_geometry(body, srdf=limits.srdf)
+    for shape, name in ((first, "start"), (last, "end")):
+        if shape is None:
+            continue
+        distances = link_distances(body, shape, geometry=geometry).distance
+        worst = int(np.argmin(distances)) if len(distances) else -1
+        if worst >= 0 and distances[worst] < limits.clearance:
+            one, other = geometry.pairs[worst]
+            raise TrajectoryError(
+                f"{name}: links {one} and {other} are {distances[worst]:.6g} m apart, nearer than the clearance of "
+                f"{limits.clearance:g} m: choose another posture, a smaller distance (--avoid), or leave the pair out "
+                "(--srdf)"
+            )
+    return geometry
 
 
 def _momentum(momentum: ArrayLike) -> Array:
