@@ -48,7 +48,8 @@ _PANELS = 128  # of a loop, on which the flux is integrated by Gauss: 1e-7 rad f
 _RULES = ((3, 8), (4, 12))  # Gauss nodes along the loop and the rays; the difference of both is the error
 _ARROWS = 11  # of the vector field along each axis
 _POSTURE = 0.45  # [in] height of a posture
-_BESIDE = 3  # postures in a row
+_BESIDE = 3  # postures in a row of a figure higher than that, else all
+_HIGH = 4.0  # [in]
 _ZOOM = 0.85  # of three-dimensional axes: their labels stay in the figure
 _SPACE_SECTORS = 180  # of the cone over three joints: two degrees each
 
@@ -168,7 +169,7 @@ def plot_loop(
     >>> print(ax.get_legend().get_title().get_text())
     one round turns the body about x by −63.3°
     = −64.4° flux in this plane (cone of all joints −64.4°)
-    +0.0° by the other joints, +1.1° by the order of the turns
+    +0.0° by other joints, +1.1° by the order of turns
     """
     flux = loop_flux(body, path, joints)
     count = whole_argument(postures, "postures", 0)
@@ -205,10 +206,18 @@ def draw_loop_flux(
     title = (
         f"one round turns the body{about} by {parts['turn']}°\n"
         f"= {parts['flux_in_plane']}° flux in this {space} (cone of all joints {parts['flux_of_cone']}°)\n"
-        f"{parts['other_joints']:+}° by the other joints, {parts['order']:+}° by the order of the turns"
+        f"{parts['other_joints']:+}° by other joints, {parts['order']:+}° by the order of turns"
     ).replace("-", "−")
-    above = {"bbox_to_anchor": (0.5, _POSTURE * -(-postures // _BESIDE)), "bbox_transform": _inches_above(ax)}
+    above = {
+        "bbox_to_anchor": (0.5, _POSTURE * -(-postures // _beside(ax, postures))),
+        "bbox_transform": _inches_above(ax),
+    }
     style.finish(ax, handles=[], title=title, loc="lower center", **above)
+
+
+def _beside(ax: Any, postures: int) -> int:
+    """Number of postures in a row."""
+    return _BESIDE if style.panel_size(ax)[1] > _HIGH else max(postures, 1)
 
 
 def _inches_above(ax: Any) -> Any:
@@ -333,11 +342,12 @@ def _draw_round(ax: Any, body: Body, path: ShapePath, flux: LoopFlux, count: int
     numbers = {"fontsize": style.SMALL - 1, "ha": "center", "va": "center", "zorder": 6.0}
     box = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": style.BLACK, "linewidth": 0.6}
     pictures = []
-    rows = -(-count // _BESIDE)
+    beside = _beside(ax, count)
+    rows = -(-count // beside)
     for k, point in enumerate(once[chosen]):
         ax.text(*point, str(k + 1), bbox=box, **numbers)
-        left, bottom = k % _BESIDE / _BESIDE, _POSTURE * (rows - 1 - k // _BESIDE)
-        pictures.append(ax.inset_axes((left, bottom, 1.0 / _BESIDE, _POSTURE), transform=_inches_above(ax)))
+        left, bottom = k % beside / beside, _POSTURE * (rows - 1 - k // beside)
+        pictures.append(ax.inset_axes((left, bottom, 1.0 / beside, _POSTURE), transform=_inches_above(ax)))
         look = numbers | {"ha": "left", "va": "top"}
         pictures[-1].text(0.0, 0.95, str(k + 1), transform=pictures[-1].transAxes, **look)
     draw_postures(pictures, body, shapes, horizontal_lift(body, route).attitude(times))
