@@ -108,10 +108,11 @@ def test_a_report_shows_each_figure_once(moving_report):
     assert titles[:2] == ["phases so far", "turn since the start"]
     assert "joints that turn" in titles
     drawn = re.findall(r"<figcaption>(.*?)</figcaption>", page)
-    others = ("torques", "inertia", "internal_momentum", "energy")
+    others = ("torques", "inertia", "internal_momentum", "energy", "loop")
     assert drawn == [FIGURES[kind].caption for kind in others]
-    assert set(FIGURES) == {"somersault", "momentum", "phases", "attitude", "shape", *others}
-    assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2, 2]
+    apart = ("curvature", "reach", "contributions", "segment_momentum")  # by the command line and `Motion.plot` only
+    assert set(FIGURES) == {"somersault", "momentum", "phases", "attitude", "shape", *others, *apart}
+    assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2, 3]
 
 
 @pytest.mark.usefixtures("no_pictures")
@@ -123,7 +124,7 @@ def test_somersault_tilt_and_twist_come_first_of_a_person(tmp_path):
     report(motion, sp.split(motion), shape_path=path).write(tmp_path / "report.html")
     drawn = re.findall(r"<figcaption>(.*?)</figcaption>", (tmp_path / "report.html").read_text(encoding="utf-8"))
     assert drawn[0] == "Somersault, tilt and twist"
-    assert len(drawn) == 5
+    assert len(drawn) == 6
 
 
 @pytest.mark.parametrize("momentum", [True, False])
@@ -141,7 +142,7 @@ def test_the_report_says_what_the_split_says(sweep, tmp_path, momentum, request)
     text = text_of(page)
     assert "a <satellite>" in text
     assert len(page) < 6e6
-    assert page.count("<figure") == (4 if momentum else 3)
+    assert page.count("<figure") == (5 if momentum else 4)
     shares, steps = zip(*told)
     assert shares == tuple(np.arange(len(told)) / len(told))
     assert len(steps) == page.count("<figure") + 1

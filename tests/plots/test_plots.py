@@ -845,6 +845,7 @@ def test_every_figure_returns_its_axes_and_is_drawn_within_its_column(motions, c
         plots.plot_shape_path: (path, cat),
         plots.plot_shape_plane: (path, joints, cat),
         plots.plot_curvature: (cat, joints),
+        plots.plot_loop: (cat, path),
         plots.plot_torques: (motion,),
         plots.plot_segment_momentum: (sp.segment_momentum(motion),),
         plots.plot_somersault: (dive,),

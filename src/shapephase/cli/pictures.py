@@ -157,8 +157,8 @@ def plot_command(
     Parameters
     ----------
     kind
-        What is drawn: somersault, momentum, phases, attitude, shape, torques, inertia, internal_momentum or energy; for
-        example `phases`.
+        What is drawn: somersault, momentum, phases, attitude, shape, torques, inertia, internal_momentum, energy, loop,
+        curvature, reach, contributions or segment_momentum; for example `phases`.
     """
     from ..arguments import check_choice
     from ..plots.named_figures import FIGURES, write_figure

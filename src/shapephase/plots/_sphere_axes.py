@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Array, Mask, finite_array
 from ._sphere_area import MAX_WINDING, AreaCells, outlines
-from .plot_style import SMALL, finish
+from .plot_style import SMALL, finish, finish_below
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +22,7 @@ _FAR_SHADE = 0.55  # strength of an area's shade on the far side
 _BEHIND = 0.3  # order in depth of background curves, below the others of their side
 _TEXT_ROOM = 0.17  # [radii of the sphere] between texts
 _VISIBLE_AREA = 5e-3  # [sr] a winding number of less is not in the legend
+_AROUND = 1.3  # [radii] half the side of the picture: room for texts beside the sphere
 _LIMB = -1e-9  # [1] height over the limb's plane: rounding on the limb is on the near side
 
 
@@ -146,22 +147,18 @@ class SphereAxes(ParallelAxes):
 
     def finish(self, name: str, title: str) -> None:
         """Draw frame and legend; `name` labels three-dimensional axes, with {} for the index of the axis."""
+        named: dict[str, Any] = {"handles": self.named.values(), "labels": self.named.keys(), "title": title}
         if self.solid:
             for axis, index in zip("xyz", "123"):
                 getattr(self.ax, f"set_{axis}label")(name.replace("{}", index), fontsize=SMALL, labelpad=-8.0)
                 getattr(self.ax, f"set_{axis}ticks")([-1.0, 1.0])
             self.ax.set(xlim=(-1.0, 1.0), ylim=(-1.0, 1.0), zlim=(-1.0, 1.0))
             self.ax.set_box_aspect((1.0, 1.0, 1.0))
-            place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.06)}
+            finish(self.ax, loc="upper center", bbox_to_anchor=(0.5, -0.06), **named)
         else:
-            # The legend is below the sphere but inside the axes, so that it cannot be cut off.
-            lines = (len(self.named) + 1) // 2 + 1 + title.count("\n")
-            self.ax.set(xlim=(-1.35, 1.35), ylim=(-1.3 - 0.13 * lines, 1.3), aspect="equal")
+            self.ax.set(xlim=(-_AROUND, _AROUND), ylim=(-_AROUND, _AROUND), aspect="equal")
             self.ax.set_axis_off()
-            place = {"loc": "lower center", "borderaxespad": 0.0}
-        legend = finish(self.ax, handles=self.named.values(), labels=self.named.keys(), title=title, **place)
-        # A legend wider than the axes would make the layout shrink them.
-        legend.set_in_layout(self.solid)
+            finish_below(self.ax, **named)
 
     def _fill(self, parts: list[Array], near: bool, label: str | None, colour: str, winding: int) -> None:
         """Fill all cells of one kind as one path around them, so that it is short and there are no seams."""

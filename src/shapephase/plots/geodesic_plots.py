@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 _POINTS = 400  # of a curve: no corner is seen at the width of a page
 _NEAREST = 2e-3  # last p of a locus, from the separatrix' (theta infinite) to the equator's
+_TRIANGLE = 3  # corners
 _FAINT: dict[str, Any] = {"color": GREY, "linewidth": 0.6, "alpha": 0.7, "zorder": 1.0}
 
 
@@ -260,10 +261,33 @@ def _directions(polar: Array, azimuth: Array) -> Array:
     return np.stack(np.broadcast_arrays(sine * np.sin(turn), -sine * np.cos(turn), np.cos(angle)), axis=-1)
 
 
-def _meshes(vectors: Array) -> Array:
-    """Corners of the meshes of a grid (N, M, 3), those left out that leave the ball of radius pi: (Q, 4, 3)."""
-    corners = np.stack([vectors[:-1, :-1], vectors[1:, :-1], vectors[1:, 1:], vectors[:-1, 1:]], axis=-2).reshape(
-        -1, 4, 3
-    )
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
-    return corners[sides.max(axis=1) < np.pi]
+def _meshes(vectors: Array) -> list[Array]:
+    """Corners (m_k, 3) of the meshes of a grid (N, M, 3); one that leaves the ball of radius pi is cut there."""
+    corners = np.stack([vectors[:-1, :-1], vectors[1:, :-1], vectors[1:, 1:], vectors[:-1, 1:]], axis=-2)
+    corners = corners.reshape(-1, 4, 3)
+    meshes = []
+    for mesh in corners:
+        if np.linalg.norm(mesh - np.roll(mesh, 1, axis=0), axis=-1).max() < np.pi:
+            meshes.append(mesh)
+            continue
+        # Vectors of the opposite sense, longer than pi, are the same rotations.
+        opposite = mesh - 2.0 * np.pi * so3.normalised(mesh)
+        nearer = np.linalg.norm(mesh - mesh[0], axis=-1) <= np.linalg.norm(opposite - mesh[0], axis=-1)
+        near = np.where(nearer[:, None], mesh, opposite)
+        if np.linalg.norm(near - np.roll(near, 1, axis=0), axis=-1).max() < 0.5 * np.pi:
+            halves = (_inside_ball(near), _inside_ball(np.where(nearer[:, None], opposite, mesh)))
+            meshes += [half for half in halves if len(half) >= _TRIANGLE]
+    return meshes
+
+
+def _inside_ball(polygon: Array) -> Array:
+    """The part of a small polygon inside the ball of radius pi: (N, 3) -> (M, 3)."""
+    depth, directions, kept = np.pi - np.linalg.norm(polygon, axis=-1), so3.normalised(polygon), []
+    for k, after in enumerate((*range(1, len(polygon)), 0)):
+        if depth[k] >= 0.0:
+            kept.append(polygon[k])
+        if (depth[k] >= 0.0) != (depth[after] >= 0.0):
+            # Between directions, so that the corner of the other part is opposite.
+            share = depth[k] / (depth[k] - depth[after])
+            kept.append(np.pi * so3.normalised((1.0 - share) * directions[k] + share * directions[after]))
+    return np.array(kept)

@@ -18,7 +18,7 @@ from ..body.couplings.coordinate_map import check_smooth
 from ..display import short_repr
 from ..errors import OpenPathError, ShapeError
 from ..letters import value_text
-from ..shape_space.body_path import check_closed, route_along
+from ..shape_space.body_path import check_closed, in_joint_order, route_along
 from ..shape_space.connection import curvature, horizontal_lift, mechanical_connection
 from ..shape_space.curvature_field import curvature_along
 from ..shape_space.shape_path import CLOSED, ShapePath
@@ -46,9 +46,11 @@ _AT_REST = 1e-9  # [rad or m] range of a joint that does not move
 _NO_TURN = 1e-6  # [rad] turns of less have no axis: whole turns are then about that of the flux
 _PANELS = 128  # of a loop, on which the flux is integrated by Gauss: 1e-7 rad for the motions of the library
 _RULES = ((3, 8), (4, 12))  # Gauss nodes along the loop and the rays; the difference of both is the error
+_MANY = 512  # panels, as of recordings: they are so short that two nodes less along the loop give as much
 _ARROWS = 11  # of the vector field along each axis
 _POSTURE = 0.45  # [in] height of a posture
-_BESIDE = 3  # postures in a row
+_BESIDE = 3  # postures in a row of a figure higher than that, else all
+_HIGH = 4.0  # [in]
 _ZOOM = 0.85  # of three-dimensional axes: their labels stay in the figure
 _SPACE_SECTORS = 180  # of the cone over three joints: two degrees each
 
@@ -168,7 +170,7 @@ def plot_loop(
     >>> print(ax.get_legend().get_title().get_text())
     one round turns the body about x by −63.3°
     = −64.4° flux in this plane (cone of all joints −64.4°)
-    +0.0° by the other joints, +1.1° by the order of the turns
+    +0.0° by other joints, +1.1° by the order of turns
     """
     flux = loop_flux(body, path, joints)
     count = whole_argument(postures, "postures", 0)
@@ -205,10 +207,18 @@ def draw_loop_flux(
     title = (
         f"one round turns the body{about} by {parts['turn']}°\n"
         f"= {parts['flux_in_plane']}° flux in this {space} (cone of all joints {parts['flux_of_cone']}°)\n"
-        f"{parts['other_joints']:+}° by the other joints, {parts['order']:+}° by the order of the turns"
+        f"{parts['other_joints']:+}° by other joints, {parts['order']:+}° by the order of turns"
     ).replace("-", "−")
-    above = {"bbox_to_anchor": (0.5, _POSTURE * -(-postures // _BESIDE)), "bbox_transform": _inches_above(ax)}
+    above = {
+        "bbox_to_anchor": (0.5, _POSTURE * -(-postures // _beside(ax, postures))),
+        "bbox_transform": _inches_above(ax),
+    }
     style.finish(ax, handles=[], title=title, loc="lower center", **above)
+
+
+def _beside(ax: Any, postures: int) -> int:
+    """Number of postures in a row."""
+    return _BESIDE if style.panel_size(ax)[1] > _HIGH else max(postures, 1)
 
 
 def _inches_above(ax: Any) -> Any:
@@ -220,24 +230,39 @@ def _inches_above(ax: Any) -> Any:
     )
 
 
+def enclosing_pair(body: Body, shapes: Array) -> list[int]:
+    """Return the two joints whose loop (N, n) encloses most: area times curvature at its middle. Raises ShapeError."""
+    usable = np.array([unit in ("rad", "m") for unit in body.joint_units])
+    span = np.where(usable, np.ptp(shapes, axis=0), 0.0)
+    widest = np.argsort(-span, kind="stable")[:2].tolist()
+    if len(widest) < 2 or span[widest[1]] <= _AT_REST:
+        raise ShapeError(f"path: a loop needs two joints that move, got {np.count_nonzero(span > _AT_REST)}")
+    middle = shapes.mean(axis=0)
+    arms, steps = np.where(usable, shapes[:-1] - middle, 0.0), np.diff(shapes, axis=0)
+    area = 0.5 * np.abs(arms.T @ steps - steps.T @ arms)
+    enclosed = np.where(usable, np.triu(np.linalg.norm(curvature(body, middle), axis=-1) * area), 0.0)
+    pair = [int(k) for k in np.unravel_index(np.argmax(enclosed), enclosed.shape)]
+    return pair if pair[0] != pair[1] else widest
+
+
+def has_loop(body: Body, path: ShapePath) -> bool:
+    """True where a path closes, and two of its joints move, so that `plot_loop` can draw it."""
+    route = in_joint_order(body, path)
+    usable = [unit in ("rad", "m") for unit in body.joint_units]
+    moves = np.ptp(route.shape(style.even_times(route, None)), axis=0)[usable] > _AT_REST
+    return bool(np.abs(route.gap).max(initial=0.0) <= CLOSED and moves.sum() > 1)
+
+
 def _drawn_axes(
     body: Body, shapes: Array, centre: Array, joints: Sequence[str | int] | str | None
 ) -> tuple[tuple[str, ...], tuple[str, ...], Array]:
     """Names, units and directions (k, n) of the axes of a figure."""
-    span = np.ptp(shapes, axis=0)
     usable = np.array([unit in ("rad", "m") for unit in body.joint_units])
-    moving = np.flatnonzero(usable & (span > _AT_REST))
-    if len(moving) < 2:
-        raise ShapeError(f"path: a loop needs two joints that move, got {len(moving)}")
     if isinstance(joints, str) and joints == PRINCIPAL:
         _, _, directions = np.linalg.svd(np.where(usable, shapes - centre, 0.0), full_matrices=False)
         return ("1st principal direction", "2nd principal direction"), ("principal",) * 2, directions[:2]
     if joints is None:
-        arms, steps = shapes[:-1] - centre, np.diff(shapes, axis=0)
-        area = 0.5 * (arms.T @ steps - steps.T @ arms)
-        enclosed = np.triu(np.linalg.norm(curvature(body, centre), axis=-1) * np.abs(area))
-        places = list(np.unravel_index(np.argmax(np.where(usable & usable[:, None], enclosed, 0.0)), enclosed.shape))
-        places = places if places[0] != places[1] else moving[np.argsort(-span[moving], kind="stable")[:2]].tolist()
+        places = enclosing_pair(body, shapes)
     elif isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) not in (2, 3):
         raise ShapeError(f'joints: two or three joints or "{PRINCIPAL}" are needed, got {value_text(joints)}')
     else:
@@ -258,7 +283,8 @@ def _flux(body: Body, route: ShapePath, edges: Array, centre: Array, directions:
     onto = None if directions is None else directions.T @ directions
     values = []
     for along_loop, along_ray in _RULES:
-        (t, dt), (x, dx) = (np.polynomial.legendre.leggauss(count) for count in (along_loop, along_ray))
+        nodes = along_loop - 2 * (len(edges) > _MANY * route.loops)
+        (t, dt), (x, dx) = (np.polynomial.legendre.leggauss(count) for count in (nodes, along_ray))
         half = 0.5 * np.diff(edges)
         times, x = (edges[:-1, None] + half[:, None] * (t + 1.0)).ravel(), 0.5 * (x + 1.0)
         shapes, rates = route.curve(times)
@@ -333,11 +359,12 @@ def _draw_round(ax: Any, body: Body, path: ShapePath, flux: LoopFlux, count: int
     numbers = {"fontsize": style.SMALL - 1, "ha": "center", "va": "center", "zorder": 6.0}
     box = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": style.BLACK, "linewidth": 0.6}
     pictures = []
-    rows = -(-count // _BESIDE)
+    beside = _beside(ax, count)
+    rows = -(-count // beside)
     for k, point in enumerate(once[chosen]):
         ax.text(*point, str(k + 1), bbox=box, **numbers)
-        left, bottom = k % _BESIDE / _BESIDE, _POSTURE * (rows - 1 - k // _BESIDE)
-        pictures.append(ax.inset_axes((left, bottom, 1.0 / _BESIDE, _POSTURE), transform=_inches_above(ax)))
+        left, bottom = k % beside / beside, _POSTURE * (rows - 1 - k // beside)
+        pictures.append(ax.inset_axes((left, bottom, 1.0 / beside, _POSTURE), transform=_inches_above(ax)))
         look = numbers | {"ha": "left", "va": "top"}
         pictures[-1].text(0.0, 0.95, str(k + 1), transform=pictures[-1].transAxes, **look)
     draw_postures(pictures, body, shapes, horizontal_lift(body, route).attitude(times))

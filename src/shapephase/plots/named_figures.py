@@ -9,20 +9,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..arguments import check_choice, check_file_name, check_object
+from ..body.body import Body
 from ..display import short_repr
 from ..errors import ShapeError
 from ..files import write_whole
 from ..phases.momentum_curve import Gauge
 from ..reconstruction.reconstruction import Motion
 from ..rigid_body.euler_top import EulerTop
+from ..segments.limb_contributions import contributions
+from ..segments.momentum import segment_momentum
+from ..shape_space.body_path import in_joint_order
+from ..shape_space.reach.holonomy_algebra import reachable
 from ..shape_space.shape_path import ShapePath
+from .contribution_plots import plot_shares
+from .loop_plots import HEIGHT as LOOP_HEIGHT
+from .loop_plots import enclosing_pair, plot_loop
 from .momentum_plots import plot_momentum_curve
 from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
-from .plot_style import axes_image, column_axes, write_axes
+from .plot_style import axes_image, column_axes, even_times, write_axes
 from .polhode_plots import plot_herpolhode, plot_polhodes
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
-from .segment_plots import plot_somersault
-from .shape_plots import plot_shape_path
+from .segment_plots import HEIGHT as SEGMENT_HEIGHT
+from .segment_plots import plot_segment_momentum, plot_somersault
+from .shape_plots import plot_curvature, plot_reach, plot_shape_path
 from .torque_plots import plot_torques
 
 if TYPE_CHECKING:
@@ -40,6 +49,8 @@ class Figure:
     draw : function of axes, motion, path of the joints and gauge
     with_momentum, with_path : whether it needs a momentum, a path of the joints
     of_change : whether it shows nothing but zero of a rigid body
+    of_loop : whether it needs a path that closes
+    in_report : whether a report has it
     of_athlete : whether a report has it only of a person or an animal whose somersaults are counted
 
     Examples
@@ -54,15 +65,34 @@ class Figure:
     with_momentum: bool = False
     with_path: bool = False
     of_change: bool = False
+    of_loop: bool = False
+    in_report: bool = True
     of_athlete: bool = False
 
     __repr__ = short_repr
 
 
 def _draw_shape(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
+    plot_shape_path(ax, _joints_of(path, "shape"), getattr(motion.deformation.description, "body", None))
+
+
+def _draw_curvature(ax: Axes, motion: Motion, path: ShapePath | None) -> None:
+    body, route = _body_of(motion, "curvature"), _joints_of(path, "curvature")
+    shapes = in_joint_order(body, route).shape(even_times(route, None))
+    plot_curvature(ax, body, enclosing_pair(body, shapes), path=route)
+
+
+def _joints_of(path: ShapePath | None, kind: str) -> ShapePath:
     if path is None:
-        raise ShapeError("the figure 'shape' needs the path of the joints, and there is none")
-    plot_shape_path(ax, path, getattr(motion.deformation.description, "body", None))
+        raise ShapeError(f"the figure {kind!r} needs the path of the joints, and there is none")
+    return path
+
+
+def _body_of(motion: Motion, kind: str) -> Body:
+    body = getattr(motion.deformation.description, "body", None)
+    if body is None:
+        raise ShapeError(f"the figure {kind!r} needs a body with joints; make the motion of articulated(body, path)")
+    return body
 
 
 FIGURES: Mapping[str, Figure] = {
@@ -96,6 +126,38 @@ FIGURES: Mapping[str, Figure] = {
         2.8,
         lambda ax, motion, *_: plot_energy(ax, motion),
         with_momentum=True,
+    ),
+    "loop": Figure(
+        "The loop of the joints on the curvature, and the parts of the turn by shape",
+        LOOP_HEIGHT,
+        lambda ax, motion, path, _: plot_loop(ax, _body_of(motion, "loop"), _joints_of(path, "loop")),
+        with_path=True,
+        of_loop=True,
+    ),
+    "curvature": Figure(
+        "The curvature over the two joints whose loop encloses most",
+        2.8,
+        lambda ax, motion, path, _: _draw_curvature(ax, motion, path),
+        with_path=True,
+        in_report=False,
+    ),
+    "reach": Figure(
+        "The pairs of joints whose small loops turn the body most",
+        2.8,
+        lambda ax, motion, *_: plot_reach(ax, reachable(_body_of(motion, "reach"))),
+        in_report=False,
+    ),
+    "contributions": Figure(
+        "The shares of the limbs in the twist",
+        2.8,
+        lambda ax, motion, *_: plot_shares(ax, contributions(motion)),
+        in_report=False,
+    ),
+    "segment_momentum": Figure(
+        "The momentum by link or limb",
+        SEGMENT_HEIGHT,
+        lambda ax, motion, *_: plot_segment_momentum(ax, segment_momentum(motion)),
+        in_report=False,
     ),
 }
 RIGID_FIGURES: Mapping[str, tuple[float, Callable[[Axes, EulerTop, float], object]]] = {

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from io import BytesIO
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +55,9 @@ SERIES: tuple[dict[str, Any], ...] = (
 _SYMBOLS = "dejavuserif"  # in sans-serif I and l are the same bar
 _RESOLUTION = 300  # [dots per inch] of raster images: what journals ask for
 _EDGE = 0.05  # [widths and heights] between an inset and the axes' edge or the next line
+_LEGEND_GAP = 0.12  # [in] between a picture and the legend below it, and around both
+_BESIDE_LEGEND = 0.2  # [in] by which axes with labels on their left lie to the right in their panel
+_LEAST_PICTURE = 0.3  # [in] of a picture whose legend needs all of the panel
 _FEW = 2  # points of a line that is a mark or a zero line
 _PLAIN_POWERS = (-4, 4)  # of ten that the numbers of a time axis show as they are
 # Loops of a path up to which its lines have their whole breadth, and the least part of it.
@@ -198,7 +202,10 @@ def subdivided(edges: Array, parts: int) -> Array:
 
 
 def finish(ax: Any, **place: Any) -> Any:
-    """Small ticks and a legend of two columns, by default above the axes; returns the legend."""
+    """Small ticks and a legend of two columns, by default above the axes; returns the legend.
+
+    Where the panel is too narrow for it, the legend has fewer columns, and its title more lines.
+    """
     ax.tick_params(labelsize=SMALL)
     ax.xaxis.get_offset_text().set_fontsize(SMALL)
     ax.yaxis.get_offset_text().set_fontsize(SMALL)
@@ -210,9 +217,48 @@ def finish(ax: Any, **place: Any) -> Any:
         "handletextpad": 0.6,
         "columnspacing": 1.0,
     }
-    legend = ax.legend(**{"ncols": 2, "frameon": False, **look, **above, **place})
-    legend.get_title().set_multialignment("center")
-    with_symbols(ax)
+    settings = {"ncols": 2, "frameon": False, **look, **above, **place}
+    room = (panel_size(ax)[0] - _BESIDE_LEGEND * ax.axison) * ax.figure.dpi
+    while True:
+        legend = ax.legend(**settings)
+        legend.get_title().set_multialignment("center")
+        with_symbols(ax)
+        title = legend.get_title().get_window_extent().width
+        if title > room:
+            lines = settings["title"].split("\n")
+            longest = int(max(map(len, lines)) * room / title)
+            settings["title"] = "\n".join(part for line in lines for part in wrap(line, longest))
+        elif legend.get_window_extent().width > room and settings["ncols"] > 1:
+            settings["ncols"] -= 1
+        else:
+            return legend
+
+
+def panel_size(ax: Any) -> tuple[float, float]:
+    """Width and height that some axes with their labels have in a figure [in]: their cell where a layout fills it."""
+    figure, spec = ax.figure, ax.get_subplotspec()
+    whole = figure.bbox.width / figure.dpi, figure.bbox.height / figure.dpi
+    if spec is None or figure.get_layout_engine() is None:
+        box = ax.get_position()
+        return whole[0] * box.width, whole[1] * box.height
+    grid = spec.get_gridspec()
+    shares = ((grid.get_width_ratios(), spec.colspan), (grid.get_height_ratios(), spec.rowspan))
+    width, height = (
+        length * sum(ratios[span.start : span.stop]) / sum(ratios) for length, (ratios, span) in zip(whole, shares)
+    )
+    return width, height
+
+
+def finish_below(ax: Any, **place: Any) -> Any:
+    """Finish a picture in axes of equal scales, with room inside them for the legend below it; returns the legend."""
+    legend = finish(ax, loc="lower center", borderaxespad=0.0, **place)
+    # A legend wider than the axes would make the layout shrink them.
+    legend.set_in_layout(False)
+    width, height = panel_size(ax)
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    needed = _LEGEND_GAP + legend.get_window_extent().height / ax.figure.dpi
+    scale = max((right - left) / width, (top - bottom) / max(height - needed, _LEAST_PICTURE))
+    ax.set_ylim(bottom - needed * scale, top)
     return legend
 
 

@@ -27,6 +27,7 @@ from ._report_text import (
     story,
     torque_words,
 )
+from .loop_plots import has_loop
 from .named_figures import FIGURES, figure_image
 from .page import Page
 from .pages.report_data import report_data
@@ -113,10 +114,12 @@ def report(
     scene, data = scene_and_data(motion, speed=None, frames=None, trail=trail, ghost=True, up=up, fall={})
     beside = report_data(motion, scene.times, result.gauge, scene.body, scene.shapes)
     has_joints = shape_path is not None and shape_path.n_shape > 0
-    kinds = [kind for kind, figure in FIGURES.items() if kind not in _MOVING]
+    kinds = [kind for kind, figure in FIGURES.items() if kind not in _MOVING and figure.in_report]
     kinds = [kind for kind in kinds if result.has_phase or not FIGURES[kind].with_momentum]
     kinds = [kind for kind in kinds if has_joints or not FIGURES[kind].with_path]
     kinds = [kind for kind in kinds if not (FIGURES[kind].of_change and is_rigid(motion))]
+    if scene.body is None or shape_path is None or not has_loop(scene.body, shape_path):
+        kinds = [kind for kind in kinds if not FIGURES[kind].of_loop]
     if scene.body is None or not _has_arms_or_legs(scene.body) or motion.counted_axes() is None:
         kinds = [kind for kind in kinds if not FIGURES[kind].of_athlete]
     figures = []

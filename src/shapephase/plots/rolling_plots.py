@@ -13,7 +13,7 @@ from ..errors import ShapeError
 from ..rigid_body.euler_top import EulerTop
 from ..rigid_body.poinsot import Poinsot, cones
 from ._sphere_axes import ParallelAxes
-from .plot_style import BLACK, BLUE, GREEN, GREY, SMALL, VERMILION, check_axes, finish
+from .plot_style import BLACK, BLUE, GREEN, GREY, SMALL, VERMILION, check_axes, finish, finish_below
 from .polhode_plots import herpolhode_times, polhode_times
 
 if TYPE_CHECKING:
@@ -301,6 +301,7 @@ def _write(space: ParallelAxes, point: Array, text: str) -> None:
 
 def _finish(space: ParallelAxes, reach: Array, title: str) -> None:
     """Set limits around all that is drawn, and the legend below it."""
+    named: dict[str, Any] = {"handles": space.named.values(), "labels": space.named.keys(), "title": title}
     if space.solid:
         middle, half = 0.5 * (reach.min(axis=0) + reach.max(axis=0)), 0.5 * float(np.ptp(reach, axis=0).max())
         for name, centre in zip("xyz", middle, strict=True):
@@ -309,12 +310,11 @@ def _finish(space: ParallelAxes, reach: Array, title: str) -> None:
         for name in "xyz":
             getattr(space.ax, f"set_{name}label")("[rad/s]", fontsize=SMALL)
             space.ax.tick_params(axis=name, labelsize=SMALL)
-        place = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.06)}
+        finish(space.ax, loc="upper center", bbox_to_anchor=(0.5, -0.06), **named)
     else:
         flat = reach @ space.screen.T
         low, high = flat.min(axis=0), flat.max(axis=0)
         room = _MARGIN * float((high - low).max())
         space.ax.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room), aspect="equal")
         space.ax.set_axis_off()
-        place = {"loc": "upper center", "bbox_to_anchor": (0.5, 0.0)}
-    finish(space.ax, handles=space.named.values(), labels=space.named.keys(), title=title, **place)
+        finish_below(space.ax, **named)

@@ -296,8 +296,9 @@ class MotionViews:
 
         Parameters
         ----------
-        kind : "somersault", "phases", "momentum", "attitude", "shape", "torques", "inertia", "internal_momentum" or
-            "energy"; None: the phases, without momentum the attitude
+        kind : "somersault", "phases", "momentum", "attitude", "shape", "torques", "inertia", "internal_momentum",
+            "energy", "loop", "curvature", "reach", "contributions" or "segment_momentum";
+            None: the phases, without momentum the attitude
         ax : axes to draw into; None: those of a new figure one column wide, which is `axes.figure`
         gauge : as for `split`
 
