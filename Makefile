@@ -43,11 +43,12 @@ times:
 notebooks:
 	PYTHONPATH=docs $(BIN)/python -m _site.executed_notebooks $(NOTEBOOKS)
 
-# Executes the notebooks too, once, where a number that is not the one committed is an error; then follows every link. Needs the
-# extra `docs`.
+# Executes the notebooks too, once, where a number that is not the one committed is an error; then follows every link, and packs
+# the site to be read offline. Needs the extra `docs`.
 docs:
 	$(BIN)/sphinx-build -j auto -nW --keep-going docs docs/_build/html
 	PYTHONPATH=docs $(BIN)/python -m _site.built_links docs/_build/html
+	cd docs/_build && $(abspath $(BIN))/python -m zipfile -c shapephase-docs.zip html
 
 full:
 	$(BIN)/pytest -n auto

@@ -18,6 +18,7 @@ from _site.coverage import write_tables
 from _site.docstrings import bars_are_norms, entries_are_descriptions, name_aliases
 from _site.equations import citing, with_citations
 from _site.executed_notebooks import library_digest, quiet_kernels, write_pages
+from _site.live_pages import write_live_pages
 from _site.name_links import places, with_names
 from _site.reference_pages import write_reference
 
@@ -91,7 +92,8 @@ bibtex_reference_style = "author_year"
 
 html_theme = "pydata_sphinx_theme"
 html_title = "shapephase"
-html_static_path = ["_static"]
+LIVE = HERE / "_build" / "live"
+html_static_path = ["_static", str(LIVE)]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sourcelink = False
@@ -108,10 +110,11 @@ mathjax3_config = {"options": {"enableMenu": False}, "svg": {"fontCache": "globa
 
 
 def _write_pages(*_: object) -> None:
-    """Pages that are made: the reference, tables of the theory; executed notebooks, as they must lie below."""
+    """Pages that are made: the reference, tables of the theory, live pages, and executed notebooks."""
     quiet_kernels(HERE / "_build" / "ipython")
     write_reference(HERE / "reference")
     write_tables(HERE.parent)
+    write_live_pages(LIVE)
     for fault in write_pages(HERE / "tutorials" / "notebooks"):
         _LOG.warning("notebooks/%s", fault)
 

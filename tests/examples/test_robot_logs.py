@@ -7,6 +7,7 @@ import pytest
 import shapephase as sp
 from support.places import ROBOTS
 from support.robot_logs import LOGS, RPM
+from support.simulated_dive import files
 
 
 @pytest.mark.parametrize("name", LOGS)
@@ -21,6 +22,17 @@ def test_the_file_is_what_the_simulation_makes(name):
         # Half of the last digit, and rounding that differs between processors.
         assert np.abs(stored[column].to_numpy() - samples).max() < 0.51 * last_digit, column
     assert (ROBOTS / name).stat().st_size < 400_000
+
+
+def test_the_dive_is_what_mujoco_simulates():
+    """To 0.001 [degrees, m, rad or kg m^2/s], which versions of MuJoCo may differ by."""
+    for name, text in files().items():
+        stored, made = (
+            (lines[0], np.loadtxt(lines[1:], delimiter=lines[0][4]))
+            for lines in (whole.split("endheader\n")[-1].splitlines() for whole in ((ROBOTS / name).read_text(), text))
+        )
+        assert stored[0] == made[0]
+        assert np.abs(stored[1] - made[1]).max() < 1e-3
 
 
 def test_the_astronaut_s_log_gives_the_momentum_and_the_turn_back():
