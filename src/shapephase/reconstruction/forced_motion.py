@@ -19,6 +19,8 @@ from ..display import Card, card_html, card_text, error_text, momentum_text, num
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.driven_attitude import DrivenAttitude, driven_attitude
+from ..offers import offered
+from ._motion_views import base_positions
 from .attitude_angles import continuous
 from .external_torque import ExternalTorque, TorqueState
 from .forced_record import read_forced_record, write_forced_record
@@ -125,6 +127,20 @@ class ForcedMotion:
         times = times_argument(t, self.duration)
         return self.solution.states(times.ravel())[:, 3].reshape(times.shape)[()]
 
+    def base_position(
+        self,
+        t: ArrayLike,
+        *,
+        start: ArrayLike = (0.0, 0.0, 0.0),
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        gravity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Array:
+        """Position of the base origin as `Motion.base_position` has it: times (...) -> (..., 3) [m].
+
+        The torque comes without a force: the centre of mass moves as without it.
+        """
+        return base_positions(self, t, start, velocity, gravity)
+
     @property
     def final_attitude(self) -> Array:
         """R(T): (3, 3)."""
@@ -180,6 +196,15 @@ class ForcedMotion:
         """
         check_file_name(path, "path")
         return cls(**read_forced_record(path))
+
+    def view(self, **options: Any) -> Any:
+        """Return a page of the motion in three dimensions, as `Motion.view`; the arrow of the momentum changes.
+
+        Parameters
+        ----------
+        options : of `shapephase.view`
+        """
+        return offered("Motion.view")(self, **options)
 
     def write_csv(self, path: str | os.PathLike[str], times: ArrayLike | None = None) -> None:
         """Write a time series: attitude (x y z w), angular velocity, momentum, torque and its work.
