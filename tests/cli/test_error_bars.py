@@ -11,6 +11,7 @@ import pytest
 import shapephase as sp
 from shapephase.cli.main import main
 from shapephase.cli.texts.error_bar_text import error_bar_lines
+from shapephase.shape_space.shape_path import without_joints
 
 MOMENTUM = ("--momentum", "2", "3", "20")
 
@@ -81,6 +82,42 @@ def test_an_angle_without_a_bar_is_told_as_such():
     lines = error_bar_lines(found, sp.uncertainty(motion, joints=0.01))
     assert sum("no bar of an angle" in line for line in lines) == 2
     assert not any("phase" in line for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("wheel", "error", "deviation"),
+    [("--rotor wheel_spin=2", "0.05", 0.05), ("--rotor-speed wheel_spin=300rpm", "5rpm", 5.0 * np.pi / 30.0)],
+)
+def test_bars_of_wheels_are_those_of_the_library(capfd, wheel, error, deviation):
+    words = ("split", "satellite", "satellite_sweep", *wheel.split(), "--rotor-error", f"wheel_spin={error}")
+    data = json.loads(said(capfd, *words, "--json"))["uncertainty"]
+    body = sp.load_body("satellite")
+    path = without_joints(sp.examples.MOTIONS["satellite_sweep"].path(), ["wheel_spin"])
+    kind = {"rotors": {"wheel_spin": 2.0}} if "speed" not in wheel else {"rotor_speeds": {"wheel_spin": 10.0 * np.pi}}
+    expected = sp.uncertainty(
+        sp.reconstruct(sp.articulated(body, path, **kind), np.zeros(3)), rotors={"wheel_spin": deviation}
+    )
+    np.testing.assert_allclose(data["wheel_rotation"], expected.wheel_rotation, rtol=1e-6)
+    (line,) = (
+        line for line in said(capfd, *words).splitlines() if re.match(r"  stored wheel momentum.* ± .* deg", line)
+    )
+    bar = float(re.search(r"± ([\d.]+) deg", line).group(1))
+    assert bar == pytest.approx(np.degrees(expected.wheel_angle), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("wheel_spin", "JOINT=VALUE is needed"),
+        ("wheel_spin=x", "a momentum in kg m"),
+        ("arm_1=0.1", "unknown wheel"),
+        ("wheel_spin=-1", "not negative"),
+    ],
+)
+def test_what_is_no_error_of_a_wheel_is_refused(capfd, word, message):
+    with pytest.raises(SystemExit):
+        main(["split", "satellite", "satellite_sweep", "--rotor", "wheel_spin=2", f"--rotor-error={word}"])
+    assert message in capfd.readouterr().err
 
 
 def test_noise_of_what_was_not_recorded_is_refused(capfd):

@@ -344,6 +344,37 @@ def test_the_page_has_the_momentum_and_at_every_frame_the_attitude_of_its_motion
     np.testing.assert_allclose(Rotation.from_quat(motion["turns"].reshape(-1, 4)).as_matrix(), expected, atol=1e-6)
 
 
+@pytest.fixture(scope="module")
+def pushed():
+    """A body whose momentum doubles and turns."""
+    push = sp.ExternalTorque(lambda _: [0.5, 0.0, 1.0], axes="space")
+    return sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 2.0), [0.0, 0.0, 1.0], torque=push)
+
+
+def test_under_a_torque_the_page_has_the_momentum_of_every_frame(pushed, tmp_path):
+    pushed.view(frames=5).write(tmp_path / "a.html")
+    motion = page_data(tmp_path / "a.html")["motion"]
+    momenta = [[0.5 * t, 0.0, 1.0 + t] for t in (0.0, 0.5, 1.0, 1.5, 2.0)]
+    np.testing.assert_allclose(motion["momenta"].reshape(-1, 3), momenta, atol=1e-6)
+    expected = pushed.attitude(np.linspace(0.0, 2.0, 5))
+    np.testing.assert_allclose(Rotation.from_quat(motion["turns"].reshape(-1, 4)).as_matrix(), expected, atol=1e-6)
+    np.testing.assert_allclose(pushed.base_position(2.0, velocity=[1.0, 2.0, 3.0]), [2.0, 4.0, 6.0], atol=1e-12)
+
+
+@pytest.mark.full
+def test_under_a_torque_the_arrow_turns_and_grows(pushed, tmp_path, chromium):
+    pushed.view(frames=5).write(tmp_path / "a.html")
+    page, said, _ = opened(chromium, tmp_path / "a.html")
+    lengths = []
+    for t in (0.0, 0.7, 2.0):
+        page.evaluate("t => page.clock.show(t)", t)
+        arrow = pose(page, "page.figure.momentum.pose")
+        np.testing.assert_allclose(so3.normalised(arrow[:3, 2]), so3.normalised(pushed.momentum(t)), atol=1e-6)
+        lengths.append(float(np.linalg.norm(arrow[:3, 2]) / np.linalg.norm(pushed.momentum(t))))
+    np.testing.assert_allclose(lengths, lengths[0], rtol=1e-6)
+    assert [message for message in said if message[0] in ("error", "warning")] == []
+
+
 def test_speed_and_frames(righting, tmp_path):
     view(righting, speed=0.1, frames=11).write(tmp_path / "a.html")
     motion = page_data(tmp_path / "a.html")["motion"]

@@ -319,6 +319,9 @@ class ErrorOptions:
     """Standard deviation of each component of the momentum, in kg m^2/s; for example `--momentum-error 0.001`."""
     attitude_error: Annotated[float | None, rare()] = None
     """Standard deviation of the attitude at the start about each axis, in rad; for example `--attitude-error 0.01`."""
+    rotor_error: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """Standard deviation of a wheel's momentum, in kg m^2/s, or speed, in rad/s or with a unit, JOINT=VALUE; of one
+    given in time that of a constant offset. For example `--rotor-error rw1=20rpm`."""
 
 
 # Defaults of the commands: a dataclass in a signature needs one instance.

@@ -77,9 +77,9 @@ def with_wheels(body: Body, options: WheelOptions) -> tuple[Body, Wheels]:
             if name in wheels.names:
                 raise ShapeError(f"{option}: the wheel {name!r:.{_MAX_SHOWN}} is given twice; keep one value")
             if option == "--rotor":
-                wheels.momenta[name] = _momentum(value, name)
+                wheels.momenta[name] = momentum_word(value, name, option)
                 continue
-            known = _speed(value, name)
+            known = speed_word(value, name, option)
             if known is None:
                 wheels.columns[name] = value
             else:
@@ -93,19 +93,21 @@ def with_wheels(body: Body, options: WheelOptions) -> tuple[Body, Wheels]:
     return body, wheels
 
 
-def _momentum(text: str, name: str) -> float:
+def momentum_word(text: str, name: str, option: str) -> float:
+    """Return the momentum of a wheel [kg m^2/s]. Raises ShapeError."""
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise ShapeError(f"--rotor: {name}: a momentum in kg m^2/s is needed, as 1.5, got {text!r:.{_MAX_SHOWN}}")
+        raise ShapeError(f"{option}: {name}: a momentum in kg m^2/s is needed, as 1.5, got {text!r:.{_MAX_SHOWN}}")
     return value
 
 
-def _speed(text: str, name: str) -> float | None:
+def speed_word(text: str, name: str, option: str) -> float | None:
+    """Return the speed of a wheel [rad/s]; None for a word that is no number. Raises ShapeError."""
     try:
-        return speed(text, f"--rotor-speed: {name}")
+        return speed(text, f"{option}: {name}")
     except TrajectoryError as error:
         raise ShapeError(str(error)) from None
 

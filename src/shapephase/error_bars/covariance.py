@@ -39,7 +39,14 @@ from .result_derivatives import (
 )
 
 _ROUNDING = 1e-9  # of the largest variance of a rotation: smaller ones about other axes are rounding
-_ROTATIONS = ("final_attitude", "total_rotation", "holonomy", "dynamical_rotation", "wheel_rotation")
+_ROTATIONS = (
+    "final_attitude",
+    "total_rotation",
+    "holonomy",
+    "dynamical_rotation",
+    "wheel_rotation",
+    "momentum_rotation",
+)
 _PHASES = ("dynamic_phase", "solid_angle", "montgomery_phase")
 
 
@@ -52,7 +59,8 @@ class Uncertainty:
 
     Attributes
     ----------
-    final_attitude, total_rotation, holonomy, dynamical_rotation, wheel_rotation : (3, 3) covariances [rad^2]
+    final_attitude, total_rotation, holonomy, dynamical_rotation, wheel_rotation, momentum_rotation : (3, 3)
+        covariances [rad^2]
     dynamic_phase, solid_angle, montgomery_phase : standard deviations [rad]
     start : (6, 6) covariance of the turn of the start, base axes [rad^2], and of the momentum [(kg m^2/s)^2], with all
         that moves a fit to a recording
@@ -68,6 +76,7 @@ class Uncertainty:
     holonomy: Array
     dynamical_rotation: Array
     wheel_rotation: Array
+    momentum_rotation: Array
     dynamic_phase: float
     solid_angle: float
     montgomery_phase: float
@@ -393,7 +402,7 @@ def _uncertainty(
     draws: int,
     smoothing_bias: float = 0.0,
 ) -> Uncertainty:
-    _, total, holonomy, _, wheels = covariances
+    _, total, holonomy, _, wheels, _ = covariances
     bars = (
         angle_bar(parts.total_rotation, total),
         angle_bar(parts.holonomy, holonomy),

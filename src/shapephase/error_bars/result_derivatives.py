@@ -36,7 +36,8 @@ class ResultDerivative:
 
     Attributes
     ----------
-    final_attitude, total_rotation, holonomy, dynamical_rotation, wheel_rotation : (3, m) [rad per unit]
+    final_attitude, total_rotation, holonomy, dynamical_rotation, wheel_rotation, momentum_rotation : (3, m) [rad per
+        unit]
     dynamic_phase, solid_angle, montgomery_phase : (m,) in the horizontal gauge [rad per unit]; without momentum zero
     """
 
@@ -45,6 +46,7 @@ class ResultDerivative:
     holonomy: Array
     dynamical_rotation: Array
     wheel_rotation: Array
+    momentum_rotation: Array
     dynamic_phase: Array
     solid_angle: Array
     montgomery_phase: Array
@@ -199,7 +201,9 @@ class Derivatives:
         magnitude = float(np.linalg.norm(momentum))
         if not magnitude:
             none = np.zeros(changes.action.shape)
-            return ResultDerivative(changes.end, of_total, of_holonomy, of_wheels, of_wheels, none, none, none)
+            return ResultDerivative(
+                changes.end, of_total, of_holonomy, of_wheels, of_wheels, 0.0 * of_total, none, none, none
+            )
         of_dynamical = of_total - dynamical @ of_holonomy
         axis = momentum / magnitude
         by_turn, by_axis = self._twist_slopes
@@ -208,7 +212,8 @@ class Derivatives:
             dynamic = dynamic - self._dynamic_phase * axis / magnitude
             montgomery = montgomery + (by_axis - (by_axis @ axis) * axis) / magnitude
         phases = dynamic, dynamic - montgomery, montgomery
-        return ResultDerivative(changes.end, of_total, of_holonomy, of_dynamical, of_wheels, *phases)
+        of_momentum = of_dynamical - dynamical @ wheels.T @ of_wheels
+        return ResultDerivative(changes.end, of_total, of_holonomy, of_dynamical, of_wheels, of_momentum, *phases)
 
     @cached_property
     def _rotations(self) -> tuple[Array, Array, Array, Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
+from typing import Protocol
 
 import numpy as np
 
@@ -34,6 +35,19 @@ _PARTS = 8.0  # of a step that passed over something
 _MOST_ROUNDS = 100  # in which something was passed over: so many narrow intervals can follow from each other
 
 
+class StatesInTime(Protocol):
+    """A unit quaternion and other numbers as functions of time."""
+
+    @property
+    def times(self) -> Array:
+        """Ends of the steps [s]."""
+        ...
+
+    def __call__(self, t: Array, /) -> Array:
+        """State at times: (N,) -> (N, 4 + k)."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class DrivenAttitude:
     """Attitudes and other states in time.
@@ -46,7 +60,7 @@ class DrivenAttitude:
     evaluations : of the rates, in all runs
     """
 
-    run: Run
+    run: StatesInTime
     scales: Array
     error_times: Array
     attitude_errors: Array

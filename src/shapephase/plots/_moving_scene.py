@@ -24,6 +24,7 @@ from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError, unknown_name
 from ..inertia_tensor import principal_axes, second_moment
 from ..letters import value_text
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 
 _MAX_FRAMES = 10_000  # five minutes at 30 a second: a larger page is too slow for a browser
@@ -65,7 +66,8 @@ class MovingScene:
     base : (F, 4, 4) pose of the base axes
     nodes : attached to the base axes
     centre : (F, 3) centre of mass
-    momentum : (3,) the angular momentum [kg m^2/s]
+    momentum : (3,) the angular momentum, under a torque that at the start [kg m^2/s]
+    momenta : (F, 3) of the frames, under a torque; None: it stays
     trail : (F, 3) positions of the origin of a link; None: no trail
     body, shapes : whose links the nodes are, and its joints (F, n); None: particles or the locked inertia
     falls : whether gravity moves the centre of mass
@@ -81,6 +83,7 @@ class MovingScene:
     body: Body | None = None
     shapes: Array | None = None
     falls: bool = False
+    momenta: Array | None = None
 
     __repr__ = short_repr
 
@@ -125,7 +128,9 @@ class MovingScene:
         return np.concatenate(found, axis=1) if found else self.centre[:, None]
 
 
-def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fall: ArrayLike) -> MovingScene:
+def moving_scene(
+    motion: Motion | ForcedMotion, frames: int, *, trail: str | None = None, **fall: ArrayLike
+) -> MovingScene:
     """The scene of a motion.
 
     An articulated body has the shapes of its links (`visuals`), whatever gauge the motion was reconstructed in. Point
@@ -157,7 +162,7 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     >>> scene.times.tolist()
     [0.0, 1.0, 2.0, 3.0, 4.0]
     """
-    check_object(motion, "Motion", "motion")
+    check_object(motion, "Motion", "motion", or_kind="ForcedMotion")
     check_keywords(fall, moving_scene)
     if motion.batch:
         raise ShapeError(f"one motion can be shown, this is a batch of {motion.batch}; reconstruct one of them")
@@ -184,13 +189,15 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
         nodes = _particle_nodes(description, times)
     else:
         nodes = (_inertia_node(motion.deformation, in_base, times),)
+    momenta = motion.momentum(times) if isinstance(motion, ForcedMotion) else None
     return MovingScene(
         title=motion.deformation.label,
         times=times,
         base=base,
         nodes=nodes,
         centre=centre,
-        momentum=motion.momentum,
+        momentum=motion.initial_momentum if isinstance(motion, ForcedMotion) else motion.momentum,
+        momenta=momenta,
         trail=points,
         body=body,
         shapes=shapes,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import check_flag, check_keywords, check_object
 from ..errors import VisualWarning
+from ..reconstruction.forced_motion import ForcedMotion
 from ..reconstruction.reconstruction import Motion
 from ._moving_scene import MovingScene, moving_scene
 from .page import Page, frame_count, playing_speed
@@ -20,7 +21,7 @@ from .pages.templates import SCENE_SCRIPTS, page_from
 
 
 def view(
-    motion: Motion,
+    motion: Motion | ForcedMotion,
     *,
     speed: float | None = None,
     frames: int | None = None,
@@ -33,7 +34,7 @@ def view(
 
     The body moves as reconstructed, with the conserved angular momentum as an arrow from the centre of mass, the axes
     of the base and of space, and the body at the start as a transparent ghost. The clock is the time of the body. Its
-    joints can be moved by hand.
+    joints can be moved by hand. Under a torque the arrow turns, and is as long as the momentum is large.
 
     Parameters
     ----------
@@ -84,7 +85,7 @@ def view(
 
 
 def scene_and_data(
-    motion: Motion,
+    motion: Motion | ForcedMotion,
     *,
     speed: float | None,
     frames: int | None,
@@ -94,7 +95,7 @@ def scene_and_data(
     fall: Mapping[str, ArrayLike],
 ) -> tuple[MovingScene, dict[str, Any]]:
     """Return a motion as a scene, and as the data of a page; arguments, errors and warnings as `view`."""
-    check_object(motion, "Motion", "motion")
+    check_object(motion, "Motion", "motion", or_kind="ForcedMotion")
     check_flag(ghost, "ghost")
     rate = playing_speed(motion.duration, speed)
     up_axis(up, None)

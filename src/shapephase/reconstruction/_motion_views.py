@@ -28,6 +28,17 @@ _AT_POLE = 1e-6  # cosine of the tilt: rates there have no digits left
 _PARTS = 8  # of a step, at which angles are continued: a step turns by less than a radian or so
 
 
+def base_positions(motion: Any, t: ArrayLike, start: ArrayLike, velocity: ArrayLike, gravity: ArrayLike) -> Array:
+    """Positions of the base origin, inertial axes, see `Motion.base_position`: times (...) -> batch + (..., 3) [m]."""
+    times = times_argument(t, motion.duration)
+    point, speed, pull = (
+        finite_array(value, name, (3,))
+        for value, name in ((start, "start"), (velocity, "velocity"), (gravity, "gravity"))
+    )
+    centre = point + times[..., None] * speed + 0.5 * times[..., None] ** 2 * pull
+    return centre - so3.apply(motion.attitude(times), motion.deformation.centre_of_mass(times))
+
+
 class MotionViews:
     """Mixin with the presentation methods of `Motion`."""
 

@@ -74,6 +74,29 @@ def _check_directions(directions: Array, quaternions: Array) -> None:
         raise ValueError("step_directions: not of length 1")
 
 
+def check_forced(arrays: Mapping[str, Any], duration: float, degrees: int) -> None:
+    """Raise ValueError where states, torques and errors of a motion under a torque do not go together."""
+    times = _numbers(arrays, "step_times", None)
+    if len(times) < 2 or times[0] != 0.0 or times[-1] != duration or np.any(np.diff(times) <= 0.0):
+        raise ValueError("step_times do not ascend from 0 to the end")
+    states = _numbers(arrays, "step_states", len(times) - 1, degrees, 8)
+    _numbers(arrays, "step_torques", len(times) - 1, None, 3)
+    # At the ends of steps Chebyshev polynomials are 1 and -1.
+    at_ends = states[:, :, :4].sum(axis=1), states[:, ::2, :4].sum(axis=1) - states[:, 1::2, :4].sum(axis=1)
+    if any(np.any(np.abs((ends**2).sum(axis=-1) - 1.0) > _UNIT) for ends in at_ends):
+        raise ValueError("step_states: quaternions are not of length 1")
+    if np.any(_numbers(arrays, "solution_scales", 4) <= 0.0):
+        raise ValueError("solution_scales are not above 0")
+    checked = _numbers(arrays, "solution_error_times", None)
+    errors = (
+        _numbers(arrays, "solution_attitude_errors", len(checked)),
+        _numbers(arrays, "solution_state_errors", len(checked), 4),
+    )
+    if not len(checked) or any(np.any(error < 0.0) for error in errors):
+        raise ValueError("solution_attitude_errors: none, or some below 0")
+    _numbers(arrays, "torque_breaks", None)
+
+
 def check_rows(parts: Sequence[Any], count: int) -> None:
     """Raise ValueError unless each of `count` motions is in one part, and in one only."""
     rows = [row for part in parts for row in _integers({"rows": part}, "rows", None).tolist()]

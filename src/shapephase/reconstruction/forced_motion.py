@@ -11,15 +11,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_choice, initial_state_arguments, times_argument
+from ..arguments import check_choice, check_file_name, initial_state_arguments, times_argument
 from ..arrays import Array, finite_array, lock_arrays
 from ..deformation.deformation import Deformation
 from ..display import Card, card_html, card_text, error_text, momentum_text, numbers
 from ..errors import ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.driven_attitude import DrivenAttitude, driven_attitude
+from ..offers import offered
+from ._motion_views import base_positions
 from .attitude_angles import continuous
 from .external_torque import ExternalTorque, TorqueState
+from .forced_record import read_forced_record, write_forced_record
 from .motion_record import joint_path, write_table
 
 METHODS = ("auto", "dop853")
@@ -123,6 +126,20 @@ class ForcedMotion:
         times = times_argument(t, self.duration)
         return self.solution.states(times.ravel())[:, 3].reshape(times.shape)[()]
 
+    def base_position(
+        self,
+        t: ArrayLike,
+        *,
+        start: ArrayLike = (0.0, 0.0, 0.0),
+        velocity: ArrayLike = (0.0, 0.0, 0.0),
+        gravity: ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Array:
+        """Position of the base origin as `Motion.base_position` has it: times (...) -> (..., 3) [m].
+
+        The torque comes without a force: the centre of mass moves as without it.
+        """
+        return base_positions(self, t, start, velocity, gravity)
+
     @property
     def final_attitude(self) -> Array:
         """R(T): (3, 3)."""
@@ -148,6 +165,45 @@ class ForcedMotion:
         times = times_argument(t, self.duration)
         place = np.searchsorted(self.solution.error_times, times)
         return self.solution.attitude_errors[np.minimum(place, len(self.solution.error_times) - 1)]
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the motion to an NPZ file that `ForcedMotion.load` reads, without need of body and torque function.
+
+        The file has the torque as it was along this motion, in time.
+        """
+        check_file_name(path, "path")
+        write_forced_record(self, path)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> ForcedMotion:
+        """Read a motion written by `save`.
+
+        Raises
+        ------
+        InputFileNotFoundError
+            If there is no such file.
+        ResultFileError
+            If the file is not a motion under a torque, is damaged, or was written by a version with another format.
+
+        Examples
+        --------
+        >>> push = sp.ExternalTorque(lambda state: [0.0, 0.0, 0.5], axes="space")
+        >>> motion = sp.reconstruct(sp.rigid(np.diag([1.0, 1.0, 2.0]), 2.0), [0.0, 0.0, 2.0], torque=push)
+        >>> motion.save("pushed.npz")
+        >>> print(sp.ForcedMotion.load("pushed.npz").momentum(2.0).round(9))
+        [0. 0. 3.]
+        """
+        check_file_name(path, "path")
+        return cls(**read_forced_record(path))
+
+    def view(self, **options: Any) -> Any:
+        """Return a page of the motion in three dimensions, as `Motion.view`; the arrow of the momentum changes.
+
+        Parameters
+        ----------
+        options : of `shapephase.view`
+        """
+        return offered("Motion.view")(self, **options)
 
     def write_csv(self, path: str | os.PathLike[str], times: ArrayLike | None = None) -> None:
         """Write a time series: attitude (x y z w), angular velocity, momentum, torque and its work.

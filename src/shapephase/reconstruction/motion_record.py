@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from .reconstruction import Motion
 
 _FORMAT = "shapephase motion 3"
+FORCED_FORMAT = "shapephase forced motion 1"
+_READERS = {_FORMAT: "load_motion(file)", FORCED_FORMAT: "ForcedMotion.load(file)"}
 _STEPS = (
     "momentum", "steps", "quaternions", "directions", "turns", "dynamics", "sampling_error", "stepping_error",
     "rounding_error", "amplification",
@@ -42,44 +44,52 @@ _VECTOR_DEGREE = 24
 def write_motion_record(motion: Motion, path: str | os.PathLike[str]) -> None:
     """Write a motion with versions and units."""
     solution, deformation = motion.stepped, motion.deformation
-    interpolant = solution.interpolant
-    header = {
+    header, arrays = stored_deformation(deformation, solution.interpolant)
+    header |= {
         "format": _FORMAT,
+        "tolerance": motion.tolerance,
+        "method": motion.method,
+        "evaluations": motion.evaluations,
+    }
+    arrays |= {"spatial_momentum": motion.momentum, "initial_attitude": motion.initial_attitude}
+    if isinstance(solution, GroupedRotations):
+        header["parts"] = [part.rotation.interpolant.evaluations for part in solution.parts]
+        for number, (rows, rotation) in enumerate(solution.parts):
+            of_part = {"rows": rows, **_samples(rotation.interpolant), **_steps(rotation)}
+            arrays.update({_of_part(number, name): value for name, value in of_part.items()})
+    else:
+        arrays.update(_steps(solution))
+    write_record(path, header, arrays | _joints(motion))
+
+
+def stored_deformation(deformation: Deformation, interpolant: Interpolant) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return header and arrays of a deformation by its samples, with versions and units."""
+    header = {
         "shapephase": __version__,
         "numpy": np.__version__,
         "deformation": deformation.label,
         "sha256": dict(deformation.inputs),
         "provenance": provenance(deformation.made_from),
-        "tolerance": motion.tolerance,
-        "method": motion.method,
-        "evaluations": motion.evaluations,
         "loops": interpolant.loops,
         "interpolant_evaluations": interpolant.evaluations,
         "shape_gap": deformation.shape_gap,
         "units": "SI: rad, s, m, kg m^2, kg m^2/s; quaternions x y z w",
     }
     arrays: dict[str, Any] = {
-        "header": np.array(json.dumps(header)),
-        "spatial_momentum": motion.momentum,
-        "initial_attitude": motion.initial_attitude,
         "breaks": deformation.breaks,
         "centre": _vector_coefficients(deformation.centre_of_mass, interpolant),
         **_samples(interpolant),
     }
     if deformation.has_wheels:
         arrays["stored"] = _vector_coefficients(deformation.stored_momentum, interpolant)
-    if isinstance(solution, GroupedRotations):
-        header["parts"] = [part.rotation.interpolant.evaluations for part in solution.parts]
-        arrays["header"] = np.array(json.dumps(header))
-        for number, (rows, rotation) in enumerate(solution.parts):
-            of_part = {"rows": rows, **_samples(rotation.interpolant), **_steps(rotation)}
-            arrays.update({_of_part(number, name): value for name, value in of_part.items()})
-    else:
-        arrays.update(_steps(solution))
     if deformation.closure is not None:
         arrays["closure"] = deformation.closure
-    arrays.update(_joints(motion))
-    write_whole(path, lambda stream: np.savez(stream, **arrays))
+    return header, arrays
+
+
+def write_record(path: str | os.PathLike[str], header: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
+    """Write an NPZ file with a header."""
+    write_whole(path, lambda stream: np.savez(stream, header=np.array(json.dumps(header)), **arrays))
 
 
 def joint_path(deformation: Deformation) -> ShapePath | None:
@@ -131,6 +141,16 @@ def read_motion_record(path: str | os.PathLike[str]) -> dict[str, Any]:
     ResultFileError
         If the file is not a motion, is damaged, or was written by a version with another format.
     """
+    return read_record(path, _FORMAT, _record)
+
+
+def read_record(
+    path: str | os.PathLike[str], known: str, record: Callable[[Mapping[str, Any], Mapping[str, Any]], dict[str, Any]]
+) -> dict[str, Any]:
+    """Read the fields of a motion from a file of the known format, made of its header and arrays.
+
+    Raises as `read_motion_record`.
+    """
     where = Path(path)
     if not where.is_file():
         raise no_such_file(where)
@@ -141,12 +161,14 @@ def read_motion_record(path: str | os.PathLike[str]) -> dict[str, Any]:
         raise ResultFileError(f"{where}: not a readable motion ({error})") from None
     if not isinstance(header, dict) or "format" not in header:
         raise ResultFileError(f"{where}: not a motion; its header is {str(header)[:80]!r}")
-    if header["format"] != _FORMAT:
+    if header["format"] != known:
+        remedy = _READERS.get(header["format"])
         raise ResultFileError(
-            f"{where}: holds {header['format']!r}, this version reads {_FORMAT!r}; compute the motion anew"
+            f"{where}: holds {header['format']!r}, this version reads {known!r} here; "
+            + ("compute the motion anew" if remedy is None else f"read it with {remedy}")
         )
     try:
-        return _record(header, arrays)
+        return record(header, arrays)
     except KeyError as error:
         raise ResultFileError(f"{where}: the motion lacks {error}; compute it anew") from None
     except (ArithmeticError, AttributeError, TypeError, ValueError) as error:
@@ -174,7 +196,8 @@ def _of_part(number: int, name: str) -> str:
     return f"part_{number}_{name}"
 
 
-def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:
+def read_deformation(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> tuple[Deformation, Interpolant]:
+    """Return the deformation made of stored samples, and these. Raises as `check_deformation`."""
     loops = int(header["loops"])
     check_deformation(arrays, loops)
     interpolant = _interpolant(arrays, loops, int(header["interpolant_evaluations"]))
@@ -184,23 +207,28 @@ def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, A
         float(breaks[-1]),
         breaks,
         arrays.get("closure"),
-        _positive(header, "shape_gap"),
+        positive(header, "shape_gap"),
         str(header["deformation"]),
         inputs={str(name): str(digest) for name, digest in header["sha256"].items()},
         made_from=_made_from(header),
     )
+    return deformation, interpolant
+
+
+def _record(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:
+    deformation, interpolant = read_deformation(header, arrays)
     return {
         "deformation": deformation,
         "momentum": arrays["spatial_momentum"],
         "initial_attitude": so3.orthonormalised(arrays["initial_attitude"]),
-        "tolerance": _positive(header, "tolerance"),
+        "tolerance": positive(header, "tolerance"),
         "method": str(header["method"]),
         "evaluations": int(header["evaluations"]),
         "solution": _solution(header, arrays, interpolant),
     }
 
 
-def _positive(header: Mapping[str, Any], name: str) -> float:
+def positive(header: Mapping[str, Any], name: str) -> float:
     """Return a number of the header that is not negative."""
     value = float(header[name])
     if not 0.0 <= value < np.inf:

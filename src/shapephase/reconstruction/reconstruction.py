@@ -36,7 +36,7 @@ from ..integrator.lift import Lift, error_turns, lift_along
 from ..integrator.many_rotations import GroupedRotations, assembled
 from ..integrator.stepped import SteppedRotation
 from ..run_progress import ProgressCallback, watched
-from ._motion_views import MotionViews
+from ._motion_views import MotionViews, base_positions
 from ._solvers import METHODS, SOLVERS, Solution, check_pieces
 from .motion_record import read_motion_record, write_motion_record
 
@@ -167,13 +167,7 @@ class Motion(MotionViews):
         ----------
         start, velocity, gravity : (3,) of the centre of mass, inertial axes [m], [m/s], [m/s^2]
         """
-        times = times_argument(t, self.duration)
-        point, speed, pull = (
-            finite_array(value, name, (3,))
-            for value, name in ((start, "start"), (velocity, "velocity"), (gravity, "gravity"))
-        )
-        centre = point + times[..., None] * speed + 0.5 * times[..., None] ** 2 * pull
-        return centre - so3.apply(self.attitude(times), self.deformation.centre_of_mass(times))
+        return base_positions(self, t, start, velocity, gravity)
 
     @property
     def final_attitude(self) -> Array:

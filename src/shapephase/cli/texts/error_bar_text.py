@@ -10,12 +10,14 @@ import numpy as np
 from ... import so3
 from ...arrays import Array
 from ...body.body import Body
+from ...errors import ShapeError, unknown_name
 from ...phases.phase_split import PhaseSplit
 from ...plain_data import plain
 from ...reconstruction.reconstruction import Motion
 from ...shape_space.files.labels import amounts
 from ...shape_space.files.read import RecordedMotion
 from ..options import ERROR_DEFAULTS, ErrorOptions
+from ..wheels import momentum_word, speed_word
 
 if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
@@ -33,7 +35,7 @@ def error_bars(
     smoothing = None if recorded is None else recorded.smoothing
     joints = options.joint_noise if options.joint_noise is not None or smoothing is None else smoothing.noise
     deviations = (joints, *relative, options.momentum_error, options.attitude_error)
-    if fitted is None and all(given is None for given in deviations):
+    if fitted is None and not options.rotor_error and all(given is None for given in deviations):
         return None
     from ...error_bars.covariance import uncertainty
     from ...error_bars.error_sources import InertiaErrors
@@ -46,7 +48,28 @@ def error_bars(
         momentum=options.momentum_error,
         attitude=options.attitude_error,
         start=fitted,
+        rotors=_rotor_errors(motion, options.rotor_error) if options.rotor_error else None,
     )
+
+
+def _rotor_errors(motion: Motion, words: tuple[str, ...]) -> dict[str, float]:
+    """Return --rotor-error by wheel [kg m^2/s] or [rad/s]. Raises ShapeError, UnknownNameError."""
+    description = motion.deformation.description
+    kinds = {rotor.joint: rotor.is_momentum for rotor in getattr(description, "rotors", ())}
+    errors: dict[str, float] = {}
+    for word in words:
+        name, _, value = (text.strip() for text in word.partition("="))
+        if not (name and value):
+            raise ShapeError(f"--rotor-error: JOINT=VALUE is needed, as in --rotor-error rw1=20rpm, got {word!r:.60}")
+        if name in errors:
+            raise ShapeError(f"--rotor-error: the wheel {name!r:.60} is given twice; keep one value")
+        if name not in kinds:
+            raise unknown_name("wheel of the motion (--rotor, --rotor-speed)", name, list(kinds))
+        known = momentum_word(value, name, "--rotor-error") if kinds[name] else speed_word(value, name, "--rotor-error")
+        if known is None:
+            raise ShapeError(f"--rotor-error: {name}: a speed is needed, as 2 or 20rpm, got {value!r:.60}")
+        errors[name] = known
+    return errors
 
 
 def joint_noise(body: Body, options: ErrorOptions) -> Array | None:
@@ -78,6 +101,10 @@ def error_bar_lines(
     lines.append(_rotation_line("total rotation", result.total_rotation, found.total_angle, found.total_rotation))
     name = "  shape holonomy" if result.is_loop else "  shape lift (open)"
     lines.append(_rotation_line(name, result.holonomy, found.holonomy_angle, found.holonomy))
+    if result.has_wheels:
+        lines.append(
+            _rotation_line("  stored wheel momentum", result.wheel_rotation, found.wheel_angle, found.wheel_rotation)
+        )
     if result.has_phase and result.gauge == "horizontal":
         for name, phase, bar in (
             ("Montgomery phase", result.montgomery_phase, found.montgomery_phase),

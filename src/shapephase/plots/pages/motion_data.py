@@ -56,6 +56,8 @@ def motion_data(scene: MovingScene, *, speed: float, ghost: bool, up: Array) -> 
         "chain": None,
         "joints": [],
     }
+    if scene.momenta is not None:
+        data |= {"momenta": single(scene.momenta), "momentum_changes": True}
     if scene.body is not None and scene.shapes is not None:
         data |= body_data(scene.body) | {
             "shapes": single(neighbours_signs(scene.shapes, ball_columns(scene.body.joint_names)))

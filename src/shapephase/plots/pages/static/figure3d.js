@@ -36,6 +36,9 @@ class Figure3D {
     this.ghosts = data.ghost ? data.nodes.map(node => this.solidsOf(node, GHOST_COLOUR)) : [];
     this.axes = AXIS_COLOURS.map(colour => this.into("base axes", scene.add(thin, colour)));
     this.magnitude = norm(data.momentum);
+    // Under a torque the arrow is as long as the momentum is large.
+    const sizes = data.momenta ? Array.from({length: data.momenta.length / 3}, (_, k) => norm(row(data.momenta, k, 3))) : [];
+    this.largest = sizes.reduce((most, size) => Math.max(most, size), 0);
     if (this.magnitude || data.momentum_changes) this.momentum = this.into("momentum", scene.add(arrow, VERMILION));
     this.centre = this.into("centre of mass", scene.add(scene.upload(sphereMesh(0.022 * data.reach)), CENTRE_COLOUR));
     if (data.floor) this.into("floor", scene.add(scene.upload({positions: data.floor}, true), [0.78, 0.78, 0.78, 1]));
@@ -111,6 +114,7 @@ class Figure3D {
   show(place) {
     this.place = place;
     this.base = this.baseAt(place);
+    if (this.data.momenta) this.pointAlong(this.between(this.data.momenta, place));
     let centre = this.between(this.data.centre, place);
     let shape = null;
     if (this.data.chain) {
@@ -155,7 +159,7 @@ class Figure3D {
 
   // Of the momentum: some pages need a longer one than others, to be seen.
   arrowLength() {
-    return (this.data.arrow ?? MOMENTUM_LENGTH) * this.data.reach;
+    return (this.data.arrow ?? MOMENTUM_LENGTH) * this.data.reach * (this.largest ? this.magnitude / this.largest : 1);
   }
 
   placeGhosts() {
