@@ -150,7 +150,7 @@ def export_command(
                 made = (write_spice_ck if name == "ck" else write_aem)(moved, file, error=goal)
                 written[name] |= {"records": made.records, "error_rad": made.error}
             elif name == "bvh":
-                write_bvh(moved, file, **({} if often is None else {"rate": often}))
+                write_bvh(moved, file) if often is None else write_bvh(moved, file, rate=often)
             elif name == "mot":
                 write_opensim_motion(moved, file, times)
             else:
