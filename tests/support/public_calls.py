@@ -39,7 +39,7 @@ GIVEN: dict[str, Any] = {
 ASKED = {"lateral"}
 # They make objects or figures, write files or need more than a few numbers, and are called by name below or elsewhere.
 MAKERS = (
-    "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias",
+    "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias", "with_wheel",
     "with_frame_inertias", "sampler", "samplers", "plot", "view", "to_dataframe", "to_xarray",
 )  # fmt: skip
 

@@ -12,6 +12,7 @@ import pinocchio as pin
 from .. import so3
 from ..arrays import Array
 from ..errors import ModelFileError
+from ._wheels import carved_wheel
 from .link_tree import Link, LinkTree, inertia_warnings
 
 _ROOT = "shapephase_free_flyer"  # name of the joint that lets the base move: unlikely in a file
@@ -113,9 +114,8 @@ def _built(tree: LinkTree, root: str) -> pin.Model:
             if joint.kind == "screw":
                 moving = pin.JointModelHelicalUnaligned(axis, joint.lead)
             if joint.kind == "continuous":
-                # Pinocchio's joint without end about any axis cannot be given one: its x turned to the axis.
-                turned = pin.SE3(so3.between(np.array([1.0, 0.0, 0.0]), axis), np.zeros(3))
-                moving, pose, after = pin.JointModelRUBX(), pose * turned, turned.inverse() * after
+                moving, turned = _endless(axis)
+                pose, after = pose * turned, turned.inverse() * after
                 lower, upper = -np.ones(2), np.ones(2)
             if joint.kind == "ball":
                 moving, lower, upper, most = pin.JointModelSpherical(), -np.ones(4), np.ones(4), np.zeros((2, 3))
@@ -128,6 +128,34 @@ def _built(tree: LinkTree, root: str) -> pin.Model:
             model.appendBodyToJoint(number, _inertia(link.mass, link.centre, link.inertia), pose)
             model.addBodyFrame(name, number, pose, 0)
     return model
+
+
+def model_with_wheel(model: pin.Model, link: int, axis: Array, inertia: float, name: str) -> pin.Model:
+    """A copy with a wheel about `axis` (3,), in the axes of a frame, at the centre of mass of what moves with it.
+
+    link : number of the frame
+    inertia : about the axis [kg m^2]; it is taken out of the link. Raises ShapeError where it holds less
+    """
+    changed, frame = model.copy(), model.frames[link]
+    number, whole = frame.parentJoint, model.inertias[frame.parentJoint]
+    axle = frame.placement.rotation @ axis
+    tensor, centre = np.array(whole.inertia), np.array(whole.lever)
+    mass, disc = carved_wheel(whole.mass, tensor, axle, inertia, frame.name)
+    changed.inertias[number] = _inertia(whole.mass - mass, centre, tensor - disc)
+    moving, turned = _endless(axle)
+    place = pin.SE3(np.eye(3), centre) * turned
+    none, ends = np.zeros(1), np.ones(2)
+    added = changed.addJoint(number, moving, place, name, none, none, -ends, ends)
+    back = turned.inverse()
+    changed.appendBodyToJoint(added, _inertia(mass, np.zeros(3), disc), back)
+    # Its axes at zero are those of the link.
+    changed.addBodyFrame(name, added, back * pin.SE3(frame.placement.rotation, np.zeros(3)), 0)
+    return changed
+
+
+def _endless(axis: Array) -> tuple[Any, pin.SE3]:
+    """Pinocchio's joint without end cannot be given an axis: one about x, and the turn of x to a unit vector."""
+    return pin.JointModelRUBX(), pin.SE3(so3.between(np.array([1.0, 0.0, 0.0]), axis), np.zeros(3))
 
 
 def _inertia(mass: float, centre: Array, tensor: Array) -> pin.Inertia:

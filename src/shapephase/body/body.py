@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import made_by
+from ..arguments import made_by, positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..card_pictures import sticks_picture
 from ..display import Card, card_html, numbers, short_repr
@@ -33,7 +33,7 @@ from ._centroidal_maps import (
     kinetic_energies,
     momentum_gradients,
 )
-from ._model_tree import model_with, moving_joints
+from ._model_tree import model_with, model_with_wheel, moving_joints
 from .couplings.coupling import Coupling
 from .couplings.joint_map import JointMap
 from .family import BodyFamily, Given, given_inertias
@@ -308,7 +308,52 @@ class Body(ShapeArguments):
                 raise unknown_name(f"joint of {self.name}", name, joints)
             if not isinstance(coupling, Coupling):
                 raise ShapeError(f"joint {name}: a Coupling is needed, got {value_text(coupling)}")
-        changed = Body(self._model, self.name, {**self.couplings, **couplings})
+        return self._remade(self._model, {**self.couplings, **couplings})
+
+    def with_wheel(self, axis: ArrayLike, inertia: float, *, name: str = "wheel_1", link: str | None = None) -> Body:
+        """The body with a wheel of which its file has the mass, but no joint: one more joint without end.
+
+        The wheel is taken out of the inertia of a link, at the centre of mass of what moves with it, so that mass and
+        locked inertia of the whole stay as they are. It is a flat disc with the radius of gyration of the link.
+        `articulated` takes what it stores by its name, as `rotors={"wheel_1": 1.5}`.
+
+        Parameters
+        ----------
+        axis : (3,) of its axle, in axes of the link, of any length but zero
+        inertia : J about the axle [kg m^2]
+        name : of the joint, and of the link that it turns
+        link : that carries it; None: the base
+
+        Raises
+        ------
+        UnknownNameError
+            For an unknown link.
+        ShapeError
+            For an axis of length zero, a name that the body has already, or a wheel that is more than the link holds:
+            what is left must have an inertia that some distribution of mass has.
+        TrajectoryError
+            If the inertia is not above 0.
+
+        Examples
+        --------
+        >>> cat = sp.load_body("cat_two_halves").with_wheel([0.0, 0.0, 1.0], 0.002)
+        >>> cat.joint_names, round(cat.mass, 6)
+        (('waist_pitch', 'waist_yaw', 'waist_roll', 'wheel_1'), 2.0)
+        """
+        frame = self._link_frame(self.link_names[0] if link is None else link)
+        axle = vector_argument(axis, "axis")
+        length = float(np.linalg.norm(axle))
+        if length == 0.0:
+            raise ShapeError("axis: a vector other than zero is needed, got [0, 0, 0]")
+        about = positive_argument(inertia, "inertia", "a moment of inertia in kg m^2")
+        taken = (*self.link_names, *self._model.names)
+        if not isinstance(name, str) or not name or name in taken:
+            raise ShapeError(f"name: one that {self.name} does not have is needed, got {value_text(name)}")
+        return self._remade(model_with_wheel(self._model, frame, axle / length, about, name), self.couplings)
+
+    def _remade(self, model: pin.Model, couplings: Mapping[str, Coupling]) -> Body:
+        """A body of another model or with other couplings, with what else is known from its file."""
+        changed = Body(model, self.name, couplings)
         for kept in ("joint_orders", "base_joints", "base_angles", "base_slides", "length_unit"):
             setattr(changed, kept, getattr(self, kept))
         return changed

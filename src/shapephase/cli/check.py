@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 from ..errors import ImplausibleBodyWarning, TrajectoryWarning
 from .options import (
     BODY_DEFAULTS,
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    WheelOptions,
 )
 from .outcome import Outcome
 
@@ -23,6 +26,7 @@ def check_command(
     motion: MotionArgument | None = None,
     /,
     *,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -30,11 +34,13 @@ def check_command(
     """Check a body, and a joint motion for it: what was read, what looks unlikely, and whether it can be used."""
     from ..body.plausibility import implausible, person_height
     from ..shape_space.summaries import body_summary, path_summary
-    from .motion import body_argument, joint_motion
+    from .motion import body_argument, joint_motion, whole_path
     from .texts.recording_text import flight_lines, flights_in, recording_data, recording_lines
     from .texts.result_text import body_lines, path_data, path_lines, plain, record_data, too_fast
+    from .wheels import wheel_lines, with_wheels
 
-    loaded = body_argument(body, floating)
+    own = body_argument(body, floating)
+    loaded, spinning = with_wheels(own, wheels)
     for doubt in implausible(loaded):
         warnings.warn(doubt, ImplausibleBodyWarning, stacklevel=2)
     summary = body_summary(loaded)
@@ -44,14 +50,17 @@ def check_command(
         lines.insert(1, f"{'height':24}{height:.2f} m, of the person, by the bones")
         data["body"]["person_height_m"] = height
     if motion is not None:
-        path, recorded = joint_motion(motion, loaded, recording)
+        path, recorded = joint_motion(motion, own, recording, spinning)
+        deformation = spinning.deformation(loaded, path, recorded)
+        path = whole_path(deformation, path)
         moved = path_summary(loaded, path)
         if moved.joints_beyond_rates:
             warnings.warn(too_fast(loaded, moved), TrajectoryWarning, stacklevel=2)
-        lines += ["", *path_lines(loaded, motion, moved, recorded), *recording_lines(loaded, recorded)]
-        data["motion"] = path_data(moved) | record_data(loaded, recorded) | recording_data(recorded)
+        lines += ["", *path_lines(loaded, motion, moved, recorded, spinning.names), *wheel_lines(deformation)]
+        lines += recording_lines(loaded, recorded)
+        data["motion"] = path_data(moved) | record_data(recorded) | recording_data(recorded)
         if recorded is not None and recorded.flight is None:
-            flights = flights_in(loaded, recorded, recording)
+            flights = flights_in(loaded, replace(recorded, path=path), recording)
             lines += flight_lines(flights, recorded)
             data["motion"]["flights"] = flights
     made_from = {} if motion is None else {"joints": list(loaded.joint_names)}

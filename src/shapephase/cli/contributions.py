@@ -10,6 +10,7 @@ from .options import (
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
     START_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
@@ -18,6 +19,7 @@ from .options import (
     RecordingOptions,
     StartOptions,
     Tolerance,
+    WheelOptions,
     option,
     rare,
 )
@@ -94,6 +96,7 @@ def contributions_command(
     html: PageFile = None,
     start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -120,10 +123,12 @@ def contributions_command(
         raise unknown_name("baseline (no such file either)", baseline, (*BASELINES, *MOTIONS))
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
+        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating, wheels=wheels)
         other = baseline
         if baseline not in BASELINES:
-            other = motions.flight(body, baseline, start, recording, tolerance, work.watch, floating=floating).motion
+            other = motions.flight(
+                body, baseline, start, recording, tolerance, work.watch, floating=floating, wheels=wheels
+            ).motion
         work.begin("holding groups")
         shares = contributions(
             flown.motion,

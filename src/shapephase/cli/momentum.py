@@ -10,6 +10,7 @@ from .options import (
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
     START_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
@@ -18,6 +19,7 @@ from .options import (
     RecordingOptions,
     StartOptions,
     Tolerance,
+    WheelOptions,
     option,
     rare,
 )
@@ -92,6 +94,7 @@ def momentum_command(
     html: PageFile = None,
     start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -107,6 +110,7 @@ def momentum_command(
     from . import motion as motions
     from .texts.recording_text import recording_data
     from .texts.result_text import split_heading
+    from .wheels import with_wheels
 
     aside = check_writable(out, "--out", ".csv")
     aside = check_writable(figure, "--figure", ".svg", ".pdf", ".png") or aside
@@ -120,10 +124,12 @@ def momentum_command(
     with steps(2) as work:
         work.begin("loading")
         loaded = motions.body_argument(body, floating)
-        path, recorded = motions.joint_motion(motion, loaded, recording)
+        _, spinning = with_wheels(loaded, wheels)
+        path, recorded = motions.joint_motion(motion, loaded, recording, spinning)
         as_recorded = (
             recorded is not None and recorded.base_attitude is not None and start.momentum is None and not fitted
         )
+        as_recorded = as_recorded and not spinning.names
         made_from: dict[str, object] = {}
         moving = None
         options = {"axes": chosen, "normalise": normalise, "stature": stature, "speed": speed}
@@ -138,7 +144,9 @@ def momentum_command(
                 f"{loaded.name} along {motion}, as recorded: {seconds:g} s, {path.n_shape} joints, {loaded.mass:.6g} kg"
             )
         else:
-            flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
+            flown = motions.flight(
+                body, motion, start, recording, tolerance, work.watch, floating=floating, wheels=wheels
+            )
             work.begin("momenta and their bars")
             moving = flown.motion
             found = segment_momentum(moving, **options)
@@ -153,7 +161,7 @@ def momentum_command(
         if html is not None:
             from ..plots.segments_page import momentum_page
 
-            write_file(html, momentum_page(found, moving, title=heading, up=recording.up).write)
+            write_file(html, momentum_page(found, moving, title=heading.splitlines()[0], up=recording.up).write)
     text = f"{heading}\n{found}"
     data = {"body": loaded.name, "motion": motion, **found.to_dict()} | recording_data(recorded)
     return Outcome(text, data, aside=aside, made_from=made_from)

@@ -15,20 +15,31 @@ from ..arguments import tolerance_argument
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.loading import load_body
-from ..deformation.deformation import articulated
+from ..deformation.deformation import Deformation
 from ..deformation.frames import gauge_link
+from ..deformation.rotors import RotorDescription
 from ..errors import ShapeError, unknown_name
 from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.machine_code import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import ProgressCallback
+from ..shape_space.body_path import without_joints
 from ..shape_space.files.base_columns import ESTIMATE
 from ..shape_space.files.flight import ANY_GRAVITY, RECORDED
 from ..shape_space.files.options import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.shape_path import ShapePath
 from .joint_values import joint_values
-from .options import BODY_DEFAULTS, RECORDING_DEFAULTS, BodyOptions, RecordingOptions, StartOptions
+from .options import (
+    BODY_DEFAULTS,
+    RECORDING_DEFAULTS,
+    WHEEL_DEFAULTS,
+    BodyOptions,
+    RecordingOptions,
+    StartOptions,
+    WheelOptions,
+)
+from .wheels import NO_WHEELS, Wheels, wheel_lines, with_wheels
 
 if TYPE_CHECKING:
     from ..error_bars.recorded_momentum import RecordedMomentum
@@ -61,7 +72,11 @@ class LoadedMotion:
 
     @property
     def beginning(self) -> str:
-        """Text about a recording for the first line: its flight, or why its momentum is zero."""
+        """Text for the first line about a recording, its flight, or why its momentum is zero; and lines of wheels."""
+        return "\n".join([self._of_recording, *wheel_lines(self.motion.deformation)])
+
+    @property
+    def _of_recording(self) -> str:
         if self.recorded is None:
             return ""
         if self.momentum_by == "nothing":
@@ -94,21 +109,23 @@ def flight(
     gauge: str = "base",
     trail: str | None = None,
     floating: BodyOptions = BODY_DEFAULTS,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
 ) -> LoadedMotion:
     """Return the motion of a command. Gauge, tolerance and trail are checked before the motion is read."""
     start = _start(motion, options)
     goal = tolerance_argument(tolerance)
     momentum = None if options.momentum is None else finite_array(options.momentum, "momentum", (3,), unit="kg m^2/s")
-    loaded = body_argument(body, floating)
+    plain = body_argument(body, floating)
+    loaded, spinning = with_wheels(plain, wheels)
     for link in (gauge_link(gauge), trail):
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
-    path, recorded = joint_motion(motion, loaded, recording, given=momentum is not None)
+    path, recorded = joint_motion(motion, plain, recording, spinning, given=momentum is not None)
     expect_work(rows=len(path.breaks))
     if recorded is None:
         zero = np.zeros(3) if momentum is None else momentum
-        moved = reconstruct(articulated(loaded, path), zero, start, tolerance=goal, progress=progress)
-        return LoadedMotion(motion=moved, body=loaded, path=path, recorded=None)
+        moved = reconstruct(spinning.deformation(loaded, path, None), zero, start, tolerance=goal, progress=progress)
+        return LoadedMotion(motion=moved, body=loaded, path=whole_path(moved.deformation, path), recorded=None)
     from ..error_bars.recorded_flight import motion_from_recording
 
     flown = motion_from_recording(
@@ -119,8 +136,17 @@ def flight(
         tolerance=goal,
         find_axes=recording.base_axes == ESTIMATE,
         progress=progress,
+        rotors=spinning.momenta,
+        rotor_speeds=spinning.speeds,
     )
+    path = whole_path(flown.motion.deformation, path)
     return LoadedMotion(flown.motion, loaded, path, recorded, flown.fitted, flown.momentum_by)
+
+
+def whole_path(deformation: Deformation, path: ShapePath) -> ShapePath:
+    """Return the path with a column for each wheel, whose angle rests at zero."""
+    description = deformation.description
+    return description.route if isinstance(description, RotorDescription) else path
 
 
 def _start(motion: str, options: StartOptions) -> Array | None:
@@ -151,9 +177,14 @@ def body_argument(body: str, floating: BodyOptions) -> Body:
 
 
 def joint_motion(
-    motion: str, body: Body, recording: RecordingOptions = RECORDING_DEFAULTS, *, given: bool | None = None
+    motion: str,
+    body: Body,
+    recording: RecordingOptions = RECORDING_DEFAULTS,
+    wheels: Wheels = NO_WHEELS,
+    *,
+    given: bool | None = None,
 ) -> tuple[ShapePath, RecordedMotion | None]:
-    """Return the path of a motion, and its recording if it comes from a file.
+    """Return the path of a motion, without its wheels, and its recording if it comes from a file.
 
     given : whether its momentum is given; False: it is fitted to the base; None: none is needed
     """
@@ -167,7 +198,12 @@ def joint_motion(
             fitting = [name for name, known in MOTIONS.items() if known.body == body.name]
             hint = f"; of {body.name} there is {', '.join(fitting)}" if fitting else ""
             raise ShapeError(f"{motion} is a motion of {owner}, whose joints {body.name} does not have{hint}")
-        return path, None
+        for name, column in wheels.columns.items():
+            raise ShapeError(
+                f"--rotor-speed {name}={column}: columns are those of recorded motions; {motion} is a motion of the "
+                f"library: give a speed, as {name}=6000rpm"
+            )
+        return without_joints(path, wheels.names), None
     if motion.startswith("-") and motion != _STANDARD_INPUT and not os.path.exists(motion):
         raise ShapeError(f"there is no option {motion[:_LONGEST_SHOWN]!r} of this command, and no such file either")
     if motion != _STANDARD_INPUT and not Path(motion).suffix and not os.path.exists(motion):
@@ -180,6 +216,8 @@ def joint_motion(
         "flight": stretch or (RECORDED if given is False else None),
         "trim": stretch if isinstance(stretch, tuple) else None,  # what lies outside may have gaps
         "gravity": ANY_GRAVITY if given and recording.gravity is None else recording.gravity,
+        "without": [name for name in wheels.names if name in body.joint_names],
+        "wheel_speeds": wheels.columns,
     }
     recorded = read_recorded_motion(motion, body, **choices)
     return recorded.path, recorded

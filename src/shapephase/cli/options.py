@@ -183,6 +183,22 @@ class StartOptions:
 
 @Parameter(name="*")
 @dataclass(frozen=True)
+class WheelOptions:
+    """Wheels that store momentum."""
+
+    rotor: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """Momentum of a wheel along its axle, turn in space included, that no motor changes: JOINT=VALUE, in kg m^2/s; for
+    example `--rotor rw1=1.5`."""
+    rotor_speed: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """Speed of a wheel on its axle, held by its motor: JOINT=VALUE, in rad/s or with a unit, or JOINT=COLUMN of the
+    recording; for example `--rotor-speed rw1=6000rpm` or `--rotor-speed rw1=tacho:rpm`."""
+    wheel: Annotated[tuple[str, ...], rare(several=True)] = ()
+    """Wheels without a joint in the file, wheel_1 and so on: axis in axes of the base, and inertia about it, in kg m^2,
+    which is taken out of that of the base; for example `--wheel "0 0 1" 0.05 --rotor wheel_1=1.5`."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
 class ColumnOptions:
     """How columns of recorded samples become joints and a base: options of `RecordingOptions` and of `audit`."""
 
@@ -297,5 +313,6 @@ PRINT_DEFAULTS = PrintOptions()
 BODY_DEFAULTS = BodyOptions()
 ERROR_DEFAULTS = ErrorOptions()
 START_DEFAULTS = StartOptions()
+WHEEL_DEFAULTS = WheelOptions()
 RECORDING_DEFAULTS = RecordingOptions()
 TRAJECTORY_DEFAULTS = TrajectoryOptions()

@@ -8,11 +8,13 @@ from .options import (
     BODY_DEFAULTS,
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
     PrintOptions,
     RecordingOptions,
+    WheelOptions,
     option,
 )
 from .outcome import Outcome
@@ -41,6 +43,7 @@ def orbits_command(
             "that can be met. For example `--tolerance 1e-7`."
         ),
     ] = None,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -56,7 +59,6 @@ def orbits_command(
 
     from .. import so3
     from ..arguments import magnitude_argument, tolerance_argument
-    from ..deformation.deformation import articulated
     from ..deformation.frames import gauge_link
     from ..deformation.gauge import named_gauge
     from ..integrator.machine_code import expect_work
@@ -67,17 +69,19 @@ def orbits_command(
     from .motion import body_argument, joint_motion
     from .texts.recording_text import recording_data, recording_lines
     from .texts.result_text import orbit_data, orbit_lines
+    from .wheels import wheel_lines, with_wheels
 
     magnitude = magnitude_argument(magnitude)
     goal = None if tolerance is None else tolerance_argument(tolerance)
     link = gauge_link(gauge)
     with steps(3) as work:
         work.begin("loading")
-        loaded = body_argument(body, floating)
+        plain = body_argument(body, floating)
+        loaded, spinning = with_wheels(plain, wheels)
         if link is not None:
             loaded.link_pose(loaded.shape(), link)
-        path, recorded = joint_motion(motion, loaded, recording, given=True)
-        deformation = articulated(loaded, path)
+        path, recorded = joint_motion(motion, plain, recording, spinning, given=True)
+        deformation = spinning.deformation(loaded, path, recorded)
         seen = named_gauge(deformation, gauge)
         work.begin("finding what closes")
         expect_work(momenta=_MOMENTA)
@@ -92,6 +96,7 @@ def orbits_command(
         *orbit_lines(*result),
         "",
         rotation_line("shape holonomy (base axes)", holonomy),
+        *wheel_lines(deformation),
         *recording_lines(loaded, recorded),
     ]
     data = orbit_data(*result) | {"holonomy": holonomy.tolist()} | recording_data(recorded)

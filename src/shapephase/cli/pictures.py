@@ -14,6 +14,7 @@ from .options import (
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
     START_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyArgument,
     BodyOptions,
     FigureFile,
@@ -25,6 +26,7 @@ from .options import (
     RecordingOptions,
     StartOptions,
     UpAxis,
+    WheelOptions,
     option,
 )
 from .outcome import FIGURE_ENDINGS, Outcome, check_writable
@@ -52,6 +54,7 @@ def view_command(
             "`--speed 0.1` for slow motion."
         ),
     ] = None,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -68,7 +71,9 @@ def view_command(
     aside = check_page_files(html, video)
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, start, recording, progress=work.watch, trail=trail, floating=floating)
+        flown = motions.flight(
+            body, motion, start, recording, progress=work.watch, trail=trail, floating=floating, wheels=wheels
+        )
         work.begin("making the page")
         page = view(flown.motion, trail=trail, speed=speed, up=recording.up or flown.up)
         lines, data = deliver(page, html, video)
@@ -142,6 +147,7 @@ def plot_command(
     out: FigureFile,
     start: StartOptions = START_DEFAULTS,
     gauge: Gauge = "horizontal",
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -165,7 +171,9 @@ def plot_command(
         raise _no_momentum(kind)
     with steps(2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, start, recording, progress=work.watch, gauge=gauge, floating=floating)
+        flown = motions.flight(
+            body, motion, start, recording, progress=work.watch, gauge=gauge, floating=floating, wheels=wheels
+        )
         if FIGURES[kind].with_momentum and not flown.motion.momentum.any():
             raise _no_momentum(kind)
         work.begin(f"drawing {kind.replace('_', ' ')}")
@@ -179,7 +187,8 @@ def _no_momentum(kind: str) -> ShapeError:
 
 
 def _heading(flown: LoadedMotion, motion: str) -> str:
-    """Return the first line about a recording: its momentum and flight; of other motions nothing."""
+    """Return the first line about a recording, its momentum and flight, and wheels; of other motions nothing."""
     from .texts.result_text import split_heading
 
-    return "" if flown.recorded is None else split_heading(flown.body, motion, flown.motion) + flown.beginning
+    beginning = flown.beginning
+    return beginning and split_heading(flown.body, motion, flown.motion) + beginning

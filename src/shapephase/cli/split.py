@@ -11,6 +11,7 @@ from .options import (
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
     START_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyArgument,
     BodyOptions,
     ErrorOptions,
@@ -21,6 +22,7 @@ from .options import (
     ReportFile,
     StartOptions,
     Tolerance,
+    WheelOptions,
     option,
     rare,
 )
@@ -39,6 +41,7 @@ def split_command(
     start: StartOptions = START_DEFAULTS,
     gauge: Gauge = "horizontal",
     tolerance: Tolerance = 1e-9,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     errors: ErrorOptions = ERROR_DEFAULTS,
     html: ReportFile = None,
@@ -95,7 +98,9 @@ def split_command(
         up_axis(recording.up, None)
     with steps(3 if html else 2) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, gauge=gauge, floating=floating)
+        flown = motions.flight(
+            body, motion, start, recording, tolerance, work.watch, gauge=gauge, floating=floating, wheels=wheels
+        )
         work.begin("splitting")
         result = split(flown.motion, gauge, progress=work.watch)
         bars = error_bars(flown.motion, errors, flown.recorded, flown.fitted)

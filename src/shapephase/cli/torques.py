@@ -10,6 +10,7 @@ from .options import (
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
     START_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyArgument,
     BodyOptions,
     MotionArgument,
@@ -17,6 +18,7 @@ from .options import (
     RecordingOptions,
     StartOptions,
     Tolerance,
+    WheelOptions,
     option,
 )
 from .outcome import Outcome, check_writable
@@ -31,6 +33,7 @@ def torques_command(
     *,
     start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = 1e-9,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     out: Annotated[
         Path | None,
@@ -54,7 +57,7 @@ def torques_command(
     aside = check_writable(out, "--out", ".csv")
     with steps(3) as work:
         work.begin("loading and reconstructing")
-        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating)
+        flown = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating, wheels=wheels)
         work.begin("inverse dynamics")
         found = joint_torques(flown.motion)
         write_file(out, found.write_csv)

@@ -205,6 +205,23 @@ def rates_alone(spins: Callable[[Array], Array]) -> ScannedFunction:
     )
 
 
+def momentum_alone(momentum: Callable[[Array], Array], least: Callable[[Array], float], name: str) -> ScannedFunction:
+    """The momentum of a wheel (N,) [kg m^2/s], which turns the body at most at its ratio to the least moment."""
+
+    def judge(times: Array, columns: Array) -> tuple[Array, Array]:
+        weight = 1.0 / least(times[:: max(1, len(times) // _RAW_SIZES)])
+        return np.array([1.0, weight]), np.array([0.0, float(np.abs(columns[:, 1]).max())])
+
+    return _scanned(
+        lambda times: (np.zeros((len(times), 1)), momentum(times)[:, None]),
+        judge,
+        f"the value in time of the wheel {name}",
+        ["nothing"],
+        ["nothing", f"momentum of the wheel {name}"],
+        words=Words(units=("kg m^2/s", "kg m^2/s"), continuous="a wheel's momentum must be continuous"),
+    )
+
+
 def _scanned(
     curve: Pair,
     judge: Judge,

@@ -45,7 +45,7 @@ from .descriptions import (
     PrescribedDescription,
     RigidDescription,
 )
-from .rotors import Rotor, RotorDescription, mapping_of_joints, rotors_argument, widened_path
+from .rotors import Rotor, RotorDescription, RotorValue, mapping_of_joints, rotors_argument, widened_path
 
 
 @made_by(
@@ -298,8 +298,8 @@ def articulated(
     body: Body | ParticleBody,
     path: ShapePath,
     *,
-    rotors: Mapping[str, float] | None = None,
-    rotor_speeds: Mapping[str, float] | None = None,
+    rotors: Mapping[str, RotorValue] | None = None,
+    rotor_speeds: Mapping[str, RotorValue] | None = None,
 ) -> Deformation: ...
 
 
@@ -311,8 +311,8 @@ def articulated(
     body: Body | ParticleBody | BodyFamily,
     path: ShapePath,
     *,
-    rotors: Mapping[str, float] | None = None,
-    rotor_speeds: Mapping[str, float] | None = None,
+    rotors: Mapping[str, RotorValue] | None = None,
+    rotor_speeds: Mapping[str, RotorValue] | None = None,
 ) -> Deformation | DeformationFamily:
     """The deformation of a body whose joints follow a path, or those of all bodies of a `BodyFamily`.
 
@@ -328,10 +328,13 @@ def articulated(
         turn of the wheel in space [kg m^2/s]; `inertia` is then that which Routh's reduction leaves, I - J a a^T
     rotor_speeds : or the speed of the wheel on its axle [rad/s]
 
+    Both take a number, which stays, or what a motor makes of it in time: a pair of times (K,) [s] from the start of the
+    path to its end and values (K,), joined by `ShapePath.spline`, or a `ShapePath` of one column.
+
     Raises
     ------
     UnknownNameError, TrajectoryError
-        If the path has other joints than the body.
+        If the path has other joints than the body, or a wheel's values last longer or less than it.
     ShapeError
         For a rotor that is not symmetric about its axle.
 
@@ -360,7 +363,7 @@ def articulated(
             raise ShapeError("rotors are wheels of links; a body of particles has none")
         route = users_route_along(body, path)
         return particles(body.masses, ParticlesAlong(body, route), route.duration, route.breaks)
-    wheels = rotors_argument(body, momenta, speeds)
+    wheels = rotors_argument(body, momenta, speeds, path.duration)
     if wheels:
         path = widened_path(body, path, tuple(wheel.joint for wheel in wheels))
     return deformation_along(body, users_route_along(body, path), wheels)
@@ -370,7 +373,10 @@ def deformation_along(body: Body, route: ShapePath, wheels: tuple[Rotor, ...] = 
     """The deformation of `articulated` along a route by `route_along`, whose angles are certainly in radians."""
     gap = float(np.max(np.abs(path_gap(body, route)), initial=0.0))
     closure = np.eye(3) if gap <= CLOSED else None
-    description = RotorDescription(body, route, wheels) if wheels else ArticulatedDescription(body, route)
+    description, breaks, loops = ArticulatedDescription(body, route), route.breaks, route.loops
+    if wheels:
+        description = RotorDescription(body, route, wheels)
+        breaks, loops = description.breaks, description.loops
     inputs = {name: given.sha256 for name, given in (("body", body), ("path", route)) if given.sha256}
     label = f"{body.name} along a path"
     made_from: dict[str, Any] = {"body": {"name": body.name, "sha256": body.sha256}, "joints": list(body.joint_names)}
@@ -378,7 +384,9 @@ def deformation_along(body: Body, route: ShapePath, wheels: tuple[Rotor, ...] = 
         made_from["path"] = {"sha256": route.sha256}
     if route.record is not None:
         made_from["recording"] = dict(route.record)
-    return Deformation(description, route.duration, route.breaks, closure, gap, label, route.loops, inputs, made_from)
+    if wheels:
+        made_from["wheels"] = {wheel.joint: wheel.record for wheel in wheels}
+    return Deformation(description, route.duration, breaks, closure, gap, label, loops, inputs, made_from)
 
 
 def rigid(inertia: ArrayLike, duration: float) -> Deformation:

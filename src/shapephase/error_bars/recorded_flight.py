@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from ..arguments import check_flag, check_object
 from ..arrays import finite_array
 from ..body.body import Body
 from ..deformation.deformation import Deformation, articulated
+from ..deformation.rotors import RotorValue, mapping_of_joints
 from ..display import short_repr
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion, reconstruct
@@ -49,6 +51,8 @@ def motion_from_recording(
     tolerance: float = 1e-9,
     find_axes: bool = False,
     progress: ProgressCallback | None = None,
+    rotors: Mapping[str, RotorValue] | None = None,
+    rotor_speeds: Mapping[str, RotorValue] | None = None,
 ) -> RecordedFlight:
     """The motion of a recorded body, as every command makes it.
 
@@ -64,6 +68,7 @@ def motion_from_recording(
     tolerance : of the attitude [rad]
     find_axes : as for `momentum_from_recording`
     progress : called while it is reconstructed
+    rotors, rotor_speeds : wheels, as for `articulated`; those of `recorded.wheel_speeds` count as well
 
     Raises
     ------
@@ -92,7 +97,9 @@ def motion_from_recording(
     check_flag(find_axes, "find_axes")
     if momentum is not None:
         momentum = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-    deformation, attitudes = articulated(body, recorded.path), recorded.base_attitude
+    speeds = {**recorded.wheel_speeds, **mapping_of_joints(rotor_speeds, "rotor_speeds")}
+    deformation = articulated(body, recorded.path, rotors=rotors, rotor_speeds=speeds)
+    attitudes = recorded.base_attitude
     if momentum is None and attitudes is not None and (recorded.flight is not None or turns(attitudes)):
         if attitude is not None:
             raise ShapeError(

@@ -101,6 +101,13 @@ class CurveErrors:
             return np.zeros(1)
         return self.lift + self._of_end(self.motion.lift_without_momentum)
 
+    @property
+    def by_momentum(self) -> Array:
+        """Error of the rotation that the total momentum adds to that of shape and wheels, at the end: (B,) [rad]."""
+        if not self.motion.deformation.has_wheels:
+            return self.between
+        return self.attitude + self._of_end(self.motion.lift_without_momentum)
+
     def _of_end(self, lift: Lift) -> Array:
         return np.minimum(_at_end(lift.turns) + _unseen_of(lift), lift.rotation.error_estimate)
 
@@ -268,6 +275,7 @@ def split_errors(motion: Motion, curve: MomentumCurve, residual: Array) -> Split
         holonomy=np.broadcast_to(errors.lift, residual.shape).reshape(batch)[()],
         dynamical_rotation=np.where(curve.has_phase | has_wheels, errors.between, 0.0).reshape(batch)[()],
         wheel_rotation=np.broadcast_to(errors.wheels, residual.shape).reshape(batch)[()],
+        momentum_rotation=of(errors.by_momentum),
         montgomery_phase=of(whole.phase),
         montgomery_angle=of(whole.phase),
         dynamic_phase=of(whole.dynamic),

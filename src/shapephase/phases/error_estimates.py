@@ -28,7 +28,8 @@ class SplitErrors:
 
     Attributes
     ----------
-    total_rotation, holonomy, dynamical_rotation, wheel_rotation, closing_tilt : angle from the true rotation [rad]
+    total_rotation, holonomy, dynamical_rotation, wheel_rotation, momentum_rotation, closing_tilt : angle from the true
+        rotation [rad]
     montgomery_phase, dynamic_phase, geometric_phase, closing_phase : modulo 4 pi [rad]
     montgomery_angle : modulo 2 pi [rad]
     solid_angle : modulo 4 pi [sr]
@@ -39,6 +40,7 @@ class SplitErrors:
     holonomy: Array
     dynamical_rotation: Array
     wheel_rotation: Array
+    momentum_rotation: Array
     montgomery_phase: Array
     montgomery_angle: Array
     dynamic_phase: Array

@@ -49,7 +49,8 @@ class PhaseSplit:
 
         exp(montgomery_phase hat(mu)) closing_tilt = dynamical_rotation    in the horizontal gauge,
         exp(montgomery_phase hat(mu)) closing_tilt = total_rotation        in the base gauge of a closed joint path,
-        total_rotation = dynamical_rotation holonomy                       always.
+        total_rotation = dynamical_rotation holonomy                       always,
+        dynamical_rotation = momentum_rotation wheel_rotation              always.
 
     Attributes
     ----------
@@ -57,8 +58,9 @@ class PhaseSplit:
     total_rotation : (3, 3) Delta R, from the start to the end of the motion, the same in every gauge
     holonomy : (3, 3) R_G, rotation by the loop of shapes alone, at any pace; for an open path the end of its lift
     dynamical_rotation : (3, 3) R_D, rotation by the momentum, that of wheels included
-    wheel_rotation : (3, 3) R_W, rotation by the momentum that wheels store, without total momentum: R_D is R_W then,
-        and otherwise the total momentum adds R_D R_W^T to it; the identity without such wheels
+    wheel_rotation : (3, 3) R_W, rotation by the momentum that wheels store, without total momentum, which grows with
+        the time that the motion takes; the identity without such wheels
+    momentum_rotation : (3, 3) R_M, rotation that the total momentum adds: R_D without wheels
     montgomery_phase : theta_M = dynamic_phase + geometric_phase, unwrapped [rad]
     montgomery_angle : theta_M in (-pi, pi] [rad]
     dynamic_phase : theta_D = integral of omega . Pi dt over the momentum's magnitude [rad]
@@ -73,7 +75,7 @@ class PhaseSplit:
     shape_gap : distance of the end shape from the start shape
     residual : |theta_M - the same angle read off the attitude|, modulo 2 pi: two independent computations [rad]
     is_loop : whether the shape closes
-    has_phase : whether there is angular momentum; without it all phases are 0 and R_D is R_W
+    has_phase : whether there is angular momentum; without it all phases are 0, R_D is R_W and R_M the identity
     has_wheels : whether wheels store momentum (`articulated(..., rotors=, rotor_speeds=)`)
     about : the motion that was split
 
@@ -94,6 +96,7 @@ class PhaseSplit:
     holonomy: Array
     dynamical_rotation: Array
     wheel_rotation: Array
+    momentum_rotation: Array
     montgomery_phase: Array
     montgomery_angle: Array
     dynamic_phase: Array
@@ -143,7 +146,7 @@ class PhaseSplit:
             whose = "total angular momentum" if self.has_wheels else "angular momentum"
             rows = [*rows[:3], ("phases", f"none: there is no {whose}"), rows[-1]]
         if self.has_wheels:
-            rows.insert(3, ("turn by wheels alone", angle_text(so3.angle(self.wheel_rotation))))
+            rows.insert(3, ("stored wheel momentum", angle_text(so3.angle(self.wheel_rotation))))
         title = f"PhaseSplit of {about.label}, {about.duration:g} s, {self.gauge} gauge"
         if np.ndim(self.montgomery_phase) or not self.has_phase:
             return Card(title, rows)

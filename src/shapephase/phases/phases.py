@@ -116,6 +116,7 @@ def split(
         holonomy=holonomy.reshape(matrix),
         dynamical_rotation=dynamical.reshape(matrix),
         wheel_rotation=wheels.reshape(matrix),
+        momentum_rotation=np.where(moving, dynamical @ so3.transpose(wheels), np.eye(3)).reshape(matrix),
         montgomery_phase=phase.reshape(batch)[()],
         montgomery_angle=so3.wrap(phase).reshape(batch)[()],
         dynamic_phase=dynamic.reshape(batch)[()],

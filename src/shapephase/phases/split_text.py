@@ -44,11 +44,9 @@ def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> l
         rotation_line(
             "  shape holonomy" if result.is_loop else "  shape lift (open)", result.holonomy, errors.holonomy
         ),
-        rotation_line("  dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
+        *_dynamical_lines(result),
+        "",
     ]
-    if result.has_wheels:
-        lines.append(rotation_line("    by wheels alone", result.wheel_rotation, errors.wheel_rotation))
-    lines.append("")
     if result.has_phase:
         lines += [
             f"{f'seen in the {result.gauge} gauge':30}{'[deg]':>10}{'± [rad]':>11}{'[rad]':>20}",
@@ -62,9 +60,7 @@ def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> l
         ]
     else:
         words = "no angular momentum: the shape alone turns the body, there is no Montgomery phase"
-        if result.has_wheels:
-            words = "no total angular momentum: the shape turns the body, and what wheels store; no Montgomery phase"
-        lines.append(words)
+        lines.append("no total angular momentum, no Montgomery phase" if result.has_wheels else words)
     if not result.is_loop:
         gap = shape_gap or f"{result.shape_gap:.6g}, of the joint that ends farthest off (rad or m)"
         lines.append(f"{'shape gap':24}{gap}: the shape does not return, there is no holonomy")
@@ -72,7 +68,36 @@ def split_lines(result: PhaseSplit, heading: str = "", shape_gap: str = "") -> l
         f"{'error estimate':24}{about.error_estimate:16.2e} rad   (of the attitude, at all times)",
         f"{'evaluations':24}{about.evaluations:16d}       (of the body, each at one time)",
     ]
-    return [*lines, *wrapped(closing_text(result))]
+    return [*lines, *wrapped(closing_text(result)), *wrapped(_wheel_text(result))]
+
+
+def _dynamical_lines(result: PhaseSplit) -> list[str]:
+    """Return lines of what shape does not turn the body by, with wheels in its parts."""
+    errors = result.error_estimates
+    whole = rotation_line("  dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation)
+    if not result.has_wheels:
+        return [whole]
+    stored = rotation_line("  stored wheel momentum", result.wheel_rotation, errors.wheel_rotation)
+    if not result.has_phase:
+        return [stored]
+    added = rotation_line("  total momentum", result.momentum_rotation, errors.momentum_rotation)
+    return [
+        stored,
+        added,
+        rotation_line("  the last two together", result.dynamical_rotation, errors.dynamical_rotation),
+    ]
+
+
+def _wheel_text(result: PhaseSplit) -> str:
+    """Return how the turns of a body with wheels compose, and on what each depends; "" without wheels."""
+    if not result.has_wheels:
+        return ""
+    shape = "holonomy" if result.is_loop else "lift"
+    return (
+        f"The turns follow each other: {shape} of the shape, stored wheel momentum"
+        f"{', total momentum' if result.has_phase else ''}. The {shape} is the same at any pace; the turn by stored "
+        "wheel momentum grows with the time that the motion takes."
+    )
 
 
 def wrapped(words: str) -> list[str]:
@@ -148,7 +173,7 @@ def _batch_lines(result: PhaseSplit, heading: str) -> list[str]:
     rows = {
         "total rotation": so3.angle(result.total_rotation),
         "shape holonomy": so3.angle(result.holonomy),
-        **({"turn by wheels alone": so3.angle(result.wheel_rotation)} if result.has_wheels else {}),
+        **({"stored wheel momentum": so3.angle(result.wheel_rotation)} if result.has_wheels else {}),
         "Montgomery phase": result.montgomery_phase,
         "dynamic phase": result.dynamic_phase,
         "geometric phase": result.geometric_phase,

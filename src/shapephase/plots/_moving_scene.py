@@ -19,6 +19,7 @@ from ..body.drawing.visual import BOX_COLOUR, Visual
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription, Description, ParticleDescription
 from ..deformation.frames import principal_frames
+from ..deformation.rotors import RotorDescription
 from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError, unknown_name
 from ..inertia_tensor import principal_axes, second_moment
@@ -170,8 +171,10 @@ def moving_scene(motion: Motion, frames: int, *, trail: str | None = None, **fal
     in_base = description.centre_of_mass(times)
     centre = base[:, :3, 3] + so3.apply(base[:, :3, :3], in_base)
     body = shapes = points = None
-    if isinstance(description, ArticulatedDescription):
-        body, shapes = description.body, description.path.curve(times)[0]
+    if isinstance(description, ArticulatedDescription | RotorDescription):
+        wheels = isinstance(description, RotorDescription)
+        body, path = (description.platform, description.route) if wheels else (description.body, description.path)
+        shapes = path.curve(times)[0]
         nodes = _link_nodes(body, shapes)
         if trail is not None:
             points = (base @ body.link_pose(shapes, trail))[:, :3, 3]

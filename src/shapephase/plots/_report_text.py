@@ -179,7 +179,7 @@ def split_rows(result: PhaseSplit) -> list[Row]:
         _rotation("Dynamical rotation", result.dynamical_rotation, errors.dynamical_rotation),
     ]
     if result.has_wheels:
-        rows.append(_rotation("By wheels alone", result.wheel_rotation, errors.wheel_rotation))
+        rows.append(_rotation("Stored wheel momentum", result.wheel_rotation, errors.wheel_rotation))
     if not result.has_phase:
         words = "none: there is no angular momentum, the body turns by its shape alone"
         if result.has_wheels:

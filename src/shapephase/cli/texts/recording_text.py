@@ -145,6 +145,8 @@ def _column_lines(body: Body, record: Any) -> list[str]:
     renamed = [f"{name} from {column!r}" for name, column in record["columns"].items() if not column.startswith(name)]
     if renamed:
         lines.append(f"{'columns':24}{_listed(renamed)}")
+    for wheel, column in record["wheel_speeds"].items():
+        lines.append(f"{'speed of a wheel':24}{wheel} from {column['name']!r}, in {column['unit']}")
     if record["at_rest"]:
         held = [f"{name} {_value(body, name, value)}" for name, value in record["at_rest"].items()]
         lines.append(f"{'without a column':24}{_listed(held)}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -131,8 +132,10 @@ def _part_lines(summary: BodySummary) -> list[str]:
     return lines
 
 
-def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMotion | None) -> list[str]:
-    """Return the table of a joint motion."""
+def path_lines(
+    body: Body, name: str, summary: PathSummary, recorded: RecordedMotion | None, wheels: Collection[str] = ()
+) -> list[str]:
+    """Return the table of a joint motion; wheels are not listed as joints at rest."""
     closes = "yes" if summary.is_loop else f"no: {gap_text(body, summary.gap)} from its start"
     lines = [
         f"{name}: {summary.duration:g} s, {_pieces(summary.breaks - 1)}",
@@ -145,7 +148,7 @@ def path_lines(body: Body, name: str, summary: PathSummary, recorded: RecordedMo
     balls = {name for ball in body.chain.follows.balls for name in ball.names}
     moved = {_of_ball(name) for name in balls - {*summary.still_joints}}
     still = [_of_ball(name) if name in balls else name for name in summary.still_joints]
-    still = [name for name in dict.fromkeys(still) if name not in moved]
+    still = [name for name in dict.fromkeys(still) if name not in moved and name not in wheels]
     for title, names in (
         ("beyond their limits", summary.joints_beyond_limits),
         ("beyond their rates", summary.joints_beyond_rates),
@@ -182,14 +185,14 @@ def gap_text(body: Body, gap: Array) -> str:
     return f"{body.joint_names[worst]} ends {off:.6g} {unit}".removesuffix(" 1") + turned
 
 
-def record_data(body: Body, recorded: RecordedMotion | None) -> dict[str, Any]:
+def record_data(recorded: RecordedMotion | None) -> dict[str, Any]:
     """Return a recording for programs."""
     if recorded is None:
         return {}
     return {
         "format": recorded.format,
         "samples": len(recorded.times),
-        "residual_rms": dict(zip(body.joint_names, recorded.residual.tolist(), strict=True)),
+        "residual_rms": dict(zip(recorded.path.joint_names or (), recorded.residual.tolist(), strict=True)),
         "base_recorded": recorded.base_attitude is not None,
     }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ from .labels import (
     LENGTHS,
     NO_UNIT,
     SI,
+    SPEEDS,
     Label,
     angle_unit,
     angles_in_rad,
@@ -35,8 +36,11 @@ from .labels import (
     label,
     other_unit,
     quantity,
+    speed_label,
+    speed_unit,
     warn_of_limits,
     warn_of_turns,
+    wheel_hint,
 )
 from .recording import LONGEST_NAME, NEARLY_UNIT, Recording, Table, checked_quaternions, listed, warn
 from .times import is_clock, part_of
@@ -53,7 +57,11 @@ _JUMP = 0.5 * np.pi  # [rad] per sample of two hinges, while the link turns by l
 
 @dataclass(frozen=True, kw_only=True)
 class JointChoices:
-    """How columns become joints, checked: options of `read_recorded_motion`; names of columns as labels."""
+    """How columns become joints, checked: options of `read_recorded_motion`; names of columns as labels.
+
+    without : joints that are left out, those of `wheel_speeds` among them where the body has them
+    wheel_speeds : wheel -> its column of speeds, also with a unit behind a colon
+    """
 
     names: Mapping[str, str | None]
     base: BaseChoices
@@ -62,6 +70,8 @@ class JointChoices:
     rest_missing: bool = False
     ignore_extra: bool = False
     fill: float | None = None
+    without: tuple[str, ...] = ()
+    wheel_speeds: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Raise ShapeError for values of the wrong kind."""
@@ -82,6 +92,8 @@ class Matched(NamedTuple):
     at_rest : joint -> where it rests [rad or m], of joints without a column
     left_out : label -> why it was left out
     gaps : what was filled, and cut off at the ends, ready for JSON; None: the recording has no gaps
+    speeds : (N, k) of wheels on their axles [rad/s]
+    speed_columns : wheel -> label and unit of its column, in the order of those
     """
 
     shapes: Array
@@ -91,10 +103,12 @@ class Matched(NamedTuple):
     at_rest: dict[str, float]
     left_out: dict[str, str]
     gaps: dict[str, Any] | None
+    speeds: Array
+    speed_columns: dict[str, Label]
 
     def kept(self, samples: Integers) -> Matched:
         """Some of the samples, by their places."""
-        return self._replace(shapes=self.shapes[samples], base=self.base.kept(samples))
+        return self._replace(shapes=self.shapes[samples], base=self.base.kept(samples), speeds=self.speeds[samples])
 
 
 def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Recording, Matched]:
@@ -118,19 +132,29 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
     names_of_base = base_names(targets, {*body.joint_names, *KNOWN, *base.own_names})
     known_names = (*body.joint_names, *base.own_names)
     companions: dict[str, str] = {}
+    speed_columns = {name: _speed_column(table, name, column) for name, column in choices.wheel_speeds.items()}
+    of_wheels = {column.name for column in speed_columns.values()}
     for text in table.columns:
+        if text in of_wheels:
+            continue
         if text not in targets:
             left_out[text] = "as told by names"
             continue
         target = targets[text]
         resolved = _resolved(target, body)
+        if resolved is not None and resolved.name in choices.without:
+            left_out[text] = "angle of a joint that is left out"
+            continue
         if resolved is None:
             part = joint_part(label(target).name, known_names)
             of_base = base.take(text, _with_unit(names_of_base.get(text), target)) or (
                 part is not None and not part[1] and base.take(text, _with_unit(part[0], target))
             )
             if not of_base:
-                if part is not None and part[1]:
+                rate = speed_label(target)
+                if rate.unit is not None and rate.name in body.joint_names:
+                    companions[rate.name] = text
+                elif part is not None and part[1]:
                     companions[part[0]] = text
                 left_out[text] = _why_left_out(text, target, recording, body, known_names, choices)
             continue
@@ -147,6 +171,8 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
             gaps.joined(table, [labels[column] for column in quaternion])
             shapes[:, quaternion] = np.stack([gaps.held(table, labels[column]) for column in quaternion], axis=1)
     _check_unread(labels, body, table, choices)
+    for name in choices.without:
+        shapes[:, body.joint_index(name)] = 0.0
     unexplained = [text for text, reason in left_out.items() if reason == _NO_JOINT]
     if body.n_shape and not labels and choices.rest_missing and unexplained:
         raise TrajectoryError(
@@ -168,13 +194,42 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
     for joint, text in labels.items():
         if body.joint_units[joint] != NO_UNIT:
             shapes[:, joint] = gaps.bridged([text], shapes[:, joint])
+    speeds = np.empty((len(shapes), len(speed_columns)))
+    for k, (text, unit) in enumerate(speed_columns.values()):
+        speeds[:, k] = SPEEDS[unit or "rad/s"] * gaps.bridged([text], gaps.held(table, text))
     warn_of_limits(shapes, body, recording)
     shapes = continued_balls(shapes, body, recording, gaps, labels)
     base_motion = base.motion(ignore_extra=choices.ignore_extra)
     columns = {body.joint_names[joint]: sources.get(text, text) for joint, text in labels.items()}
     kept, filled = gaps.settled()
-    motion = Matched(shapes, base_motion, columns, units, at_rest, left_out | base_motion.left_out, filled)
+    left_out |= base_motion.left_out
+    motion = Matched(shapes, base_motion, columns, units, at_rest, left_out, filled, speeds, speed_columns)
     return (recording, motion) if len(kept) == len(shapes) else (part_of(recording, kept), motion.kept(kept))
+
+
+def _speed_column(table: Table, wheel: str, column: str) -> Label:
+    """Label and unit of a wheel's column of speeds. Raises UnknownColumnError, TrajectoryError without a unit."""
+    name, _, behind = column.rpartition(":")
+    stated = speed_unit(behind) if name else None
+    wanted = column if column in table.columns or stated is None else name
+    found = [text for text in table.columns if text == wanted] or [
+        text for text in table.columns if speed_label(text).name == wanted
+    ]
+    if not found:
+        raise unknown_name(
+            f"column of speeds of {wheel} in {table.where}", wanted, [*table.columns], UnknownColumnError
+        )
+    if len(found) > 1:
+        raise TrajectoryError(f"{table.where}: {wanted!r} may be {' or '.join(map(repr, found))}; write it in full")
+    own = speed_label(found[0]).unit or speed_unit(table.units.get(found[0], ""))
+    if own is None and stated is None:
+        raise TrajectoryError(
+            f"{table.where}: column {found[0]!r} states no unit of speed; write one of {', '.join(SPEEDS)} behind it: "
+            f"--rotor-speed '{wheel}={wanted}:rpm' (wheel_speeds={{{wheel!r}: '{wanted}:rpm'}})"
+        )
+    if own is not None and stated not in (None, own):
+        raise TrajectoryError(f"{table.where}: column {found[0]!r} is in {own}, and {stated} was given")
+    return Label(found[0], own or stated)
 
 
 def _with_unit(name: str | None, target: str) -> str:
@@ -311,12 +366,13 @@ def _rest_of_missing(
         if joint in labels:
             raise TrajectoryError(f"{where}: rest: joint {name} has a column, {labels[joint]!r}; leave one of them out")
         at_rest[name] = quantity(value, body.joint_units[joint], f"rest of joint {name}")
-    missing = [name for i, name in enumerate(body.joint_names) if i not in labels and name not in at_rest]
+    known = {*at_rest, *choices.without}
+    missing = [name for i, name in enumerate(body.joint_names) if i not in labels and name not in known]
     moving = next((name for name in missing if name in companions), None)
     if moving is not None and not choices.rest_missing:
         raise TrajectoryError(
             f"{where}: {companions[moving]!r} is recorded of joint {moving}, and its position is not; add a column "
-            f"{moving}, or say where it rests: --rest {moving}=0 (rest={{{moving!r}: 0}})"
+            f"{moving}, or say where it rests: --rest {moving}=0 (rest={{{moving!r}: 0}}){wheel_hint(body, moving)}"
         )
     if choices.rest_missing or (missing and labels and explained):
         neutral = body.shape()
@@ -333,7 +389,7 @@ def _rest_of_missing(
         raise TrajectoryError(
             f"{where}: no column for {', '.join(missing)}; add them (zeros where the joint rests), or say where they "
             "rest: rest={joint: value} (--rest JOINT=VALUE), or rest_missing=True (--rest-missing) for zero. Joints of "
-            f"{body.name}: {', '.join(body.joint_names)}"
+            f"{body.name}: {', '.join(body.joint_names)}{wheel_hint(body, *missing)}"
         )
     return {name: at_rest[name] for name in body.joint_names if name in at_rest}
 

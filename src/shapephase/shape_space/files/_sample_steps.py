@@ -99,8 +99,8 @@ def evenly_spaced(times: Array, motion: Matched, inside: slice, rate: float) -> 
         base = replace(base, attitude=turned)
     if base.position is not None:
         base = replace(base, position=CubicSpline(times, base.position)(at))
-    shapes = CubicSpline(times, motion.shapes)(at)
-    return at - at[0], motion._replace(shapes=shapes, base=base), slice(before, before + past + 1)
+    shapes, speeds = (CubicSpline(times, values)(at) for values in (motion.shapes, motion.speeds))
+    return at - at[0], motion._replace(shapes=shapes, base=base, speeds=speeds), slice(before, before + past + 1)
 
 
 def low_passed(times: Array, motion: Matched, cut_off: float) -> Matched:

@@ -17,6 +17,7 @@ from .recording import Recording, Table, listed, warn
 
 ANGLES = {"rad": 1.0, "deg": float(np.radians(1.0)), "mrad": 1e-3}  # unit -> size [rad]
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # unit -> size [m]
+SPEEDS = {"rad/s": 1.0, "deg/s": float(np.radians(1.0)), "rpm": 2.0 * float(np.pi) / 60.0}  # unit -> size [rad/s]
 IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}  # division keeps whole ms exact
 SI = "SI"  # unit of a column in rad or m, as its joint has it; written by `write_shape_path` where needed
 NO_UNIT = "1"  # of a quaternion's numbers
@@ -40,6 +41,17 @@ _BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<rou
 # Any unit may follow an underscore; only whole words follow a blank or a point.
 _SUFFIXED = re.compile(r"(?P<name>.*[^\s_.])(?P<mark>[\s_.]|(?=°))(?P<unit>[^\W\d_]+|°)", re.DOTALL)
 _WORDS = {"rad", "deg", "ms"}
+_SPEED_UNITS = {
+    "°/s": "deg/s",
+    "rads^-1": "rad/s",
+    "degs^-1": "deg/s",
+    "rev/min": "rpm",
+    "r/min": "rpm",
+    "1/min": "rpm",
+}
+_SPEED = re.compile(
+    r"(?P<name>.*\S)(?:\s*\[(?P<square>[^\[\]]*)\]|\s*\((?P<round>[^()]*)\)|[_ ](?P<rest>\w+))", re.DOTALL
+)
 _NO_UNITS = ("", "-")  # in the brackets of columns without a unit
 _OTHER_UNIT = re.compile(  # units of rates, forces and other quantities beside a posture
     r"(rad|deg|°|m|cm|mm|rev|r)\s*([/ ]\s*(s|min)|s\^?-1|\s*s\^-1)\S*|rpm|n|nm|n\*m|n\.m|a|ma|v|w|°c|degc|pa|bar", re.I
@@ -53,6 +65,7 @@ _COUNTERS = (  # columns that count rows, in lower case without marks
     *("frame", "frames", "framenumber", "subframe", "index", "sample", "samples", "seq", "count", "counter", "row"),
 )
 _QUANTITY = re.compile(r"(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>[^\W\d_]*|°)")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _WHOLE_TURN = 2.0 * np.pi  # [rad] larger angles of base and ball joints without a unit are rather in degrees
 _MANY_TURNS = 2.0 * _WHOLE_TURN  # [rad] range of a joint without limits from which its unit must be stated
 _HALF_TURN = np.pi  # [rad] per sample: coarser samples do not determine the way between
@@ -94,6 +107,35 @@ def other_unit(text: str) -> str | None:
     bracketed = _BRACKETED.fullmatch(text)
     inside = "" if bracketed is None else bracketed["square"] or bracketed["round"] or ""
     return inside if _OTHER_UNIT.fullmatch(inside.strip()) else None
+
+
+def speed_unit(text: str) -> str | None:
+    """Unit of a speed about an axle by one of its spellings, or None."""
+    plain = re.sub(r"\s", "", text.lower())
+    unit = _SPEED_UNITS.get(plain, plain)
+    return unit if unit in SPEEDS else None
+
+
+def speed_label(text: str) -> Label:
+    """Name and unit of a column of speeds: `rw1 [rpm]`, `rw1 (rad/s)` and `rw1_rpm` are those of rw1."""
+    parts = _SPEED.fullmatch(text)
+    unit = None if parts is None else speed_unit(parts["square"] or parts["round"] or parts["rest"] or "")
+    return Label(text, None) if parts is None or unit is None else Label(parts["name"], unit)
+
+
+def speed(text: str, what: str) -> float | None:
+    """A speed such as `6000rpm`, `-3 deg/s` or `628` [rad/s]; None for a text that does not begin with a number.
+
+    Raises TrajectoryError for a number with another unit.
+    """
+    number = _NUMBER.match(text.strip())
+    if number is None:
+        return None
+    behind = text.strip()[number.end() :].strip()
+    unit = speed_unit(behind or "rad/s")
+    if unit is None:
+        raise TrajectoryError(f"{what}: {behind!r:.40} is no unit of speed; these are: {', '.join(SPEEDS)}")
+    return float(number[0]) * SPEEDS[unit]
 
 
 def is_counter(text: str) -> bool:
@@ -306,7 +348,7 @@ def check_unit(values: Array, joint: int, body: Body, recording: Recording) -> N
             turns, step = np.ptp(values) / _WHOLE_TURN, np.abs(np.diff(values)).max()
             raise TrajectoryError(
                 f"{recording.place(largest)}: joint {name} is at {at:.6g} rad; it would turn {turns:.3g} times, and up "
-                f"to {step:.3g} rad from one {table.row} to the next: {way}"
+                f"to {step:.3g} rad from one {table.row} to the next: {way}{wheel_hint(body, name)}"
             )
     elif not table.by_format and limited and looks_like(values, LENGTHS["mm"], lower, upper):
         raise TrajectoryError(
@@ -334,6 +376,17 @@ def warn_of_limits(shapes: Array, body: Body, recording: Recording) -> None:
         f"{recording.place(int(sample))}: joint {body.joint_names[joint]} is at {shapes[sample, joint]:.6g} {unit}, "
         f"outside its limits {lower[joint]:.6g} to {upper[joint]:.6g} {unit} by {beyond[sample, joint]:.3g} {unit} (in "
         f"{count} of {len(shapes)} {row}s){also}; check the file's units and signs (--degrees, --radians, --names)"
+    )
+
+
+def wheel_hint(body: Body, *joints: str) -> str:
+    """What to type for the first of some joints that turns without end, as a wheel does; "" without one."""
+    name = next((name for name in joints if body.continuous[body.joint_index(name)]), None)
+    if name is None:
+        return ""
+    return (
+        f". A wheel has a speed instead, --rotor-speed {name}=COLUMN or {name}=6000rpm, or a momentum, --rotor "
+        f"{name}=1.5: leave it out of the path, without=[{name!r}], and give articulated rotor_speeds= or rotors="
     )
 
 

@@ -12,7 +12,9 @@ from typing import Any, TypedDict, TypeVar
 
 from numpy.typing import ArrayLike
 
-from ...arguments import check_choice, check_file_name, positive_argument
+from ...arguments import check_choice, check_file_name, check_mapping, positive_argument
+from ...arguments import names_argument as names_list
+from ...body.body import Body
 from ...body.joint_orders import WORDS
 from ...errors import ShapeError, TrajectoryError, WrongObjectError, unknown_name
 from ...letters import value_text
@@ -61,6 +63,8 @@ class ReadingOptions(TrajectoryOptions, total=False):
     flight: str | Sequence[float] | None
     up: str | None
     gravity: float | str | None
+    without: Sequence[str] | None
+    wheel_speeds: Mapping[str, str] | None
 
 
 def show_options(options: type) -> Callable[[Read], Read]:
@@ -107,7 +111,7 @@ class Reading:
     given: Callable[[str], Any]
 
     @classmethod
-    def of(cls, options: ReadingOptions) -> Reading:
+    def of(cls, options: ReadingOptions, body: Body) -> Reading:
         """Checked options. Raises ShapeError, TrajectoryError, UnknownNameError; WrongObjectError for unknown ones."""
         check_options(options, ReadingOptions, "read_recorded_motion")
         given = options.get
@@ -131,6 +135,10 @@ class Reading:
                 "'3deg'"
             )
         names = names_argument(given("names"))
+        without, speeds = _left_out(given("without"), body), given("wheel_speeds") or {}
+        check_mapping(speeds, "wheel_speeds", "wheel -> column")
+        if not all(isinstance(column, str) for column in speeds.values()):
+            raise ShapeError(f"wheel_speeds: names of columns are needed, got {value_text(speeds)}")
         return cls(
             names=names,
             listed=isinstance(given("names"), list | tuple),
@@ -142,6 +150,8 @@ class Reading:
                 rest_missing=given("rest_missing", False),
                 ignore_extra=given("ignore_extra", False),
                 fill=fill_argument(given("fill")),
+                without=tuple(name for name in body.joint_names if name in without or name in speeds),
+                wheel_speeds=speeds,
             ),
             segments=SegmentChoices(
                 names=names or {}, calibration=given("calibration"), length_tolerance=given("length_tolerance")
@@ -153,6 +163,14 @@ class Reading:
             close=close,
             given=given,
         )
+
+
+def _left_out(names: object, body: Body) -> tuple[str, ...]:
+    """Joints whose path is not wanted. Raises ShapeError, UnknownNameError."""
+    left_out = () if names is None else names_list(names, "without", "names of joints in a list")
+    for name in left_out:
+        body.joint_index(name)
+    return left_out
 
 
 def read_names(file: str | os.PathLike[str]) -> dict[str, str | None]:

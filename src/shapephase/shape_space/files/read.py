@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Unpack
 
@@ -14,8 +14,9 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
+from ..body_path import without_joints
 from ..shape_path import ShapePath
-from ._joint_columns import Matched, matched
+from ._joint_columns import JointChoices, Matched, matched
 from ._sample_origins import resampled
 from ._sample_steps import evenly_spaced, low_passed, surrounded, warn_of_fast_turns, without_first_pose
 from ._segment_poses import SegmentMotion, without_segments
@@ -39,7 +40,7 @@ class RecordedMotion:
 
     Attributes
     ----------
-    path : the joints of the body, in its order; it carries the SHA-256 of the file
+    path : the joints of the body, in its order, but those of `without`; it carries the SHA-256 of the file
     residual : (n,) rms of the samples minus the path [rad or m]; zero where it goes through all of them
     times : (N,) of the samples, from 0 [s]
     base_attitude : (N, 3, 3) recorded attitude of the base, base axes to the recorder's axes, or None
@@ -51,6 +52,7 @@ class RecordedMotion:
     closing : how a cycle was closed, and what that changed; None: it was not
     flight : the free flight that was kept; None: none was requested
     segments : angular momentum from poses of segments beside that of base and joints; None: the file has no such poses
+    wheel_speeds : speed of each wheel whose column was given [rad/s], for `articulated(..., rotor_speeds=)`
     """
 
     path: ShapePath
@@ -64,6 +66,7 @@ class RecordedMotion:
     closing: Closing | None = None
     flight: Flight | None = None
     segments: SegmentMotion | None = None
+    wheel_speeds: Mapping[str, ShapePath] = field(default_factory=dict)
 
     __repr__ = short_repr
 
@@ -169,6 +172,10 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         pose in the file, as "tpose"; "links", these are the axes of the links; None: an MVNX file's own pose, or
         "links" for the body of the file that the segments are from
     length_tolerance : share by which distances between joints may differ from the body's, on average; None: 0.1
+    without : joints that the path lacks, whose columns are ignored: wheels that have a momentum or a speed instead
+    wheel_speeds : wheel -> its column of speeds in rad/s, deg/s or rpm, the unit in its label, as `rw1 [rpm]`, or
+        behind a colon, as "rw1:rpm"; it is filtered and resampled as the joints are, and smoothed where `smooth` has a
+        noise for it [rad/s]. Such a wheel is left out of the path, too
 
     Raises
     ------
@@ -197,7 +204,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     2.0 0.0
     """
     check_object(body, "Body", "body")
-    how = Reading.of(options)
+    how = Reading.of(options, body)
     option, unit = how.given, how.given("time_unit")
     given, step = read_input(file, body, option("topic"), option("timestep"), option("joint_order"), how.names)
     table, names = without_segments(given.table, body, how.segments, unit, step)
@@ -207,7 +214,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     warn_of_fast_turns(recording, motion, body)
     recording, motion, flight = in_flight(recording, motion, body, how.flight)
     try:
-        noise = _noise_levels(option("smooth"), body)
+        noise = _noise_levels(option("smooth"), body, joints)
         around = recording, motion, slice(None)
         if (noise.any() or how.cut_off is not None) and (how.trim is not None or flight is not None):
             around = surrounded(
@@ -225,6 +232,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
             whole = low_passed(times, whole, how.cut_off)
         motion = whole.kept(np.arange(len(times))[inside])
         samples = Recorded(times, whole.shapes, noise, body.joint_names, inside, how.cut_off)
+        wheel_speeds = _speed_paths(replace(samples, shapes=whole.speeds), motion, option("smooth"))
         closing = None
         if how.close is not None:
             path, smoothing, closing = closed_path(
@@ -240,7 +248,9 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         count = max(round(path.duration * how.rate), 2)
         if count > _MOST_SAMPLES:
             raise TrajectoryError(f"{table.where}: resample: {count} samples; up to {_MOST_SAMPLES} are made")
-        path = resampled(path, np.linspace(0.0, path.duration, count + 1))
+        even = np.linspace(0.0, path.duration, count + 1)
+        path = resampled(path, even)
+        wheel_speeds = {name: resampled(speed, even) for name, speed in wheel_speeds.items()}
     kept_times = times[inside] - times[inside][0]
     residual = np.zeros(body.n_shape)
     if samples.smoothed or how.rate is not None or closing is not None:
@@ -251,6 +261,8 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         "samples_in_file": len(table.rows),
         "trim": how.trim,
         **_record(recording, motion),
+        "without": list(joints.without),
+        "wheel_speeds": {name: column._asdict() for name, column in motion.speed_columns.items()},
         "smooth": dict(zip(body.joint_names, noise.tolist(), strict=True)) if noise.any() else None,
         "lowpass": None if how.cut_off is None else smoothing.filter_record(body.joint_names),
         "smoothing": smoothing.spline_record(body.joint_names) if noise.any() else None,
@@ -258,6 +270,8 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         "flight": None if flight is None else flight.record,
         "resampled_to_hz": None if how.rate is None else (len(path.breaks) - 1) / path.duration,
     }
+    residual = residual[[name not in joints.without for name in body.joint_names]]
+    path = without_joints(path, joints.without)
     return RecordedMotion(
         path=replace(path, sha256=given.sha256, record=record),
         residual=residual,
@@ -270,6 +284,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         closing=closing,
         flight=flight,
         segments=table.segments,
+        wheel_speeds=wheel_speeds,
     )
 
 
@@ -289,6 +304,18 @@ def read_shape_path(file: Any, body: Body, **options: Unpack[ReadingOptions]) ->
     (3.0, ('waist_pitch', 'waist_yaw', 'waist_roll'), [0.3, 0.0, 0.0])
     """
     return read_recorded_motion(file, body, **options).path
+
+
+def _speed_paths(samples: Recorded, motion: Matched, smooth: Any) -> dict[str, ShapePath]:
+    """Speeds of wheels as paths of one column: wheel -> path [rad/s]."""
+    names = tuple(motion.speed_columns)
+    if not names:
+        return {}
+    levels = smooth if isinstance(smooth, Mapping) else {}
+    noise = np.array([amounts(levels.get(name, 0.0), f"smooth, wheel {name}")["rad"] for name in names])
+    samples = replace(samples, noise=noise, joint_names=names)
+    path, _ = prepared_path(samples, periodic=samples.meets)
+    return {name: without_joints(path, {*names} - {name}) for name in names}
 
 
 def _names_of_columns(names: Mapping[str, str | None], how: Reading, table: Table) -> dict[str, str | None]:
@@ -332,11 +359,13 @@ def _record(recording: Recording, motion: Matched) -> dict[str, Any]:
     }
 
 
-def _noise_levels(smooth: float | str | Mapping[str, float | str] | None, body: Body) -> Array:
+def _noise_levels(smooth: float | str | Mapping[str, float | str] | None, body: Body, choices: JointChoices) -> Array:
     """The noise of each joint: (n,) [rad or m]."""
     level = 0.0 if smooth is None else smooth
     by_joint = level if isinstance(level, Mapping) else dict.fromkeys(body.joint_names, level)
     for name in by_joint:
-        body.joint_index(name)
+        if name not in choices.wheel_speeds:
+            body.joint_index(name)
+    by_joint = {name: value for name, value in by_joint.items() if name not in choices.without}
     units = zip(body.joint_names, body.joint_units, strict=True)
     return np.array([amounts(by_joint.get(name, 0.0), f"smooth, joint {name}")[unit] for name, unit in units])
