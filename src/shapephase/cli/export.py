@@ -14,11 +14,13 @@ from .options import (
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
     START_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyOptions,
     PrintOptions,
     RecordingOptions,
     StartOptions,
     Tolerance,
+    WheelOptions,
     option,
     rare,
 )
@@ -57,7 +59,13 @@ class FileOptions:
 
 
 _FILE_DEFAULTS = FileOptions()
-_STORED = (START_DEFAULTS, _TOLERANCE, RECORDING_DEFAULTS, BODY_DEFAULTS)  # options for motions computed here
+_STORED = (
+    START_DEFAULTS,
+    _TOLERANCE,
+    WHEEL_DEFAULTS,
+    RECORDING_DEFAULTS,
+    BODY_DEFAULTS,
+)  # options for motions computed here
 _WHOLE = 1.0 + 1e-12  # the last sample is at the end where the duration is a whole number of samples
 _ENDINGS = {"ck": (".bc",), "aem": (".aem", ".txt"), "mot": (".mot", ".sto")}
 
@@ -101,6 +109,7 @@ def export_command(
     ] = False,
     start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = _TOLERANCE,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -134,13 +143,13 @@ def export_command(
                 raise ShapeError(
                     f"{body:.80} needs a motion, as in `shapephase export cat cat_righting --csv fall.csv`"
                 )
-            if (start, tolerance, recording, floating) != _STORED:
-                raise ShapeError(
-                    f"{body:.80} is a stored motion; leave out options of its start, accuracy, body and recording"
-                )
+            if (start, tolerance, wheels, recording, floating) != _STORED:
+                raise ShapeError(f"{body:.80} is a stored motion; leave out options by which a motion is computed")
             moved = load_motion(body)
         else:
-            moved = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating).motion
+            moved = motions.flight(
+                body, motion, start, recording, tolerance, work.watch, floating=floating, wheels=wheels
+            ).motion
         work.begin("writing")
         times = None if often is None else np.arange(np.floor(moved.duration * often * _WHOLE) + 1.0) / often
         written: dict[str, dict[str, object]] = {}
