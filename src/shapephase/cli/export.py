@@ -39,7 +39,7 @@ class FileOptions:
     ck: Annotated[Path | None, option()] = None
     """Attitude as a C-kernel of SPICE, with clock and frame beside it (.tsc); for example `--ck fall.bc`."""
     aem: Annotated[Path | None, option()] = None
-    """Attitude as a message of CCSDS (AEM) in keywords and values; for example `--aem fall.aem`."""
+    """Attitude as a message of CCSDS (AEM), in XML where the name ends in .xml; for example `--aem fall.aem`."""
     csv: Annotated[Path | None, option()] = None
     """Base, joints and wheels at times, in SI units, as CSV; for example `--csv fall.csv`."""
     mcap: Annotated[Path | None, option()] = None
@@ -67,7 +67,7 @@ _STORED = (
     BODY_DEFAULTS,
 )  # options for motions computed here
 _WHOLE = 1.0 + 1e-12  # the last sample is at the end where the duration is a whole number of samples
-_ENDINGS = {"ck": (".bc",), "aem": (".aem", ".txt"), "mot": (".mot", ".sto")}
+_ENDINGS = {"ck": (".bc",), "aem": (".aem", ".txt", ".xml"), "mot": (".mot", ".sto")}
 
 
 def export_command(
