@@ -23,12 +23,11 @@ from ..examples.scenarios import MOTIONS, named_motion
 from ..integrator.machine_code import expect_work
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import ProgressCallback
-from ..shape_space.body_path import without_joints
 from ..shape_space.files.base_columns import ESTIMATE
 from ..shape_space.files.flight import ANY_GRAVITY, RECORDED
 from ..shape_space.files.options import name_pair, read_names
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
-from ..shape_space.shape_path import ShapePath
+from ..shape_space.shape_path import ShapePath, without_joints
 from .joint_values import joint_values
 from .options import (
     BODY_DEFAULTS,

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Collection
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -21,10 +19,9 @@ from ..integrator import machine_code
 from ..integrator.families import many_inverted
 from ..integrator.link_tree import tree_channels, trees_channels
 from ..integrator.sampling import Sampler
-from .curves import Fourier, PiecewisePolynomial, Reordered
+from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import with_crossings
 from .path_series import evenly_divided, panel_edges
-from .scan.function_scan import DerivedScan
 from .shape_path import CLOSED, ShapePath
 
 _FAR_BEYOND = 0.2  # of the width of a joint's limits: noise leaves them by less
@@ -64,17 +61,6 @@ def one_shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
             f"got shape {shape.shape}"
         )
     return shape
-
-
-def without_joints(path: ShapePath, names: Collection[str]) -> ShapePath:
-    """Return the path of the other joints; of a path without names the path itself."""
-    kept = [k for k, name in enumerate(path.joint_names or ()) if name not in names]
-    if path.joint_names is None or len(kept) == path.n_shape:
-        return path
-    order, left = np.array(kept, dtype=int), tuple(path.joint_names[k] for k in kept)
-    scanner = DerivedScan(path, "reordered", (order,))
-    curve = Reordered(path.curve, order)
-    return replace(path, curve=curve, n_shape=len(kept), joint_names=left, scanner=scanner, origin=None)
 
 
 def path_gap(body: Body | ParticleBody, path: ShapePath) -> Array:

@@ -13,7 +13,7 @@ from ..errors import WrongObjectError
 from .curves import PiecewisePolynomial, Reordered
 from .interpolation import REST_TO_REST
 from .shape_geodesic import ClosingArc
-from .shape_path import PathOrigin, ShapePath, interpolated
+from .shape_path import PathOrigin, ShapePath, interpolated, without_joints
 
 
 class SampleOrigin(PathOrigin, Protocol):
@@ -91,9 +91,12 @@ class PathSamples:
         origin = self.arc or self.origin
         if origin is None:
             return interpolated(self.curve.knots, values, self.curve.through)
-        recorded = np.empty_like(values)
+        # The path may lack joints of the recording, as wheels.
+        recorded = values.copy() if self.origin is None else self.origin.samples.copy()
         recorded[:, self.order] = values
-        return origin.path(recorded)
+        whole = origin.path(recorded)
+        kept = {*self.order.tolist()}
+        return without_joints(whole, [name for k, name in enumerate(whole.joint_names or ()) if k not in kept])
 
     def derivative(self, times: Array, by_shape: Array, by_rate: Array) -> Array:
         """Sums over times of (N, k, n) derivatives by shapes and rates, by the samples: (k, count n)."""
@@ -184,7 +187,7 @@ class PathSamples:
 
     def _through(self, rule: Callable[[Array], Array], by_knots: Array) -> Array:
         n_shape = len(self.order)
-        of_curve = np.empty((self._at_knots, len(by_knots), n_shape))
+        of_curve = np.zeros((self._at_knots, len(by_knots), self._source.coefficients.shape[2]))
         of_curve[:, :, self.order] = np.moveaxis(by_knots.reshape(len(by_knots), -1, n_shape), 1, 0)
         return np.moveaxis(rule(of_curve)[:, :, self.order], 0, 1).reshape(len(by_knots), -1)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -438,6 +438,17 @@ class ShapePath:
         shapes, rates = self.curve(times.ravel())
         expected_shape = (*times.shape, self.n_shape)
         return shapes.reshape(expected_shape), rates.reshape(expected_shape)
+
+
+def without_joints(path: ShapePath, names: Collection[str]) -> ShapePath:
+    """Return the path of the other joints; of a path without names the path itself."""
+    kept = [k for k, name in enumerate(path.joint_names or ()) if name not in names]
+    if path.joint_names is None or len(kept) == path.n_shape:
+        return path
+    order, left = np.array(kept, dtype=int), tuple(path.joint_names[k] for k in kept)
+    scanner = DerivedScan(path, "reordered", (order,))
+    curve = Reordered(path.curve, order)
+    return replace(path, curve=curve, n_shape=len(kept), joint_names=left, scanner=scanner)
 
 
 def interpolated(

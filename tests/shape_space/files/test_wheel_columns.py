@@ -8,6 +8,7 @@ from scipy.signal import butter, sosfiltfilt
 
 import shapephase as sp
 from shapephase.errors import ShapeError, TrajectoryError, UnknownNameError
+from shapephase.shape_space.path_samples import path_samples
 from support.independent import apart
 
 SATELLITE = sp.load_body("satellite")
@@ -94,6 +95,32 @@ def test_speeds_are_filtered_cut_bridged_and_resampled_with_the_joints(tmp_path)
         sp.read_recorded_motion(file, SATELLITE, wheel_speeds=wheel)
     filled = sp.read_recorded_motion(file, SATELLITE, wheel_speeds=wheel, fill=0.2).wheel_speeds["wheel_spin"]
     np.testing.assert_allclose(filled.shape(TIMES)[:, 0], IN_RAD * RPM, rtol=1e-5)
+
+
+@pytest.mark.parametrize("how", [{"lowpass": 4.0}, {"smooth": 0.01}, {"resample": 20.0}, {"close": 0.1}])
+def test_the_path_without_a_wheel_remembers_the_samples_of_its_joints(tmp_path, how):
+    """Derivatives by samples, which error bars are made of, against the same steps with other samples."""
+    rng = np.random.default_rng(2)
+    columns = joints(wheel_spin=0.2 * TIMES) if "close" not in how else joints(wheel_spin=angles(3))
+    noisy = {name: 0.1 + values + rng.normal(0.0, 0.01, len(TIMES)) for name, values in columns.items()}
+    recorded = sp.read_recorded_motion(log(tmp_path, noisy), SATELLITE, without=["arm_2"], **how)
+    names = [name for name in SATELLITE.joint_names if name != "arm_2"]
+    samples = path_samples(recorded.path)
+    change = rng.normal(size=samples.values.shape)
+    moved = samples.path_through(samples.values + 1e-4 * change).matched(names, "the rest")
+    # One row a joint: its shape at one time.
+    by_shape = np.eye(len(names))[None]
+    slopes = samples.derivative(np.array([1.234]), by_shape, 0.0 * by_shape) @ change.ravel()
+    np.testing.assert_allclose((moved.shape(1.234) - recorded.path.shape(1.234)) / 1e-4, slopes, rtol=0, atol=1e-8)
+    assert np.abs(slopes).max() > 0.05
+    if recorded.smoothing is not None:
+        assert recorded.smoothing.noise.shape == (len(names),)
+
+
+def test_a_geodesic_cannot_close_a_cycle_beside_wheels(tmp_path):
+    file = log(tmp_path, joints())
+    with pytest.raises(TrajectoryError, match="--close-by drift"):
+        sp.read_shape_path(file, SATELLITE, without=["wheel_spin"], close=0.1, close_by="geodesic")
 
 
 def test_errors_name_what_lacks_and_what_to_type(tmp_path):

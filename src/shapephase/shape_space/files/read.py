@@ -14,8 +14,7 @@ from ...arrays import Array
 from ...body.body import Body
 from ...display import short_repr
 from ...errors import ShapeError, TrajectoryError, unknown_name
-from ..body_path import without_joints
-from ..shape_path import ShapePath
+from ..shape_path import ShapePath, without_joints
 from ._joint_columns import JointChoices, Matched, matched
 from ._sample_origins import resampled
 from ._sample_steps import evenly_spaced, low_passed, surrounded, warn_of_fast_turns, without_first_pose
@@ -235,6 +234,11 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         wheel_speeds = _speed_paths(replace(samples, shapes=whole.speeds), motion, option("smooth"))
         closing = None
         if how.close is not None:
+            if joints.without and option("close_by") == "geodesic":
+                raise TrajectoryError(
+                    "a geodesic takes time in which the wheels that are left out do something unknown: give "
+                    "close_by='drift' (--close-by drift)"
+                )
             path, smoothing, closing = closed_path(
                 samples, body, within=how.close, by=option("close_by"), penalty=option("smooth_penalty")
             )
@@ -270,8 +274,8 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         "flight": None if flight is None else flight.record,
         "resampled_to_hz": None if how.rate is None else (len(path.breaks) - 1) / path.duration,
     }
-    residual = residual[[name not in joints.without for name in body.joint_names]]
-    path = without_joints(path, joints.without)
+    kept = np.array([name not in joints.without for name in body.joint_names], dtype=bool)
+    residual, path = residual[kept], without_joints(path, joints.without)
     return RecordedMotion(
         path=replace(path, sha256=given.sha256, record=record),
         residual=residual,
@@ -280,7 +284,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         base_position=motion.base.position,
         format=table.format,
         record=record,
-        smoothing=smoothing if samples.smoothed else None,
+        smoothing=smoothing.of_joints(kept) if samples.smoothed else None,
         closing=closing,
         flight=flight,
         segments=table.segments,

@@ -67,6 +67,12 @@ class Smoothing:
 
     __post_init__ = lock_arrays
 
+    def of_joints(self, kept: Mask) -> Smoothing:
+        """What it did to some of the joints, True in (n,)."""
+        by_joint = ("noise", "penalty", "degrees_of_freedom", "bias", "residual", "in_band", "noise_in_band")
+        given = {name: getattr(self, name) for name in by_joint}
+        return replace(self, **{name: value[..., kept] for name, value in given.items() if value is not None})
+
     def spline_record(self, joint_names: tuple[str, ...]) -> dict[str, Any]:
         """Penalties and bias of a smoothing spline, by joint, ready for JSON."""
         return {
