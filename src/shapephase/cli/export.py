@@ -151,7 +151,10 @@ def export_command(
                 body, motion, start, recording, tolerance, work.watch, floating=floating, wheels=wheels
             ).motion
         work.begin("writing")
-        times = None if often is None else np.arange(np.floor(moved.duration * often * _WHOLE) + 1.0) / often
+        times = None
+        if often is not None:
+            times = np.arange(np.floor(moved.duration * often * _WHOLE) + 1.0) / often
+            times = np.minimum(times, moved.duration)
         written: dict[str, dict[str, object]] = {}
         for name, file in given.items():
             written[name] = {"file": str(file)}
