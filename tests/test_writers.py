@@ -103,8 +103,9 @@ def test_every_writer_of_the_command_line_is_tried():
         if not name.startswith("-"):
             arguments = app[name].assemble_argument_collection()
             offered |= {(name, one.name) for one in arguments if "Path" in str(one.hint)}
-    # A film takes a browser, too slow to be killed hundreds of times; its file goes the way of the others.
-    assert offered - {("view", "--video"), ("rigid", "--video")} == {
+    # A film takes a browser, too slow to be killed hundreds of times; its file goes the way of the others, as do the
+    # two files of SPICE.
+    assert offered - {("view", "--video"), ("rigid", "--video"), ("export", "--ck")} == {
         (words[0], words[-1]) for words in COMMANDS.values()
     }
 

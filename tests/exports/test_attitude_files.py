@@ -217,6 +217,20 @@ def test_without_an_error_it_is_a_thousandth_of_the_noise_that_joints_were_smoot
     assert sp.exports.write_aem(satellite, tmp_path / "attitude.aem").error == 1e-8
 
 
+def test_a_message_in_xml_is_the_one_in_keywords(satellite, tmp_path):
+    """Read by ccsds-ndm; names with letters that XML reserves among them."""
+    reader = pytest.importorskip("ccsds_ndm.ndm_io")
+    segments = []
+    for ending in ("aem", "xml"):
+        file = tmp_path / f"attitude.{ending}"
+        sp.exports.write_aem(satellite, file, error=1e-6, object_name="A&B <1>")
+        (segment,) = reader.NdmIo().from_path(file).body.segment
+        segments.append(segment)
+    assert (tmp_path / "attitude.xml").read_text().startswith("<?xml")
+    assert segments[0] == segments[1]
+    assert segments[1].metadata.object_name == "A&B <1>"
+
+
 def test_a_message_says_what_it_holds(satellite, tmp_path):
     file = tmp_path / "attitude.aem"
     sp.exports.write_aem(

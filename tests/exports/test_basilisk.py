@@ -22,8 +22,7 @@ def test_basilisk_makes_the_same_motion_of_prescribed_links(tmp_path, monkeypatc
     ours, replay, compared = re.findall(r"^```python\n(.*?)^```", section, re.MULTILINE | re.DOTALL)
     names = {}
     exec(ours, names)
-    (tmp_path / "replay.py").write_text(replay)
-    subprocess.run([str(INTERPRETER), "replay.py"], check=True, env={}, timeout=600)
+    subprocess.run([str(INTERPRETER), "-c", replay], check=True, env={}, timeout=600)
     exec(compared, names)
     right, degrees = capsys.readouterr().out.split()[-2:]
     assert right == "True"

@@ -14,23 +14,28 @@ MOMENTUM = np.array([3.0, -1.0, 2.0])
 WHEEL = "wheel_spin"
 
 
-@pytest.fixture(scope="module", params=["rotors", "rotor_speeds"])
+IN_TIME = (np.linspace(0.0, 2.0, 6), [30.0, 10.0, -5.0, 0.0, 12.0, 20.0])
+
+
+@pytest.fixture(scope="module", params=[("rotors", 30.0), ("rotor_speeds", 30.0), ("rotor_speeds", IN_TIME)])
 def motion(request):
     body = body_of("satellite")
     others = [name for name in body.joint_names if name != WHEEL]
     loop = random_loop(91, len(others))
     middle = np.where(np.array(others) == "boom_extension", 0.9, loop.mean)
     path = sp.ShapePath.fourier(middle, loop.cosines, loop.sines, loop.duration, joint_names=others)
-    deformation = sp.articulated(body, path, **{request.param: {WHEEL: 30.0}})
+    kind, value = request.param
+    deformation = sp.articulated(body, path, **{kind: {WHEEL: value}})
     return sp.reconstruct(deformation, MOMENTUM, random_rotation(92))
 
 
 @pytest.fixture(scope="module")
 def angles(motion):
-    """Integrals of the wheel's speed by 100 Gauss points from the start to each time."""
+    """Integrals of the wheel's speed by 100 Gauss points on each tenth of the way from the start to each time."""
     places, weights = np.polynomial.legendre.leggauss(100)
-    speeds = sp.dynamics.wheel_speeds(motion, 0.5 * TIMES[:, None] * (1.0 + places))[..., 0]
-    return 0.5 * TIMES * (speeds @ weights)
+    parts = (np.arange(10)[:, None] + 0.5 * (1.0 + places)).ravel() / 10.0
+    speeds = sp.dynamics.wheel_speeds(motion, TIMES[:, None] * parts)[..., 0]
+    return TIMES * (speeds @ np.tile(weights, 10)) / 20.0
 
 
 def test_mujoco_finds_the_momentum_and_the_wheel_turned_by_its_speed(motion, angles):

@@ -34,6 +34,10 @@ COMMANDS = {
         f"samples.{kind}": ("split", *CAT, ("0.02", "0.03"), "--samples")
         for kind in ("csv", "parquet", "nc", "mat", "h5")
     },
+    **{
+        f"export.{kind}": ("export", *CAT, ("0.02", "0.03"), f"--{kind}")
+        for kind in ("aem", "csv", "mcap", "parquet", "nc", "mat", "h5", "bvh", "mot")
+    },
     "torques.csv": ("torques", *CAT, ("0.02", "0.03"), "--out"),
     "momentum.csv": ("momentum", *CAT, ("0.02", "0.03"), "--out"),
     **{f"momentum.{kind}": ("momentum", *CAT, ("0.02", "0.03"), "--figure") for kind in ("svg", "pdf", "png")},
@@ -126,7 +130,9 @@ def is_whole(content: bytes, writer: str) -> bool:
         return _ARRAYS[kind](io.BytesIO(content)) > 100
     if kind == "svg":
         return ElementTree.fromstring(content).tag.endswith("svg")
-    ends = {"html": b"</html>", "pdf": b"%%EOF", "png": b"IEND\xaeB`\x82"}
+    if kind in ("bvh", "mot"):
+        return content.endswith(b"\n") and len(content.splitlines()) > 200
+    ends = {"html": b"</html>", "pdf": b"%%EOF", "png": b"IEND\xaeB`\x82", "aem": b"DATA_STOP", "mcap": b"\x89MCAP0"}
     return content.rstrip().endswith(ends[kind])
 
 

@@ -14,11 +14,13 @@ from .options import (
     PRINT_DEFAULTS,
     RECORDING_DEFAULTS,
     START_DEFAULTS,
+    WHEEL_DEFAULTS,
     BodyOptions,
     PrintOptions,
     RecordingOptions,
     StartOptions,
     Tolerance,
+    WheelOptions,
     option,
     rare,
 )
@@ -37,7 +39,7 @@ class FileOptions:
     ck: Annotated[Path | None, option()] = None
     """Attitude as a C-kernel of SPICE, with clock and frame beside it (.tsc); for example `--ck fall.bc`."""
     aem: Annotated[Path | None, option()] = None
-    """Attitude as a message of CCSDS (AEM) in keywords and values; for example `--aem fall.aem`."""
+    """Attitude as a message of CCSDS (AEM), in XML where the name ends in .xml; for example `--aem fall.aem`."""
     csv: Annotated[Path | None, option()] = None
     """Base, joints and wheels at times, in SI units, as CSV; for example `--csv fall.csv`."""
     mcap: Annotated[Path | None, option()] = None
@@ -57,9 +59,15 @@ class FileOptions:
 
 
 _FILE_DEFAULTS = FileOptions()
-_STORED = (START_DEFAULTS, _TOLERANCE, RECORDING_DEFAULTS, BODY_DEFAULTS)  # options for motions computed here
+_STORED = (
+    START_DEFAULTS,
+    _TOLERANCE,
+    WHEEL_DEFAULTS,
+    RECORDING_DEFAULTS,
+    BODY_DEFAULTS,
+)  # options for motions computed here
 _WHOLE = 1.0 + 1e-12  # the last sample is at the end where the duration is a whole number of samples
-_ENDINGS = {"ck": (".bc",), "aem": (".aem", ".txt"), "mot": (".mot", ".sto")}
+_ENDINGS = {"ck": (".bc",), "aem": (".aem", ".txt", ".xml"), "mot": (".mot", ".sto")}
 
 
 def export_command(
@@ -101,6 +109,7 @@ def export_command(
     ] = False,
     start: StartOptions = START_DEFAULTS,
     tolerance: Tolerance = _TOLERANCE,
+    wheels: WheelOptions = WHEEL_DEFAULTS,
     recording: RecordingOptions = RECORDING_DEFAULTS,
     floating: BodyOptions = BODY_DEFAULTS,
     printing: PrintOptions = PRINT_DEFAULTS,  # noqa: ARG001
@@ -134,15 +143,18 @@ def export_command(
                 raise ShapeError(
                     f"{body:.80} needs a motion, as in `shapephase export cat cat_righting --csv fall.csv`"
                 )
-            if (start, tolerance, recording, floating) != _STORED:
-                raise ShapeError(
-                    f"{body:.80} is a stored motion; leave out options of its start, accuracy, body and recording"
-                )
+            if (start, tolerance, wheels, recording, floating) != _STORED:
+                raise ShapeError(f"{body:.80} is a stored motion; leave out options by which a motion is computed")
             moved = load_motion(body)
         else:
-            moved = motions.flight(body, motion, start, recording, tolerance, work.watch, floating=floating).motion
+            moved = motions.flight(
+                body, motion, start, recording, tolerance, work.watch, floating=floating, wheels=wheels
+            ).motion
         work.begin("writing")
-        times = None if often is None else np.arange(np.floor(moved.duration * often * _WHOLE) + 1.0) / often
+        times = None
+        if often is not None:
+            times = np.arange(np.floor(moved.duration * often * _WHOLE) + 1.0) / often
+            times = np.minimum(times, moved.duration)
         written: dict[str, dict[str, object]] = {}
         for name, file in given.items():
             written[name] = {"file": str(file)}
@@ -150,7 +162,7 @@ def export_command(
                 made = (write_spice_ck if name == "ck" else write_aem)(moved, file, error=goal)
                 written[name] |= {"records": made.records, "error_rad": made.error}
             elif name == "bvh":
-                write_bvh(moved, file, **({} if often is None else {"rate": often}))
+                write_bvh(moved, file) if often is None else write_bvh(moved, file, rate=often)
             elif name == "mot":
                 write_opensim_motion(moved, file, times)
             else:

@@ -127,7 +127,7 @@ def moving_body(
     slopes = so3.apply(inverse, np.cross(momenta, spins) + push - so3.apply(inertia_rate, spins) - internal_rate)
     if wheels is not None:
         joints = shapes, rates, accelerations
-        accelerations, slopes = with_free_wheels(wheels, joints, (spins, slopes), matrix, inverse)
+        accelerations, slopes = with_free_wheels(wheels, times, joints, (spins, slopes), matrix, inverse)
     return MovingBody(
         shapes=shapes, rates=rates, accelerations=accelerations, spins=spins, spin_rates=slopes, push=push
     )

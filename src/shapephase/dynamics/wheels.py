@@ -68,23 +68,27 @@ def with_wheels(
     """
     if len(momenta) > 1 and any(rotor.is_momentum for rotor in wheels.rotors):
         raise ShapeError(
-            f"wheels that keep their momentum have other speeds in each of {len(momenta)} motions; reconstruct one"
+            f"wheels of given momentum have other speeds in each of {len(momenta)} motions; reconstruct one"
         )
-    rates = rates.copy()
+    rates, accelerations = rates.copy(), accelerations.copy()
     rates[:, wheel_columns(wheels)] = _speeds(wheels, times, momenta)[0]
+    for rotor in wheels.rotors:
+        if not rotor.is_momentum:
+            accelerations[:, wheels.platform.joint_index(rotor.joint)] = rotor.at(times)[1]
     return rates, accelerations
 
 
 def with_free_wheels(
     wheels: RotorDescription,
+    times: Array,
     joints: tuple[Array, Array, Array],
     base: tuple[Array, Array],
     matrix: Array,
     inverse: Array,
 ) -> tuple[Array, Array]:
-    """Accelerations of the joints and of the base with those of wheels that keep their momentum: (N, n), (B, N, 3).
+    """Accelerations of the joints and of the base with those of wheels of given momentum: (N, n), (B, N, 3).
 
-    No motor turns such a wheel: the torque about its axle, which is linear in the accelerations, is zero.
+    The torque about such an axle, which is linear in the accelerations, is the rate of the momentum.
 
     joints : (N, n) shapes, rates, and accelerations that are zero for these wheels
     base : (B, N, 3) angular velocities and their rates by these, B = 1 where there are such wheels
@@ -98,7 +102,8 @@ def with_free_wheels(
     carried = matrix[:, :, columns]
     turned = inverse @ carried
     moments = np.diag([rotor.inertia for rotor in free]) - np.swapaxes(carried, 1, 2) @ turned
-    spun = -np.linalg.solve(moments, torques[..., None])
+    given = np.stack([rotor.at(times)[1] for rotor in free], axis=-1)
+    spun = np.linalg.solve(moments, (given - torques)[..., None])
     accelerations = joints[2].copy()
     accelerations[:, columns] = spun[..., 0]
     return accelerations, base[1] - (turned @ spun)[..., 0]

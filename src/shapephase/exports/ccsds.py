@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import datetime
 import os
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from pathlib import Path
@@ -21,6 +23,7 @@ from ._attitude_records import WINDOW, error_argument, record_times
 from ._whole_motion import base_attitude, continued_quaternions
 
 TIME_SYSTEMS = ("TDB", "TT", "TAI", "GPS", "UTC")  # of the epochs of a message
+_VERSION = "CCSDS_AEM_VERS"  # name of the first entry
 _DIGITS = 15  # of a second: a turn at 100 rad/s within the last one is below rounding
 
 
@@ -57,7 +60,7 @@ def write_aem(
     object_id: str = "2000-000A",
     reference: str = "EME2000",
 ) -> AttitudeMessage:
-    """Write the attitude of the base as an Attitude Ephemeris Message (CCSDS 504.0-B-1), in keywords and values.
+    """Write the attitude of the base as an Attitude Ephemeris Message (CCSDS 504.0-B-1): keywords and values, or XML.
 
     Quaternions turn the inertial axes into those of the base, scalar part last, every digit kept. Records are as
     near to each other as the error requires where a reader interpolates as the message states: each part of the
@@ -66,6 +69,7 @@ def write_aem(
     Parameters
     ----------
     motion : a single one, in any gauge
+    path : of the message; one that ends in .xml is written in XML
     error : the largest of the attitude between records [rad], beside the motion's own; None: 1e-8, or a thousandth of
         the noise that the joints were smoothed for, if that is larger
     epoch : of the motion's start, as "2026-11-23T10:00:00.5"
@@ -97,35 +101,52 @@ def write_aem(
     times = record_times(motion, goal)
     quaternions = continued_quaternions(base_attitude(motion, times))
     epochs = _epochs(begin, times)
-    made = str(provenance()["date"])[:19]
-    lines = [
-        "CCSDS_AEM_VERS = 1.0",
-        f"CREATION_DATE = {made}",
-        f"ORIGINATOR = SHAPEPHASE {__version__}",
-        "",
-        "META_START",
-        f"COMMENT within {goal!r} rad between records",
-        f"OBJECT_NAME = {object_name}",
-        f"OBJECT_ID = {object_id}",
-        f"REF_FRAME_A = {reference}",
-        "REF_FRAME_B = SC_BODY_1",
-        "ATTITUDE_DIR = A2B",
-        f"TIME_SYSTEM = {time_system}",
-        f"START_TIME = {epochs[0]}",
-        f"STOP_TIME = {epochs[-1]}",
-        "ATTITUDE_TYPE = QUATERNION",
-        "QUATERNION_TYPE = LAST",
-        "INTERPOLATION_METHOD = LAGRANGE",
-        f"INTERPOLATION_DEGREE = {WINDOW - 1}",
-        "META_STOP",
-        "",
-        "DATA_START",
-        *(" ".join([at, *map(repr, row)]) for at, row in zip(epochs, quaternions.tolist(), strict=True)),
-        "DATA_STOP",
-        "",
-    ]
-    write_whole(path, lambda stream: stream.write("\n".join(lines).encode()))
+    header = {"CREATION_DATE": str(provenance()["date"])[:19], "ORIGINATOR": f"SHAPEPHASE {__version__}"}
+    about = {
+        "COMMENT": f"within {goal!r} rad between records",
+        "OBJECT_NAME": object_name,
+        "OBJECT_ID": object_id,
+        "REF_FRAME_A": reference,
+        "REF_FRAME_B": "SC_BODY_1",
+        "ATTITUDE_DIR": "A2B",
+        "TIME_SYSTEM": time_system,
+        "START_TIME": epochs[0],
+        "STOP_TIME": epochs[-1],
+        "ATTITUDE_TYPE": "QUATERNION",
+        "QUATERNION_TYPE": "LAST",
+        "INTERPOLATION_METHOD": "LAGRANGE",
+        "INTERPOLATION_DEGREE": str(WINDOW - 1),
+    }
+    text = (_xml if Path(path).suffix.lower() == ".xml" else _keywords)(header, about, epochs, quaternions)
+    write_whole(path, lambda stream: stream.write(text.encode()))
     return AttitudeMessage(file=Path(path), records=len(times), error=goal, degree=WINDOW - 1)
+
+
+def _keywords(header: Mapping[str, str], about: Mapping[str, str], epochs: list[str], quaternions: Array) -> str:
+    """Message in keywords and values."""
+    named = [f"{name} {value}" if name == "COMMENT" else f"{name} = {value}" for name, value in about.items()]
+    rows = [" ".join([at, *map(repr, row)]) for at, row in zip(epochs, quaternions.tolist(), strict=True)]
+    lines = [f"{_VERSION} = 1.0", *(f"{name} = {value}" for name, value in header.items())]
+    return "\n".join([*lines, "", "META_START", *named, "META_STOP", "", "DATA_START", *rows, "DATA_STOP", ""])
+
+
+def _xml(header: Mapping[str, str], about: Mapping[str, str], epochs: list[str], quaternions: Array) -> str:
+    """Message in XML. Source: CCSDS 505.0-B-1, section 4."""
+    root = ElementTree.Element("aem", id=_VERSION, version="1.0")
+    heading, body = (ElementTree.SubElement(root, name) for name in ("header", "body"))
+    segment = ElementTree.SubElement(body, "segment")
+    metadata, data = (ElementTree.SubElement(segment, name) for name in ("metadata", "data"))
+    for parent, entries in ((heading, header), (metadata, about)):
+        for name, value in entries.items():
+            ElementTree.SubElement(parent, name).text = value
+    for at, row in zip(epochs, quaternions.tolist(), strict=True):
+        state = ElementTree.SubElement(ElementTree.SubElement(data, "attitudeState"), "quaternionState")
+        ElementTree.SubElement(state, "EPOCH").text = at
+        parts = ElementTree.SubElement(state, "quaternion")
+        for name, value in zip(("Q1", "Q2", "Q3", "QC"), row, strict=True):
+            ElementTree.SubElement(parts, name).text = repr(value)
+    ElementTree.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
 
 
 def _epoch(text: str) -> tuple[datetime.datetime, Decimal]:
