@@ -151,7 +151,8 @@ def momentum_from_recording(
         If the shapes disagree; for rates beside axes to be found, and arguments without what they belong to.
     TrajectoryError
         If there are fewer than three times, or they do not ascend; or if the attitudes are a flight only once their
-        quaternions are read with w first, or as their inverse, or the rates once they are read in deg/s.
+        quaternions are read with w first, or as their inverse, or the rates once they are read in deg/s; or if by the
+        rates the base turns over half a turn from one time to the next.
     AccuracyNotReached
         If the fit does not settle: the recording is no free flight of this body, or too coarse; or if it does not tell
         the axes, or the bias that is to be found.
@@ -194,6 +195,10 @@ def momentum_from_recording(
     if len(at) < 3 or np.any(np.diff(at) <= 0.0):
         raise TrajectoryError("times: three or more that ascend are needed to fit a momentum")
     measured = None if rates is None else finite_array(rates, "rates", (len(at), 3), unit="rad/s")
+    if measured is not None:
+        if measured.ndim > 2:
+            raise ShapeError(f"rates: ({len(at)}, 3), one for each time, are needed, got {measured.shape}")
+        _check_speed(at, measured)
     _check_choices(recorded, measured, noise, rate_noise, attitude, find_bias=find_bias, find_axes=find_axes)
     least = _Least(deformation, at, recorded, tolerance)
     if recorded is None:
@@ -214,6 +219,16 @@ def momentum_from_recording(
     if not result.conserved:
         warn_of_drift(result)
     return result
+
+
+def _check_speed(times: Array, rates: Array) -> None:
+    """Raise TrajectoryError for rates by which a body turns too far from one sample to the next."""
+    turn = float(np.median(np.abs(rates[1:]).max(axis=1) * np.diff(times)))
+    if turn > np.pi:
+        raise TrajectoryError(
+            f"rates: by them the base turns {turn:.3g} rad from one sample to the next, over half a turn; give samples "
+            "that are closer, or the unit, if it is not rad/s: numpy.radians(rates) (--names 'COLUMN=COLUMN [deg/s]')"
+        )
 
 
 def _check_choices(
