@@ -157,6 +157,8 @@ def test_what_is_wrong_is_named(flight: sp.Motion):
     sp.momentum_from_recording(SOMERSAULT, _TIMES, rates=slow)
     with pytest.raises(TrajectoryError, match=r"in deg/s they are: .*--names 'COLUMN=COLUMN \[deg/s\]'"):
         sp.momentum_from_recording(SOMERSAULT, _TIMES, rates=np.degrees(slow))
+    with pytest.raises(TrajectoryError, match=r"over half a turn; .*deg/s"):
+        sp.momentum_from_recording(SOMERSAULT, _TIMES, rates=np.degrees(given["rates"]))
     with pytest.raises(TrajectoryError, match=r"read as its inverse, it is one: base_inverse=True \(--base-inverse\)"):
         sp.momentum_from_recording(SOMERSAULT, _TIMES, so3.transpose(flight.attitude(_TIMES)))
     for wrong, words in (

@@ -171,7 +171,7 @@ def _rate(options: StartOptions) -> Array | None:
         return None
     if options.momentum is not None:
         raise ShapeError("--rate and --momentum: either states how the body turns; leave one of them out")
-    size = rate_size(words[-1]) if len(words) > 3 else 1.0
+    size, omega = rate_size(words[-1]) if len(words) > 3 else 1.0, np.zeros(3)
     try:
         omega = np.array([float(word) for word in words[:3]])
     except ValueError:

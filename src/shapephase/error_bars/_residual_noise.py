@@ -88,7 +88,8 @@ def residual_noise(residuals: Array, slopes: Array) -> ResidualNoise:
     parameters = np.asarray(np.linalg.solve(precisions, right[:, :, None])[:, :, 0], dtype=np.float64)
     free = 3 * count - unknowns
     plain = residuals.ravel() - slopes @ np.linalg.lstsq(slopes, residuals.ravel(), rcond=None)[0]
-    taken = np.einsum("abf,ba->f", _by_correlation(np.linalg.pinv(slopes)), slopes.T @ slopes)
+    estimator = np.asarray(np.linalg.pinv(slopes), dtype=np.float64)
+    taken = np.einsum("abf,ba->f", _by_correlation(estimator), slopes.T @ slopes)
     left = np.maximum(moments[:, 0, 0] - (right * parameters).sum(axis=1), np.finfo(float).tiny)
     likelihood = -0.5 * (free * np.log(left) + np.linalg.slogdet(precisions)[1]) - volumes
     # One half for the exponential ones, white noise among them, and a quarter for each of the others.

@@ -38,7 +38,7 @@ _WEIGHINGS = 3  # of attitudes against rates: the third changes their noise by l
 _FIRST_TIMES = 6  # attitudes that are fitted first, or up to twice as many
 _NO_FLIGHT = 0.5  # [rad] rms from every motion of the body, beyond which a recording is none of its flights
 _RIGHT = 0.5  # of what is left in another reading: in the right unit, order or direction it was less than a quarter
-_DOUBTFUL = 2.0  # widening of the bars by correlation: inverse attitudes of an uneven flight had 4
+_WINDOW = 0.3  # [rad] turns by which readings are compared: 0.5 deg of noise at both ends are 4 % of it
 _ROUNDED = 10.0  # tolerances of the reconstruction: smaller residuals are rounding
 _CONSTANT = 0.01  # of the momentum and of the internal momentum: a smaller change is not reported
 
@@ -151,7 +151,8 @@ def momentum_from_recording(
         If the shapes disagree; for rates beside axes to be found, and arguments without what they belong to.
     TrajectoryError
         If there are fewer than three times, or they do not ascend; or if the attitudes are a flight only once their
-        quaternions are read with w first, or as their inverse, or the rates once they are read in deg/s.
+        quaternions are read with w first, or as their inverse, or the rates once they are read in deg/s; or if by the
+        rates the base turns over half a turn from one time to the next.
     AccuracyNotReached
         If the fit does not settle: the recording is no free flight of this body, or too coarse; or if it does not tell
         the axes, or the bias that is to be found.
@@ -194,11 +195,17 @@ def momentum_from_recording(
     if len(at) < 3 or np.any(np.diff(at) <= 0.0):
         raise TrajectoryError("times: three or more that ascend are needed to fit a momentum")
     measured = None if rates is None else finite_array(rates, "rates", (len(at), 3), unit="rad/s")
+    if measured is not None:
+        if measured.ndim > 2:
+            raise ShapeError(f"rates: ({len(at)}, 3), one for each time, are needed, got {measured.shape}")
+        _check_speed(at, measured)
     _check_choices(recorded, measured, noise, rate_noise, attitude, find_bias=find_bias, find_axes=find_axes)
     least = _Least(deformation, at, recorded, tolerance)
     if recorded is None:
         assert measured is not None
         start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
+        if start.shape != (3, 3):
+            raise ShapeError(f"attitude: one (3, 3) at the start is needed, got {start.shape}")
         least = replace(least, rates=measured, weight=1.0 / (_size(measured) or 1.0), start=start)
         least, fit = _fitted_to_rates(least, find_bias)
     else:
@@ -207,11 +214,21 @@ def momentum_from_recording(
         if measured is not None:
             least, fit = _weighed(replace(least, find_bias=find_bias is not False), fit, measured, noise, rate_noise)
     result = _estimated(least, fit, noise, rate_noise)
-    if (not result.conserved or result.widening > _DOUBTFUL) and measured is None and not find_axes:
+    if measured is None and not find_axes:
         _check_readings(least, _RIGHT * _size(fit.residuals))
     if not result.conserved:
         warn_of_drift(result)
     return result
+
+
+def _check_speed(times: Array, rates: Array) -> None:
+    """Raise TrajectoryError for rates by which a body turns too far from one sample to the next."""
+    turn = float(np.median(np.abs(rates[1:]).max(axis=1) * np.diff(times)))
+    if turn > np.pi:
+        raise TrajectoryError(
+            f"rates: by them the base turns {turn:.3g} rad from one sample to the next, over half a turn; give samples "
+            "that are closer, or the unit, if it is not rad/s: numpy.radians(rates) (--names 'COLUMN=COLUMN [deg/s]')"
+        )
 
 
 def _check_choices(
@@ -256,12 +273,16 @@ def _fitted_to_attitudes(least: _Least, *, find_axes: bool) -> _Fitted:
 def _check_readings(least: _Least, off: float, cause: Exception | None = None) -> None:
     """Raise TrajectoryError where attitudes are nearer to a flight with w first, or as their inverse.
 
-    off : rms angle that the fit leaves [rad]
+    off : rms angle that is too large beside that of such a flight [rad]; infinite where no other is near
     """
     assert least.recorded is not None
+    usual = least.wander()
     for other, words in ((read_w_first, W_FIRST), (so3.transpose, INVERSE)):
+        reading = replace(least, recorded=other(least.recorded))
+        if cause is None and reading.wander() > _RIGHT * usual:
+            continue
         with suppress(AccuracyNotReached):
-            if _size(_flight_fitted(replace(least, recorded=other(least.recorded)), find_axes=False).residuals) < off:
+            if _size(_flight_fitted(reading, find_axes=False).residuals) < off:
                 raise TrajectoryError(f"the recorded base is no flight of this body; {words}") from cause
 
 
@@ -310,19 +331,24 @@ def _weighed(
     bias = off.mean(axis=0) if least.find_bias else np.zeros(3)
     fit = near._replace(state=near.state._replace(bias=bias))
     own, others = (
-        _left(near.residuals.ravel(), near.slopes, np.linalg.pinv(near.slopes)),
+        _left(near.residuals.ravel(), near.slopes, _inverse(near.slopes)),
         _size(off - bias) / np.sqrt(3.0),
     )
     for _ in range(_WEIGHINGS):
         levels = noise or max(own, least.tolerance), rate_noise or max(others, least.tolerance)
         least = replace(least, rates=rates, weight=levels[0] / levels[1])
         fit = least.settled(fit.state)
-        estimator, rows = np.linalg.pinv(fit.slopes), fit.residuals.ravel()
+        estimator, rows = _inverse(fit.slopes), fit.residuals.ravel()
         own, others = (
             _left(rows[part], fit.slopes[part], estimator[:, part]) for part in (slice(0, count), slice(count, None))
         )
         others /= least.weight
     return least, fit
+
+
+def _inverse(slopes: Array) -> Array:
+    """Parameters by residuals, in the sense of least squares: (n, m) -> (m, n)."""
+    return np.asarray(np.linalg.pinv(slopes), dtype=np.float64)
 
 
 def _left(residuals: Array, slopes: Array, estimator: Array) -> float:
@@ -333,7 +359,7 @@ def _left(residuals: Array, slopes: Array, estimator: Array) -> float:
 def _estimated(least: _Least, fit: _Fitted, noise: float | None, rate_noise: float | None) -> RecordedMomentum:
     """The fit with the noise and the change of the momentum that its residuals show."""
     motion, times, tolerance = fit.state.motion, least.times, least.tolerance
-    estimator = np.asarray(np.linalg.pinv(fit.slopes), dtype=np.float64)
+    estimator = _inverse(fit.slopes)
     count, blocks = len(times), len(fit.residuals) // len(times)
     # The first of the recorded quantities shows whether the momentum changes.
     residuals, slopes = fit.residuals[:count], fit.slopes[: 3 * count]
@@ -343,7 +369,9 @@ def _estimated(least: _Least, fit: _Fitted, noise: float | None, rate_noise: flo
     if _size(residuals) > _ROUNDED * tolerance:
         by_modes = least.slopes_by_modes(motion)
         modes, sure = drift_modes(residuals, slopes, by_modes)
-    covariance, white_covariance = np.zeros((2, *estimator.shape[:1], *estimator.shape[:1]))
+    covariance = np.zeros((len(estimator), len(estimator)))
+    white_covariance = covariance.copy()
+    stated_covariance = covariance.copy()
     lefts, seen = [], []
     for block in range(blocks):
         rows = slice(3 * count * block, 3 * count * (block + 1))
@@ -356,11 +384,13 @@ def _estimated(least: _Least, fit: _Fitted, noise: float | None, rate_noise: flo
         seen.append(_left(fit.residuals.ravel()[rows], own, part))
         stated = noise if block == 0 and least.recorded is not None else rate_noise
         stated = None if stated is None else stated * (least.weight if least.recorded is None or block else 1.0)
-        covariance += 0.0 if stated is None else max(stated**2 - seen[-1] ** 2, 0.0) * white
+        if stated is not None:
+            stated_covariance += max(stated**2 - seen[-1] ** 2, 0.0) * white
         lefts.append(left)
     fixed = 3 if least.recorded is None else 0  # unknowns of the start, which is given
     own = slice(3 - fixed, UNKNOWNS - fixed)
-    widening = float(np.sqrt(np.diag(covariance / white_covariance)[own].max()))
+    widening = float(np.sqrt((np.diag(covariance) / np.diag(white_covariance))[own].max()))
+    covariance += stated_covariance
     momenta, conserved = np.tile(motion.momentum, (count, 1)), True
     if modes:
         left = lefts[0]
@@ -574,6 +604,17 @@ class _Least:
                 turns.append(turns[-1] @ turn)
             momenta = so3.apply(np.array(turns), so3.apply(inertia, self.rates) + internal)
         return _State(self._reconstructed(momenta.mean(axis=0), start), axes, np.zeros(3))
+
+    def wander(self) -> float:
+        """Scatter of the momenta by turns of the attitudes, relative to them."""
+        assert self.recorded is not None
+        stride, known = 1, self.recorded
+        while 4 * stride < len(known):
+            if np.median(so3.angle(so3.transpose(known[:-stride]) @ known[stride:])) > _WINDOW:
+                break
+            stride *= 2
+        momenta = _momenta(self.deformation, self.times[::stride], known[::stride])
+        return _size(momenta - momenta.mean(axis=0)) / (_size(momenta) or 1.0)
 
     def rates_by_turns(self, motion: Motion) -> Array:
         """Change of the rates by turns of the attitude, both in base axes: (N, 3, 3) [1/s]."""

@@ -12,7 +12,7 @@ import numpy as np
 from ... import so3
 from ...arrays import Array
 from ...errors import TrajectoryError
-from .labels import ANGLES, Label, rate_size
+from .labels import ANGLES, Label, check_range, rate_size
 from .recording import Recording
 
 RATE_NAMES = ("base_omega_x", "base_omega_y", "base_omega_z")
@@ -76,6 +76,7 @@ def in_rad_per_s(recording: Recording, columns: Sequence[tuple[str, str | None]]
             f"{recording.table.where}: columns {', '.join(texts)} are rates of the base; give them one unit such as "
             f"rad/s or deg/s: {_names_option(texts, 'deg/s')}"
         )
+    check_range(recording, f"the rate of the base in {', '.join(texts)}", np.abs(values).max(axis=1), "rad/s")
     return BaseRates(values * (sizes[0] or 1.0), texts, columns[0][1] or "rad/s", columns[0][1] is not None)
 
 
