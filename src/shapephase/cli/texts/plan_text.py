@@ -156,7 +156,7 @@ def end_bar_lines(bars: Uncertainty | None) -> list[str]:
     """Return the line with the error bar of the attitude at the end by errors of masses and others; none without."""
     if bars is None:
         return []
-    worst = math.degrees(math.sqrt(max(float(np.linalg.eigvalsh(bars.total_rotation)[-1]), 0.0)))
+    worst = math.degrees(math.sqrt(max(float(np.linalg.eigvalsh(bars.final_attitude)[-1]), 0.0)))
     return [f"{'attitude at the end':24}{'±':>8} {worst:<7.2g} deg about the worst axis, one standard deviation"]
 
 
