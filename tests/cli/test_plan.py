@@ -76,7 +76,7 @@ def test_a_plan_is_found_written_and_read_again(tmp_path, capsys):
         (("cat_two_halves", "--undo", "kane_scher", "--rates-at-ends", "free"), 2, "--rates-at-ends"),
         (("cat_two_halves", "--undo", "kane_scher", "--symmetry", "x"), 2, "not with --undo"),
         (("cat_two_halves", "--undo", "kane_scher", "--momentum", 0, 0, 0.01), 2, "--duration"),
-        (("cat_two_halves", "--turn", "9 about x", "--flight", "auto"), 2, "--flight: goes with --undo or --match"),
+        (("cat_two_halves", "--turn", "9 about x", "--flight", "auto"), 2, "--flight: goes with --undo"),
         (("cat_two_halves", "--turn", "9 about x", "--attitude", 1, 0, 0, 0), 2, "--attitude: goes with --undo"),
         (("cat_two_halves", "--match", "kane_scher@9"), 2, "a time from 0 to 1 s is needed, got '9'"),
         (("no_such_cat", "--turn", "90 about x"), 2, "no_such_cat"),

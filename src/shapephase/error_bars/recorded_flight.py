@@ -59,7 +59,7 @@ def motion_from_recording(
     Parameters
     ----------
     recorded : as `read_recorded_motion` gives it; with its flight="recorded" only what is a flight
-    momentum : (3,) the recorder's axes [kg m^2/s]; None: as the file states or the recorded base shows, or zero
+    momentum : (3,) the recorder's axes [kg m^2/s]; None: as the recorded base shows, or zero
     attitude : (3, 3) or quaternion (4,) x y z w of the start, beside a momentum; None: as recorded, or the identity
     tolerance : of the attitude [rad]
     find_axes : as for `momentum_from_recording`
@@ -90,10 +90,10 @@ def motion_from_recording(
     check_object(body, "Body", "body")
     check_object(recorded, "RecordedMotion", "recorded")
     check_flag(find_axes, "find_axes")
+    if momentum is None:
+        momentum = recorded.momentum
     if momentum is not None:
         momentum = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
-    elif recorded.momentum is not None:
-        momentum = recorded.momentum
     deformation, attitudes = articulated(body, recorded.path), recorded.base_attitude
     if momentum is None and attitudes is not None and (recorded.flight is not None or turns(attitudes)):
         if attitude is not None:

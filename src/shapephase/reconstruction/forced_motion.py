@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +21,7 @@ from ..inertia_tensor import inverse_inertia
 from ..integrator.driven_attitude import DrivenAttitude, driven_attitude
 from .attitude_angles import continuous
 from .external_torque import ExternalTorque, TorqueState
-from .motion_record import joint_path, write_table
+from .motion_record import write_table
 
 METHODS = ("auto", "dop853")
 _ROWS = 201  # of a table, by default
@@ -226,7 +227,10 @@ def _torques(law: ExternalTorque, *states: Array) -> Array:
 
 def _shapes(deformation: Deformation) -> Callable[[Array], Array]:
     """Return the function from times (N,) to shapes (N, n); without joints (N, 0)."""
-    path = joint_path(deformation)
+    description: Any = deformation.description
+    while hasattr(description, "original"):
+        description = description.original
+    path = getattr(description, "path", None)
     if path is None:
         return lambda t: np.zeros((len(t), 0))
     return lambda t: path.curve(t)[0]

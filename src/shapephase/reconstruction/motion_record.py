@@ -82,7 +82,7 @@ def write_motion_record(motion: Motion, path: str | os.PathLike[str]) -> None:
     write_whole(path, lambda stream: np.savez(stream, **arrays))
 
 
-def joint_path(deformation: Deformation) -> ShapePath | None:
+def _joint_path(deformation: Deformation) -> ShapePath | None:
     """Path of the joints behind a deformation, in any gauge; None without one."""
     description: Any = deformation.description
     while hasattr(description, "original"):
@@ -93,7 +93,7 @@ def joint_path(deformation: Deformation) -> ShapePath | None:
 
 def _joints(motion: Motion) -> dict[str, Array]:
     """Joints and base at `ShapePath.sample_times`, for `read_recorded_motion`; empty for batches and without a path."""
-    path = joint_path(motion.deformation)
+    path = _joint_path(motion.deformation)
     if path is None or motion.batch or not path.n_shape:
         return {}
     with suppress(TrajectoryError):  # a path that needs more than a million rows

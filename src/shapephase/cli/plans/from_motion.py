@@ -20,11 +20,10 @@ _TOLERANCE = 1e-11  # [rad] of the recording's attitude: plans reach their goal 
 
 def check_without_motion(start: StartOptions, recording: RecordingOptions) -> None:
     """Raise ShapeError for options of a recording where none is read."""
-    given = {**vars(recording), "attitude": start.attitude}
-    usual = {**vars(RECORDING_DEFAULTS), "attitude": None}
-    for name, value in given.items():
-        if name != "up" and value != usual[name]:
-            raise ShapeError(f"--{name.replace('_', '-')}: goes with --undo or --match, none of which is given")
+    usual = vars(RECORDING_DEFAULTS) | vars(START_DEFAULTS)
+    for name, value in (vars(recording) | vars(start)).items():
+        if name not in ("up", "momentum") and value != usual[name]:
+            raise ShapeError(f"--{name.replace('_', '-')}: goes with --undo, or --match, which are not given")
 
 
 def undone(

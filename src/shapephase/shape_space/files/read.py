@@ -44,10 +44,10 @@ class RecordedMotion:
     times : (N,) of the samples, from 0 [s]
     base_attitude : (N, 3, 3) recorded attitude of the base, base axes to the recorder's axes, or None
     base_position : (N, 3) recorded position of the base [m], or None
-    momentum : (3,) about the centre of mass, where the file is one of `Motion.save` [kg m^2/s], or None
     format : the kind of file
     record : what was read and what was done to it, ready for JSON: the file with its hash, samples and times, columns
         and units of joints, where the others rest, what was left out, smoothed, closed, resampled
+    momentum : (3,) about the centre of mass, which a file of `Motion.save` states [kg m^2/s], or None
     smoothing : what smoothing did, with its penalty, degrees of freedom and bias; None: it was not smoothed
     closing : how a cycle was closed, and what that changed; None: it was not
     flight : the free flight that was kept; None: none was requested
@@ -61,11 +61,11 @@ class RecordedMotion:
     base_position: Array | None
     format: str
     record: Mapping[str, Any]
+    momentum: Array | None = None
     smoothing: Smoothing | None = None
     closing: Closing | None = None
     flight: Flight | None = None
     segments: SegmentMotion | None = None
-    momentum: Array | None = None
 
     __repr__ = short_repr
 
@@ -269,11 +269,11 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         base_position=motion.base.position,
         format=table.format,
         record=record,
+        momentum=table.momentum,
         smoothing=smoothing if samples.smoothed else None,
         closing=closing,
         flight=flight,
         segments=table.segments,
-        momentum=table.momentum,
     )
 
 
