@@ -264,12 +264,12 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     return RecordedMotion(
         path=replace(path, sha256=given.sha256, record=record),
         residual=residual,
+        momentum=table.momentum,
         times=kept_times,
         base_attitude=motion.base.attitude,
         base_position=motion.base.position,
         format=table.format,
         record=record,
-        momentum=table.momentum,
         smoothing=smoothing if samples.smoothed else None,
         closing=closing,
         flight=flight,
