@@ -78,7 +78,7 @@ def plan_data(body: Body, plan: Plan) -> dict[str, object]:
 def undo_lines(body: Body, flown: LoadedMotion, ways: Undo) -> list[str]:
     """Return the table of the ways back from a recording: played backwards, and planned."""
     shown = [way for way in (ways.backwards, ways.plan) if way is not None]
-    momentum, best = " ".join(f"{value:g}" for value in flown.motion.momentum), ways.best
+    momentum, best = " ".join(f"{value + 0.0:g}" for value in flown.motion.momentum), ways.best
     fastest = [_fastest(body, way) for way in shown]
     rows = [
         ("", [way.name for way in shown], ""),
