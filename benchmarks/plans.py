@@ -104,6 +104,22 @@ def two_armed_satellite() -> str:
     return _robot("two_armed_satellite", *parts)
 
 
+def winged_satellite() -> str:
+    """A bus with two wings that turn about one axis, and an arm of three joints."""
+    wings = [_link(f"{side}_wing", 8.0, (3.0, 0.3, 3.2), f"0 {1.2 * sign} 0") for side, sign in (("l", 1), ("r", -1))]
+    arm = [_link(f"arm_{k}", 7.0 - k, (0.03, 0.25, 0.25), "0.35 0 0") for k in range(3)]
+    places = ("0.4 0 0.3", "0.7 0 0", "0.7 0 0")
+    hinges = [
+        _hinge(f"arm_hinge_{k}", f"arm_{k - 1}" if k else "bus", f"arm_{k}", axis, places[k])
+        for k, axis in enumerate(("0 0 1", "0 1 0", "1 0 0"))
+    ]
+    drives = [
+        _hinge(f"{side}_drive", "bus", f"{side}_wing", "0 1 0", f"0 {0.5 * sign} 0")
+        for side, sign in (("l", 1), ("r", -1))
+    ]
+    return _robot("winged_satellite", _link("bus", 80.0, (9.0, 7.0, 11.0)), *wings, *arm, *drives, *hinges)
+
+
 def long_tree() -> str:
     """A tree of 52 joints."""
     rng = np.random.default_rng(5)
@@ -120,6 +136,7 @@ WRITTEN = {
     "planar3": planar_chain,
     "hinged_pair": hinged_pair,
     "two_armed_satellite": two_armed_satellite,
+    "winged_satellite": winged_satellite,
     "tree_52": long_tree,
 }
 BODIES = (

@@ -71,6 +71,14 @@ def test_a_plan_is_found_written_and_read_again(tmp_path, capsys):
         (("cat_two_halves", "--turn", "9 about x", "--workers", 0), 2, "--workers"),
         (("cat_two_halves", "--turn", "9 about x", "--time-limit", 0), 2, "--time-limit"),
         (("cat_two_halves", "--turn", "90 about x", "--out", "plan.txt"), 2, "--out"),
+        (("cat_two_halves", "--undo", "kane_scher", "--turn", "9 about x"), 2, "--turn and --undo are two goals"),
+        (("cat_two_halves", "--undo", "kane_scher", "--from", "waist_yaw=1"), 2, "--from: the postures at both ends"),
+        (("cat_two_halves", "--undo", "kane_scher", "--rates-at-ends", "free"), 2, "--rates-at-ends"),
+        (("cat_two_halves", "--undo", "kane_scher", "--symmetry", "x"), 2, "not with --undo"),
+        (("cat_two_halves", "--undo", "kane_scher", "--momentum", 0, 0, 0.01), 2, "--duration"),
+        (("cat_two_halves", "--turn", "9 about x", "--flight", "auto"), 2, "--flight: goes with --undo"),
+        (("cat_two_halves", "--turn", "9 about x", "--attitude", 1, 0, 0, 0), 2, "--attitude: goes with --undo"),
+        (("cat_two_halves", "--match", "kane_scher@9"), 2, "a time from 0 to 1 s is needed, got '9'"),
         (("no_such_cat", "--turn", "90 about x"), 2, "no_such_cat"),
     ],
 )
@@ -176,6 +184,65 @@ def test_postures_on_the_way(tmp_path, capsys):
         main(["plan", "cat_two_halves", "--turn", "10 about z", "--via", f"{first}@1.5"])
     assert ended.value.code == 2
     assert "ends at 1 s" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("few_guesses")
+def test_a_motion_is_undone(tmp_path, capsys):
+    """A stored motion is taken back from its end to its start, by the path written, too."""
+    stored, out = tmp_path / "motion.npz", tmp_path / "back.csv"
+    body, half = sp.load_body("cat_two_halves"), [[0.0, 0.0, 0.1], [0.5, -0.4, 0.3], [0.2, 0.1, -0.1]]
+    path = sp.ShapePath.waypoints([0.0, 0.5, 1.0], half, joint_names=body.joint_names)
+    motion = sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 0.0], so3.exp(np.array([0.3, -0.2, 0.1])))
+    motion.save(stored)
+    words = ("plan", "cat_two_halves", "--undo", str(stored), "--pieces", "12", "--mass-error", "0.05")
+    main([*words, "--out", str(out), "--json"])
+    data = json.loads(capsys.readouterr().out)
+    assert data["best"] == "plan"
+    assert set(data["ways_back"]) == {"backwards", "plan"}
+    for way in data["ways_back"].values():
+        assert way["undoes"]
+        assert way["keeps_limits"]
+        assert way["duration_s"] == 1.0
+        assert np.abs(way["final_attitude_quat_xyzw"] - so3.quat_from_matrix(motion.initial_attitude)).max() < 1e-8
+    assert data["ways_back"]["plan"]["cost"] < data["ways_back"]["backwards"]["cost"]
+    back = sp.read_shape_path(out, body)
+    again = sp.reconstruct(sp.articulated(body, back), [0.0, 0.0, 0.0], motion.final_attitude)
+    assert so3.angle(again.final_attitude.T @ motion.initial_attitude) < 1e-8
+    bars = sp.uncertainty(again, inertias=sp.InertiaErrors(masses=0.05))
+    assert np.allclose(data["uncertainty"]["final_attitude"], bars.final_attitude, rtol=1e-5)
+
+
+@pytest.mark.usefixtures("few_guesses")
+def test_a_motion_with_momentum_is_undone_at_a_time(tmp_path, capsys):
+    """From a table of the joints alone; the table says that playing backwards does not undo."""
+    table = tmp_path / "joints.csv"
+    body, knots = sp.load_body("cat_two_halves"), [[0.0, 0.0, 0.0], [0.4, -0.2, 0.1], [0.0, 0.2, 0.1]]
+    sp.write_shape_path(sp.ShapePath.spline([0.0, 0.5, 1.0], knots, joint_names=body.joint_names), table)
+    words = ("--momentum", "0.002", "0", "0.002", "--duration", "1.4", "--pieces", "12")
+    main(["plan", "cat_two_halves", "--undo", str(table), *words, "--attitude-error", "0.01"])
+    shown = capsys.readouterr().out
+    assert "best: the plan" in shown
+    assert re.search(r"Played backwards it ends \d.* deg off: the momentum turns the body on\.", shown)
+    assert re.search(r"limits +kept +kept", shown)
+    # Attitudes flow without change of volume: some error of the end is no smaller than that of the start.
+    worst = float(re.search(r"attitude at the end +± ([0-9.]+) +deg about the worst axis", shown)[1])
+    assert worst > np.degrees(0.0099)
+
+
+@pytest.mark.usefixtures("few_guesses")
+def test_posture_and_attitude_of_a_motion_are_matched(tmp_path, capsys):
+    body, turned, stored = sp.load_body("cat_two_halves"), np.array([0.1, 0.2, 0.0]), tmp_path / "motion.npz"
+    knots = [[0.0, 0.0, 0.0], [0.4, -0.2, 0.1], [0.0, 0.2, 0.1]]
+    path = sp.ShapePath.spline([0.0, 0.5, 1.0], knots, joint_names=body.joint_names)
+    motion = sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 0.0], so3.exp(turned))
+    motion.save(stored)
+    for at, seconds, start in (("", 1.0, np.zeros(3)), ("@0.4", 0.4, np.array([0.0, -0.1, 0.2]))):
+        quat = map(str, so3.quat_from_matrix(so3.exp(start)))
+        words = ("--match", f"{stored}{at}", "--attitude", *quat)
+        data, shapes, _ = planned("cat_two_halves", *words, capsys=capsys, out=tmp_path / "plan.csv")
+        attitude = so3.exp(start) @ so3.matrix_from_quat(np.array(data["final_attitude_quat_xyzw"]))
+        assert so3.angle(attitude.T @ motion.attitude(seconds)) < 1e-8
+        assert np.abs(shapes[-1] - path.shape(seconds)).max() < 1e-9
 
 
 def test_what_is_shown_of_a_search_says_how_far_off_it_is_and_how_long_it_may_take(monkeypatch):

@@ -10,16 +10,14 @@ from ..arrays import Array
 from ..dynamics.torques import joint_torques
 from ..errors import UnstatedLimitWarning
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.shape_path import ShapePath
 from ._spline_basis import SplineBasis
 from .plan_options import Limits
-from .task import FARTHEST, Reorientation, limits_of_joints
+from .task import Reorientation
 
 TIMES = 4001  # least number of even times at which efforts are compared with their limits
 LIMIT_SLACK = 1e-7  # share by which the solver may exceed limits
 _MARGIN = 5e-5  # by which efforts are limited tighter than their excess asks for; doubled each round
 _HASTE = 1.5  # exponent above 1, since peaks move to where there is more room: 4 % too much takes back 6 %
-_TOGETHER = 1e-9  # share of the duration: closer times would leave no digits of a difference
 _MOST_NAMED = 8  # joints in a warning
 
 
@@ -95,35 +93,6 @@ def limit_shares(task: Reorientation, basis: SplineBasis, control: Array, motion
     shares = derivative_shares(task, basis, control, motion.duration)
     if task.efforts_limited:
         shares["effort"] = float(effort_shares(task, basis, motion).max(initial=0.0))
-    return shares
-
-
-def motion_shares(task: Reorientation, limits: Limits, motion: Motion, route: ShapePath) -> dict[str, float]:
-    """Largest shares of their limits that a motion along a route takes up, at 4,001 even times and the route's breaks.
-
-    The jerk by differences of accelerations, which is exact between the breaks of a cubic spline.
-    """
-    body, times = task.body, np.union1d(np.linspace(0.0, motion.duration, TIMES), route.breaks)
-    shapes, rates = route.curve(times)
-    bends = route.acceleration(times)
-    apart = np.diff(times) > _TOGETHER * motion.duration
-    jerks = np.diff(bends, axis=0)[apart] / np.diff(times)[apart, None]
-    bounded = np.isfinite(body.joint_limits).any(axis=1) & limits.joint_limits
-    lower, upper = np.clip(body.joint_limits, -FARTHEST, FARTHEST).T
-    bounds = {
-        "position": (shapes - 0.5 * (lower + upper), np.where(bounded, 0.5 * (upper - lower), np.inf)),
-        "rate": (rates, limits.rate_limits),
-        "acceleration": (bends, limits.acceleration_limits),
-        "jerk": (jerks, limits.jerk_limits),
-    }
-    shares: dict[str, float] = {}
-    for name, (values, given) in bounds.items():
-        limit = limits_of_joints(body, given, f"{name}_limits", body.rate_limits)
-        bounded = np.isfinite(limit)
-        if bounded.any():
-            shares[name] = float((np.abs(values[:, bounded]) / limit[bounded]).max())
-    if task.efforts_limited:
-        shares["effort"] = float(np.abs(joint_torques(motion, times).torque / task.effort_measure).max())
     return shares
 
 

@@ -15,18 +15,20 @@ from ..arrays import Array
 from ..deformation.deformation import articulated
 from ..display import Card, card_html, card_text, numbers
 from ..dynamics.moving_body import needed_body_and_path
+from ..dynamics.torques import joint_torques
 from ..errors import PlanNotFound, ShapeError
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import ProgressCallback
 from ..shape_space.shape_path import ShapePath
 from ._path_cost import motion_cost
-from ._plan_limits import LIMIT_SLACK, TIMES, motion_shares
+from ._plan_limits import LIMIT_SLACK, TIMES
 from ._polish import GOAL_TOLERANCE
 from .plan import COST_UNITS, Plan
 from .plan_options import Goal, Limits, Search
 from .planning import plan_reorientation
-from .task import reorientation
+from .task import FARTHEST, Reorientation, limits_of_joints, reorientation
 
+_TOGETHER = 1e-9  # share of the duration: closer times would leave no digits of a difference
 _TOLERANCE = 1e-10  # [rad] of the reconstructions: a hundredth of what counts as undone
 
 
@@ -199,7 +201,7 @@ def undo(
             error=float(so3.angle(so3.transpose(first) @ moved.final_attitude)),
             cost=motion_cost(moved, body, route, cost, task.effort_measure),
             cost_name=cost,
-            limit_shares=motion_shares(task, within, moved, route),
+            limit_shares=_motion_shares(task, within, moved, route),
             plan=plan,
         )
 
@@ -214,3 +216,32 @@ def undo(
             raise
         return Undo(backwards, None, getattr(failure.best, "status", "not found"), str(failure))
     return Undo(backwards, way("plan", plan.path, plan), plan.status)
+
+
+def _motion_shares(task: Reorientation, limits: Limits, motion: Motion, route: ShapePath) -> dict[str, float]:
+    """Largest shares of their limits that a motion along a route takes up, at 4,001 even times and the route's breaks.
+
+    The jerk by differences of accelerations, which is exact between the breaks of a cubic spline.
+    """
+    body, times = task.body, np.union1d(np.linspace(0.0, motion.duration, TIMES), route.breaks)
+    shapes, rates = route.curve(times)
+    bends = route.acceleration(times)
+    apart = np.diff(times) > _TOGETHER * motion.duration
+    jerks = np.diff(bends, axis=0)[apart] / np.diff(times)[apart, None]
+    bounded = np.isfinite(body.joint_limits).any(axis=1) & limits.joint_limits
+    lower, upper = np.clip(body.joint_limits, -FARTHEST, FARTHEST).T
+    bounds = {
+        "position": (shapes - 0.5 * (lower + upper), np.where(bounded, 0.5 * (upper - lower), np.inf)),
+        "rate": (rates, limits.rate_limits),
+        "acceleration": (bends, limits.acceleration_limits),
+        "jerk": (jerks, limits.jerk_limits),
+    }
+    shares: dict[str, float] = {}
+    for name, (values, given) in bounds.items():
+        limit = limits_of_joints(body, given, f"{name}_limits", body.rate_limits)
+        bounded = np.isfinite(limit)
+        if bounded.any():
+            shares[name] = float((np.abs(values[:, bounded]) / limit[bounded]).max())
+    if task.efforts_limited:
+        shares["effort"] = float(np.abs(joint_torques(motion, times).torque / task.effort_measure).max())
+    return shares

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import ShapeError
 from ..options import RECORDING_DEFAULTS, START_DEFAULTS, BodyOptions, RecordingOptions, StartOptions
 from .constraints import JointOptions
+from .goals import GoalOptions
 
 if TYPE_CHECKING:
     from ...optimal_control.plan_options import Goal
@@ -18,13 +19,19 @@ if TYPE_CHECKING:
 _TOLERANCE = 1e-11  # [rad] of the recording's attitude: plans reach their goal to 1e-8
 
 
-def check_without_motion(start: StartOptions, recording: RecordingOptions) -> None:
-    """Raise ShapeError for options of a recording where none is read."""
-    given = {**vars(recording), "attitude": start.attitude}
-    usual = {**vars(RECORDING_DEFAULTS), "attitude": None}
+def check_needed(goal: GoalOptions, start: StartOptions, recording: RecordingOptions) -> None:
+    """Raise ShapeError for options of a recording without one, and of a start that the goal does not take."""
+    taken, given = ["up", "momentum"], vars(start)
+    if goal.match is not None:
+        taken.append("attitude")
+    elif goal.undo is None:
+        given = given | vars(recording)
+    else:
+        return
+    usual = vars(RECORDING_DEFAULTS) | vars(START_DEFAULTS)
     for name, value in given.items():
-        if name != "up" and value != usual[name]:
-            raise ShapeError(f"--{name.replace('_', '-')}: goes with --undo or --match, none of which is given")
+        if name not in taken and value != usual[name]:
+            raise ShapeError(f"--{name.replace('_', '-')}: goes with --undo, which is not given")
 
 
 def undone(

@@ -107,13 +107,12 @@ def plan_command(
         undo_purpose,
     )
     from ..texts.recording_text import recording_data
-    from .from_motion import check_without_motion, matched, undone
+    from .from_motion import check_needed, matched, undone
 
     target, settings = goal.goal(), searching.search()
     if duration is not None and not 0.0 < duration < math.inf:
         raise ShapeError(f"--duration: a time in s above 0 is needed, got {duration:g}")
-    if goal.recorded is None:
-        check_without_motion(start, recording)
+    check_needed(goal, start, recording)
     aside = any([check_writable(out, "--out", ".csv"), check_writable(html, "--html", ".html")])
     with steps(3 if html else 2) as work:
         work.begin("loading")

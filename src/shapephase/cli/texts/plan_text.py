@@ -78,7 +78,7 @@ def plan_data(body: Body, plan: Plan) -> dict[str, object]:
 def undo_lines(body: Body, flown: LoadedMotion, ways: Undo) -> list[str]:
     """Return the table of the ways back from a recording: played backwards, and planned."""
     shown = [way for way in (ways.backwards, ways.plan) if way is not None]
-    momentum, best = " ".join(f"{value:g}" for value in flown.motion.momentum), ways.best
+    momentum, best = " ".join(f"{value + 0.0:g}" for value in flown.motion.momentum), ways.best
     fastest = [_fastest(body, way) for way in shown]
     rows = [
         ("", [way.name for way in shown], ""),
@@ -156,7 +156,7 @@ def end_bar_lines(bars: Uncertainty | None) -> list[str]:
     """Return the line with the error bar of the attitude at the end by errors of masses and others; none without."""
     if bars is None:
         return []
-    worst = math.degrees(math.sqrt(max(float(np.linalg.eigvalsh(bars.total_rotation)[-1]), 0.0)))
+    worst = math.degrees(math.sqrt(max(float(np.linalg.eigvalsh(bars.final_attitude)[-1]), 0.0)))
     return [f"{'attitude at the end':24}{'±':>8} {worst:<7.2g} deg about the worst axis, one standard deviation"]
 
 

@@ -45,10 +45,10 @@ class RecordedMotion:
     base_attitude : (N, 3, 3) recorded attitude of the base, base axes to the recorder's axes, or None
     base_position : (N, 3) recorded position of the base [m], or None
     base_rates : (N, 3) recorded angular velocity of the base, base axes [rad/s], or None
-    momentum : (3,) about the centre of mass, where the file is one of `Motion.save` [kg m^2/s], or None
     format : the kind of file
     record : what was read and what was done to it, ready for JSON: the file with its hash, samples and times, columns
         and units of joints, where the others rest, what was left out, smoothed, closed, resampled
+    momentum : (3,) about the centre of mass, which a file of `Motion.save` states [kg m^2/s], or None
     smoothing : what smoothing did, with its penalty, degrees of freedom and bias; None: it was not smoothed
     closing : how a cycle was closed, and what that changed; None: it was not
     flight : the free flight that was kept; None: none was requested
@@ -63,13 +63,13 @@ class RecordedMotion:
     base_position: Array | None
     format: str
     record: Mapping[str, Any]
+    momentum: Array | None = None
     smoothing: Smoothing | None = None
     closing: Closing | None = None
     flight: Flight | None = None
     segments: SegmentMotion | None = None
     wheel_speeds: Mapping[str, ShapePath] = field(default_factory=dict)
     base_rates: Array | None = None
-    momentum: Array | None = None
 
     __repr__ = short_repr
 
@@ -289,6 +289,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     return RecordedMotion(
         path=replace(path, sha256=given.sha256, record=record),
         residual=residual,
+        momentum=table.momentum,
         times=kept_times,
         base_attitude=motion.base.attitude,
         base_position=motion.base.position,
@@ -300,7 +301,6 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
         flight=flight,
         segments=table.segments,
         wheel_speeds=wheel_speeds,
-        momentum=table.momentum,
     )
 
 
