@@ -243,10 +243,9 @@ def failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Atte
     more = "more iterations or starts (Search(starts=8), --starts 8)"
     closest = best.closest if best is not None else ()
     if closest and task.clearance is not None and closest[0].distance < task.clearance:
-        (one, other), nearest = closest[0].links, closest[0]
         way_out = (
-            f"links {one} and {other} come within {nearest.distance:.4g} m of each other at {nearest.time:.4g} s, "
-            f"nearer than the clearance of {task.clearance:g} m: give a smaller distance (--avoid), more joints or {more}"
+            f"links come nearer than the clearance of {task.clearance:g} m, {closest[0].text}: give a smaller distance "
+            f"(--avoid), more time or {more}"
         )
     elif task.cost == "time":
         way_out = f"it may take longer than {task.duration:.6g} s: give a longer duration (--duration), or {more}"

@@ -40,6 +40,13 @@ class ClosestApproach:
     time: float
     distance: float
 
+    @property
+    def text(self) -> str:
+        """The links, how near they come, and when."""
+        depth = self.distance < 0.0
+        how = f"overlap by {-self.distance:.6g} m" if depth else f"are {self.distance:.6g} m apart"
+        return f"{self.links[0]} and {self.links[1]} {how} at {self.time:.6g} s"
+
 
 @dataclass(frozen=True, eq=False)
 class Clearance:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from ...shape_space.closest_approach import Clearance
+from collections.abc import Sequence
+
+from ...shape_space.closest_approach import Clearance, ClosestApproach
 
 
 def clearance_lines(result: Clearance, distance: float) -> list[str]:
@@ -24,24 +26,19 @@ def clearance_lines(result: Clearance, distance: float) -> list[str]:
     return lines
 
 
-def nearest_pair(result: Clearance) -> str:
-    """Return a sentence on the pair of links that comes nearest."""
-    nearest = result.approaches[0]
-    first, second = nearest.links
-    how = f"overlap by {-nearest.distance:.6g} m" if nearest.distance < 0.0 else f"are {nearest.distance:.6g} m apart"
-    return f"links come too close: {first} and {second} {how} at {nearest.time:.6g} s"
-
-
 def clearance_data(result: Clearance, distance: float) -> dict[str, object]:
     """Return closest approaches for programs."""
     return {
         "below_m": distance,
         "pairs_compared": len(result.geometry.pairs),
-        "closer": [
-            {"links": list(near.links), "time_s": near.time, "distance_m": near.distance} for near in result.approaches
-        ],
+        "closer": approach_data(result.approaches),
         "left_out": [
             {"links": [first, second], "reason": reason} for first, second, reason in result.geometry.left_out
         ],
         "links_without_shapes": list(result.geometry.missing),
     }
+
+
+def approach_data(approaches: Sequence[ClosestApproach]) -> list[dict[str, object]]:
+    """Return pairs of links with their least distance for programs."""
+    return [{"links": list(near.links), "time_s": near.time, "distance_m": near.distance} for near in approaches]
