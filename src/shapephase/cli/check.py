@@ -50,9 +50,17 @@ def check_command(
     from ..shape_space.summaries import body_summary, path_summary
     from .joint_values import value_in_si
     from .motion import body_argument, joint_motion
-    from .texts.clearance_text import clearance_data, clearance_lines
     from .texts.recording_text import flight_lines, flights_in, recording_data, recording_lines
-    from .texts.result_text import body_lines, path_data, path_lines, plain, record_data, too_fast
+    from .texts.result_text import (
+        body_lines,
+        clearance_data,
+        clearance_lines,
+        path_data,
+        path_lines,
+        plain,
+        record_data,
+        too_fast,
+    )
 
     if motion is None and clearance is not None:
         raise ShapeError("--clearance: a motion is needed, as in `shapephase check cat cat_righting --clearance 0.02`")

@@ -15,13 +15,12 @@ from ..dynamics.torques import joint_torques
 from ..errors import ShapePhaseError
 from ..shape_space.closest_approach import ClosestApproach
 from ._path_cost import path_cost
-from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
+from ._plan_limits import LIMIT_SLACK, Margins, closest_links, effort_shares, limit_shares, tightened, widened
 from ._polish import GAUSS_NODES, GOAL_TOLERANCE, PolishedPath, polish
 from ._spline_basis import SplineBasis
 from ._via_points import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control
-from .nodes.node_distances import Margins, closest_links, widened
 from .plan import Start
 from .plan_options import Search
 from .solver_callback import IterationCallback

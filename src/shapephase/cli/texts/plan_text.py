@@ -6,7 +6,7 @@ from ... import so3
 from ...body.body import Body
 from ...optimal_control.plan import Plan
 from ...phases.split_text import rotation_line
-from .clearance_text import approach_data
+from .result_text import approach_data
 
 _OF_RANGE = {"position": ", from the middle of the range"}
 _ENDINGS = {
