@@ -83,10 +83,12 @@ def at_all_times(body, path, pairs):
 
 def keeps_apart(body, goal, distance, search, **options):
     """Plan without and with a clearance; the first touches, the second keeps it and reaches the goal as well."""
-    plain = sp.plan_reorientation(body, goal, search=search, **options)
+    plain = sp.plan_reorientation(body, goal, limits=Limits(rate_limits=None), search=search, **options)
     assert sp.clearance(body, plain.path, below=0.0).approaches, "links touch without a clearance"
     assert plain.closest == ()
-    plan = sp.plan_reorientation(body, goal, limits=Limits(clearance=distance), search=search, **options)
+    plan = sp.plan_reorientation(
+        body, goal, limits=Limits(rate_limits=None, clearance=distance), search=search, **options
+    )
     assert plan.status == "found"
     assert so3.angle(plan.motion.final_attitude.T @ goal) < 1e-8
     assert plan.cost > plain.cost
@@ -110,7 +112,9 @@ def test_a_plan_keeps_links_apart_at_all_times(gymnast, number):
 def test_a_plan_keeps_the_legs_of_the_cat_off_its_trunk():
     goal = so3.exp(np.array([1.5, 0.0, 0.0]))
     plan = keeps_apart(sp.load_body("cat"), goal, 0.01, Search(pieces=20), joints=LEGS)
-    assert plan.closest[0].links == ("trunk_rear", "rear_left_lower_leg")
+    # The mirror image costs the same.
+    assert plan.closest[0].links[0] == "trunk_rear"
+    assert plan.closest[0].links[1] in ("rear_left_lower_leg", "rear_right_lower_leg")
 
 
 @pytest.mark.usefixtures("few_guesses")

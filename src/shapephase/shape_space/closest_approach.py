@@ -27,7 +27,7 @@ _SHARPEST = 1e-9  # share of the duration to which a time is polished
 
 @dataclass(frozen=True)
 class ClosestApproach:
-    """Least distance of two links along a path.
+    """Least distance of two links along a path. Made by `clearance`.
 
     Attributes
     ----------
@@ -90,10 +90,11 @@ def clearance(
 
     Examples
     --------
-    >>> body = sp.load_body("astronaut")
-    >>> path = sp.ShapePath.waypoints([0.0, 1.0], [body.shape(), body.shape({"left_shoulder_y": 0.5})])
-    >>> [approach.links for approach in sp.clearance(body, path, below=0.03).approaches]
-    []
+    >>> cat = sp.load_body("cat")
+    >>> path = sp.ShapePath.waypoints([0.0, 1.0], [cat.shape(), cat.shape({"rear_left_hip_pitch": -1.5})])
+    >>> nearest = sp.clearance(cat, path, below=0.01).approaches[0]
+    >>> nearest.links, round(nearest.distance, 4)
+    (('trunk_rear', 'rear_left_lower_leg'), -0.0223)
     """
     check_object(body, "Body", "body")
     if not isinstance(below, int | float | np.number) or np.isnan(below):

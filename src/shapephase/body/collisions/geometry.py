@@ -74,12 +74,6 @@ class CollisionGeometry:
     pairs : names of the links of each pair
     left_out : pairs that do not count: link, link, and why ("adjacent", "overlap at rest", "SRDF")
     missing : links whose shapes are not all known, which have no solids
-
-    Examples
-    --------
-    >>> geometry = sp.body.collision_geometry(sp.load_body("astronaut"))
-    >>> len(geometry.pairs), geometry.left_out[0]
-    (95, ('lower_trunk', 'left_thigh', 'adjacent'))
     """
 
     chain: JointChain
@@ -219,6 +213,12 @@ def collision_geometry(body: Body, *, srdf: str | Path | None = None) -> Collisi
     -----
     VisualWarning
         If a mesh or an element cannot be read: its link has no solids, and is not compared with others.
+
+    Examples
+    --------
+    >>> geometry = sp.body.collision_geometry(sp.load_body("astronaut"))
+    >>> len(geometry.pairs), geometry.left_out[0]
+    (95, ('lower_trunk', 'left_thigh', 'adjacent'))
     """
     check_object(body, "Body", "body")
     if body not in _kept:
