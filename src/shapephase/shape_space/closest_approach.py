@@ -183,7 +183,7 @@ class _Search:
         distances = self._geometry.separations(postures, rows, members).distances
         pairs = self._geometry.members[1][members]
         order = np.argsort(-distances, kind="stable")
-        # Of several for one pair, the last, smallest stays.
+        # Where a pair stands several times, the last and smallest distance stays.
         best = np.full(len(self.least), -1)
         best[pairs[order]] = order
         chosen = best[best >= 0]

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...arguments import check_object
+from ...arguments import check_file_name, check_object
 from ...arrays import Array, Integers
 from ...display import short_repr
 from ...errors import MissingExtraError, NoCollisionGeometryError, VisualWarning, unknown_name
@@ -221,6 +221,8 @@ def collision_geometry(body: Body, *, srdf: str | Path | None = None) -> Collisi
     (95, ('lower_trunk', 'left_thigh', 'adjacent'))
     """
     check_object(body, "Body", "body")
+    if srdf is not None:
+        check_file_name(srdf, "srdf")
     if body not in _kept:
         _kept[body] = _geometry(body)
     geometry = _kept[body]
