@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -161,7 +162,7 @@ class _Search:
         when, width = float(self.when[pair]), float(self.widths[pair])
         bounds = max(when - width, 0.0), min(when + width, period)
         options = {"xatol": _SHARPEST * period}
-        polished = minimize_scalar(distance, bounds=bounds, method="bounded", options=options)
+        polished: Any = minimize_scalar(distance, bounds=bounds, method="bounded", options=options)
         # Paths often come nearest where they begin or end, which a bounded search leaves out.
         time, least = min(
             [(when, float(self.least[pair])), (float(polished.x), float(polished.fun))]

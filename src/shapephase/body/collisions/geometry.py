@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+# What coal's compiled part brings, a type checker does not see.
+# pyright: reportAttributeAccessIssue=false
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass

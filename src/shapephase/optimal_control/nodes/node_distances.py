@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array, Integers
-from ...body.collisions.geometry import CollisionGeometry
 from .._plan_limits import Margins
 from .._spline_basis import SplineBasis
 from ..task import Reorientation
@@ -29,9 +28,15 @@ class DistanceTerms:
     def __init__(self, task: Reorientation, basis: SplineBasis, places: Array, margins: Margins, unknown: Any) -> None:
         import casadi
 
-        geometry = _geometry(task)
+        assert task.geometry is not None
+        assert task.clearance is not None
+        self._geometry = geometry = task.geometry
         numbers = [geometry.pairs.index(pair) for pair in margins]
-        self._task, self._members = task, np.flatnonzero(np.isin(geometry.members[1], numbers))
+        self._task, self._least, self._members = (
+            task,
+            task.clearance,
+            np.flatnonzero(np.isin(geometry.members[1], numbers)),
+        )
         m, count, kinds = task.dimension, len(places), len(self._members)
         sparse = scipy_sparse()
         shapes = sparse.kron(basis.matrix(places), sparse.eye(m))
@@ -47,9 +52,8 @@ class DistanceTerms:
 
     def bounds(self, margins: Margins) -> Array:
         """Least values of the rows: the clearance, and the margin of each pair: (K N,) [m]."""
-        geometry = _geometry(self._task)
-        pairs = [geometry.pairs[number] for number in geometry.members[1][self._members].tolist()]
-        least = [self._task.clearance + margins[pair] for pair in pairs]
+        pairs = [self._geometry.pairs[number] for number in self._geometry.members[1][self._members].tolist()]
+        least = [self._least + margins[pair] for pair in pairs]
         return np.tile(least, self._at.shape[1])
 
     def hessian(self, multipliers: Any) -> Any:
@@ -62,7 +66,7 @@ class DistanceTerms:
 
     def _measured(self, coordinates: Array, rows: Integers, members: Integers) -> tuple[Array, Array]:
         """Distances of pairs of solids (M,) at coordinates (N, m) of rows (M,), and their derivatives (M, m)."""
-        geometry = _geometry(self._task)
+        geometry = self._geometry
         postures = geometry.postures(self._task.shapes(coordinates))
         separations = geometry.separations(postures, rows, members)
         slopes = geometry.slopes(postures, rows, members, separations)
@@ -86,16 +90,11 @@ class DistanceTerms:
         coordinates = (at.T[None] + shifts[:, None]).reshape(-1, m)
         rows = (np.arange(m + 1)[:, None] * count + nodes).ravel()
         _, slopes = self._measured(coordinates, rows, np.tile(self._members[kinds], m + 1))
-        gradients = np.zeros((m + 1, count, m))
+        gradients = np.zeros((count, m + 1, m))
         weighted = slopes.reshape(m + 1, -1, m) * weights[kinds, nodes][:, None]
-        np.add.at(gradients, (slice(None), nodes), weighted)
-        bent = (gradients[1:] - gradients[:1]).transpose(1, 0, 2) / _STEP
+        np.add.at(gradients, nodes, weighted.transpose(1, 0, 2))
+        bent = (gradients[:, 1:] - gradients[:, :1]) / _STEP
         return (0.5 * (bent + bent.transpose(0, 2, 1))).transpose(1, 0, 2).reshape(m, -1)
-
-
-def _geometry(task: Reorientation) -> CollisionGeometry:
-    assert task.geometry is not None
-    return task.geometry
 
 
 def _callback(name: str, function: Callable[..., Array], inputs: list[tuple[int, int]], output: tuple[int, int]) -> Any:
