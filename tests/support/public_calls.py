@@ -37,6 +37,8 @@ GIVEN: dict[str, Any] = {
 }
 # Given although they have a default: links of the cat of two halves are not called left and right.
 ASKED = {"lateral"}
+DIVER = sp.load_body("diver")
+SWING = sp.ShapePath.waypoints([0.0, 1.0], [[0.0, 0.5], [1.0, -0.4]])
 # They make objects or figures, write files or need more than a few numbers, and are called by name below or elsewhere.
 MAKERS = (
     "fourier", "spline", "waypoints", "function", "save", "write_csv", "with_couplings", "with_inertias", "with_wheel",
@@ -121,6 +123,7 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "particle_body": lambda: sp.curvature(sp.particle_body([1.0, 2.0, 3.0], corners, ["angle"]), [0.4]),
         "contributions": lambda: sp.contributions(motion, "rotation", groups="joints"),
         "segment_momentum": lambda: sp.segment_momentum(motion),
+        "clearance": lambda: sp.clearance(DIVER, SWING).approaches,
         "final_attitudes": lambda: sp.final_attitudes(body, [path, path.reversed()], MOMENTUM),
         "horizontal_gauge": lambda: sp.reconstruct(sp.horizontal_gauge(deformation), MOMENTUM),
         "link_gauge": lambda: sp.link_gauge(deformation, given["link"]).inertia(TIMES),

@@ -54,9 +54,17 @@ def check_command(
     from ..shape_space.summaries import body_summary, path_summary
     from .joint_values import value_in_si
     from .motion import body_argument, joint_motion, whole_path
-    from .texts.clearance_text import clearance_data, clearance_lines, nearest_pair
     from .texts.recording_text import flight_lines, flights_in, recording_data, recording_lines
-    from .texts.result_text import body_lines, path_data, path_lines, plain, record_data, too_fast
+    from .texts.result_text import (
+        body_lines,
+        clearance_data,
+        clearance_lines,
+        path_data,
+        path_lines,
+        plain,
+        record_data,
+        too_fast,
+    )
     from .wheels import wheel_lines, with_wheels
 
     if motion is None and clearance is not None:
@@ -93,6 +101,7 @@ def check_command(
             data["motion"]["clearance"] = clearance_data(result, distance)
             if result.approaches:
                 code = ExitCode.TRAJECTORY
-                warnings.warn(nearest_pair(result), TrajectoryWarning, stacklevel=2)
+                nearest = result.approaches[0].text
+                warnings.warn(f"links come too close: {nearest}", TrajectoryWarning, stacklevel=2)
     made_from = {} if motion is None else {"joints": list(loaded.joint_names)}
     return Outcome("\n".join(lines), data, with_verdict=True, code=code, made_from=made_from)

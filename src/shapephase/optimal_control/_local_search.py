@@ -15,13 +15,12 @@ from ..dynamics.torques import joint_torques
 from ..errors import ShapePhaseError
 from ..shape_space.closest_approach import ClosestApproach
 from ._path_cost import path_cost
-from ._plan_limits import LIMIT_SLACK, effort_shares, limit_shares, tightened
+from ._plan_limits import LIMIT_SLACK, Margins, closest_links, effort_shares, limit_shares, tightened, widened
 from ._polish import GAUSS_NODES, GOAL_TOLERANCE, PolishedPath, polish
 from ._spline_basis import SplineBasis
 from ._via_points import via_rows
 from .collocation import GOOD_STATUS, STAGES, CollocationProgram, NlpSolution
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control
-from .nodes.node_distances import Margins, closest_links, widened
 from .plan import Start
 from .plan_options import Search
 from .solver_callback import IterationCallback
@@ -243,10 +242,9 @@ def failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Atte
     more = "more iterations or starts (Search(starts=8), --starts 8)"
     closest = best.closest if best is not None else ()
     if closest and task.clearance is not None and closest[0].distance < task.clearance:
-        (one, other), nearest = closest[0].links, closest[0]
         way_out = (
-            f"links {one} and {other} come within {nearest.distance:.4g} m of each other at {nearest.time:.4g} s, "
-            f"nearer than the clearance of {task.clearance:g} m: give a smaller distance (--avoid), more joints or {more}"
+            f"links come nearer than the clearance of {task.clearance:g} m, {closest[0].text}: give a smaller distance "
+            f"(--avoid), more time or {more}"
         )
     elif task.cost == "time":
         way_out = f"it may take longer than {task.duration:.6g} s: give a longer duration (--duration), or {more}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from ..arrays import Array
 from ..dynamics.torques import joint_torques
 from ..errors import UnstatedLimitWarning
 from ..reconstruction.reconstruction import Motion
+from ..shape_space.closest_approach import ClosestApproach, clearance
+from ..shape_space.shape_path import ShapePath
 from ._spline_basis import SplineBasis
 from .plan_options import Limits
 from .task import Reorientation
@@ -19,6 +22,12 @@ LIMIT_SLACK = 1e-7  # share by which the solver may exceed limits
 _MARGIN = 5e-5  # by which efforts are limited tighter than their excess asks for; doubled each round
 _HASTE = 1.5  # exponent above 1, since peaks move to where there is more room: 4 % too much takes back 6 %
 _MOST_NAMED = 8  # joints in a warning
+_FIRST_MARGIN = 1e-5  # [m] that nodes keep beyond the clearance: what splines lose between them with 40 pieces
+_CLEARANCE_HASTE = 2.0  # factor by which margins exceed what is missing between nodes
+_NEAR = 1e-3  # [m] beyond the clearance, up to which pairs are watched at all times
+
+Margins = Mapping[tuple[str, str], float]
+"""Pairs of links whose distance a program bounds, and by how much its nodes keep them farther apart [m]."""
 
 
 def derivative_shares(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> dict[str, float]:
@@ -78,6 +87,35 @@ def tightened(room: Array | None, shares: Array, stages: int, rounds: int) -> Ar
     ends[1:] = np.minimum(ends[1:], factor)
     at_places = np.concatenate([np.repeat(factor, stages, axis=0), ends])
     return at_places if room is None else room * at_places
+
+
+def closest_links(task: Reorientation, path: ShapePath) -> tuple[ClosestApproach, ...]:
+    """Return the pairs of links that come nearer on a path than the clearance and a millimetre, at 4,001 times too."""
+    if task.clearance is None or task.geometry is None:
+        return ()
+    geometry, times = task.geometry, np.linspace(0.0, path.duration, TIMES)
+    near = clearance(task.body, path, below=task.clearance + _NEAR, geometry=geometry).approaches
+    postures = geometry.postures(path.shape(times)) if near else None
+    result = []
+    for approach in near:
+        members = np.flatnonzero(geometry.members[1] == geometry.pairs.index(approach.links))
+        rows = np.repeat(np.arange(TIMES), len(members))
+        assert postures is not None
+        distances = geometry.separations(postures, rows, np.tile(members, TIMES)).distances
+        least = int(np.argmin(distances))
+        sampled = ClosestApproach(approach.links, float(times[rows[least]]), float(distances[least]))
+        result.append(min(approach, sampled, key=lambda entry: entry.distance))
+    return tuple(sorted(result, key=lambda entry: entry.distance))
+
+
+def widened(margins: Margins, closest: tuple[ClosestApproach, ...], least: float) -> Margins:
+    """Return margins with which pairs that came nearer than the clearance `least` [m] will keep it."""
+    missing = {near.links: least - near.distance for near in closest if near.distance < least}
+    added = {
+        links: margins[links] + _CLEARANCE_HASTE * gap if links in margins else _FIRST_MARGIN
+        for links, gap in missing.items()
+    }
+    return {**margins, **added}
 
 
 def position_share(task: Reorientation, basis: SplineBasis, control: Array) -> dict[str, float]:

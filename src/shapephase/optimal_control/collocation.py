@@ -10,10 +10,11 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array
+from ._plan_limits import Margins
 from ._polish import end_conditions
 from ._spline_basis import SplineBasis, gauss_tableau
 from ._via_points import open_points, symbolic_via_rows
-from .nodes.node_distances import DistanceTerms, Margins
+from .nodes.node_distances import DistanceTerms
 from .nodes.node_efforts import EffortTerms
 from .nodes.node_functions import node_arguments, node_functions, scipy_sparse, sparse_matrix
 from .solver_callback import BestIterate, IterationCallback, ipopt_callback

@@ -12,6 +12,7 @@ from ..body.body import Body
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, angle_text, card_html, card_text, momentum_text, numbers, short_repr
 from ..reconstruction.reconstruction import Motion
+from ..shape_space.closest_approach import ClosestApproach
 from ..shape_space.shape_path import ShapePath
 from ..so3 import angle
 from .plan_options import Goal
@@ -85,6 +86,7 @@ class Plan:
     goal : the goal that `path` was to reach; of several, the cheapest
     status : "found"; "not found" for a `PlanNotFound.best`; "stopped" or "out of time" before the end of all starts
     waypoint_times : (v,) times at which `path` passes its waypoints [s]
+    closest : with `Limits(clearance=...)`, pairs of links that come nearer than that and 1 mm, the nearest first
     """
 
     body: Body
@@ -107,6 +109,7 @@ class Plan:
     goal: Goal | None = None
     status: str = "found"
     waypoint_times: Array = field(default_factory=lambda: np.zeros(0))
+    closest: tuple[ClosestApproach, ...] = ()
 
     @property
     def agreeing_starts(self) -> int:
@@ -138,6 +141,8 @@ class Plan:
         ]
         if len(self.waypoint_times):
             rows.append(("waypoints passed at", numbers(self.waypoint_times, "s")))
+        if self.closest:
+            rows.append(("closest links", self.closest[0].text))
         if self.hamiltonian_spread is not None:
             rows.append(("Hamiltonian", f"constant to {self.hamiltonian_spread:.1e}"))
         shapes = self.path.shape(np.linspace(0.0, self.path.duration, MOST_POINTS))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, number_argument, positive_argument
+from ..arguments import check_file_name, check_object, number_argument, positive_argument
 from ..arrays import Array, finite_array, real_array
 from ..display import short_repr
 from ..errors import ShapeError, unknown_name
@@ -171,6 +171,8 @@ class Limits:
             raise ShapeError(f"joint_limits: True or False is needed, got {value_text(self.joint_limits)}")
         if self.clearance is not None:
             object.__setattr__(self, "clearance", positive_argument(self.clearance, "clearance", "a distance in m"))
+        if self.srdf is not None:
+            check_file_name(self.srdf, "srdf")
         for name, (unit, stated) in LIMIT_UNITS.items():
             given, words = getattr(self, name), ("body",) if stated else ()
             if given is None or (isinstance(given, str) and given in words):

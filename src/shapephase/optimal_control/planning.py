@@ -404,6 +404,7 @@ def _plan(
         hamiltonian_spread=hamiltonian_spread(task, best.basis, best.polished.control, best.polished.duration),
         limit_shares=position_share(task, best.basis, best.polished.control)
         | limit_shares(task, best.basis, best.polished.control, best.polished.motion),
+        closest=best.closest,
     )
 
 

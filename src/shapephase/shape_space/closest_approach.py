@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +28,7 @@ _SHARPEST = 1e-9  # share of the duration to which a time is polished
 
 @dataclass(frozen=True)
 class ClosestApproach:
-    """Least distance of two links along a path.
+    """Least distance of two links along a path. Made by `clearance`.
 
     Attributes
     ----------
@@ -39,6 +40,13 @@ class ClosestApproach:
     links: tuple[str, str]
     time: float
     distance: float
+
+    @property
+    def text(self) -> str:
+        """The links, how near they come, and when."""
+        depth = self.distance < 0.0
+        how = f"overlap by {-self.distance:.6g} m" if depth else f"are {self.distance:.6g} m apart"
+        return f"{self.links[0]} and {self.links[1]} {how} at {self.time:.6g} s"
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +91,11 @@ def clearance(
 
     Examples
     --------
-    >>> body = sp.load_body("astronaut")
-    >>> path = sp.ShapePath.waypoints([0.0, 1.0], [body.shape(), body.shape({"left_shoulder_y": 0.5})])
-    >>> [approach.links for approach in sp.clearance(body, path, below=0.03).approaches]
-    []
+    >>> cat = sp.load_body("cat")
+    >>> path = sp.ShapePath.waypoints([0.0, 1.0], [cat.shape(), cat.shape({"rear_left_hip_pitch": -1.5})])
+    >>> nearest = sp.clearance(cat, path, below=0.01).approaches[0]
+    >>> nearest.links, round(nearest.distance, 4)
+    (('trunk_rear', 'rear_left_lower_leg'), -0.0223)
     """
     check_object(body, "Body", "body")
     if not isinstance(below, int | float | np.number) or np.isnan(below):
@@ -153,7 +162,7 @@ class _Search:
         when, width = float(self.when[pair]), float(self.widths[pair])
         bounds = max(when - width, 0.0), min(when + width, period)
         options = {"xatol": _SHARPEST * period}
-        polished = minimize_scalar(distance, bounds=bounds, method="bounded", options=options)
+        polished: Any = minimize_scalar(distance, bounds=bounds, method="bounded", options=options)
         # Paths often come nearest where they begin or end, which a bounded search leaves out.
         time, least = min(
             [(when, float(self.least[pair])), (float(polished.x), float(polished.fun))]
@@ -175,7 +184,7 @@ class _Search:
         distances = self._geometry.separations(postures, rows, members).distances
         pairs = self._geometry.members[1][members]
         order = np.argsort(-distances, kind="stable")
-        # Of several for one pair, the last, smallest stays.
+        # Where a pair stands several times, the last and smallest distance stays.
         best = np.full(len(self.least), -1)
         best[pairs[order]] = order
         chosen = best[best >= 0]

@@ -38,7 +38,7 @@ class LinkDistances:
 def link_distances(body: Body, shape: ArrayLike, *, geometry: CollisionGeometry | None = None) -> LinkDistances:
     """Return the signed distances between the links of a body.
 
-    Of links with several solids the nearest two count, and of meshes their convex hulls.
+    The nearest two solids of two links count, and meshes as their convex hulls.
 
     Parameters
     ----------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+# What coal's compiled part brings, a type checker does not see.
+# pyright: reportAttributeAccessIssue=false
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,7 +15,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...arguments import check_object
+from ...arguments import check_file_name, check_object
 from ...arrays import Array, Integers
 from ...display import short_repr
 from ...errors import MissingExtraError, NoCollisionGeometryError, VisualWarning, unknown_name
@@ -74,12 +76,6 @@ class CollisionGeometry:
     pairs : names of the links of each pair
     left_out : pairs that do not count: link, link, and why ("adjacent", "overlap at rest", "SRDF")
     missing : links whose shapes are not all known, which have no solids
-
-    Examples
-    --------
-    >>> geometry = sp.body.collision_geometry(sp.load_body("astronaut"))
-    >>> len(geometry.pairs), geometry.left_out[0]
-    (95, ('lower_trunk', 'left_thigh', 'adjacent'))
     """
 
     chain: JointChain
@@ -115,15 +111,17 @@ class CollisionGeometry:
         return table[:, :2], table[:, 2]
 
     @cached_property
-    def radii(self) -> Array:
-        """Radii of the spheres around the solids: (s,) [m]."""
-        return np.array([_sphere(solid)[1] for solid in self.solids])
+    def spheres(self) -> tuple[Array, Array]:
+        """Centres, in axes of the solids, and radii of spheres around them: (s, 3), (s,) [m]."""
+        centres, radii = zip(*(_sphere(solid) for solid in self.solids), strict=True)
+        return np.array(centres), np.array(radii)
 
     @cached_property
     def extents(self) -> Array:
         """Largest distances of points of the solids from the origins of their frames: (s,) [m]."""
-        middles = [pose[:3, :3] @ _sphere(solid)[0] + pose[:3, 3] for solid, pose in zip(self.solids, self.poses)]
-        return np.linalg.norm(middles, axis=1) + self.radii
+        centres, radii = self.spheres
+        placed = (self.poses[:, :3, :3] @ centres[..., None])[..., 0] + self.poses[:, :3, 3]
+        return np.linalg.norm(placed, axis=1) + radii
 
     @cached_property
     def poses(self) -> Array:
@@ -141,14 +139,14 @@ class CollisionGeometry:
         origins -= origins[:, :1]
         turns = motions.turns[:, self.frames] @ self.poses[:, :3, :3]
         places = origins[:, self.frames] + (motions.turns[:, self.frames] @ self.poses[:, :3, 3:])[..., 0]
-        middles = np.array([_sphere(solid)[0] for solid in self.solids])
+        middles, _ = self.spheres
         return Postures(shapes, motions.turns, origins, turns, places, places + (turns @ middles[..., None])[..., 0])
 
     def least_gaps(self, postures: Postures) -> Array:
         """Lower bounds of the distances of all pairs of solids, by the spheres around them: (N, K) [m]."""
         first, second = self.members[0].T
-        between = postures.centres[:, first] - postures.centres[:, second]
-        return np.linalg.norm(between, axis=-1) - self.radii[first] - self.radii[second]
+        between, (_, radii) = postures.centres[:, first] - postures.centres[:, second], self.spheres
+        return np.linalg.norm(between, axis=-1) - radii[first] - radii[second]
 
     def separations(self, postures: Postures, rows: Integers, members: Integers) -> Separations:
         """Distances of pairs of solids `members` (M,) in the postures `rows` (M,)."""
@@ -217,8 +215,16 @@ def collision_geometry(body: Body, *, srdf: str | Path | None = None) -> Collisi
     -----
     VisualWarning
         If a mesh or an element cannot be read: its link has no solids, and is not compared with others.
+
+    Examples
+    --------
+    >>> geometry = sp.body.collision_geometry(sp.load_body("astronaut"))
+    >>> len(geometry.pairs), geometry.left_out[0]
+    (95, ('lower_trunk', 'left_thigh', 'adjacent'))
     """
     check_object(body, "Body", "body")
+    if srdf is not None:
+        check_file_name(srdf, "srdf")
     if body not in _kept:
         _kept[body] = _geometry(body)
     geometry = _kept[body]

@@ -70,6 +70,11 @@ class LimitOptions:
     effort: Annotated[str | None, rare()] = None
     """Largest torque or force of every joint, in N m or N, or body for the limits that the body's file states; default:
     none. For example `--effort body`."""
+    avoid: Annotated[str | None, option()] = None
+    """Keep the links at least this far apart, in m or with a unit; default: they may pass through each other. Shapes as
+    for `check --clearance`. For example `--avoid 0.02` or `--avoid 2cm`."""
+    srdf: Annotated[Path | None, rare()] = None
+    """Pairs of links that --avoid leaves out: an SRDF file; for example `--srdf robot.srdf`."""
 
     def limits(self, body: Body) -> Limits:
         """Return the limits. Raises ShapeError, UnknownNameError."""
@@ -81,6 +86,8 @@ class LimitOptions:
             acceleration_limits=_limit(body, self.acceleration_limit, "--acceleration-limit", 2),
             jerk_limits=_limit(body, self.jerk_limit, "--jerk-limit", 3),
             effort_limits=None if self.effort is None else _effort(self.effort),
+            clearance=None if self.avoid is None else value_in_si(self.avoid, "m", "--avoid"),
+            srdf=self.srdf,
         )
 
 

@@ -12,6 +12,7 @@ from ...body.body import Body
 from ...optimal_control.plan import COST_UNITS, Plan
 from ...optimal_control.way_back import Undo, WayBack
 from ...phases.split_text import rotation_line
+from .result_text import approach_data
 
 if TYPE_CHECKING:
     from ...error_bars.covariance import Uncertainty
@@ -44,6 +45,7 @@ def plan_lines(body: Body, plan: Plan) -> list[str]:
             f"{f'{name} at most':24}{share:16.4%}   of its limit{_OF_RANGE.get(name, '')}"
             for name, share in plan.limit_shares.items()
         ),
+        *([f"{'closest links':24}{plan.closest[0].text}"] if plan.closest else []),
         *([f"{'waypoints passed at':24}{passed:>16} s"] if passed else []),
         f"{'KKT residual (scaled)':24}{plan.kkt_residual:16.2e}",
         f"{'iterations':24}{plan.iterations:16d}       (in {plan.seconds:.1f} s, {searches})",
@@ -64,6 +66,7 @@ def plan_data(body: Body, plan: Plan) -> dict[str, object]:
         "cost_unit": plan.cost_unit,
         "rates_at_ends": plan.rates_at_ends,
         "limit_shares": dict(plan.limit_shares),
+        "closest_links": approach_data(plan.closest),
         "waypoint_times_s": plan.waypoint_times.tolist(),
         "kkt_residual": plan.kkt_residual,
         "iterations": plan.iterations,

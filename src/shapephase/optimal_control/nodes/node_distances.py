@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ...arrays import Array, Integers
-from ...body.collisions.geometry import CollisionGeometry
-from ...shape_space.closest_approach import ClosestApproach, clearance
-from ...shape_space.shape_path import ShapePath
-from .._plan_limits import TIMES
+from .._plan_limits import Margins
 from .._spline_basis import SplineBasis
 from ..task import Reorientation
 from .node_functions import scipy_sparse, sparse_matrix
 
-Margins = Mapping[tuple[str, str], float]
-"""Pairs of links whose distance a program bounds, and by how much its nodes keep them farther apart [m]."""
-
-FIRST_MARGIN = 1e-5  # [m] that nodes keep beyond the clearance: what splines lose between them with 40 pieces
 _STEP = 1e-4  # [rad or m] of differences of gradients: their error is 1e-5, a kink of parallel faces is as sharp
 _COUNTS = 1e-6  # share of the largest multiplier below which a distance has no part in second derivatives
-_HASTE = 2.0  # factor by which margins exceed what is missing between nodes
-_NEAR = 1e-3  # [m] beyond the clearance, up to which pairs are watched at all times
 
 
 class DistanceTerms:
@@ -37,9 +28,15 @@ class DistanceTerms:
     def __init__(self, task: Reorientation, basis: SplineBasis, places: Array, margins: Margins, unknown: Any) -> None:
         import casadi
 
-        geometry = _geometry(task)
+        assert task.geometry is not None
+        assert task.clearance is not None
+        self._geometry = geometry = task.geometry
         numbers = [geometry.pairs.index(pair) for pair in margins]
-        self._task, self._members = task, np.flatnonzero(np.isin(geometry.members[1], numbers))
+        self._task, self._least, self._members = (
+            task,
+            task.clearance,
+            np.flatnonzero(np.isin(geometry.members[1], numbers)),
+        )
         m, count, kinds = task.dimension, len(places), len(self._members)
         sparse = scipy_sparse()
         shapes = sparse.kron(basis.matrix(places), sparse.eye(m))
@@ -55,9 +52,8 @@ class DistanceTerms:
 
     def bounds(self, margins: Margins) -> Array:
         """Least values of the rows: the clearance, and the margin of each pair: (K N,) [m]."""
-        geometry = _geometry(self._task)
-        pairs = [geometry.pairs[number] for number in geometry.members[1][self._members].tolist()]
-        least = [self._task.clearance + margins[pair] for pair in pairs]
+        pairs = [self._geometry.pairs[number] for number in self._geometry.members[1][self._members].tolist()]
+        least = [self._least + margins[pair] for pair in pairs]
         return np.tile(least, self._at.shape[1])
 
     def hessian(self, multipliers: Any) -> Any:
@@ -70,7 +66,7 @@ class DistanceTerms:
 
     def _measured(self, coordinates: Array, rows: Integers, members: Integers) -> tuple[Array, Array]:
         """Distances of pairs of solids (M,) at coordinates (N, m) of rows (M,), and their derivatives (M, m)."""
-        geometry = _geometry(self._task)
+        geometry = self._geometry
         postures = geometry.postures(self._task.shapes(coordinates))
         separations = geometry.separations(postures, rows, members)
         slopes = geometry.slopes(postures, rows, members, separations)
@@ -94,44 +90,11 @@ class DistanceTerms:
         coordinates = (at.T[None] + shifts[:, None]).reshape(-1, m)
         rows = (np.arange(m + 1)[:, None] * count + nodes).ravel()
         _, slopes = self._measured(coordinates, rows, np.tile(self._members[kinds], m + 1))
-        gradients = np.zeros((m + 1, count, m))
+        gradients = np.zeros((count, m + 1, m))
         weighted = slopes.reshape(m + 1, -1, m) * weights[kinds, nodes][:, None]
-        np.add.at(gradients, (slice(None), nodes), weighted)
-        bent = (gradients[1:] - gradients[:1]).transpose(1, 0, 2) / _STEP
+        np.add.at(gradients, nodes, weighted.transpose(1, 0, 2))
+        bent = (gradients[:, 1:] - gradients[:, :1]) / _STEP
         return (0.5 * (bent + bent.transpose(0, 2, 1))).transpose(1, 0, 2).reshape(m, -1)
-
-
-def closest_links(task: Reorientation, path: ShapePath) -> tuple[ClosestApproach, ...]:
-    """Return the pairs of links that come nearer on a path than the clearance and a millimetre, at 4,001 times too."""
-    if task.clearance is None:
-        return ()
-    geometry, times = _geometry(task), np.linspace(0.0, path.duration, TIMES)
-    near = clearance(task.body, path, below=task.clearance + _NEAR, geometry=geometry).approaches
-    postures = geometry.postures(path.shape(times)) if near else None
-    result = []
-    for approach in near:
-        members = np.flatnonzero(geometry.members[1] == geometry.pairs.index(approach.links))
-        rows = np.repeat(np.arange(TIMES), len(members))
-        assert postures is not None
-        distances = geometry.separations(postures, rows, np.tile(members, TIMES)).distances
-        least = int(np.argmin(distances))
-        sampled = ClosestApproach(approach.links, float(times[rows[least]]), float(distances[least]))
-        result.append(min(approach, sampled, key=lambda entry: entry.distance))
-    return tuple(sorted(result, key=lambda entry: entry.distance))
-
-
-def widened(margins: Margins, closest: tuple[ClosestApproach, ...], least: float) -> Margins:
-    """Return margins with which pairs that came nearer than the clearance `least` [m] will keep it."""
-    missing = {near.links: least - near.distance for near in closest if near.distance < least}
-    added = {
-        links: margins[links] + _HASTE * gap if links in margins else FIRST_MARGIN for links, gap in missing.items()
-    }
-    return {**margins, **added}
-
-
-def _geometry(task: Reorientation) -> CollisionGeometry:
-    assert task.geometry is not None
-    return task.geometry
 
 
 def _callback(name: str, function: Callable[..., Array], inputs: list[tuple[int, int]], output: tuple[int, int]) -> Any:
