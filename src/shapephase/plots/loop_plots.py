@@ -23,7 +23,7 @@ from ..shape_space.connection import curvature, horizontal_lift, mechanical_conn
 from ..shape_space.curvature_field import curvature_along
 from ..shape_space.shape_path import CLOSED, ShapePath
 from . import plot_style as style
-from ._curvature_map import (
+from .curvature_map import (
     colour_scale,
     component_of,
     curvature_colours,
