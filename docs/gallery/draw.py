@@ -31,6 +31,8 @@ MOMENTA = {
     "diver": (0.0, 61.558831, 0.0),
 }
 BEND = 1.037187
+# Pictures in space.
+SOLID = ("caustic", "loop_space")
 TOP = ([1.0, 2.0, 3.0], [0.3, 0.5, 0.9])
 
 
@@ -47,6 +49,20 @@ def top(moments: list[float], momentum: list[float]) -> sp.EulerTop:
 
 
 DRAWINGS: dict[str, tuple[float, Callable[[Axes], object]]] = {
+    "loop": (5.2, lambda ax: plots.plot_loop(ax, sp.load_body("cat"), MOTIONS["cat_righting"].path())),
+    "loop_principal": (
+        5.2,
+        lambda ax: plots.plot_loop(
+            ax, sp.load_body("cat_two_halves"), sp.examples.kane_scher(0.0, BEND), "principal", axis="norm"
+        ),
+    ),
+    "curvature": (
+        2.8,
+        lambda ax: plots.plot_curvature(
+            ax, sp.load_body("satellite"), ("arm_1", "boom_extension"), path=MOTIONS["satellite_sweep"].path()
+        ),
+    ),
+    "reach": (2.8, lambda ax: plots.plot_reach(ax, sp.reachable(sp.load_body("cat")))),
     "attitude": (2.8, lambda ax: plots.plot_attitude(ax, motion("diver", "diver_twist"))),
     "energy": (2.8, lambda ax: plots.plot_energy(ax, motion("diver", "diver_twist"))),
     "joints": (2.8, lambda ax: plots.plot_shape_path(ax, MOTIONS["cat_righting"].path(), sp.load_body("cat"))),
@@ -65,13 +81,20 @@ DRAWINGS: dict[str, tuple[float, Callable[[Axes], object]]] = {
     "rolling": (3.6, lambda ax: plots.plot_rolling_ellipsoid(ax, top(*TOP), 1.0)),
     "cones_oblate": (3.6, lambda ax: plots.plot_cones(ax, top([1.0, 1.0, 1.7], [0.3, 0.5, 0.8]))),
     "cones_prolate": (3.6, lambda ax: plots.plot_cones(ax, top([2.0, 2.0, 0.8], [0.3, 0.5, 0.8]))),
+    "caustic": (3.6, lambda ax: plots.plot_caustic(ax, [2.0, 2.0, 1.0])),
+    "loop_space": (
+        5.2,
+        lambda ax: plots.plot_loop(
+            ax, sp.load_body("cat"), MOTIONS["cat_righting"].path(), ("waist_pitch", "waist_yaw", "neck_yaw")
+        ),
+    ),
 }
 
 
 def draw(name: str, folder: Path = HERE) -> Path:
     """Write one of the pictures; returns its file."""
     height, drawing = DRAWINGS[name]
-    ax = column_axes(height)
+    ax = column_axes(height, projection="3d" if name in SOLID else None)
     drawing(ax)
     stream = BytesIO()
     ax.figure.savefig(stream, format="png", dpi=RESOLUTION)

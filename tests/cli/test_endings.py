@@ -158,6 +158,7 @@ def test_endings_in_any_case(capfd, tmp_path, ending):
         ("rigid", "1", "2", "3", "--momentum", "1", "0", "2", "--out"),
         ("rigid", "1", "2", "3", "--momentum", "1", "0", "2", "--html"),
         ("reach", "cat", "--out"),
+        ("loop", *CAT[1:], "--out"),
         ("explore", "cat", "--joints", "waist_pitch", "waist_yaw", "--html"),
     ],
 )
@@ -169,7 +170,7 @@ def test_what_cannot_be_written_is_said_before_anything_is_computed(capfd, tmp_p
     monkeypatch.setattr("shapephase.rigid_body.geodesics.serret_andoyer_metric", never)
     monkeypatch.setattr("shapephase.rigid_body.euler_top.EulerTop.principal", never)
     endings = {"plot": ".svg", "conjugate": ".svg", "plan": ".csv", "split": ".npz", "view": ".html"}
-    of_command = endings | {"torques": ".csv", "rigid": ".svg", "reach": ".svg"}
+    of_command = endings | {"torques": ".csv", "rigid": ".svg", "reach": ".svg", "loop": ".svg"}
     ending = ".html" if command[-1] == "--html" else of_command[command[0]]
     folder = tmp_path / f"folder{ending}"
     folder.mkdir()

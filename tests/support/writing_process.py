@@ -55,6 +55,7 @@ COMMANDS = {
     "reach.svg": ("reach", ("diver", "cat_two_halves"), "--out"),
     "reach.pdf": ("reach", ("diver", "cat_two_halves"), "--out"),
     "reach.png": ("reach", ("diver", "cat_two_halves"), "--out"),
+    **{f"loop.{kind}": ("loop", *CAT[:2], "--component", ("x", "norm"), "--out") for kind in ("svg", "pdf", "png")},
     "audit.svg": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),
     "audit.pdf": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),
     "audit.png": ("audit", "cat_two_halves", FLOWN, "--flight", "0", ("0.9", "0.8"), "--figure"),

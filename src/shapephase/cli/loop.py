@@ -58,7 +58,7 @@ def loop_command(
     import numpy as np
 
     from ..arguments import check_choice
-    from ..plots._curvature_map import COMPONENTS, component_of
+    from ..plots.curvature_map import COMPONENTS, component_of
     from ..plots.loop_plots import PRINCIPAL, draw_loop_flux, loop_axes, loop_flux
     from .motion import body_argument, joint_motion
     from .texts.recording_text import recording_data, recording_lines

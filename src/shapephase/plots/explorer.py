@@ -21,6 +21,7 @@ from .page import Page
 from .pages.motion_data import body_data, frame_nodes, up_axis
 from .pages.plane_series import PlaneSeries, least_perturbation_turns, plane_series
 from .pages.templates import SCENE_SCRIPTS, page_from
+from .plot_style import NEGATIVE_CURVATURE, POSITIVE_CURVATURE
 
 _MAP = 101  # points of the curvature map along each joint
 _END = {"rad": np.pi, "m": 1.0}  # [rad, m] of the map for a joint without a limit
@@ -36,8 +37,9 @@ def explore(body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None,
 
     The page computes the turn of the body along the periodic cubic spline through the loop's points, by ordered
     products of exponentials, without angular momentum or with one that is chosen by sliders. It states how far the turn
-    may be off: by the Chebyshev series of inertia and momentum that it carries, and by its steps. The loop can be saved
-    as a CSV file that `split` reads.
+    may be off: by the Chebyshev series of inertia and momentum that it carries, and by its steps; and the flux of the
+    curvature through the loop. Sliders move what is drawn. The loop can be saved as a CSV file that `split` reads, the
+    map with it as PNG or SVG; the loop of such a file can be opened.
 
     Parameters
     ----------
@@ -82,7 +84,7 @@ def explore(body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None,
     return page_from(
         "explore.html",
         title=f"{body.name}: loops of {joints[0]} and {joints[1]}",
-        scripts=(*SCENE_SCRIPTS, "plots", "loop", "holonomy", "map", "explore_page"),
+        scripts=(*SCENE_SCRIPTS, "plots", "loop", "holonomy", "svg_pen", "map", "explore_page"),
         styles=("page", "explore_page"),
         data={
             "motion": _still_motion(body, places, shown, still, upwards),
@@ -123,6 +125,7 @@ def _plane_data(
         "connection_error": series.error,
         "largest_momentum": _largest_momentum(series),
         "map": _MAP,
+        "colours": {"positive": POSITIVE_CURVATURE, "negative": NEGATIVE_CURVATURE},
         "curvature": {
             "base axes": field.astype(np.float32),
             "least perturbation": so3.apply(turns, field).astype(np.float32),

@@ -23,7 +23,9 @@ from ..shape_space.connection import curvature, horizontal_lift, mechanical_conn
 from ..shape_space.curvature_field import curvature_along
 from ..shape_space.shape_path import CLOSED, ShapePath
 from . import plot_style as style
-from ._curvature_map import (
+from ._joint_styles import joint_place
+from ._postures import draw_postures
+from .curvature_map import (
     colour_scale,
     component_of,
     curvature_colours,
@@ -34,8 +36,6 @@ from ._curvature_map import (
     shown_part,
     squared_unit,
 )
-from ._joint_styles import joint_place
-from ._postures import draw_postures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,6 +51,7 @@ _ARROWS = 11  # of the vector field along each axis
 _POSTURE = 0.45  # [in] height of a posture
 _BESIDE = 3  # postures in a row of a figure higher than that, else all
 _HIGH = 4.0  # [in]
+_TICKS = 5  # on each of three axes: their numbers do not touch
 _ZOOM = 0.85  # of three-dimensional axes: their labels stay in the figure
 _SPACE_SECTORS = 180  # of the cone over three joints: two degrees each
 
@@ -198,7 +199,6 @@ def draw_loop_flux(
         _draw_space(ax, body, flux, direction, name)
         ax.set_box_aspect(None, zoom=_ZOOM)
         ax.set_anchor("N")
-    name_axes(ax, flux.joints, ["rad" if unit == "principal" else unit for unit in flux.units])
     if postures:
         _draw_round(ax, body, path, flux, postures)
     parts = {key: round(float(np.degrees(value)), 1) + 0.0 for key, value in flux.parts(direction).items()}
@@ -321,6 +321,7 @@ def _draw_plane(ax: Any, body: Body, flux: LoopFlux, direction: Array | None, na
         turning = -np.einsum("a,ijan,kn->kji", direction, connection, across)
         ax.quiver(*step, *turning, color="#333333", width=0.006, alpha=0.6, pivot="middle", zorder=2.2)
     draw_loop(ax, flux.points)
+    name_axes(ax, flux.joints, units)
 
 
 def _draw_space(ax: Any, body: Body, flux: LoopFlux, direction: Array | None, name: str) -> None:
@@ -343,8 +344,11 @@ def _draw_space(ax: Any, body: Body, flux: LoopFlux, direction: Array | None, na
     ax.add_collection3d(Poly3DCollection(triangles, facecolors=mapped.to_rgba(values), alpha=0.8))
     ax.plot(*points.T, color=style.BLACK, linewidth=1.6)
     ax.plot(*points[:1].T, marker="*", color=style.GREEN, markersize=10.0, linestyle="none")
-    what = "norm" if direction is None else f"along {name}"
-    colour_scale(ax, mapped, f"curvature of the cone, {what} [deg per area]", "bottom", signed=direction is not None)
+    name_axes(ax, flux.joints, flux.units)
+    ax.locator_params(nbins=_TICKS)
+    what = "norm" if direction is None else f"{name} component"
+    per = "deg/rad²" if {*flux.units} == {"rad"} else "deg per area"
+    colour_scale(ax, mapped, f"curvature of the cone, {what} [{per}]", "bottom", signed=direction is not None)
 
 
 def _draw_round(ax: Any, body: Body, path: ShapePath, flux: LoopFlux, count: int) -> None:

@@ -341,8 +341,8 @@ def ticks_in_degrees(axis: Any) -> None:
     from matplotlib.ticker import AutoLocator
 
     class DegreeLocator(AutoLocator):
-        def tick_values(self, vmin: float, vmax: float) -> Array:
-            return np.radians(super().tick_values(np.degrees(vmin), np.degrees(vmax)))
+        def tick_values(self, vmin: float, vmax: float) -> list[float]:
+            return np.radians(super().tick_values(np.degrees(vmin), np.degrees(vmax))).tolist()
 
     axis.set_major_locator(DegreeLocator())
     axis.set_major_formatter(lambda value, _: f"{round(np.degrees(value), 6):g}".replace("-", "−"))

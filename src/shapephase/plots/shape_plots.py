@@ -18,8 +18,8 @@ from ..shape_space.curvature_field import curvature_on_plane
 from ..shape_space.reach.holonomy_algebra import Reach
 from ..shape_space.shape_path import ShapePath
 from . import plot_style as style
-from ._curvature_map import component_of, draw_loop, draw_map, even_row, name_axes, row_around, squared_unit, two_joints
 from ._joint_styles import MAX_NAMED, both_sides, joint_place, joint_styles, plain_text, plot_joints
+from .curvature_map import component_of, draw_loop, draw_map, even_row, name_axes, row_around, squared_unit, two_joints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -177,7 +177,7 @@ def plot_curvature(
         _row(values, body, k, None if points is None else points[:, n], label)
         for n, (values, k, label) in enumerate(zip((first, second), places, ("first", "second")))
     ]
-    field = curvature_on_plane(body, places, *rows, shape)
+    field = curvature_on_plane(body, places, rows[0], rows[1], shape)
     units = [body.joint_units[k] for k in places]
     draw_map(ax, rows, field, *component_of(axis, field), squared_unit(*units))
     if points is not None:

@@ -3,6 +3,8 @@
 
 // Points of a loop, evenly in time.
 const LOOP_POINTS = 64;
+// Points of a file's loop: of more, every second or third is taken.
+const MOST_POINTS = 256;
 // Sweeps of Gauss and Seidel, each of which makes the error of a spline's bends four times smaller or more.
 const SWEEPS = 40;
 
@@ -17,13 +19,35 @@ const SHAPES = {
   "Lissajous 2 : 3": s => [Math.sin(2 * s), Math.sin(3 * s)],
 };
 
-// A named shape about a centre, with half widths, turned by an angle.
-function madeLoop(name, centre, half, angle) {
+// Points of a named shape within the unit square.
+const unitLoop = name => Array.from({length: LOOP_POINTS}, (_, k) => SHAPES[name](2 * Math.PI * k / LOOP_POINTS));
+
+// A loop of the unit square about a centre, with half widths, turned by an angle.
+function placedLoop(points, centre, half, angle) {
   const [c, s] = [Math.cos(angle), Math.sin(angle)];
-  return Array.from({length: LOOP_POINTS}, (_, k) => {
-    const [x, y] = SHAPES[name](2 * Math.PI * k / LOOP_POINTS);
-    return [centre[0] + half[0] * (c * x - s * y), centre[1] + half[1] * (s * x + c * y)];
-  });
+  return points.map(([x, y]) => [centre[0] + half[0] * (c * x - s * y), centre[1] + half[1] * (s * x + c * y)]);
+}
+
+// Centre and half widths of a loop.
+function extentOf(points) {
+  const ends = [0, 1].map(n => { const values = points.map(p => p[n]); return [Math.min(...values), Math.max(...values)]; });
+  return {centre: ends.map(([low, high]) => 0.5 * (low + high)), half: ends.map(([low, high]) => 0.5 * (high - low) || 1e-9)};
+}
+
+// Points of two joints in the text of a CSV file, [rad or m]; an error where it has no such columns.
+function loopOfFile(text, joints) {
+  const rows = text.split(/\r?\n/).filter(line => line.trim() && !line.startsWith("#"))
+    .map(line => line.split(/[,;\t]/).map(cell => cell.trim().replace(/^"|"$/g, "")));
+  const places = joints.map(({name}) => rows[0].findIndex(cell => cell.replace(/ *\[.*\]$/, "") === name));
+  const factors = places.map(place => /\[(deg|°)\]$/.test(rows[0][place]) ? Math.PI / 180 : 1);
+  let points = rows.slice(1).map(row => places.map((place, n) => factors[n] * Number(row[place])));
+  if (places.includes(-1) || points.length < 4 || !points.flat().every(Number.isFinite)) {
+    throw new Error(`no loop of ${joints.map(({name}) => name).join(" and ")} in this file`);
+  }
+  const gap = [0, 1].map(n => points[points.length - 1][n] - points[0][n]);
+  if (Math.hypot(...gap) < 1e-6) points = points.slice(0, -1);
+  const every = Math.ceil(points.length / MOST_POINTS);
+  return points.filter((_, k) => k % every === 0);
 }
 
 // Of the points of a pointer: evenly along the closed line, and smooth where the hand was not.

@@ -1,9 +1,9 @@
 // The map of the curvature over two joints, and the loop on it: drawn by a pointer.
 "use strict";
 
-// From negative over none to positive: blue, white, orange; lightness alone tells the size.
-const NEGATIVE = [0, 84, 147];
-const POSITIVE = [190, 76, 0];
+// Red, green and blue of a colour #RRGGBB.
+const channels = hex => [1, 3, 5].map(k => parseInt(hex.slice(k, k + 2), 16));
+
 // Room for numbers and names [px]: left, right, above, below.
 const MAP_ROOM = [58, 12, 12, 46];
 
@@ -24,6 +24,7 @@ class CurvatureMap {
   constructor(holder, plane) {
     Object.assign(this, {holder, plane, gauge: "least perturbation", component: "largest", points: [], listeners: []});
     this.canvas = holder.appendChild(document.createElement("canvas"));
+    this.hues = [plane.colours.negative, plane.colours.positive].map(channels);
     this.picture = document.createElement("canvas");
     this.picture.width = this.picture.height = plane.map;
     this.colour();
@@ -51,7 +52,7 @@ class CurvatureMap {
     for (let a = 0; a < count; a++) {
       for (let b = 0; b < count; b++) {
         const value = values[a * count + b] / this.largest, share = Math.abs(value);
-        const hue = value < 0 ? NEGATIVE : POSITIVE, place = 4 * ((count - 1 - b) * count + a);
+        const hue = this.hues[value < 0 ? 0 : 1], place = 4 * ((count - 1 - b) * count + a);
         for (let n = 0; n < 3; n++) image.data[place + n] = 255 + share * (hue[n] - 255);
         image.data[place + 3] = 255;
       }
@@ -81,6 +82,11 @@ class CurvatureMap {
     [this.canvas.style.width, this.canvas.style.height] = [`${across}px`, `${down}px`];
     const pen = this.canvas.getContext("2d");
     pen.scale(ratio, ratio);
+    this.paint(pen);
+  }
+
+  // The map and the loop, by the pen of a canvas or an `SvgPen`.
+  paint(pen) {
     pen.drawImage(this.picture, MAP_ROOM[0], MAP_ROOM[2], this.size, this.size);
     pen.strokeStyle = "#777";
     pen.strokeRect(MAP_ROOM[0], MAP_ROOM[2], this.size, this.size);
