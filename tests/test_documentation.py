@@ -213,6 +213,19 @@ def test_links_between_pages_lead_somewhere(page):
         assert (page.parent / target).resolve().exists(), target
 
 
+def test_live_pages_are_made_where_pages_show_them(steps, tmp_path):
+    live = steps("live_pages")
+    shown = {
+        page.parent / source
+        for page in PAGES
+        for source in re.findall(r'<iframe class="live" src="([^"]+)"', page.read_text(encoding="utf-8"))
+    }
+    assert {source.resolve() for source in shown} == {DOCS / "_static" / name for name in live.LIVE}
+    live.write_live_pages(tmp_path)
+    for name in live.LIVE:
+        assert 100_000 < (tmp_path / name).stat().st_size < 500_000
+
+
 def examples(thing: Any) -> list[doctest.Example]:
     return doctest.DocTestParser().get_examples(inspect.getdoc(thing) or "")
 

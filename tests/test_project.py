@@ -139,6 +139,17 @@ def test_what_would_be_uploaded_passes_the_package_index_s_check(tmp_path):
     assert said.count("PASSED") == 2
 
 
+def test_hosts_build_what_make_docs_builds():
+    hosted = (ROOT / ".readthedocs.yaml").read_text(encoding="utf-8")
+    assert "  configuration: docs/conf.py\n  fail_on_warning: true\n" in hosted
+    assert "extra_requirements: [docs]\n" in hosted
+    workflow = (ROOT / ".github" / "workflows" / "pages.yml").read_text(encoding="utf-8")
+    assert "pip install --quiet '.[docs]'\n      - run: make docs\n" in workflow
+    packed = re.search(r"^\tcd (\S+) .* -c (\S+\.zip) html$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    assert packed
+    assert f"path: {packed[1]}/{packed[2]}\n" in workflow
+
+
 def test_the_readme_begins_with_the_two_commands():
     blocks = re.findall(r"```sh\n(.*?)```", _readme(), re.DOTALL)
     assert len(blocks) >= 2
