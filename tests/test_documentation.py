@@ -144,8 +144,8 @@ def test_command_lines_that_need_no_file_run(tmp_path, monkeypatch):
     from shapephase.cli.main import main
 
     monkeypatch.chdir(tmp_path)
-    for _, tokens in commands():
-        if "cat_righting" in tokens:
+    for page, tokens in commands():
+        if "cat_righting" in tokens and page != "faq.md":  # it shows errors, too, in tests of its own
             main(tokens)
 
 
