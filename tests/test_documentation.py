@@ -269,7 +269,9 @@ def test_every_exported_function_and_class_has_an_example():
     assert not [name for name, thing in lacking.items() if not inspect.isclass(thing) or made[name] is None]
 
 
-ANSWERS = re.findall(r"^```text\n(shapephase [^\n]*)\n(.*?)```", (DOCS / "howto" / "faq.md").read_text(), re.M | re.S)
+ANSWERS = re.findall(
+    r"^```text\n(shapephase [^\n]*)\n(.*?)```", (DOCS / "howto" / "faq.md").read_text("utf-8"), re.M | re.S
+)
 QUICK_ANSWERS = 3  # the others take a second each, or many
 
 
@@ -291,6 +293,8 @@ def test_answers_show_what_their_commands_print(command, shown, tmp_path, monkey
 
 
 def test_there_are_25_questions_each_with_a_command():
-    questions = re.findall(r"^### ([^\n]*)\n(.*?)(?=^###? |\Z)", (DOCS / "howto" / "faq.md").read_text(), re.M | re.S)
+    questions = re.findall(
+        r"^### ([^\n]*)\n(.*?)(?=^###? |\Z)", (DOCS / "howto" / "faq.md").read_text("utf-8"), re.M | re.S
+    )
     assert len(questions) >= 25
     assert not [title for title, answer in questions if "```text\nshapephase " not in answer]
