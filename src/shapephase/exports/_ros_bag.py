@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, Integers
-from ..errors import MissingExtraError
+from ..errors import MissingExtraError, OutputFileError
 
 _NANO = 10**9  # of the stamps, in a second
 _WORLD = "world"  # frame of the inertial axes
@@ -21,6 +23,17 @@ def whole_nanoseconds(times: Array, duration: float) -> Array:
     return np.minimum(np.round(times * _NANO) / _NANO, np.floor(duration * _NANO) / _NANO)
 
 
+@contextmanager
+def _bag_folder() -> Iterator[Path]:
+    """A temporary folder for a bag. Raises OutputFileError for what the system refuses to write there."""
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            yield Path(folder)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise OutputFileError(f"cannot write a bag into {tempfile.gettempdir()}: {reason}") from None
+
+
 def mcap_bag(
     times: Array, quat_xyzw: Array, position: Array, link: str, joints: tuple[tuple[str, ...], Array, Array] | None
 ) -> bytes:
@@ -29,7 +42,7 @@ def mcap_bag(
     link : frame of the base
     joints : names (n,), coordinates and rates (N, n); None: no topic of joints
 
-    Raises MissingExtraError without rosbags.
+    Raises MissingExtraError without rosbags; OutputFileError where the folder for temporary files is full.
     """
     try:
         from rosbags.rosbag2 import StoragePlugin, Writer
@@ -43,8 +56,8 @@ def mcap_bag(
         return kinds[kind](*fields)
 
     stamps: Integers = np.round(times * _NANO).astype(np.int64)
-    with tempfile.TemporaryDirectory() as folder:
-        bag = Path(folder) / "motion"
+    with _bag_folder() as folder:
+        bag = folder / "motion"
         with Writer(bag, version=_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
 
             def topic(name: str, kind: str) -> Any:
