@@ -84,7 +84,7 @@ def test_a_star_tracker_alone_is_asked_for_its_direction(columns, tmp_path, caps
     assert "sigma_3: base axes to the recorder's, --base-inverse for the inverse" in capsys.readouterr().out
 
 
-def test_a_gyro_alone_starts_where_it_is_told(columns, tmp_path, capsys):
+def test_a_gyro_alone_starts_at_a_given_attitude(columns, tmp_path, capsys):
     file = log(tmp_path / "m.csv", columns, (GYRO, np.degrees(columns["rates"])))
     start = Rotation.from_matrix(simulated()[1].attitude[0]).as_quat()
     found = split(capsys, file, "--attitude", *start)

@@ -141,6 +141,21 @@ def test_derivatives_of_a_fit_by_samples_as_fits_to_others_show(kind: str, fligh
     np.testing.assert_allclose(change[3:], exact.momentum, atol=1e-6)
 
 
+def test_a_body_with_a_wheel_that_keeps_its_momentum():
+    satellite = sp.load_body("satellite")
+    others = [name for name in satellite.joint_names if name != "wheel_spin"]
+    path = sp.ShapePath.waypoints([0.0, 3.0], np.outer([0.0, 0.3], np.ones(len(others))), joint_names=others)
+    deformation, times = sp.articulated(satellite, path, rotors={"wheel_spin": 2.0}), np.linspace(0.0, 3.0, 25)
+    motion = sp.reconstruct(deformation, [1.0, 2.0, 3.0], tolerance=1e-10)
+    rates = motion.angular_velocity(times)
+    found = sp.momentum_from_recording(deformation, times, rates=rates, find_bias=False, tolerance=1e-9)
+    np.testing.assert_allclose(found.momentum, [1.0, 2.0, 3.0], atol=1e-6)
+    without = sp.articulated(satellite, path, rotors={"wheel_spin": 0.0})
+    with pytest.warns(TrajectoryWarning, match="not constant"):
+        other = sp.momentum_from_recording(without, times, motion.attitude(times), rates=rates, find_bias=False)
+    assert np.abs(other.momentum - [1.0, 2.0, 3.0]).max() > 0.1, "the wheel must matter"
+
+
 def test_a_momentum_that_changes_shows_in_rates_alone():
     """A rigid body about its middle axis whose rate doubles."""
     times = np.linspace(0.0, 0.8, 41)

@@ -274,7 +274,7 @@ def test_momentum_from_rate_in_closed_form():
 
 
 def test_momentum_from_a_rate_later_in_the_motion():
-    """Back to the start: of a rigid body by its closed form, of moving joints by the motion itself."""
+    """Back to the start: of a rigid body by its closed form, of moving joints and wheels by the motion itself."""
     inertia, start = np.diag([1.0, 2.0, 2.5]), random_rotation(2)
     top = sp.EulerTop(inertia, np.array([0.3, 2.0, 1.0]))
     rigid, later = sp.rigid(inertia, 20.0), 17.0
@@ -285,6 +285,14 @@ def test_momentum_from_a_rate_later_in_the_motion():
     for time in (0.4, motion.duration):
         found = sp.momentum_from_rate(motion.deformation, motion.angular_velocity(time), start, time=time)
         np.testing.assert_allclose(found, motion.momentum, rtol=0, atol=1e-12)
+    satellite = body_of("satellite")
+    others = [name for name in satellite.joint_names if name != "wheel_spin"]
+    ends = np.zeros((2, len(others)))
+    ends[1] = 0.3
+    path = sp.ShapePath.waypoints([0.0, 3.0], ends, joint_names=others)
+    moving = sp.reconstruct(sp.articulated(satellite, path, rotors={"wheel_spin": 2.0}), [1.0, 2.0, 3.0], start)
+    found = sp.momentum_from_rate(moving.deformation, moving.angular_velocity(2.0), start, time=2.0)
+    np.testing.assert_allclose(found, moving.momentum, rtol=0, atol=1e-8)
     with pytest.raises(TrajectoryError, match="lies outside the motion"):
         sp.momentum_from_rate(rigid, omega, time=21.0)
 

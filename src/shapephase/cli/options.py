@@ -174,9 +174,9 @@ class StartOptions:
     """Momentum of the body, and its attitude at the start."""
 
     momentum: Annotated[tuple[float, float, float] | None, option(negative_iterable="")] = None
-    """Angular momentum about the centre of mass, inertial axes, in kg m^2/s; default: fitted to a recorded base, else
-    zero. For example `--momentum 0 0 0.02`."""
-    rate: Annotated[tuple[str, ...], option(several=True)] = ()
+    """Angular momentum about the centre of mass, inertial axes, in kg m^2/s; default: by --rate, or fitted to a
+    recorded base, else zero. For example `--momentum 0 0 0.02`."""
+    rate: Annotated[tuple[str, ...], rare(several=True)] = ()
     """Angular velocity of the base at the start instead of --momentum, base axes, in rad/s or with a unit; for example
     `--rate 0 0 0.01` or `--rate "0 0 2 deg/s"`."""
     rate_time: Annotated[float | None, rare()] = None

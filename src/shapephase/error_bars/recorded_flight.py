@@ -110,8 +110,8 @@ def motion_from_recording(
     deformation = articulated(body, recorded.path, rotors=rotors, rotor_speeds=speeds)
     attitudes, rates = recorded.base_attitude, recorded.base_rates
     given = momentum is not None or rate is not None
-    is_turning = turns(attitudes) or (rates is not None and bool(rates.any()))
-    if not given and (recorded.flight is not None or is_turning) and (attitudes is not None or rates is not None):
+    is_turning = turns(attitudes) if attitudes is not None else rates is not None and bool(rates.any())
+    if not given and (is_turning or (recorded.flight is not None and (attitudes is not None or rates is not None))):
         if attitude is not None and attitudes is not None:
             raise ShapeError(
                 "the attitude at the start is fitted to the recorded base, with the momentum; leave it out "
