@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ...errors import ShapeError
@@ -13,7 +12,6 @@ from .constraints import JointOptions
 from .goals import GoalOptions
 
 if TYPE_CHECKING:
-    from ...optimal_control.plan_options import Goal
     from ..motion import LoadedMotion
 
 _TOLERANCE = 1e-11  # [rad] of the recording's attitude: plans reach their goal to 1e-8
@@ -56,8 +54,8 @@ def undone(
 
 def matched(
     body: str, text: str, start: StartOptions, recording: RecordingOptions, floating: BodyOptions
-) -> tuple[Goal, dict[str, Any]]:
-    """Return the goal of --match in base axes at the start, and the arguments `end` and `momentum` of the plan."""
+) -> dict[str, Any]:
+    """Return the arguments of a plan for --match: goal and momentum in base axes at the start, and the posture."""
     import numpy as np
 
     from ... import so3
@@ -67,13 +65,17 @@ def matched(
     file, timed, at = (text, "", "") if os.path.exists(text) else text.rpartition("@")
     if not timed:
         file = text
-    flown = motions.flight(body, file, replace(START_DEFAULTS), recording, _TOLERANCE, floating=floating)
+    flown = motions.flight(body, file, START_DEFAULTS, recording, _TOLERANCE, floating=floating)
     time = _time(at, flown.motion.duration) if timed else flown.motion.duration
     attitude = np.eye(3) if start.attitude is None else so3.quat_argument(start.attitude, "attitude")
     momentum = np.zeros(3) if start.momentum is None else np.array(start.momentum)
     back = so3.transpose(attitude)
     goal = Goal(rotation=back @ flown.motion.attitude(time))
-    return goal, {"end": flown.motion.deformation.description.path.shape(time), "momentum": so3.apply(back, momentum)}
+    return {
+        "goal": goal,
+        "end": flown.path.matched(flown.body.joint_names, flown.body.name).shape(time),
+        "momentum": so3.apply(back, momentum),
+    }
 
 
 def _time(text: str, duration: float) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 
 from cyclopts import Parameter
 
@@ -36,6 +36,10 @@ from .search import SearchOptions, running_search
 
 if TYPE_CHECKING:
     from ...optimal_control.plan import Plan
+    from ...optimal_control.way_back import Undo
+    from ...reconstruction.reconstruction import Motion
+    from ...shape_space.shape_path import ShapePath
+    from ..motion import LoadedMotion
 
 _CODES = {
     "found": ExitCode.DONE,
@@ -96,17 +100,7 @@ def plan_command(
     from ...optimal_control.way_back import undo
     from ...shape_space.files.write import write_shape_path
     from ..texts.error_bar_text import error_bar_data, error_bars
-    from ..texts.plan_text import (
-        end_bar_lines,
-        plan_comment,
-        plan_data,
-        plan_lines,
-        plan_purpose,
-        undo_data,
-        undo_lines,
-        undo_purpose,
-    )
-    from ..texts.recording_text import recording_data
+    from ..texts.plan_text import end_bar_lines
     from .from_motion import check_needed, matched, undone
 
     target, settings = goal.goal(), searching.search()
@@ -116,20 +110,17 @@ def plan_command(
     aside = any([check_writable(out, "--out", ".csv"), check_writable(html, "--html", ".html")])
     with steps(3 if html else 2) as work:
         work.begin("loading")
-        loaded = load_body(body, **floating.loading)
+        loaded, flown = load_body(body, **floating.loading), None
         within, arguments = limits.limits(loaded), joints.arguments(loaded)
-        flown, ways, plan = None, None, None
         if goal.undo is not None:
             flown = undone(body, goal.undo, start, recording, floating, joints, rates_at_ends)
-            loaded = flown.body
         elif goal.match is not None:
-            target, more = matched(body, goal.match, start, recording, floating)
-            arguments |= more
+            arguments |= matched(body, goal.match, start, recording, floating)
         else:
-            arguments["momentum"] = (0.0, 0.0, 0.0) if start.momentum is None else start.momentum
+            arguments |= {"goal": target, "momentum": (0.0, 0.0, 0.0) if start.momentum is None else start.momentum}
         work.begin("searching")
         with running_search(searching, work) as (search, executor):
-            shared = {
+            shared: dict[str, Any] = {
                 "cost": cost,
                 "limits": within,
                 "search": settings,
@@ -138,46 +129,68 @@ def plan_command(
             }
             try:
                 if flown is not None:
-                    moving = {name: arguments[name] for name in ("joints", "symmetric")}
-                    ways = undo(flown.motion, duration=duration, **shared, **moving)
+                    shared |= {name: arguments[name] for name in ("joints", "symmetric")}
+                    result = _undone(flown, undo(flown.motion, duration=duration, **shared))
                 else:
-                    length = 1.0 if duration is None else duration
-                    plan = plan_reorientation(
-                        loaded, target, duration=length, rates_at_ends=rates_at_ends, **shared, **arguments
-                    )
+                    shared |= {"duration": 1.0 if duration is None else duration, "rates_at_ends": rates_at_ends}
+                    result = _planned(plan_reorientation(loaded, **shared, **arguments))
             except PlanNotFound as failure:
                 if failure.best is None:
                     raise
-                plan = cast("Plan", failure.best)
+                result = _planned(cast("Plan", failure.best))
                 warnings.warn(str(failure), stacklevel=2)
-        shown = plan if ways is None else ways.best
-        bars = error_bars(shown.motion, errors, None)
-        purpose = plan_purpose(plan) if ways is None else undo_purpose(ways)
-        comment = plan_comment(loaded, plan) if ways is None else f"shapephase plan, {loaded.name}: {purpose}"
-        write_file(out, lambda file: write_shape_path(shown.path, file, comment=comment))
+        bars = error_bars(result.motion, errors, None)
+        write_file(out, lambda file: write_shape_path(result.path, file, comment=result.comment))
         if html is not None:
             work.begin("making the report")
             from ...phases.phases import split
             from ...plots.report_page import report
 
             page = report(
-                shown.motion,
-                split(shown.motion),
-                shape_path=shown.path,
+                result.motion,
+                split(result.motion),
+                shape_path=result.path,
                 title=f"{loaded.name} turns itself",
-                purpose=purpose,
+                purpose=result.purpose,
                 progress=work.watch,
             )
             write_file(html, page.write)
-    if ways is None:
-        lines, data, code = plan_lines(loaded, plan), plan_data(loaded, plan), _CODES[plan.status]
-    else:
-        lines, data = undo_lines(loaded, flown, ways), undo_data(loaded, ways) | recording_data(flown.recorded)
-        code = ExitCode.DONE if ways.status == "not found" else _CODES[ways.status]
     return Outcome(
-        "\n".join([*lines, *end_bar_lines(bars)]),
-        data | error_bar_data(bars),
-        code=code,
+        "\n".join([*result.lines, *end_bar_lines(bars)]),
+        result.data | error_bar_data(bars),
+        code=result.code,
         aside=aside,
-        made_from=shown.motion.deformation.made_from,
+        made_from=result.motion.deformation.made_from,
     )
+
+
+class _Result(NamedTuple):
+    """Motion of the joints that the command found, and what is printed and written of it."""
+
+    motion: Motion
+    path: ShapePath
+    lines: list[str]
+    data: dict[str, Any]
+    purpose: str
+    comment: str
+    code: ExitCode
+
+
+def _planned(plan: Plan) -> _Result:
+    from ..texts.plan_text import plan_comment, plan_data, plan_lines, plan_purpose
+
+    body, code = plan.body, _CODES[plan.status]
+    lines, comment = plan_lines(body, plan), plan_comment(body, plan)
+    return _Result(plan.motion, plan.path, lines, plan_data(body, plan), plan_purpose(plan), comment, code)
+
+
+def _undone(flown: LoadedMotion, ways: Undo) -> _Result:
+    """Return the best way back; one played backwards is a result, too, where the search found none."""
+    from ..texts.plan_text import undo_data, undo_lines, undo_purpose
+    from ..texts.recording_text import recording_data
+
+    best, purpose = ways.best, undo_purpose(ways)
+    data = undo_data(flown.body, ways) | recording_data(flown.recorded)
+    comment = f"shapephase plan, {flown.body.name}: {purpose}"
+    code = ExitCode.DONE if ways.status == "not found" else _CODES[ways.status]
+    return _Result(best.motion, best.path, undo_lines(flown, ways), data, purpose, comment, code)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,7 +52,7 @@ def plan_lines(body: Body, plan: Plan) -> list[str]:
     ]
 
 
-def plan_data(body: Body, plan: Plan) -> dict[str, object]:
+def plan_data(body: Body, plan: Plan) -> dict[str, Any]:
     """Return a plan for programs."""
     return {
         "body": body.name,
@@ -78,9 +78,9 @@ def plan_data(body: Body, plan: Plan) -> dict[str, object]:
     }
 
 
-def undo_lines(body: Body, flown: LoadedMotion, ways: Undo) -> list[str]:
+def undo_lines(flown: LoadedMotion, ways: Undo) -> list[str]:
     """Return the table of the ways back from a recording: played backwards, and planned."""
-    shown = [way for way in (ways.backwards, ways.plan) if way is not None]
+    body, shown = flown.body, [way for way in (ways.backwards, ways.plan) if way is not None]
     momentum, best = " ".join(f"{value + 0.0:g}" for value in flown.motion.momentum), ways.best
     fastest = [_fastest(body, way) for way in shown]
     rows = [
@@ -116,7 +116,7 @@ def undo_lines(body: Body, flown: LoadedMotion, ways: Undo) -> list[str]:
     return lines
 
 
-def undo_data(body: Body, ways: Undo) -> dict[str, object]:
+def undo_data(body: Body, ways: Undo) -> dict[str, Any]:
     """Return the ways back for programs."""
     shown = {way.name: way for way in (ways.backwards, ways.plan) if way is not None}
     back = {

@@ -187,7 +187,8 @@ def guess_of_path(task: Reorientation, basis: SplineBasis, path: ShapePath) -> G
     if task.body.ball_joints:
         return None
     away = route.shape(PLACES * route.duration) - task.offset
-    return guess_of(task, basis, np.linalg.lstsq(task.coupling, away.T, rcond=None)[0].T)
+    curve = np.asarray(np.linalg.lstsq(task.coupling, away.T, rcond=None)[0].T, dtype=np.float64)
+    return guess_of(task, basis, curve)
 
 
 def guess_of_control(
