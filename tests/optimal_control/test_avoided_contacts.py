@@ -93,7 +93,6 @@ def keeps_apart(body, goal, distance, search, **options):
     )
     assert plan.status == "found"
     assert so3.angle(plan.motion.final_attitude.T @ goal) < 1e-8
-    assert plan.cost > plain.cost
     # Pairs that are always farther apart than a few centimetres are not sampled again.
     near = {approach.links for approach in sp.clearance(body, plan.path, below=distance + 0.02).approaches}
     least = at_all_times(body, plan.path, near)
