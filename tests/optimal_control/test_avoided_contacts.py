@@ -12,6 +12,7 @@ from shapephase import so3
 from shapephase.cli.main import main
 from shapephase.errors import PlanNotFound, ShapePhaseError, TrajectoryError
 from shapephase.optimal_control import Limits, Search, Waypoint
+from shapephase.optimal_control._plan_limits import Margins
 from shapephase.optimal_control._spline_basis import SplineBasis
 from shapephase.optimal_control.collocation import CollocationProgram
 from shapephase.optimal_control.task import reorientation
@@ -44,10 +45,11 @@ def gymnast(load_urdf):
 def test_a_program_has_the_derivatives_of_its_distances(gymnast, rng):
     """Jacobian and Hessian of two pairs at all nodes against differences of rows and of gradients."""
     task = reorientation(gymnast, so3.exp(np.array([1.0, 0.0, 0.0])), limits=Limits(clearance=0.01))
-    basis, margins = SplineBasis(6), {("trunk", "left"): 1e-5, ("left", "right"): 1e-5}
-    assert set(margins) <= set(task.geometry.pairs)
+    basis, pairs = SplineBasis(6), [("trunk", "left"), ("left", "right")]
+    margins = Margins(dict.fromkeys(pairs, 1e-5), 4)
     with_rows, without = CollocationProgram(task, basis, margins), CollocationProgram(task, basis)
-    count = 2 * len(with_rows.places)
+    places, _ = basis.gauss(4)
+    count = 2 * len(places)
     at, way = rng.normal(scale=0.3, size=(2, with_rows.program["x"].shape[0]))
     at[task.dimension * basis.dimension] = 1.0
     weights = np.zeros(with_rows.program["g"].shape[0])
@@ -61,9 +63,9 @@ def test_a_program_has_the_derivatives_of_its_distances(gymnast, rng):
     (ahead, steeper), (behind, flatter) = (rows_and_slopes(at + s * step * way) for s in (1.0, -1.0))
     rows, jacobian = rows_and_slopes(at)
     np.testing.assert_allclose(jacobian @ way, (ahead - behind) / (2.0 * step), atol=1e-8)
-    shapes = task.shapes(basis.matrix(with_rows.places) @ at[: task.dimension * basis.dimension].reshape(-1, 3))
+    shapes = task.shapes(basis.matrix(places) @ at[: task.dimension * basis.dimension].reshape(-1, 3))
     distances = sp.body.link_distances(task.body, shapes)
-    chosen = [distances.pairs.index(pair) for pair in task.geometry.pairs if pair in margins]
+    chosen = [distances.pairs.index(pair) for pair in task.geometry.pairs if pair in pairs]
     np.testing.assert_allclose(rows, distances.distance[:, chosen].ravel(), atol=1e-12)
     upper, bare = (
         np.array(program.derivatives["hess_lag"](at, [], 0.0, weights[: program.program["g"].shape[0]]))
@@ -91,7 +93,6 @@ def keeps_apart(body, goal, distance, search, **options):
     )
     assert plan.status == "found"
     assert so3.angle(plan.motion.final_attitude.T @ goal) < 1e-8
-    assert plan.cost > plain.cost
     # Pairs that are always farther apart than a few centimetres are not sampled again.
     near = {approach.links for approach in sp.clearance(body, plan.path, below=distance + 0.02).approaches}
     least = at_all_times(body, plan.path, near)

@@ -63,16 +63,31 @@ def test_a_flick_between_samples_is_not_missed(scissors, at):
     assert approach.distance == pytest.approx(2.0 * np.sin(0.15) - 0.2, abs=1e-9)
 
 
-def test_ends_of_a_path_and_joints_that_slide_count(load_urdf):
-    """A ball on a rail that slides out for 2 m and turns: its reach about the hinge grows with the slide."""
+@pytest.fixture
+def crane(load_urdf):
+    """A ball on a rail that turns about z, and a ball of the base 2 m along y."""
     links = [with_ball("base", place=(0.0, 2.0, 0.0)), link("arm", 1.0, [0.1, 0.1, 0.1]), with_ball("car")]
     hinge, rail = joint("hinge", "continuous", "base", "arm"), joint("rail", "prismatic", "arm", "car", (1, 0, 0))
-    body = load_urdf(urdf(*links, hinge, rail))
+    return load_urdf(urdf(*links, hinge, rail))
+
+
+def test_a_path_may_come_nearest_at_its_end(crane):
     path = sp.ShapePath.spline(np.linspace(0.0, 1.0, 9), np.outer(np.linspace(0.0, 1.0, 9), [1.4, 2.0]))
-    (approach,) = sp.clearance(body, path).approaches
+    (approach,) = sp.clearance(crane, path).approaches
     end = 2.0 * np.array([np.cos(1.4), np.sin(1.4)])
     assert approach.time == 1.0
     assert approach.distance == pytest.approx(np.linalg.norm(end - [0.0, 2.0]) - 0.2, abs=1e-9)
+
+
+def test_the_reach_of_a_link_grows_with_its_slide(crane):
+    """Far out on the rail small turns are fast; a pair a millimetre below the distance is listed."""
+    swing = 0.4 * np.array([np.cos(0.26 * np.pi), np.sin(0.26 * np.pi)])
+    path = sp.ShapePath.fourier([1.0, 5.0], [[swing[0]], [0.0]], [[swing[1]], [0.0]], duration=1.0)
+    least = np.linalg.norm(5.0 * np.array([np.cos(1.4), np.sin(1.4)]) - [0.0, 2.0]) - 0.2
+    assert sp.clearance(crane, path, below=least - 1e-3).approaches == ()
+    (approach,) = sp.clearance(crane, path, below=least + 1e-3).approaches
+    assert approach.time == pytest.approx(0.13, abs=1e-6)
+    assert approach.distance == pytest.approx(least, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", ["cat", "satellite"])

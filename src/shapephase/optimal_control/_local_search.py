@@ -62,6 +62,12 @@ class Attempt:
         return not self.report.converged, not self.reaches_goal, self.cost if self.reaches_goal else self.goal_error
 
     @property
+    def touches(self) -> bool:
+        """True where links come nearer than the clearance."""
+        least = self.task.clearance
+        return least is not None and any(near.distance < least for near in self.closest)
+
+    @property
     def goal_error(self) -> float:
         """Goal error of the corrected path [rad]."""
         return np.inf if self.polished is None else self.polished.goal_error
@@ -102,7 +108,7 @@ class LocalSearch:
         best, control = self._on(self.program, guess, callback)
         for _ in range(self.halvings):
             solved = best.report.status in GOOD_STATUS
-            if not solved or best.reaches_goal:
+            if best.reaches_goal or not (solved or best.touches):
                 break
             finer = SplineBasis(2 * best.basis.pieces)
             onward = guess_of(self.task, finer, best.basis.matrix(PLACES) @ control)
@@ -128,7 +134,7 @@ class LocalSearch:
             "iteration_callback": callback,
             "settles": self.settles,
             "room": None,
-            "margins": {},
+            "margins": Margins({}, STAGES),
         }
         rounds = 0
         while True:
@@ -142,7 +148,7 @@ class LocalSearch:
             if tighter is None or again is None:
                 break
             room, margins = tighter
-            if set(margins) != set(options["margins"]):
+            if not margins.same_rows(options["margins"]):
                 program = CollocationProgram(task, basis, margins)
             options |= {"room": room, "margins": margins, "via_places": solution.via_places}
             control, duration, attitudes = solution.control, solution.duration, guessed_attitudes(task, again)
@@ -159,8 +165,8 @@ def _tightened(
         shares = effort_shares(task, basis, attempt.polished.motion)
         if shares.max() > 1.0 + LIMIT_SLACK:
             room, tighter = tightened(room, shares, STAGES, rounds), True
-    if task.clearance is not None and attempt.closest and attempt.closest[0].distance < task.clearance:
-        margins, tighter = widened(margins, attempt.closest, task.clearance), True
+    if attempt.touches:
+        margins, tighter = widened(margins, attempt.closest, task.clearance or 0.0), True
     return (room, margins) if tighter else None
 
 
@@ -173,7 +179,6 @@ def corrected_attempt(task: Reorientation, basis: SplineBasis, solution: NlpSolu
         cost = _cost(task, basis, polished)
         closest = closest_links(task, polished.path)
         reaches_goal = polished.goal_error <= GOAL_TOLERANCE and _within_limits(task, basis, polished)
-        reaches_goal = reaches_goal and (not closest or closest[0].distance >= (task.clearance or 0.0))
     report = Start(
         status=solution.status,
         converged=solution.converged and reaches_goal,
@@ -185,7 +190,10 @@ def corrected_attempt(task: Reorientation, basis: SplineBasis, solution: NlpSolu
         seconds=time.perf_counter() - began,
         second_order=solution.second_order,
     )
-    return Attempt(task, report, polished, cost, reaches_goal, basis, closest)
+    attempt = Attempt(task, report, polished, cost, reaches_goal, basis, closest)
+    if attempt.touches:
+        attempt = replace(attempt, report=replace(report, converged=False), reaches_goal=False)
+    return attempt
 
 
 def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> float:
@@ -240,11 +248,10 @@ def failure_message(task: Reorientation, attempts: Sequence[Attempt], best: Atte
         shares = limit_shares(best.task, best.basis, best.polished.control, best.polished.motion)
         near = [name for name, share in shares.items() if share > _NEARLY]
     more = "more iterations or starts (Search(starts=8), --starts 8)"
-    closest = best.closest if best is not None else ()
-    if closest and task.clearance is not None and closest[0].distance < task.clearance:
+    if best is not None and best.touches:
         way_out = (
-            f"links come nearer than the clearance of {task.clearance:g} m, {closest[0].text}: give a smaller distance "
-            f"(--avoid), more time or {more}"
+            f"links come nearer than the clearance of {task.clearance:g} m, {best.closest[0].text}: give a smaller "
+            f"distance (--avoid), more time or {more}"
         )
     elif task.cost == "time":
         way_out = f"it may take longer than {task.duration:.6g} s: give a longer duration (--duration), or {more}"

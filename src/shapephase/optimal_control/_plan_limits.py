@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,11 +24,27 @@ _MARGIN = 5e-5  # by which efforts are limited tighter than their excess asks fo
 _HASTE = 1.5  # exponent above 1, since peaks move to where there is more room: 4 % too much takes back 6 %
 _MOST_NAMED = 8  # joints in a warning
 _FIRST_MARGIN = 1e-5  # [m] that nodes keep beyond the clearance: what splines lose between them with 40 pieces
+_FINE_GAP = 1e-3  # [m] missing between nodes, beyond which there are more nodes
 _CLEARANCE_HASTE = 2.0  # factor by which margins exceed what is missing between nodes
 _NEAR = 1e-3  # [m] beyond the clearance, up to which pairs are watched at all times
 
-Margins = Mapping[tuple[str, str], float]
-"""Pairs of links whose distance a program bounds, and by how much its nodes keep them farther apart [m]."""
+
+@dataclass(frozen=True)
+class Margins:
+    """Pairs of links whose distance a program bounds.
+
+    Attributes
+    ----------
+    beyond : by how much the nodes keep each pair farther apart than the clearance [m]
+    nodes : number of Gauss nodes in a piece at which distances are bounded
+    """
+
+    beyond: Mapping[tuple[str, str], float]
+    nodes: int
+
+    def same_rows(self, other: Margins) -> bool:
+        """True where a program has the same rows."""
+        return (set(self.beyond), self.nodes) == (set(other.beyond), other.nodes)
 
 
 def derivative_shares(task: Reorientation, basis: SplineBasis, control: Array, duration: float) -> dict[str, float]:
@@ -109,13 +126,16 @@ def closest_links(task: Reorientation, path: ShapePath) -> tuple[ClosestApproach
 
 
 def widened(margins: Margins, closest: tuple[ClosestApproach, ...], least: float) -> Margins:
-    """Return margins with which pairs that came nearer than the clearance `least` [m] will keep it."""
+    """Return margins with which pairs that came nearer than the clearance `least` [m] will keep it.
+
+    What is missing between nodes is added to the nodes; where that is much, there are twice as many nodes.
+    """
     missing = {near.links: least - near.distance for near in closest if near.distance < least}
-    added = {
-        links: margins[links] + _CLEARANCE_HASTE * gap if links in margins else _FIRST_MARGIN
-        for links, gap in missing.items()
-    }
-    return {**margins, **added}
+    known = {links: gap for links, gap in missing.items() if links in margins.beyond}
+    added = {links: margins.beyond[links] + _CLEARANCE_HASTE * min(gap, _FINE_GAP) for links, gap in known.items()}
+    first = {links: _FIRST_MARGIN for links in missing if links not in known}
+    coarse = any(gap > _FINE_GAP for gap in known.values())
+    return Margins({**margins.beyond, **(margins.beyond if coarse else added), **first}, margins.nodes * (1 + coarse))
 
 
 def position_share(task: Reorientation, basis: SplineBasis, control: Array) -> dict[str, float]:

@@ -123,7 +123,7 @@ class CollocationProgram:
         effort_rows, effort_jacobian = (
             (casadi.MX(0, 1), casadi.MX(0, unknown.shape[0])) if efforts is None else (efforts.values, efforts.jacobian)
         )
-        distances = DistanceTerms(task, basis, self.places, margins, unknown) if margins else None
+        distances = DistanceTerms(task, basis, margins, unknown) if margins else None
         # Rows of no particular structure, which CasADi differentiates itself.
         others = casadi.vertcat(end, via, bends)
         groups = [linear @ unknown - from_turning @ casadi.vec(turning), others, effort_rows]

@@ -17,6 +17,7 @@ from ..body.collisions.distances import link_distances
 from ..body.collisions.geometry import CollisionGeometry, collision_geometry
 from ..body.couplings.coordinate_map import check_smooth
 from ..errors import ShapeError, TrajectoryError, unknown_name
+from ..shape_space.closest_approach import distance_text
 from ._ball_chart import BallChart
 from ._via_points import ViaPoint, check_follows, check_within, via_points
 from .plan_options import RATES_AT_ENDS, Goal, Limits, Waypoint, goal_argument
@@ -288,11 +289,10 @@ def _geometry(body: Body, limits: Limits, first: Array, last: Array | None) -> C
         distances = link_distances(body, shape, geometry=geometry).distance
         worst = int(np.argmin(distances)) if len(distances) else -1
         if worst >= 0 and distances[worst] < limits.clearance:
-            one, other = geometry.pairs[worst]
+            how = distance_text(geometry.pairs[worst], float(distances[worst]))
             raise TrajectoryError(
-                f"{name}: links {one} and {other} are {distances[worst]:.6g} m apart, nearer than the clearance of "
-                f"{limits.clearance:g} m: choose another posture, a smaller distance (--avoid), or leave the pair out "
-                "(--srdf)"
+                f"{name}: links {how}, nearer than the clearance of {limits.clearance:g} m: choose another posture, a "
+                "smaller distance (--avoid), or leave the pair out (--srdf)"
             )
     return geometry
 

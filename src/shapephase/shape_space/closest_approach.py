@@ -44,9 +44,7 @@ class ClosestApproach:
     @property
     def text(self) -> str:
         """The links, how near they come, and when."""
-        depth = self.distance < 0.0
-        how = f"overlap by {-self.distance:.6g} m" if depth else f"are {self.distance:.6g} m apart"
-        return f"{self.links[0]} and {self.links[1]} {how} at {self.time:.6g} s"
+        return f"{distance_text(self.links, self.distance)} at {self.time:.6g} s"
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +118,12 @@ def clearance(
         undecided = np.concatenate([undecided, undecided])
     approaches = [search.approach(pair) for pair in np.flatnonzero(search.least < below).tolist()]
     return Clearance(tuple(sorted(approaches, key=lambda approach: approach.distance)), known)
+
+
+def distance_text(links: tuple[str, str], distance: float) -> str:
+    """Return the names of links and how far they are apart, or how deep they overlap."""
+    how = f"overlap by {-distance:.6g} m" if distance < 0.0 else f"are {distance:.6g} m apart"
+    return f"{links[0]} and {links[1]} {how}"
 
 
 class _Search:

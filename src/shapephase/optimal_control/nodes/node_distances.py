@@ -25,18 +25,19 @@ class DistanceTerms:
     values, jacobian : expressions of the unknowns, (K N,) and its derivative: all distances at each of N places [m]
     """
 
-    def __init__(self, task: Reorientation, basis: SplineBasis, places: Array, margins: Margins, unknown: Any) -> None:
+    def __init__(self, task: Reorientation, basis: SplineBasis, margins: Margins, unknown: Any) -> None:
         import casadi
 
         assert task.geometry is not None
         assert task.clearance is not None
         self._geometry = geometry = task.geometry
-        numbers = [geometry.pairs.index(pair) for pair in margins]
+        numbers = [geometry.pairs.index(pair) for pair in margins.beyond]
         self._task, self._least, self._members = (
             task,
             task.clearance,
             np.flatnonzero(np.isin(geometry.members[1], numbers)),
         )
+        places, _ = basis.gauss(margins.nodes)
         m, count, kinds = task.dimension, len(places), len(self._members)
         sparse = scipy_sparse()
         shapes = sparse.kron(basis.matrix(places), sparse.eye(m))
@@ -53,7 +54,7 @@ class DistanceTerms:
     def bounds(self, margins: Margins) -> Array:
         """Least values of the rows: the clearance, and the margin of each pair: (K N,) [m]."""
         pairs = [self._geometry.pairs[number] for number in self._geometry.members[1][self._members].tolist()]
-        least = [self._least + margins[pair] for pair in pairs]
+        least = [self._least + margins.beyond[pair] for pair in pairs]
         return np.tile(least, self._at.shape[1])
 
     def hessian(self, multipliers: Any) -> Any:
