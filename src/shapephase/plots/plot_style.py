@@ -331,7 +331,7 @@ def degrees_first(ax: Any, label: str, *, radians: bool = True) -> None:
     if radians:
         ax.yaxis.tick_right()
         ax.yaxis.set_label_position("right")
-        label_ordinate(ax, "[rad]", largest)
+        label_ordinate(ax, f"{label} [rad]", largest)
     else:
         ax.tick_params(axis="y", left=False, labelleft=False)
         ax.set_ylabel("")
