@@ -115,6 +115,16 @@ def test_a_report_shows_each_figure_once(moving_report):
     assert [row.count("<figure") for row in re.findall(r'<div class="row">(.*?)</div>', page, re.DOTALL)] == [2, 3]
 
 
+def test_a_report_has_the_loop_of_a_path_that_closes(tmp_path):
+    body = sp.load_body("cat_two_halves")
+    opened_path = sp.ShapePath.waypoints([0.0, 1.0], [[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]], joint_names=body.joint_names)
+    for path, there in ((sp.examples.kane_scher(0.0, 0.5), True), (opened_path, False)):
+        motion = sp.reconstruct(sp.articulated(body, path), [0.0, 0.0, 0.01])
+        report(motion, sp.split(motion), shape_path=path).write(tmp_path / "report.html")
+        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert (FIGURES["loop"].caption in page) == there
+
+
 @pytest.mark.usefixtures("no_pictures")
 def test_somersault_tilt_and_twist_come_first_of_a_person(tmp_path):
     """The satellite of the test above has wings named left and right, but neither arms nor legs."""

@@ -460,7 +460,7 @@ def test_the_attitude_is_drawn_as_it_is(motions, name):
     for piece in drawn(ax, BLUE, 1.6):
         assert np.abs(np.diff(piece[:, 1])).max(initial=0.0) < 1.0
     assert labels(ax) == [r"$\theta_x$", r"$\theta_y$", r"$\theta_z$", r"$|\theta|$"]
-    assert [other.get_ylabel() for other in (ax, *ax.child_axes)] == ["[rad]", "rotation vector [deg]"]
+    assert [other.get_ylabel() for other in (ax, *ax.child_axes)] == ["rotation vector [rad]", "rotation vector [deg]"]
     ax = plots.plot_attitude(flat_axes(2.6), motion, "quaternion")
     quaternions = np.stack([by_label(ax, f"$q_{name}$") for name in "xyzw"], axis=-1)
     assert np.linalg.norm(quaternions, axis=-1) == pytest.approx(np.ones(len(quaternions)), abs=1e-14)

@@ -18,7 +18,7 @@ from ..body.couplings.coordinate_map import check_smooth
 from ..display import short_repr
 from ..errors import OpenPathError, ShapeError
 from ..letters import value_text
-from ..shape_space.body_path import check_closed, in_joint_order, route_along
+from ..shape_space.body_path import check_closed, route_along
 from ..shape_space.connection import curvature, horizontal_lift, mechanical_connection
 from ..shape_space.curvature_field import curvature_along
 from ..shape_space.shape_path import CLOSED, ShapePath
@@ -46,6 +46,7 @@ _AT_REST = 1e-9  # [rad or m] range of a joint that does not move
 _NO_TURN = 1e-6  # [rad] turns of less have no axis: whole turns are then about that of the flux
 _PANELS = 128  # of a loop, on which the flux is integrated by Gauss: 1e-7 rad for the motions of the library
 _RULES = ((3, 8), (4, 12))  # Gauss nodes along the loop and the rays; the difference of both is the error
+_MIDDLES = 256  # even times whose mean shape is the centre, as of `stokes_holonomy`
 _MANY = 512  # panels, as of recordings: they are so short that two nodes less along the loop give as much
 _ARROWS = 11  # of the vector field along each axis
 _POSTURE = 0.45  # [in] height of a posture
@@ -114,17 +115,18 @@ def loop_flux(body: Body, path: ShapePath, joints: Sequence[str | int] | str | N
         raise OpenPathError(
             f"joint {body.joint_names[turned[0]]} ends whole turns from its start: no cone spans a loop"
         )
+    shapes = route.shape(style.even_times(route, None))
+    centre = route.shape((np.arange(_MIDDLES) + 0.5) / _MIDDLES * route.duration / route.loops).mean(axis=0)
+    names, units, directions = _drawn_axes(body, shapes, centre, joints)
     lift = horizontal_lift(body, route)
     edges = np.union1d(route.breaks, np.linspace(0.0, route.duration, _PANELS * route.loops + 1))
-    shapes = route.shape(style.even_times(route, None))
-    centre = 0.5 * (shapes[1:] + shapes[:-1]).mean(axis=0)
-    names, units, directions = _drawn_axes(body, shapes, centre, joints)
     whole, plane = (_flux(body, route, edges, centre, onto) for onto in (None, directions))
     vector = so3.log(lift.end)
+    # A vector that is not zero, where there is neither a turn nor a flux.
     axis = so3.normalised(vector if np.linalg.norm(vector) > _NO_TURN else whole[0] + _NO_TURN)
     vector = vector + 2.0 * np.pi * np.round((whole[0] - vector) @ axis / (2.0 * np.pi)) * axis
     error = max(whole[1], plane[1], lift.error_estimate)
-    points = (shapes - centre * (units[0] == "principal")) @ directions.T
+    points = (shapes - centre * (units[0] == PRINCIPAL)) @ directions.T
     return LoopFlux(names, units, centre, directions, points, plane[0], whole[0], vector, error)
 
 
@@ -245,27 +247,18 @@ def enclosing_pair(body: Body, shapes: Array) -> list[int]:
     return pair if pair[0] != pair[1] else widest
 
 
-def has_loop(body: Body, path: ShapePath) -> bool:
-    """True where a path closes, and two of its joints move, so that `plot_loop` can draw it."""
-    route = in_joint_order(body, path)
-    usable = [unit in ("rad", "m") for unit in body.joint_units]
-    moves = np.ptp(route.shape(style.even_times(route, None)), axis=0)[usable] > _AT_REST
-    return bool(np.abs(route.gap).max(initial=0.0) <= CLOSED and moves.sum() > 1)
-
-
 def _drawn_axes(
     body: Body, shapes: Array, centre: Array, joints: Sequence[str | int] | str | None
 ) -> tuple[tuple[str, ...], tuple[str, ...], Array]:
     """Names, units and directions (k, n) of the axes of a figure."""
     usable = np.array([unit in ("rad", "m") for unit in body.joint_units])
+    places = enclosing_pair(body, shapes)
     if isinstance(joints, str) and joints == PRINCIPAL:
         _, _, directions = np.linalg.svd(np.where(usable, shapes - centre, 0.0), full_matrices=False)
-        return ("1st principal direction", "2nd principal direction"), ("principal",) * 2, directions[:2]
-    if joints is None:
-        places = enclosing_pair(body, shapes)
-    elif isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) not in (2, 3):
-        raise ShapeError(f'joints: two or three joints or "{PRINCIPAL}" are needed, got {value_text(joints)}')
-    else:
+        return ("1st principal direction", "2nd principal direction"), (PRINCIPAL,) * 2, directions[:2]
+    if joints is not None:
+        if isinstance(joints, str) or not isinstance(joints, Sequence | np.ndarray) or len(joints) not in (2, 3):
+            raise ShapeError(f'joints: two or three joints or "{PRINCIPAL}" are needed, got {value_text(joints)}')
         places = [joint_place(joint, body.joint_names) for joint in joints]
     names = tuple(body.joint_names[k] for k in places)
     if len({*names}) < len(names):
@@ -302,7 +295,7 @@ def _flux(body: Body, route: ShapePath, edges: Array, centre: Array, directions:
 def _draw_plane(ax: Any, body: Body, flux: LoopFlux, direction: Array | None, name: str) -> None:
     """Draw curvature, connection and loop in the plane of two joints."""
     rows = [row_around(points) for points in flux.points.T]
-    offset = 0.0 if flux.units[0] == "principal" else flux.centre @ flux.directions.T
+    offset = 0.0 if flux.units[0] == PRINCIPAL else flux.centre @ flux.directions.T
     start = flux.centre - offset @ flux.directions if np.ndim(offset) else flux.centre
 
     def shapes_at(first: Array, second: Array) -> Array:
@@ -311,7 +304,7 @@ def _draw_plane(ax: Any, body: Body, flux: LoopFlux, direction: Array | None, na
     shapes = shapes_at(*rows)
     one, other = (np.broadcast_to(d, shapes.shape).reshape(-1, body.n_shape) for d in flux.directions)
     field, _, _ = curvature_along(body, shapes.reshape(-1, body.n_shape), one, other)
-    units = ["rad" if unit == "principal" else unit for unit in flux.units]
+    units = ["rad" if unit == PRINCIPAL else unit for unit in flux.units]
     draw_map(ax, rows, field.reshape(*shapes.shape[:2], 3), direction, name, squared_unit(*units), "bottom")
     if direction is not None:
         step = [np.linspace(row[0], row[-1], 2 * _ARROWS + 1)[1::2] for row in rows]

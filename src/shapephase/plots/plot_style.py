@@ -52,6 +52,7 @@ SERIES: tuple[dict[str, Any], ...] = (
     {"color": PURPLE, "linestyle": (0, (3, 1.5, 1, 1.5, 1, 1.5)), "linewidth": 1.5},
 )
 """One style for each curve of a figure, the first three for x, y and z."""
+_NO_GLYPH = ("Glyph .* missing from", UserWarning)  # a letter that the font has not
 _SYMBOLS = "dejavuserif"  # in sans-serif I and l are the same bar
 _RESOLUTION = 300  # [dots per inch] of raster images: what journals ask for
 _EDGE = 0.05  # [widths and heights] between an inset and the axes' edge or the next line
@@ -111,7 +112,7 @@ def axes_image(ax: Any, ending: str) -> bytes:
     stream = BytesIO()
     # In one piece, a curve that crosses itself very often is more than the rasterizer holds.
     # And a letter that the font has not is an empty frame in the figure.
-    with quiet("Glyph .* missing from", UserWarning), rc_context({"agg.path.chunksize": _RASTER_PIECE}):
+    with quiet(*_NO_GLYPH), rc_context({"agg.path.chunksize": _RASTER_PIECE}):
         ax.figure.savefig(stream, format=ending, dpi=_RESOLUTION, metadata=stamp)
     return stream.getvalue()
 
@@ -223,12 +224,12 @@ def finish(ax: Any, **place: Any) -> Any:
         legend = ax.legend(**settings)
         legend.get_title().set_multialignment("center")
         with_symbols(ax)
-        title = legend.get_title().get_window_extent().width
+        title = _extent(legend.get_title()).width
         if title > room:
             lines = settings["title"].split("\n")
             longest = int(max(map(len, lines)) * room / title)
             settings["title"] = "\n".join(part for line in lines for part in wrap(line, longest))
-        elif legend.get_window_extent().width > room and settings["ncols"] > 1:
+        elif _extent(legend).width > room and settings["ncols"] > 1:
             settings["ncols"] -= 1
         else:
             return legend
@@ -256,7 +257,7 @@ def finish_below(ax: Any, **place: Any) -> Any:
     legend.set_in_layout(False)
     width, height = panel_size(ax)
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
-    needed = _LEGEND_GAP + legend.get_window_extent().height / ax.figure.dpi
+    needed = _LEGEND_GAP + _extent(legend).height / ax.figure.dpi
     scale = max((right - left) / width, (top - bottom) / max(height - needed, _LEAST_PICTURE))
     ax.set_ylim(bottom - needed * scale, top)
     return legend
@@ -330,7 +331,7 @@ def degrees_first(ax: Any, label: str, *, radians: bool = True) -> None:
     if radians:
         ax.yaxis.tick_right()
         ax.yaxis.set_label_position("right")
-        label_ordinate(ax, "[rad]", largest)
+        label_ordinate(ax, f"{label} [rad]", largest)
     else:
         ax.tick_params(axis="y", left=False, labelleft=False)
         ax.set_ylabel("")
@@ -367,6 +368,13 @@ def inset_where_free(ax: Any, extent: tuple[float, float], room: tuple[float, fl
             place = (across + room[0] + 0.5 * _EDGE, up + room[1] + 0.5 * _EDGE)
             return ax.inset_axes((*place, *extent))
     return None
+
+
+def _extent(artist: Any) -> Any:
+    """Box of a text or a legend [pixels]."""
+    # A letter that the font has not is as wide as its empty frame.
+    with quiet(*_NO_GLYPH):
+        return artist.get_window_extent()
 
 
 def _check_matplotlib() -> None:

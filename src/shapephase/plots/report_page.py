@@ -9,7 +9,7 @@ from typing import Any
 from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
-from ..errors import RunStopped
+from ..errors import RunStopped, ShapePhaseError
 from ..phases.phases import PhaseSplit
 from ..reconstruction.reconstruction import Motion
 from ..run_progress import ProgressCallback, check_progress
@@ -27,7 +27,6 @@ from ._report_text import (
     story,
     torque_words,
 )
-from .loop_plots import has_loop
 from .named_figures import FIGURES, figure_image
 from .page import Page
 from .pages.report_data import report_data
@@ -118,14 +117,18 @@ def report(
     kinds = [kind for kind in kinds if result.has_phase or not FIGURES[kind].with_momentum]
     kinds = [kind for kind in kinds if has_joints or not FIGURES[kind].with_path]
     kinds = [kind for kind in kinds if not (FIGURES[kind].of_change and is_rigid(motion))]
-    if scene.body is None or shape_path is None or not has_loop(scene.body, shape_path):
-        kinds = [kind for kind in kinds if not FIGURES[kind].of_loop]
     if scene.body is None or not _has_arms_or_legs(scene.body) or motion.counted_axes() is None:
         kinds = [kind for kind in kinds if not FIGURES[kind].of_athlete]
     figures = []
     for done, kind in enumerate(kinds, start=1):
         _report_to(progress, done / (len(kinds) + 1), f"drawing {kind.replace('_', ' ')}")
-        image = base64.b64encode(figure_image(kind, motion, shape_path, result.gauge)).decode()
+        try:
+            image = base64.b64encode(figure_image(kind, motion, shape_path, result.gauge)).decode()
+        except ShapePhaseError:
+            # The path is open, or its curvature cannot be integrated.
+            if not FIGURES[kind].of_loop:
+                raise
+            continue
         figures.append({"caption": FIGURES[kind].caption, "image": image})
     torques = [torque_words(motion, noise)] if scene.body is not None and scene.body.n_shape else []
     return page_from(
