@@ -25,7 +25,8 @@ _HASTE = 1.5  # exponent above 1, since peaks move to where there is more room: 
 _MOST_NAMED = 8  # joints in a warning
 _FIRST_MARGIN = 1e-5  # [m] that nodes keep beyond the clearance: what splines lose between them with 40 pieces
 _FINE_GAP = 1e-3  # [m] missing between nodes, beyond which there are more nodes
-_CLEARANCE_HASTE = 2.0  # factor by which margins exceed what is missing between nodes
+_MORE_NODES, _MOST_NODES = 4, 48  # factor and most of a piece: corners of boxes that pass fast need 48 on 12 pieces
+_CLEARANCE_HASTE = 1.5  # factor by which margins exceed what is missing between nodes
 _NEAR = 1e-3  # [m] beyond the clearance, up to which pairs are watched at all times
 
 
@@ -128,14 +129,15 @@ def closest_links(task: Reorientation, path: ShapePath) -> tuple[ClosestApproach
 def widened(margins: Margins, closest: tuple[ClosestApproach, ...], least: float) -> Margins:
     """Return margins with which pairs that came nearer than the clearance `least` [m] will keep it.
 
-    What is missing between nodes is added to the nodes; where that is much, there are twice as many nodes.
+    What is missing between nodes is added to the nodes; where that is much, there are more nodes first.
     """
     missing = {near.links: least - near.distance for near in closest if near.distance < least}
     known = {links: gap for links, gap in missing.items() if links in margins.beyond}
-    added = {links: margins.beyond[links] + _CLEARANCE_HASTE * min(gap, _FINE_GAP) for links, gap in known.items()}
     first = {links: _FIRST_MARGIN for links in missing if links not in known}
-    coarse = any(gap > _FINE_GAP for gap in known.values())
-    return Margins({**margins.beyond, **(margins.beyond if coarse else added), **first}, margins.nodes * (1 + coarse))
+    if margins.nodes < _MOST_NODES and any(gap > _FINE_GAP for gap in known.values()):
+        return Margins({**margins.beyond, **first}, _MORE_NODES * margins.nodes)
+    added = {links: margins.beyond[links] + _CLEARANCE_HASTE * gap for links, gap in known.items()}
+    return Margins({**margins.beyond, **added, **first}, margins.nodes)
 
 
 def position_share(task: Reorientation, basis: SplineBasis, control: Array) -> dict[str, float]:
