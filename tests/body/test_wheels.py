@@ -101,18 +101,23 @@ def test_a_wheel_in_a_rigid_body_is_the_closed_gyrostat(kind):
     assert apart(motion.attitude(times), closed) < 1e-8
 
 
-def test_what_is_left_of_the_link_can_exist_up_to_the_wheel_that_the_error_names():
-    cat = sp.load_body("cat_two_halves")
+def test_what_is_left_of_the_link_can_exist_up_to_the_wheel_that_the_error_names(tmp_path):
+    file = tmp_path / "body.urdf"
+    file.write_text(random_chain(3).urdf)
+    body = sp.load_body(file)
     with pytest.raises(ShapeError, match="can hold; up to") as refused:
-        cat.with_wheel(AXIS, 1.0)
+        body.with_wheel(AXIS, 1.0)
     largest = float(re.search(r"up to (\S+) kg", str(refused.value)).group(1))
     with pytest.raises(ShapeError, match="can hold"):
-        cat.with_wheel(AXIS, 1.001 * largest)
-    wheeled = cat.with_wheel(AXIS, 0.999 * largest)
-    for part in wheeled.moving_parts:
+        body.with_wheel(AXIS, 1.001 * largest)
+    base, *_, wheel = body.with_wheel(AXIS, 0.999 * largest).moving_parts
+    for part in (base, wheel):
         moments = np.linalg.eigvalsh(part.inertia)
         assert moments[2] <= (moments[0] + moments[1]) * (1.0 + 1e-12)
-        assert part.mass >= 0.0
+        assert part.mass > 0.0
+    # The largest leaves nothing of the second moment in some direction.
+    moments = np.linalg.eigvalsh(base.inertia)
+    assert moments[2] > 0.99 * (moments[0] + moments[1])
 
 
 def test_a_wheel_turns_on_a_body_with_ball_joints(tmp_path):

@@ -108,3 +108,16 @@ def test_the_table_names_each_part_and_what_depends_on_the_pace(body):
     turned = np.degrees(so3.angle(with_momentum.momentum_rotation))
     assert f"total momentum {turned:.6f}" in " ".join(str(with_momentum).split())
     assert "stored wheel momentum" in repr(with_momentum)
+
+
+@pytest.mark.full
+def test_a_minute_of_samples_is_split(body):
+    """More steps than a frame may add by turning fast: 6,001 samples, as a log at 100 Hz has them."""
+    times, loop = np.linspace(0.0, 60.0, 6001), loop_of(60.0)
+    path = sp.ShapePath.spline(times, loop.at(times)[0], joint_names=JOINTS)
+    smooth, sampled = (
+        sp.split(sp.reconstruct(sp.articulated(body, route, rotor_speeds={"j2": 0.1}), [0.0, 0.1, 0.2]))
+        for route in (fourier(loop), path)
+    )
+    assert apart(sampled.holonomy, smooth.holonomy) < 1e-9
+    assert float(sampled.montgomery_phase) == pytest.approx(float(smooth.montgomery_phase), abs=1e-8)

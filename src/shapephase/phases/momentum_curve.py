@@ -20,7 +20,7 @@ from ..integrator.stepped import SteppedRotation
 from ..letters import value_text
 from ..reconstruction.reconstruction import Motion
 
-_MOST_STEPS = 20_000  # along the motion, for memory and time: a frame that needs more is refused
+_MOST_STEPS = 20_000  # added to those of the motion, for memory and time: a frame that needs more is refused
 _HALVINGS = 30  # of a step that passes by the point opposite the reference, down to the resolution of times
 _SHARE = 0.2  # of the motion's error estimate: error allowed for integrals over its steps, which estimates include
 _SHARE_AT_TIMES = 5e-3  # of it, for phases in time
@@ -314,7 +314,7 @@ def _by_quadrature(curve: _Curve, edges: Array, goal: Array) -> CurvePieces:
         parts = (dynamic, slivers, missed, start, *(part[:, first] for part in in_body))
         done.append((left[~rough], *(part[:, ~rough] for part in parts)))
         count += int(rough.sum())
-        if count > _MOST_STEPS:
+        if rough.any() and count > len(edges) + _MOST_STEPS:
             raise GaugeError(f"the gauge's frame turns too fast to be followed near t = {left[rough][0]:.9g} s")
         at_end = at_end or tuple(part[:, -1:] for part in (corners, *in_body))
         left, middle, right = left[rough], 0.5 * (left + right)[rough], right[rough]
