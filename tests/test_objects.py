@@ -41,8 +41,9 @@ INNER = ("deformation.frames", "shape_space.body_path", "plots.plot_style", "opt
          "plots.loop_plots.draw_loop_flux", "plots.loop_plots.enclosing_pair",
          "optimal_control.extremals.hamiltonian.checked_metric",
          "optimal_control.extremals.hamiltonian.flow", "phases.error_estimates.by_parts",
-         "reconstruction.forced_motion.reconstruct_forced", "reconstruction.motion_record.write_motion_record",
-         "segments.direct_shares.articulated_parts", "segments.mirrored_motion",
+         "reconstruction.forced_motion.reconstruct_forced", "reconstruction.motion_record",
+         "segments.direct_shares.articulated_parts", "segments.direct_shares.rotors_of",
+         "segments.direct_shares.reduced_body", "segments.mirrored_motion",
          "optimal_control.extremals.hamiltonian.natural_scales")  # fmt: skip
 
 

@@ -124,7 +124,7 @@ def inputs_of(
     fit, together = None, None
     if isinstance(start, RecordedMomentum):
         fit, together = start, start.covariance
-        if not (
+        if isinstance(motion, ForcedMotion) or not (
             np.array_equal(fit.momentum, motion.momentum)
             and np.array_equal(fit.initial_attitude, motion.initial_attitude)
         ):
