@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from .. import so3
-from ..arguments import check_object, positive_argument
+from ..arguments import check_executor, check_mapping, check_object, names_argument, positive_argument
 from ..arrays import Array
 from ..deformation.deformation import articulated
 from ..display import Card, card_html, card_text, numbers
@@ -18,7 +18,7 @@ from ..dynamics.moving_body import needed_body_and_path
 from ..dynamics.torques import joint_torques
 from ..errors import PlanNotFound, ShapeError
 from ..reconstruction.reconstruction import Motion, reconstruct
-from ..run_progress import ProgressCallback
+from ..run_progress import ProgressCallback, check_progress
 from ..shape_space.shape_path import ShapePath
 from ._path_cost import motion_cost
 from ._plan_limits import LIMIT_SLACK, TIMES
@@ -177,8 +177,16 @@ def undo(
         )
     length = path.duration if duration is None else positive_argument(duration)
     back = path.reversed() if length == path.duration or tumbling else path.reversed().stretched(length / path.duration)
+    within, chosen = Limits() if limits is None else limits, Search() if search is None else search
+    check_object(within, "Limits", "limits")
+    check_object(chosen, "Search", "search")
+    check_executor(executor)
+    check_progress(progress)
+    if joints is not None:
+        names_argument(joints, "joints", "names of joints")
+    if symmetric is not None:
+        check_mapping(symmetric, "symmetric", "joint -> (joint that it follows, factor)")
     last, first = motion.final_attitude, motion.initial_attitude
-    within = Limits() if limits is None else limits
     goal = Goal(rotation=so3.transpose(last) @ first)
     options = {
         "momentum": so3.apply(so3.transpose(last), motion.momentum),
@@ -206,7 +214,6 @@ def undo(
         )
 
     backwards = way("backwards", back)
-    chosen = Search() if search is None else search
     if chosen.guess is None and not tumbling:
         chosen = replace(chosen, guess=back)
     try:
