@@ -29,6 +29,7 @@ _SHORTEST = 1e-3  # least duration as a share of the longest, cost "time": keeps
 _SETTLED_TOLERANCE = 1e-3  # scaled accuracy then
 _SETTLED_CHANGE = 3e-4  # relative change of the cost, during at least
 _SETTLED_ITERATIONS = 3  # iterations
+_NEAR_BARRIER = 1e-3  # first barrier of a search from a path whose links touch: adaptive ones left it for dear ones
 _UNBOUNDED = 1e10  # no bound, for IPOPT
 GOOD_STATUS = ("Solve_Succeeded", "Solved_To_Acceptable_Level")  # IPOPT's, for a local optimum
 _INTERRUPTED = "NonIpopt_Exception_Thrown"  # IPOPT's, after Ctrl-C within an iteration, which CasADi handles
@@ -264,11 +265,13 @@ class CollocationProgram:
         import casadi
 
         best = BestIterate(iteration_callback, self._goal_error)
+        barrier: dict[str, Any] = {"mu_strategy": "adaptive"}
         rows_low, rows_high = self._low.copy(), self._high.copy()
         if room is not None:
             rows_low[-room.size :], rows_high[-room.size :] = -room.ravel(), room.ravel()
         if self._distances is not None and margins:
             least = self._distances.bounds(margins)
+            barrier = {"mu_strategy": "monotone", "mu_init": _NEAR_BARRIER}
             rows_low, rows_high = np.append(rows_low, least), np.append(rows_high, np.full(len(least), np.inf))
         settled = {
             "acceptable_tol": _SETTLED_TOLERANCE,
@@ -287,7 +290,7 @@ class CollocationProgram:
             "nlp_scaling_method": "none",
             "bound_relax_factor": 0.0,
             "linear_solver": "mumps",
-            "mu_strategy": "adaptive",
+            **barrier,
             **(settled if settles else {}),
         }
         # The local name keeps it alive: CasADi does not.
