@@ -34,7 +34,7 @@ def check_command(
         str | None,
         option(
             "List pairs of links that come closer than this along the motion, in m or with a unit; the exit code is "
-            "then 4. Shapes are those of <collision>, else those that are drawn; meshes count as their convex hulls. "
+            "then 4. Shapes are those for collisions, else those that are drawn; meshes count as their convex hulls. "
             "For example `--clearance 0.02` or `--clearance 2cm`."
         ),
     ] = None,
