@@ -28,7 +28,8 @@ WRONG_OF_A_STUDY = {"body": ("str",), "motion": ("str", "builtin_function_or_met
 FUNCTIONS = ("Callable", "ProgressCallback", "Gauge", "Profile", "Meridian", "Stretch", "ClosedArcs", "Effort")
 # What may be given as well as what the example gives.
 ALSO_TAKEN = (("rigid_body.geodesics._andoyer_variables.andoyer_motion", "Motion"),
-              ("shape_space.connection.curvature", "Body"), ("segments.momentum.segment_momentum", "Motion"))  # fmt: skip
+              ("shape_space.connection.curvature", "Body"),
+              ("segments.momentum.segment_momentum", "Motion"))  # fmt: skip
 
 
 def faults(name: str) -> list[str]:
