@@ -65,6 +65,7 @@ def write_motion_record(motion: Motion, path: str | os.PathLike[str]) -> None:
         "breaks": deformation.breaks,
         "centre": _vector_coefficients(deformation.centre_of_mass, interpolant),
         **_samples(interpolant),
+        **_joints(motion),
     }
     if deformation.has_wheels:
         arrays["stored"] = _vector_coefficients(deformation.stored_momentum, interpolant)
@@ -78,7 +79,6 @@ def write_motion_record(motion: Motion, path: str | os.PathLike[str]) -> None:
         arrays.update(_steps(solution))
     if deformation.closure is not None:
         arrays["closure"] = deformation.closure
-    arrays.update(_joints(motion))
     write_whole(path, lambda stream: np.savez(stream, **arrays))
 
 
