@@ -21,7 +21,7 @@ from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import ProgressCallback, check_progress
 from ..shape_space.shape_path import ShapePath
 from ._path_cost import motion_cost
-from ._plan_limits import LIMIT_SLACK, TIMES
+from ._plan_limits import LIMIT_SLACK, TIMES, closest_links
 from ._polish import GOAL_TOLERANCE
 from .plan import COST_UNITS, Plan
 from .plan_options import Goal, Limits, Search
@@ -251,4 +251,7 @@ def _motion_shares(task: Reorientation, limits: Limits, motion: Motion, route: S
             shares[name] = float((np.abs(values[:, bounded]) / limit[bounded]).max())
     if task.efforts_limited:
         shares["effort"] = float(np.abs(joint_torques(motion, times).torque / task.effort_measure).max())
+    for nearest in closest_links(task, route)[:1]:
+        # Above 1 by the part of the distance that is missing, which may be all of it and more.
+        shares["clearance"] = 2.0 - nearest.distance / (task.clearance or nearest.distance)
     return shares
