@@ -176,7 +176,7 @@ class PseudoRigidMotion:
     momentum: Array
     """(3,) angular momentum, inertial axes, constant [kg m^2/s]."""
     error_estimate: float
-    """Of the attitude: the largest difference from a run with 32 times the tolerance [rad]."""
+    """Error of the attitude: its largest difference from a run with 32 times the tolerance [rad]."""
     _solution: OdeSolution = field(repr=False)
 
     __repr__ = short_repr
