@@ -89,7 +89,7 @@ def test_the_figure_ends_in_the_table_and_says_what_closes_the_curve(number):
     assert title.startswith(f"{gauge} gauge")
     gap, added = np.degrees([split.momentum_gap, split.closing_phase])
     assert (f"open by {gap:.2f}°; closing it adds {added:+.2f}°".replace("-", "−") in title) == (gap > 1.0)
-    assert [axis.get_ylabel() for axis in (ax, *ax.child_axes[:1])] == ["[rad]", "phase [deg]"]
+    assert [axis.get_ylabel() for axis in (ax, *ax.child_axes[:1])] == ["phase [rad]", "phase [deg]"]
 
 
 def test_what_closes_an_open_curve_is_said_in_words():

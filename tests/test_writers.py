@@ -21,6 +21,7 @@ from shapephase.cli.outcome import ExitCode
 from support.writing_process import AS_NOBODY, COMMANDS, WRITERS, WritingProcess, is_whole
 
 QUICK = ("split.npz",)
+READ = (("check", "--srdf"), ("plan", "--srdf"))  # files that are options, too
 AS_ROOT = pytest.mark.skipif(os.geteuid() != 0, reason="needs another user to write as")
 # Standard error is a file here, too, and has to hold its line [bytes].
 WHAT_IS_SAID = 512
@@ -105,7 +106,7 @@ def test_every_writer_of_the_command_line_is_tried():
             offered |= {(name, one.name) for one in arguments if "Path" in str(one.hint)}
     # A film takes a browser, too slow to be killed hundreds of times; its file goes the way of the others, as do the
     # two files of SPICE.
-    assert offered - {("view", "--video"), ("rigid", "--video"), ("export", "--ck")} == {
+    assert offered - {("view", "--video"), ("rigid", "--video"), ("export", "--ck"), *READ} == {
         (words[0], words[-1]) for words in COMMANDS.values()
     }
 

@@ -124,7 +124,9 @@ def test_what_is_no_store_or_file_of_a_study_is_named(call):
 def test_every_function_that_hands_keywords_on_names_one_that_it_does_not_have(tmp_path):
     """The fault names the function that was called and its arguments, not one inside that never heard of it."""
     motion = sp.reconstruct(sp.rigid(np.diag([1.0, 2.0, 2.5]), 1.0), [1.0, 0.0, 0.0])
+    pushed = sp.reconstruct(motion.deformation, [1.0, 0.0, 0.0], torque=lambda _: np.zeros(3))
     calls = {
+        "ForcedMotion.view": (pushed.view,),
         "Motion.to_dataframe": (motion.to_dataframe,),
         "Motion.to_xarray": (motion.to_xarray,),
         "Motion.view": (motion.view,),

@@ -93,6 +93,8 @@ class CollocationProgram:
     margins : pairs of links whose distance is bounded at the nodes
     """
 
+    _distances: DistanceTerms | None = None
+
     def __init__(self, task: Reorientation, basis: SplineBasis, margins: Margins | None = None) -> None:
         import casadi
 

@@ -163,7 +163,7 @@ def undo(
     >>> motion = sp.reconstruct(sp.articulated(cat, loop), [0.0, 0.0, 0.0])
     >>> back = sp.optimal_control.undo(motion, search=sp.optimal_control.Search(pieces=12))
     >>> back.best.name, back.backwards.undoes
-    ('plan', True)
+    ('backwards', True)
     """
     check_object(motion, "Motion", "motion")
     body, path = needed_body_and_path(motion, "a way back needs")

@@ -41,6 +41,8 @@ class ClosestApproach:
     time: float
     distance: float
 
+    __repr__ = short_repr
+
     @property
     def text(self) -> str:
         """The links, how near they come, and when."""

@@ -71,8 +71,8 @@ class LimitOptions:
     """Largest torque or force of every joint, in N m or N, or body for the limits that the body's file states; default:
     none. For example `--effort body`."""
     avoid: Annotated[str | None, option()] = None
-    """Keep the links at least this far apart, in m or with a unit; default: they may pass through each other. Shapes as
-    for `check --clearance`. For example `--avoid 0.02` or `--avoid 2cm`."""
+    """Least distance between links, in m or with a unit, as for `check --clearance`; default: they may pass through
+    each other. For example `--avoid 2cm`."""
     srdf: Annotated[Path | None, rare()] = None
     """Pairs of links that --avoid leaves out: an SRDF file; for example `--srdf robot.srdf`."""
 

@@ -34,7 +34,7 @@ class SearchOptions:
     workers: Annotated[int | None, option()] = None
     """Processes that search in parallel; default: 1. For example `--workers 4`."""
     time_limit: Annotated[float | None, option()] = None
-    """Longest time of the search, in s; the best result is written. For example `--time-limit 60`."""
+    """Longest search, in s; the best result is written. For example `--time-limit 60`."""
     seed: Annotated[int, rare()] = 0
     """Seed of the random guesses; for example `--seed 7`."""
     pieces: Annotated[int | None, rare()] = None
