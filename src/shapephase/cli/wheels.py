@@ -11,7 +11,7 @@ from ..body.body import Body
 from ..deformation.deformation import Deformation, articulated
 from ..deformation.rotors import Rotor, RotorDescription
 from ..errors import ShapeError, TrajectoryError
-from ..shape_space.files.labels import SPEEDS, speed
+from ..shape_space.files.labels import RPM, speed
 from ..shape_space.files.read import RecordedMotion
 from ..shape_space.shape_path import ShapePath
 from .options import WheelOptions
@@ -121,7 +121,7 @@ def wheel_lines(deformation: Deformation) -> list[str]:
 def _line(rotor: Rotor) -> str:
     known = rotor.record
     ends = np.atleast_1d(known["momentum_kg_m2_s" if rotor.is_momentum else "speed_rad_s"])
-    amounts = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (ends if rotor.is_momentum else ends / SPEEDS["rpm"])))
+    amounts = " to ".join(dict.fromkeys(f"{end:.6g}" for end in (ends if rotor.is_momentum else ends / RPM)))
     way = "given in time" if "in_time" in known else "kept, its motor off" if rotor.is_momentum else "held by its motor"
     unit = "kg m^2/s along its axle in space" if rotor.is_momentum else "rpm on its axle"
     return f"{rotor.joint}: {amounts} {unit}, {way}"

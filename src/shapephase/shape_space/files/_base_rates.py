@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple
@@ -12,14 +11,10 @@ import numpy as np
 from ... import so3
 from ...arrays import Array
 from ...errors import TrajectoryError
-from .labels import ANGLES, Label, check_range, rate_size
+from .labels import ANGLES, check_range, rate_label, rate_size
 from .recording import Recording
 
 RATE_NAMES = ("base_omega_x", "base_omega_y", "base_omega_z")
-_WITH_UNIT = (  # `gyro_x [deg/s]`, `gyro_x_dps`, `gyro_x_rad_s`
-    re.compile(r"(?P<name>.*\S)\s*[\[(](?P<unit>[^\[\]()]*)[\])]", re.DOTALL),
-    *(re.compile(rf"(?P<name>.+)[_ ](?P<unit>{unit})", re.DOTALL) for unit in (r"[^_ ]+", r"[^_ ]+_[^_ ]+")),
-)
 _FASTEST = 35.0  # [rad/s] 2,000 deg/s, the range of usual gyros
 _WINDOW = 0.3  # [rad] turns that are compared: 0.5 deg of noise at both ends are 4 % of it
 _SMALLEST = 0.05  # [rad] shorter turns are noise of attitudes or biases of gyros
@@ -56,15 +51,6 @@ class Reading(NamedTuple):
     rates: Array
     inverse: bool = False
     inertial: bool = False
-
-
-def rate_label(text: str) -> Label:
-    """Name and unit of a column of rates: `gyro_x [deg/s]`, `omega_x_rad_s` and `wx dps` have one, others None."""
-    for pattern in _WITH_UNIT:
-        match = pattern.fullmatch(text)
-        if match is not None and rate_size(match["unit"]) is not None:
-            return Label(match["name"], match["unit"].strip())
-    return Label(text, None)
 
 
 def in_rad_per_s(recording: Recording, columns: Sequence[tuple[str, str | None]], values: Array) -> BaseRates:

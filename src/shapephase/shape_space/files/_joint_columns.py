@@ -17,15 +17,14 @@ from ...body.body import Body
 from ...errors import ShapeError, TrajectoryError, UnknownColumnError, unknown_name
 from ...letters import value_text
 from ..interpolation import ball_columns, neighbours_signs
-from ._base_rates import rate_label
 from ._gaps import Gaps
 from .base_columns import HINT, KNOWN, BaseChoices, BaseColumns, BaseMotion, base_names
 from .labels import (
     ANGLES,
     LENGTHS,
     NO_UNIT,
+    RATE_UNITS,
     SI,
-    SPEEDS,
     Label,
     angle_unit,
     angles_in_rad,
@@ -37,8 +36,8 @@ from .labels import (
     label,
     other_unit,
     quantity,
-    speed_label,
-    speed_unit,
+    rate_label,
+    rate_size,
     warn_of_limits,
     warn_of_turns,
     wheel_hint,
@@ -152,7 +151,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
                 part is not None and not part[1] and base.take(text, _with_unit(part[0], target))
             )
             if not of_base:
-                rate = speed_label(target)
+                rate = rate_label(target)
                 if rate.unit is not None and rate.name in body.joint_names:
                     companions[rate.name] = text
                 elif part is not None and part[1]:
@@ -197,7 +196,7 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
             shapes[:, joint] = gaps.bridged([text], shapes[:, joint])
     speeds = np.empty((len(shapes), len(speed_columns)))
     for k, (text, unit) in enumerate(speed_columns.values()):
-        speeds[:, k] = SPEEDS[unit or "rad/s"] * gaps.bridged([text], gaps.held(table, text))
+        speeds[:, k] = (rate_size(unit or "rad/s") or 1.0) * gaps.bridged([text], gaps.held(table, text))
     warn_of_limits(shapes, body, recording)
     shapes = continued_balls(shapes, body, recording, gaps, labels)
     base_motion = base.motion(ignore_extra=choices.ignore_extra)
@@ -211,10 +210,10 @@ def matched(recording: Recording, body: Body, choices: JointChoices) -> tuple[Re
 def _speed_column(table: Table, wheel: str, column: str) -> Label:
     """Label and unit of a wheel's column of speeds. Raises UnknownColumnError, TrajectoryError without a unit."""
     name, _, behind = column.rpartition(":")
-    stated = speed_unit(behind) if name else None
+    stated = behind if name and rate_size(behind) is not None else None
     wanted = column if column in table.columns or stated is None else name
     found = [text for text in table.columns if text == wanted] or [
-        text for text in table.columns if speed_label(text).name == wanted
+        text for text in table.columns if rate_label(text).name == wanted
     ]
     if not found:
         raise unknown_name(
@@ -222,13 +221,14 @@ def _speed_column(table: Table, wheel: str, column: str) -> Label:
         )
     if len(found) > 1:
         raise TrajectoryError(f"{table.where}: {wanted!r} may be {' or '.join(map(repr, found))}; write it in full")
-    own = speed_label(found[0]).unit or speed_unit(table.units.get(found[0], ""))
+    beside = table.units.get(found[0], "")
+    own = rate_label(found[0]).unit or (beside if rate_size(beside) is not None else None)
     if own is None and stated is None:
         raise TrajectoryError(
-            f"{table.where}: column {found[0]!r} states no unit of speed; write one of {', '.join(SPEEDS)} behind it: "
+            f"{table.where}: column {found[0]!r} states no unit of speed; write one of {RATE_UNITS} behind it: "
             f"--rotor-speed '{wheel}={wanted}:rpm' (wheel_speeds={{{wheel!r}: '{wanted}:rpm'}})"
         )
-    if own is not None and stated not in (None, own):
+    if own is not None and stated is not None and rate_size(own) != rate_size(stated):
         raise TrajectoryError(f"{table.where}: column {found[0]!r} is in {own}, and {stated} was given")
     return Label(found[0], own or stated)
 

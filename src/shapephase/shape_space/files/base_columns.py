@@ -17,9 +17,9 @@ from ...body.link_tree import Joint
 from ...body.virtual_base import joint_coordinates, way_names, way_poses
 from ...errors import TrajectoryError
 from ...letters import value_text
-from ._base_rates import RATE_NAMES, BaseRates, agreeing, check_speed, in_rad_per_s, rate_label
+from ._base_rates import RATE_NAMES, BaseRates, agreeing, check_speed, in_rad_per_s
 from ._gaps import Gaps
-from .labels import NO_UNIT, Label, angles_in_rad, check_range, label, lengths_in_m
+from .labels import NO_UNIT, Label, angles_in_rad, check_range, label, lengths_in_m, rate_label
 from .recording import OFF_UNIT, Recording, checked_quaternions
 
 ESTIMATE = "estimate"  # axes of the base that a fit determines

@@ -17,7 +17,6 @@ from .recording import Recording, Table, listed, warn
 
 ANGLES = {"rad": 1.0, "deg": float(np.radians(1.0)), "mrad": 1e-3}  # unit -> size [rad]
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # unit -> size [m]
-SPEEDS = {"rad/s": 1.0, "deg/s": float(np.radians(1.0)), "rpm": 2.0 * float(np.pi) / 60.0}  # unit -> size [rad/s]
 IN_A_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}  # division keeps whole ms exact
 SI = "SI"  # unit of a column in rad or m, as its joint has it; written by `write_shape_path` where needed
 NO_UNIT = "1"  # of a quaternion's numbers
@@ -38,21 +37,19 @@ _SPELLINGS = {
 }
 _UNITS = {spelling: unit for unit, spellings in _SPELLINGS.items() for spelling in spellings}
 _RATE = re.compile(r"(?P<angle>[^\W\d_]+?|°)\s*(?:/\s*s(?:ec)?|[_ .*·]?s(?:ec)?\^?-1|_s)", re.I)
-_OTHER_RATES = {"dps": ANGLES["deg"], "rpm": np.pi / 30.0, "rev/min": np.pi / 30.0}  # unit -> size [rad/s]
+RPM = 2.0 * float(np.pi) / 60.0  # [rad/s]
+_OTHER_RATES = {
+    "dps": ANGLES["deg"],
+    **dict.fromkeys(("rpm", "rev/min", "r/min", "1/min"), RPM),
+}  # unit -> size [rad/s]
+RATE_UNITS = "rad/s, deg/s, rpm"  # for messages
 _BRACKETED = re.compile(r"(?P<name>.*\S)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))", re.DOTALL)
 # Any unit may follow an underscore; only whole words follow a blank or a point.
 _SUFFIXED = re.compile(r"(?P<name>.*[^\s_.])(?P<mark>[\s_.]|(?=°))(?P<unit>[^\W\d_]+|°)", re.DOTALL)
 _WORDS = {"rad", "deg", "ms"}
-_SPEED_UNITS = {
-    "°/s": "deg/s",
-    "rads^-1": "rad/s",
-    "degs^-1": "deg/s",
-    "rev/min": "rpm",
-    "r/min": "rpm",
-    "1/min": "rpm",
-}
-_SPEED = re.compile(
-    r"(?P<name>.*\S)(?:\s*\[(?P<square>[^\[\]]*)\]|\s*\((?P<round>[^()]*)\)|[_ ](?P<rest>\w+))", re.DOTALL
+_WITH_UNIT = (  # `gyro_x [deg/s]`, `gyro_x_dps`, `gyro_x_rad_s`
+    re.compile(r"(?P<name>.*\S)\s*[\[(](?P<unit>[^\[\]()]*)[\])]", re.DOTALL),
+    *(re.compile(rf"(?P<name>.+)[_ ](?P<unit>{unit})", re.DOTALL) for unit in (r"[^_ ]+", r"[^_ ]+_[^_ ]+")),
 )
 _NO_UNITS = ("", "-")  # in the brackets of columns without a unit
 _OTHER_UNIT = re.compile(  # units of rates, forces and other quantities beside a posture
@@ -111,18 +108,13 @@ def other_unit(text: str) -> str | None:
     return inside if _OTHER_UNIT.fullmatch(inside.strip()) else None
 
 
-def speed_unit(text: str) -> str | None:
-    """Unit of a speed about an axle by one of its spellings, or None."""
-    plain = re.sub(r"\s", "", text.lower())
-    unit = _SPEED_UNITS.get(plain, plain)
-    return unit if unit in SPEEDS else None
-
-
-def speed_label(text: str) -> Label:
-    """Name and unit of a column of speeds: `rw1 [rpm]`, `rw1 (rad/s)` and `rw1_rpm` are those of rw1."""
-    parts = _SPEED.fullmatch(text)
-    unit = None if parts is None else speed_unit(parts["square"] or parts["round"] or parts["rest"] or "")
-    return Label(text, None) if parts is None or unit is None else Label(parts["name"], unit)
+def rate_label(text: str) -> Label:
+    """Name and unit of a column of rates: `gyro_x [deg/s]`, `omega_x_rad_s` and `wx dps` have one, others None."""
+    for pattern in _WITH_UNIT:
+        match = pattern.fullmatch(text)
+        if match is not None and rate_size(match["unit"]) is not None:
+            return Label(match["name"], match["unit"].strip())
+    return Label(text, None)
 
 
 def speed(text: str, what: str) -> float | None:
@@ -134,10 +126,10 @@ def speed(text: str, what: str) -> float | None:
     if number is None:
         return None
     behind = text.strip()[number.end() :].strip()
-    unit = speed_unit(behind or "rad/s")
-    if unit is None:
-        raise TrajectoryError(f"{what}: {behind!r:.40} is no unit of speed; these are: {', '.join(SPEEDS)}")
-    return float(number[0]) * SPEEDS[unit]
+    size = rate_size(behind or "rad/s")
+    if size is None:
+        raise TrajectoryError(f"{what}: {behind!r:.40} is no unit of speed; these are: {RATE_UNITS}")
+    return float(number[0]) * size
 
 
 def is_counter(text: str) -> bool:
