@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 import shapephase as sp
 from shapephase import so3
 from shapephase.cli.main import main
+from shapephase.cli.texts.plan_text import undo_lines
 from shapephase.errors import PlanNotFound, ShapePhaseError, TrajectoryError
 from shapephase.optimal_control import Limits, Search, Waypoint
 from shapephase.optimal_control._plan_limits import Margins
@@ -81,6 +83,28 @@ def at_all_times(body, path, pairs):
     """The least distance of some pairs at 4,001 even times [m]."""
     distances = sp.body.link_distances(body, path.shape(np.linspace(0.0, path.duration, 4001)))
     return distances.distance[:, [distances.pairs.index(pair) for pair in pairs]].min(initial=np.inf)
+
+
+@pytest.mark.usefixtures("few_guesses")
+@pytest.mark.parametrize("swing", [-0.7, 0.7])
+def test_a_way_back_that_touches_is_not_within_its_limits(gymnast, swing):
+    """A recording whose arm goes through the trunk's ball, or away from it; the plan keeps apart in either case."""
+    shapes = [[0.0, 0.0, 0.0], [0.1, swing, 0.3], [0.2, 0.1, 0.1], [0.1, 0.0, 0.0]]
+    path = sp.ShapePath.waypoints([0.0, 0.3, 0.7, 1.0], shapes, joint_names=gymnast.joint_names)
+    motion = sp.reconstruct(sp.articulated(gymnast, path), [0.0, 0.0, 0.0])
+    pairs = sp.body.link_distances(gymnast, gymnast.shape()).pairs
+    touches = at_all_times(gymnast, path, pairs) < DISTANCE
+    assert touches == (swing < 0.0)
+    limits, search = Limits(rate_limits=None, clearance=DISTANCE), Search(pieces=12)
+    ways = sp.optimal_control.undo(motion, limits=limits, search=search)
+    assert ways.backwards.undoes
+    assert ways.backwards.keeps_limits != touches
+    assert (ways.backwards.closest[0].distance < DISTANCE) if touches else not ways.backwards.closest
+    assert ways.plan.keeps_limits
+    assert at_all_times(gymnast, ways.plan.path, pairs) >= DISTANCE
+    assert ways.best.keeps_limits
+    lines = undo_lines(SimpleNamespace(body=gymnast, motion=motion, beginning=""), ways)
+    assert any("the motion played backwards: " in line for line in lines) == touches
 
 
 def keeps_apart(body, goal, distance, search, **options):

@@ -19,6 +19,7 @@ from ..dynamics.torques import joint_torques
 from ..errors import PlanNotFound, ShapeError
 from ..reconstruction.reconstruction import Motion, reconstruct
 from ..run_progress import ProgressCallback, check_progress
+from ..shape_space.closest_approach import ClosestApproach
 from ..shape_space.shape_path import ShapePath
 from ._path_cost import motion_cost
 from ._plan_limits import LIMIT_SLACK, TIMES, closest_links
@@ -45,6 +46,8 @@ class WayBack:
     cost, cost_name : what it costs, in the unit of the cost
     limit_shares : largest share that it takes up of each kind of limit, 1 being all of it; at 4,001 times and the knots
         of the path
+    clearance, closest : least distance of links that `Limits` require [m], and the pairs that come nearer than that
+        and 1 mm, the nearest first
     plan : the search's own result; None for a motion played backwards
     """
 
@@ -55,6 +58,8 @@ class WayBack:
     cost: float
     cost_name: str
     limit_shares: Mapping[str, float]
+    clearance: float | None = None
+    closest: tuple[ClosestApproach, ...] = ()
     plan: Plan | None = None
 
     __repr__, _repr_html_ = card_text, card_html
@@ -66,7 +71,9 @@ class WayBack:
 
     @property
     def keeps_limits(self) -> bool:
-        """True where no limit is exceeded."""
+        """True where no limit is exceeded, and no links come nearer than the clearance."""
+        if self.clearance is not None and any(near.distance < self.clearance for near in self.closest):
+            return False
         return max(self.limit_shares.values(), default=0.0) <= 1.0 + LIMIT_SLACK
 
     @cached_property
@@ -80,6 +87,7 @@ class WayBack:
             ("off the start", f"{self.error:.1e} rad"),
             ("cost", f"{numbers(self.cost, COST_UNITS[self.cost_name])} ({self.cost_name})"),
             ("of the limits", ", ".join(f"{name} {share:.1%}" for name, share in self.limit_shares.items())),
+            *([("closest links", self.closest[0].text)] if self.closest else []),
         ]
         return Card(f"Way back: {self.name}", rows)
 
@@ -210,6 +218,8 @@ def undo(
             cost=motion_cost(moved, body, route, cost, task.effort_measure),
             cost_name=cost,
             limit_shares=_motion_shares(task, within, moved, route),
+            clearance=task.clearance,
+            closest=closest_links(task, route) if plan is None else plan.closest,
             plan=plan,
         )
 
@@ -251,7 +261,4 @@ def _motion_shares(task: Reorientation, limits: Limits, motion: Motion, route: S
             shares[name] = float((np.abs(values[:, bounded]) / limit[bounded]).max())
     if task.efforts_limited:
         shares["effort"] = float(np.abs(joint_torques(motion, times).torque / task.effort_measure).max())
-    for nearest in closest_links(task, route)[:1]:
-        # Above 1 by the part of the distance that is missing, which may be all of it and more.
-        shares["clearance"] = 2.0 - nearest.distance / (task.clearance or nearest.distance)
     return shares

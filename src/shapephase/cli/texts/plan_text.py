@@ -109,6 +109,9 @@ def undo_lines(flown: LoadedMotion, ways: Undo) -> list[str]:
     if not ways.backwards.undoes:
         off = math.degrees(ways.backwards.error)
         lines.append(f"Played backwards it ends {off:.4g} deg off: the momentum turns the body on.")
+    for way in shown:
+        if way.closest:
+            lines.append(f"closest links, {_WAYS[way.name]}: {way.closest[0].text}")
     if ways.plan is None:
         lines.append(f"no plan: {ways.failure}")
     elif ways.plan.plan is not None:
@@ -127,6 +130,7 @@ def undo_data(body: Body, ways: Undo) -> dict[str, Any]:
             "duration_s": way.path.duration,
             "limit_shares": dict(way.limit_shares),
             "keeps_limits": way.keeps_limits,
+            "closest_links": approach_data(way.closest),
             "peak_rates": dict(zip(body.joint_names, way.peak_rates.tolist(), strict=True)),
             "final_attitude_quat_xyzw": so3.quat_from_matrix(way.motion.final_attitude).tolist(),
             "search": None if way.plan is None else plan_data(body, way.plan),
