@@ -72,9 +72,8 @@ class WayBack:
     @property
     def keeps_limits(self) -> bool:
         """True where no limit is exceeded, and no links come nearer than the clearance."""
-        if self.clearance is not None and any(near.distance < self.clearance for near in self.closest):
-            return False
-        return max(self.limit_shares.values(), default=0.0) <= 1.0 + LIMIT_SLACK
+        apart = all(near.distance >= (self.clearance or 0.0) for near in self.closest)
+        return apart and max(self.limit_shares.values(), default=0.0) <= 1.0 + LIMIT_SLACK
 
     @cached_property
     def peak_rates(self) -> Array:
