@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..display import short_repr
-from ..inertia_tensor import FULL_FROM_SIX, SIX_OF_FULL
+from ..inertia_tensor import SIX_OF_FULL
 from ._model_tree import moving_joints
 from .couplings.coordinate_map import CoordinateMap
 
@@ -50,16 +50,6 @@ class LinkRows:
         """Coordinates and rates of all joints, followers included, contiguous: (N, n), (N, n) -> (N, k), (N, k)."""
         coordinates, speeds = self.follows.with_rates(shapes, rates)
         return np.ascontiguousarray(coordinates), np.ascontiguousarray(speeds)
-
-    def in_chain_axes(self, derivatives: Array) -> Array:
-        """Derivatives by first moments and inertias of frames, (m, k + 1, 10) as `inertial_sums` has them, turned."""
-        bases, result = np.asarray(self.bases, dtype=np.float64), derivatives.copy()
-        result[..., 1:4] = (bases @ derivatives[..., 1:4, None])[..., 0]
-        # An entry off the diagonal of a tensor stands there twice.
-        tensors = derivatives[..., 4:][..., FULL_FROM_SIX] * (0.5 + 0.5 * np.eye(3))
-        turned = bases @ tensors @ np.swapaxes(bases, -1, -2)
-        result[..., 4:] = turned.reshape(*derivatives.shape[:2], 9)[..., SIX_OF_FULL] * np.repeat([1.0, 2.0], 3)
-        return result
 
 
 @dataclass(frozen=True, eq=False)
