@@ -6,7 +6,7 @@ hold nearly all of the first and little of the second.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -16,7 +16,7 @@ from scipy.stats import f
 
 from ..arguments import check_pair, whole_argument
 from ..arrays import Array, Mask, finite_array
-from ..display import short_repr
+from ..display import frozen
 
 _HIGHEST = 12  # order of the polynomials, the samples allowing
 _SAMPLES_EACH = 3  # samples that a polynomial needs
@@ -40,7 +40,7 @@ _FEWEST_ORDERS = 5.0  # of a plateau
 _UNLIKE = 2.0  # mean deviance in units of that of noise; 1.3 is exceeded by chance in a thousand with 30 orders
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class SmoothPart:
     """What the first polynomials take of residuals.
 
@@ -65,8 +65,6 @@ class SmoothPart:
     noise: float
     colour: float = 1.0
     least: Array = field(default_factory=lambda: np.zeros(0), repr=False)
-
-    __repr__ = short_repr
 
 
 def polynomials(times: Array, highest: int) -> Array:

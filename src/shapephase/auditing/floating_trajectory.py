@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from ..arguments import check_choice, check_object, names_argument, positive_arg
 from ..arrays import FARTHEST, Array, finite_array
 from ..body.body import Body
 from ..body.joint_orders import WORDS
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapeError, TrajectoryError
 from ..shape_space.files.formats.floating_arrays import MUJOCO_QPOS, PINOCCHIO_Q, FreeJoint, with_free_joint
 from ..shape_space.files.recording import Rates
@@ -29,7 +29,7 @@ _OF_JOINTS = ("shapes", "joint_rates")  # what is read up to `FARTHEST`, as by a
 _OFF_UNIT = 0.1  # what is no quaternion at all: recordings keep few digits, and an audit has to look at what is wrong
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@frozen(kw_only=True)
 class FloatingTrajectory:
     """Base and joints of a floating body at N times.
 
@@ -75,8 +75,6 @@ class FloatingTrajectory:
     certain: tuple[str, ...] = ()
     captured: bool = False
     noise: TrajectoryNoise | None = None
-
-    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         """Check the arrays against each other. Raises ShapeError, TrajectoryError, UnknownNameError."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ..arrays import Array, Integers
-from ..display import short_repr
+from ..display import frozen
 from ..inertia_tensor import SIX_OF_FULL
 from ._model_tree import moving_joints
 from .couplings.coordinate_map import CoordinateMap
@@ -23,7 +23,7 @@ GEOMETRY = 12  # numbers that do not depend on masses; they come first
 _PARALLEL = 1e-14  # sine between a screw's axis and its slide: all that rounding leaves
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LinkRows:
     """Frame 0 is the base; joint k turns and slides frame k + 1 along its own z axis, by its coordinate q.
 
@@ -44,15 +44,13 @@ class LinkRows:
     follows: CoordinateMap
     bases: Any
 
-    __repr__ = short_repr
-
     def coordinates(self, shapes: Array, rates: Array) -> tuple[Array, Array]:
         """Coordinates and rates of all joints, followers included, contiguous: (N, n), (N, n) -> (N, k), (N, k)."""
         coordinates, speeds = self.follows.with_rates(shapes, rates)
         return np.ascontiguousarray(coordinates), np.ascontiguousarray(speeds)
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointChain:
     """Frame 0 is the base; frame k + 1 hangs on joint k, later in the list than its parent, with links fixed to it.
 
@@ -90,8 +88,6 @@ class JointChain:
     inertias: Array
     follows: CoordinateMap
     link_frames: Mapping[str, tuple[int, Array]]
-
-    __repr__ = short_repr
 
     @property
     def matrix(self) -> Array:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import reduce
 from typing import Protocol
 
 import numpy as np
 
 from .. import so3
-from ..arrays import Array, lock_arrays
-from ..display import short_repr
+from ..arrays import Array
+from ..display import frozen
 from ..errors import AccuracyNotReached
 from ..sphere import gauss_nodes
 from .channels import Evaluate
@@ -48,7 +47,7 @@ class StatesInTime(Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class DrivenAttitude:
     """Attitudes and other states in time.
 
@@ -66,9 +65,6 @@ class DrivenAttitude:
     attitude_errors: Array
     state_errors: Array
     evaluations: int
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
     @property
     def times(self) -> Array:

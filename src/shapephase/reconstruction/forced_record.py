@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import so3
-from ..arrays import Array, lock_arrays
+from ..arrays import Array
 from ..chebyshev import PiecewiseChebyshev, inside, nodes_on, values_to_coefficients
-from ..display import short_repr
+from ..display import frozen
 from ..integrator.driven_attitude import DrivenAttitude
 from .external_torque import ExternalTorque, TorqueState
 from .motion_record import FORCED_FORMAT, read_deformation, read_record, stored_deformation, write_record
@@ -25,7 +24,7 @@ _TORQUE_DEGREE = 16  # on a step: of gravity gradient it misses 1e-15
 _SOLUTION = ("scales", "error_times", "attitude_errors", "state_errors")
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class StoredRun:
     """Unit quaternion and other states in time, as a series on each step.
 
@@ -36,9 +35,6 @@ class StoredRun:
     times: Array
     coefficients: Array
 
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
-
     def __call__(self, t: Array) -> Array:
         """States at times: (N,) -> (N, 4 + k)."""
         values = PiecewiseChebyshev(self.times, self.coefficients)(t)
@@ -46,7 +42,7 @@ class StoredRun:
         return values
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class StoredTorque:
     """Torque along a motion, a function of time.
 
@@ -55,9 +51,6 @@ class StoredTorque:
 
     times: Array
     coefficients: Array
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
     def __call__(self, state: TorqueState) -> Array:
         """Torque at the time of a state: (3,)."""

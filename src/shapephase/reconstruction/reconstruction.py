@@ -25,7 +25,7 @@ from ..arguments import (
 )
 from ..arrays import Array, Integers, common_batch, copied_when_read, finite_array, lock_arrays, read_only
 from ..deformation.deformation import Deformation, DeformationFamily
-from ..display import short_repr
+from ..display import frozen, short_repr
 from ..errors import ShapeError, WrongObjectError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.driven_attitude import dop853_attitude
@@ -48,7 +48,7 @@ _FAMILY_METHODS = ("auto", "spectral")
 _BACKWARD_TOLERANCE = 1e-11  # [rad] of the turn back to the start: a hundredth of the usual one of `reconstruct`
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Sensitivity:
     """Derivatives of the final attitude by the momentum and the initial attitude. Made by `Motion.sensitivity`.
 
@@ -63,9 +63,6 @@ class Sensitivity:
 
     by_momentum: Array
     by_attitude: Array
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
 
 @made_by(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +11,7 @@ from .. import so3
 from ..arguments import check_object, tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..body.body import Body
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapeError, ShapePhaseError, WrongObjectError
 from ..integrator.many_rotations import rotations_of_each
 from ..letters import value_text
@@ -20,7 +19,7 @@ from .body_path import path_sampler, route_along
 from .shape_path import ShapePath
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class FinalAttitudes:
     """Final attitudes of many motions. Made by `final_attitudes`.
 
@@ -34,8 +33,6 @@ class FinalAttitudes:
     attitude: Array
     error_estimate: Array
     evaluations: Integers
-
-    __repr__ = short_repr
 
 
 def final_attitudes(
