@@ -15,7 +15,8 @@ from scipy.interpolate import make_interp_spline
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from ..arrays import Array
-from ._noise import TrajectoryNoise, continuous, estimated_noise, white_noise
+from ..reconstruction.attitude_angles import continuous
+from ._noise import TrajectoryNoise, estimated_noise, white_noise
 from .floating_trajectory import FloatingTrajectory
 from .hypothesis import FittedValue, Hypothesis, milliseconds
 

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..arguments import made_by
 from ..arrays import Array
 from ..display import short_repr
+from ..reconstruction.attitude_angles import continuous
 from ..shape_space.path_noise import white_noise
 from .floating_trajectory import FloatingTrajectory
 
@@ -66,9 +65,3 @@ def _of_vector(samples: Array | None) -> float:
 
 def _of_each(samples: Array | None) -> tuple[float, ...]:
     return () if samples is None else tuple(white_noise(samples[:, :, None], 1).tolist())
-
-
-def continuous(quaternions: Array) -> Array:
-    """Quaternions of the same attitudes without changes of sign."""
-    flips = np.where((quaternions[1:] * quaternions[:-1]).sum(axis=1) < 0.0, -1.0, 1.0)
-    return quaternions * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
