@@ -33,6 +33,7 @@ from ._centroidal_maps import (
     momentum_gradients,
 )
 from ._model_tree import model_with, model_with_wheel, moving_joints
+from .couplings.coordinate_map import CoordinateMap
 from .couplings.coupling import Coupling
 from .couplings.joint_map import JointMap
 from .family import BodyFamily, Given, given_inertias
@@ -137,6 +138,11 @@ class Body(ShapeArguments):
         self.rate_columns, self.n_rates = self._joints.rate_columns, len(self.rate_names)
         self.ball_joints = tuple(ball.name for ball in self.chain.follows.balls)
         self.link_names = tuple(f.name for f in model.frames if f.type == pin.FrameType.BODY)
+
+    @property
+    def follows(self) -> CoordinateMap:
+        """Coordinates of all joints from the shape."""
+        return self.chain.follows
 
     @property
     def n_joints(self) -> int:
