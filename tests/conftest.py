@@ -81,7 +81,7 @@ def few_guesses(monkeypatch):
 @pytest.fixture
 def no_pictures(monkeypatch):
     """Reports whose figures are drawn as nothing, for tests of their words."""
-    monkeypatch.setattr("shapephase.plots.report_page.figure_image", lambda *_: b"<svg/>")
+    monkeypatch.setattr("shapephase.plots.pages.report_page.figure_image", lambda *_: b"<svg/>")
 
 
 @pytest.fixture(scope="session")

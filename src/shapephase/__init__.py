@@ -45,4 +45,4 @@ def __dir__() -> list[str]:
 offer("Motion.plot", "shapephase.plots.named_figures", "motion_figure")
 offer("Motion.segment_momentum", "shapephase.segments.momentum", "segment_momentum")
 offer("Motion.to_xarray", "shapephase.exports.tables", "motion_dataset")
-offer("Motion.view", "shapephase.plots.viewer", "view")
+offer("Motion.view", "shapephase.plots.pages.viewer", "view")

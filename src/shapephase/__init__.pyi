@@ -70,7 +70,7 @@ from .phases.phases import (
 from .phases.recurrence import Crossings, Returns, momentum_crossings, momentum_returns
 from .phases.return_map import FixedPoints, ReturnMap, closed_orbits, fixed_points, stroboscopic_map
 from .phases.whole_turns import TurnCounts, turn_counts
-from .plots.viewer import view
+from .plots.pages.viewer import view
 from .reconstruction.external_torque import ExternalTorque, TorqueState
 from .reconstruction.forced_motion import ForcedMotion
 from .reconstruction.reconstruction import (

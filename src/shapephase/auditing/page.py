@@ -11,10 +11,10 @@ import numpy as np
 from ..arguments import check_object
 from ..body.body import Body
 from ..letters import printable
-from ..plots.page import Page
+from ..plots.pages.page import Page
+from ..plots.pages.report_page import figure_rows
 from ..plots.pages.templates import page_from
 from ..plots.plot_style import axes_image
-from ..plots.report_page import figure_rows
 from ._held_states import held_states
 from ._observation import observed
 from ._residuals import residuals

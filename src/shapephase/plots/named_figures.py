@@ -21,18 +21,16 @@ from ..segments.momentum import segment_momentum
 from ..shape_space.body_path import in_joint_order
 from ..shape_space.reach.holonomy_algebra import reachable
 from ..shape_space.shape_path import ShapePath
-from .contribution_plots import plot_shares
 from .loop_plots import HEIGHT as LOOP_HEIGHT
 from .loop_plots import enclosing_pair, plot_loop
 from .momentum_plots import plot_momentum_curve
-from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases
+from .motion_plots import plot_attitude, plot_energy, plot_inertia, plot_internal_momentum, plot_phases, plot_torques
 from .plot_style import axes_image, column_axes, even_times, write_axes
 from .polhode_plots import plot_herpolhode, plot_polhodes
 from .rolling_plots import plot_cones, plot_rolling_ellipsoid
 from .segment_plots import HEIGHT as SEGMENT_HEIGHT
-from .segment_plots import plot_segment_momentum, plot_somersault
+from .segment_plots import plot_segment_momentum, plot_shares, plot_somersault
 from .shape_plots import plot_curvature, plot_reach, plot_shape_path
-from .torque_plots import plot_torques
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

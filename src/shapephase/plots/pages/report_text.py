@@ -7,25 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from .. import so3
-from ..arrays import Array
-from ..body.body import Body
-from ..deformation.descriptions import RigidDescription
-from ..display import number_with_bar
-from ..dynamics.loads import JointLoads
-from ..dynamics.moving_body import body_and_path
-from ..dynamics.torque_noise import LoadErrors, load_errors
-from ..dynamics.torques import joint_torques
-from ..errors import WrongObjectError
-from ..phases.phases import PhaseSplit
-from ..phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
-from ..phases.whole_turns import turn_counts
-from ..provenance import provenance
-from ..reconstruction.reconstruction import Motion
-from ..shape_space.body_path import in_joint_order
-from ..shape_space.path_noise import path_errors, stated_noise
-from ..shape_space.shape_path import ShapePath
-from ..shape_space.summaries import body_summary, path_summary
+from ... import so3
+from ...arrays import Array
+from ...body.body import Body
+from ...deformation.descriptions import RigidDescription
+from ...display import number_with_bar
+from ...dynamics.loads import JointLoads
+from ...dynamics.moving_body import body_and_path
+from ...dynamics.torque_noise import LoadErrors, load_errors
+from ...dynamics.torques import joint_torques
+from ...errors import WrongObjectError
+from ...phases.phases import PhaseSplit
+from ...phases.split_text import CLOSED_GAP, DEGREE_DIGITS, RADIAN_DIGITS, digits_left
+from ...phases.whole_turns import turn_counts
+from ...provenance import provenance
+from ...reconstruction.reconstruction import Motion
+from ...shape_space.body_path import in_joint_order
+from ...shape_space.path_noise import path_errors, stated_noise
+from ...shape_space.shape_path import ShapePath
+from ...shape_space.summaries import body_summary, path_summary
 
 CONVENTIONS = (
     ("attitude R", "", "takes base axes to inertial axes; R' = R hat(omega), omega in base axes"),

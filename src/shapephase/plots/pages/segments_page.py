@@ -5,17 +5,16 @@ from __future__ import annotations
 import base64
 from typing import Any
 
-from ..arguments import check_object, check_text
-from ..reconstruction.reconstruction import Motion
-from ..segments.limb_contributions import Contributions
-from ..segments.momentum import SegmentMomentum
-from ..segments.momentum_text import bars_text, conservation_text, link_rows, mean_text
-from .contribution_plots import contributions_figure
+from ...arguments import check_object, check_text
+from ...reconstruction.reconstruction import Motion
+from ...segments.limb_contributions import Contributions
+from ...segments.momentum import SegmentMomentum
+from ...segments.momentum_text import bars_text, conservation_text, link_rows, mean_text
+from ..plot_style import axes_image, column_axes
+from ..segment_plots import HEIGHT, contributions_figure, plot_segment_momentum
 from .page import Page, frame_count, playing_speed
-from .pages.templates import SCENE_SCRIPTS, page_from
-from .plot_style import axes_image, column_axes
 from .report_page import figure_rows
-from .segment_plots import HEIGHT, plot_segment_momentum
+from .templates import SCENE_SCRIPTS, page_from
 from .viewer import scene_and_data
 
 

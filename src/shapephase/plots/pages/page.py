@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from ..arguments import check_file_name
-from ..errors import ShapeError
-from ..files import write_whole
-from ..letters import value_text
-from .pages.video import FILM_SIZE, check_video, frame_times, write_video
+from ...arguments import check_file_name
+from ...errors import ShapeError
+from ...files import write_whole
+from ...letters import value_text
+from .video import FILM_SIZE, check_video, frame_times, write_video
 
 _CELL_HEIGHT = 520  # [px] in a notebook
 _MIN_PLAYING, _MAX_PLAYING = 4.0, 20.0  # [s] of playing unless a speed is given: to follow it, and not to tire

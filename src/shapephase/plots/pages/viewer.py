@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_flag, check_keywords, check_object
-from ..errors import VisualWarning
-from ..reconstruction.forced_motion import ForcedMotion
-from ..reconstruction.reconstruction import Motion
-from ._moving_scene import MovingScene, moving_scene
+from ...arguments import check_flag, check_keywords, check_object
+from ...errors import VisualWarning
+from ...reconstruction.forced_motion import ForcedMotion
+from ...reconstruction.reconstruction import Motion
+from .._moving_scene import MovingScene, moving_scene
+from .motion_data import motion_data, up_axis
 from .page import Page, frame_count, playing_speed
-from .pages.motion_data import motion_data, up_axis
-from .pages.templates import SCENE_SCRIPTS, page_from
+from .templates import SCENE_SCRIPTS, page_from
 
 
 def view(

@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import so3
-from ..arguments import check_object
-from ..arrays import Array, finite_array
-from ..body.body import Body
-from ..body.drawing.appearance import visuals
-from ..errors import ShapeError
-from ..letters import value_text
-from ..shape_space.curvature_field import curvature_on_plane
-from ._moving_scene import shapes_by_link
+from ... import so3
+from ...arguments import check_object
+from ...arrays import Array, finite_array
+from ...body.body import Body
+from ...body.drawing.appearance import visuals
+from ...errors import ShapeError
+from ...letters import value_text
+from ...shape_space.curvature_field import curvature_on_plane
+from .._moving_scene import shapes_by_link
+from ..plot_style import NEGATIVE_CURVATURE, POSITIVE_CURVATURE
+from .motion_data import body_data, frame_nodes, up_axis
 from .page import Page
-from .pages.motion_data import body_data, frame_nodes, up_axis
-from .pages.plane_series import PlaneSeries, least_perturbation_turns, plane_series
-from .pages.templates import SCENE_SCRIPTS, page_from
-from .plot_style import NEGATIVE_CURVATURE, POSITIVE_CURVATURE
+from .plane_series import PlaneSeries, least_perturbation_turns, plane_series
+from .templates import SCENE_SCRIPTS, page_from
 
 _MAP = 101  # points of the curvature map along each joint
 _END = {"rad": np.pi, "m": 1.0}  # [rad, m] of the map for a joint without a limit

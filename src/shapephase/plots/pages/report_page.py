@@ -6,16 +6,19 @@ import base64
 from collections.abc import Sequence
 from typing import Any
 
-from ..arguments import check_object
-from ..arrays import Array
-from ..body.body import Body
-from ..errors import RunStopped, ShapePhaseError
-from ..phases.phases import PhaseSplit
-from ..reconstruction.reconstruction import Motion
-from ..run_progress import ProgressCallback, check_progress
-from ..segments.limbs import SegmentTree
-from ..shape_space.shape_path import ShapePath
-from ._report_text import (
+from ...arguments import check_object
+from ...arrays import Array
+from ...body.body import Body
+from ...errors import RunStopped, ShapePhaseError
+from ...phases.phases import PhaseSplit
+from ...reconstruction.reconstruction import Motion
+from ...run_progress import ProgressCallback, check_progress
+from ...segments.limbs import SegmentTree
+from ...shape_space.shape_path import ShapePath
+from ..named_figures import FIGURES, figure_image
+from .page import Page
+from .report_data import report_data
+from .report_text import (
     CONVENTIONS,
     accuracy,
     input_rows,
@@ -27,10 +30,7 @@ from ._report_text import (
     story,
     torque_words,
 )
-from .named_figures import FIGURES, figure_image
-from .page import Page
-from .pages.report_data import report_data
-from .pages.templates import SCENE_SCRIPTS, page_from
+from .templates import SCENE_SCRIPTS, page_from
 from .viewer import scene_and_data
 
 _MOVING = ("momentum", "phases", "attitude", "shape")  # figures that the page's scripts draw
