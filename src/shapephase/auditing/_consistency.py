@@ -8,10 +8,9 @@ import numpy as np
 
 from ..arrays import Array
 from ..display import frozen
-from ._noise import TrajectoryNoise
 from ._observation import REACH, difference_weights, differentiated, fewer_neighbours, turn_rates
 from ._smooth_part import smooth_part
-from .floating_trajectory import FloatingTrajectory
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise
 
 _ROUNDING = 32.0 * float(np.finfo(np.float64).eps)  # of a rate or coordinate: rounding of 32 operations
 

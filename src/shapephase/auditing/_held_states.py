@@ -16,8 +16,8 @@ from scipy.signal import savgol_coeffs, savgol_filter
 
 from ..arrays import Array
 from ..reconstruction.attitude_angles import continuous
-from ._noise import TrajectoryNoise, estimated_noise, white_noise
-from .floating_trajectory import FloatingTrajectory
+from ..shape_space.path_noise import white_noise
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise, estimated_noise
 from .hypothesis import FittedValue, Hypothesis, milliseconds
 
 _ORDER = 6  # of differences: a motion of 11 rad/s at every 20 ms keeps 1e-4 of itself

@@ -13,7 +13,7 @@ from ..display import frozen
 from ._airborne import AirbornePart
 from ._consistency import RateAgreement
 from ._engine_faults import StepOrder
-from ._noise import TrajectoryNoise
+from .floating_trajectory import TrajectoryNoise
 from .hypothesis import EXPLAINS, Hypothesis, milliseconds, percent
 
 _MOST_SHOWN = 8  # hypotheses in a table
