@@ -218,7 +218,8 @@ def particle_body(
     Raises
     ------
     ShapeError
-        If limits do not ascend, masses are not positive, arrays have other shapes, or derivatives are not those of the places.
+        If limits do not ascend, masses are not positive, arrays have other shapes, or derivatives are not those of the
+        places.
     WrongObjectError
         If `places` cannot be called.
 
