@@ -7,13 +7,14 @@ from itertools import pairwise
 import numpy as np
 
 from .. import so3
-from ..arguments import check_choice, check_object
+from ..arguments import check_choice
 from ..arrays import Array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..dynamics.torques import joint_torques
 from ..errors import AccuracyNotReached
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.body_path import route_along
+from ..shape_space.body_path import as_path, route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
 from ._spline_basis import gauss_tableau
@@ -23,7 +24,7 @@ _HALVINGS = 6  # of two panels between two breaks, until the cost has converged
 _CONVERGED = 1e-10  # relative change between subdivisions: 100 roundings of the body's matrices
 
 
-def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
+def path_cost(body: Body | str, path: ShapePath | str, cost: str = "kinetic") -> float:
     """Cost "kinetic" or "rate" of a path (see `plan_reorientation`), with the body's own matrices.
 
     By Gauss quadrature with twelve nodes a panel; the panels between two breaks of the path are halved until the cost
@@ -42,8 +43,8 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     >>> print(f"{sp.optimal_control.path_cost(cat, loop, 'rate'):.6f} rad^2/s")
     5.169923 rad^2/s
     """
-    check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
+    body = as_body(body)
+    path = as_path(path, body)
     check_choice(cost, "cost of a path", ("kinetic", "rate"))
     route = route_along(body, path)
     before, panels = _quadrature(body, route, cost, 2), 2

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_executor, check_object
+from ..arguments import check_executor
 from ..arrays import Array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..errors import PlanNotFound
 from ..run_progress import ProgressCallback, check_progress
 from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes
@@ -61,7 +62,7 @@ _USUAL_ITERATIONS = 50  # iterations after which half of a start is reported as 
 
 
 def plan_reorientation(
-    body: Body,
+    body: Body | str,
     goal: Goal | ArrayLike,
     *,
     momentum: ArrayLike = 0.0,
@@ -142,7 +143,7 @@ def plan_reorientation(
     >>> print(f"{sp.so3.angle(goal.T @ plan.motion.final_attitude):.6f} rad off")
     0.000000 rad off
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     check_executor(executor)
     check_progress(progress)
     chosen = Search() if search is None else search

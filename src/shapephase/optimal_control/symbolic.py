@@ -10,11 +10,12 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..arguments import check_choice, check_object
+from ..arguments import check_choice
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.functions import JointFunction
 from ..body.joint_chain import JointChain
+from ..body.loading import as_body
 from ..display import short_repr
 from ..errors import unknown_name
 
@@ -113,7 +114,7 @@ class SymbolicBody:
         return self._made[key]
 
 
-def symbolic_body(body: Body) -> SymbolicBody:
+def symbolic_body(body: Body | str) -> SymbolicBody:
     """Return the functions of a body; built at its first call, kept as long as the body.
 
     Source: the composite rigid body algorithm (Featherstone, Rigid Body Dynamics Algorithms, section 6.2), reduced by
@@ -126,7 +127,7 @@ def symbolic_body(body: Body) -> SymbolicBody:
     >>> print(np.array(functions.inertia(np.zeros(3))).diagonal().round(6))
     [0.005 0.02  0.02 ]
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     with _building:
         if body not in _built:
             _built[body] = _symbolic(body)

@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_object, tolerance_argument
+from ..arguments import tolerance_argument
 from ..arrays import Array, Integers, finite_array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..display import short_repr
 from ..errors import ShapeError, ShapePhaseError, WrongObjectError
 from ..integrator.many_rotations import rotations_of_each
 from ..letters import value_text
-from .body_path import path_sampler, route_along
+from .body_path import as_path, path_sampler, route_along
 from .shape_path import ShapePath
 
 
@@ -39,8 +40,8 @@ class FinalAttitudes:
 
 
 def final_attitudes(
-    body: Body,
-    paths: Iterable[ShapePath],
+    body: Body | str,
+    paths: Iterable[ShapePath | str],
     momentum: ArrayLike,
     attitude: ArrayLike | None = None,
     *,
@@ -72,7 +73,7 @@ def final_attitudes(
     >>> print(np.degrees(sp.so3.angle(sp.final_attitudes(cat, paths, np.zeros(3)).attitude)).round(3))
     [26.393 65.305]
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     goal = tolerance_argument(tolerance)
     spatial = finite_array(momentum, "momentum", (3,), unit="kg m^2/s")
     start = np.eye(3) if attitude is None else so3.rotation_argument(attitude, "attitude")
@@ -85,10 +86,10 @@ def final_attitudes(
     estimates: list[float] = []
     evaluations: list[int] = []
     for number, path in enumerate(paths):
-        check_object(path, "ShapePath", f"path {number}")
+        route = as_path(path, body, f"path {number}")
         mu, first = _of_path(spatial, 1, number), _of_path(start, 2, number)
         try:
-            sampler = path_sampler(body, route_along(body, path))
+            sampler = path_sampler(body, route_along(body, route))
             solution = rotations_of_each(sampler, (first.T @ mu)[None], goal)
         except ShapePhaseError as error:
             raise type(error)(f"path {number}: {error}") from error

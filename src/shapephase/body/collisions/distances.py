@@ -12,6 +12,7 @@ from ...arrays import Array, finite_array
 from ...display import short_repr
 from ...errors import ShapeError
 from ..body import Body
+from ..loading import as_body
 from .geometry import CollisionGeometry, Separations, collision_geometry
 
 
@@ -35,7 +36,7 @@ class LinkDistances:
     __repr__ = short_repr
 
 
-def link_distances(body: Body, shape: ArrayLike, *, geometry: CollisionGeometry | None = None) -> LinkDistances:
+def link_distances(body: Body | str, shape: ArrayLike, *, geometry: CollisionGeometry | None = None) -> LinkDistances:
     """Return the signed distances between the links of a body.
 
     The nearest two solids of two links count, and meshes as their convex hulls.
@@ -63,7 +64,7 @@ def link_distances(body: Body, shape: ArrayLike, *, geometry: CollisionGeometry 
     >>> distances.distance.shape, bool(distances.distance.min() > 0.0)
     ((95,), True)
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     known = collision_geometry(body) if geometry is None else geometry
     check_object(known, "CollisionGeometry", "geometry", call="collision_geometry(body)")
     shapes = finite_array(shape, "shape")

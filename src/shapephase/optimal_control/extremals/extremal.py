@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 from scipy.integrate import OdeSolution
 
 from ... import so3
-from ...arguments import check_object, made_by, positive_argument, times_argument, tolerance_argument, vector_argument
+from ...arguments import made_by, positive_argument, times_argument, tolerance_argument, vector_argument
 from ...arrays import Array, check_reach
 from ...body.body import Body
+from ...body.loading import as_body
 from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
 from ...shape_space.shape_path import ShapePath
@@ -105,7 +106,7 @@ class Extremal:
 
 
 def extremal(
-    body: Body,
+    body: Body | str,
     shape: ArrayLike,
     rate: ArrayLike,
     charge: ArrayLike,
@@ -151,7 +152,7 @@ def extremal(
     >>> print(f"{path.cost:.6f} J s")
     0.002500 J s
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     start, speed = (vector_argument(value, name, body.n_shape) for value, name in ((shape, "shape"), (rate, "rate")))
     check_reach(start, "shape")
     check_reach(speed, "rate")

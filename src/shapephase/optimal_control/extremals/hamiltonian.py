@@ -12,10 +12,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ...arguments import check_choice, check_object
+from ...arguments import check_choice
 from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_no_balls, check_smooth
+from ...body.loading import as_body
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError
 from ...shape_space.connection import mechanical_connection
@@ -64,7 +65,7 @@ class Hamiltonian:
         return casadi.Function("second", parts, [casadi.densify(rows)])
 
 
-def hamiltonian(body: Body, metric: str) -> Hamiltonian:
+def hamiltonian(body: Body | str, metric: str) -> Hamiltonian:
     """Return the equations of a body; built at its first call, kept as long as the body.
 
     Raises UnknownNameError, and ShapeError where a joint follows others by a function with knots.
@@ -76,7 +77,7 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
     >>> print(np.array(equations.metric(np.zeros(3))).diagonal().round(6))
     [0.005   0.005   0.00125]
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     check_choice(metric, "metric", _COSTS)
     check_smooth(body.chain.follows, "the equations of extremals need")
     check_no_balls(body.chain.follows, "the equations of extremals need")

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 
 from ... import so3
-from ...arguments import check_object
 from ...arrays import Array
 from ...body.body import Body
+from ...body.loading import as_body
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
-from ...shape_space.body_path import route_along
+from ...shape_space.body_path import as_path, route_along
 from ...shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
 from ...shape_space.shape_path import ShapePath
 from ..symbolic import call_casadi
@@ -57,8 +57,8 @@ class WongFit:
 
 
 def wong_residual(
-    body: Body,
-    path: ShapePath,
+    body: Body | str,
+    path: ShapePath | str,
     *,
     metric: str = "kinetic",
     joints: Sequence[str] | None = None,
@@ -95,8 +95,8 @@ def wong_residual(
     >>> print(f"{sp.optimal_control.wong_residual(cat, loop).residual:.3f}")  # an extremal
     0.000
     """
-    check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
+    body = as_body(body)
+    path = as_path(path, body)
     route = route_along(body, path)
     equations = hamiltonian(body, metric)
     coupling = joint_coupling(body, joints, symmetric)
