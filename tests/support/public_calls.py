@@ -11,7 +11,7 @@ import inspect
 import json
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -220,6 +220,8 @@ def numbers(thing: Any, depth: int = 0) -> list[Any]:
         return [repr(thing)]
     if isinstance(thing, tuple | list):
         return [number for part in thing for number in numbers(part, depth)]
+    if isinstance(thing, Mapping):
+        return numbers(list(thing.items()), depth)
     if isinstance(thing, sp.Motion):
         return [thing.attitude(TIMES), thing.final_attitude, thing.error_estimate]
     if isinstance(thing, sp.Deformation | sp.ShapePath):

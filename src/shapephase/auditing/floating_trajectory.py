@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_choice, check_object, made_by, names_argument, positive_argument
+from ..arguments import check_choice, made_by, names_argument, positive_argument
 from ..arrays import FARTHEST, Array, finite_array
 from ..body.body import Body
 from ..body.joint_orders import WORDS
+from ..body.loading import as_body
 from ..display import frozen, short_repr
 from ..errors import ShapeError, TrajectoryError
 from ..reconstruction.attitude_angles import continuous
@@ -140,7 +141,7 @@ class FloatingTrajectory:
 
     @staticmethod
     def from_mujoco(
-        body: Body,
+        body: Body | str,
         times: ArrayLike,
         qpos: ArrayLike,
         qvel: ArrayLike | None = None,
@@ -174,7 +175,7 @@ class FloatingTrajectory:
         >>> sp.FloatingTrajectory.from_mujoco(cat, np.linspace(0.0, 1.0, 21), qpos).shapes.shape
         (21, 3)
         """
-        check_object(body, "Body", "body")
+        body = as_body(body)
         if joint_order is not None:
             check_choice(joint_order, "joint_order", WORDS)
             if joint_names is not None:
@@ -193,7 +194,7 @@ class FloatingTrajectory:
 
     @staticmethod
     def from_pinocchio(
-        body: Body,
+        body: Body | str,
         times: ArrayLike,
         q: ArrayLike,
         v: ArrayLike | None = None,
@@ -224,6 +225,7 @@ class FloatingTrajectory:
         >>> sp.FloatingTrajectory.from_pinocchio(cat, np.linspace(0.0, 1.0, 21), q).quaternion[0].tolist()
         [0.0, 0.0, 0.0, 1.0]
         """
+        body = as_body(body)
         return _of_arrays(
             body, times, (q, v), ("q", "v"), PINOCCHIO_Q, joint_names, None, integrator_step=integrator_step, name=name
         )
@@ -301,7 +303,6 @@ def _of_arrays(
     name: str,
 ) -> FloatingTrajectory:
     """The trajectory in arrays of coordinates and of rates with a free joint."""
-    check_object(body, "Body", "body")
     names = None if joint_names is None else names_argument(joint_names, "joint_names", "names of joints")
     places = finite_array(arrays[0], labels[0], (None, None))
     motion = with_free_joint(layout, places, arrays[1], body, names=names, order=order, labels=labels, where=name)

@@ -12,6 +12,7 @@ from .. import so3
 from ..arguments import check_object, positive_argument, whole_argument
 from ..arrays import Array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..deformation.deformation import articulated
 from ..error_bars.recorded_momentum import momentum_from_recording
 from ..errors import ShapeError, ShapePhaseError, TrajectoryError, TrajectoryWarning
@@ -66,7 +67,7 @@ _JOINT_TORQUES = "Torques and friction of the joints change no momentum: nothing
 
 
 def audit(
-    body: Body,
+    body: Body | str,
     trajectories: FloatingTrajectory | Sequence[FloatingTrajectory],
     *,
     tolerance: float | None = None,
@@ -114,7 +115,7 @@ def audit(
     >>> sp.audit(top, trajectory).right
     True
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     if noise is not None:
         check_object(noise, "TrajectoryNoise", "noise")
     runs = given_runs(trajectories)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..arguments import check_flag, check_object, initial_state_arguments
 from ..arrays import finite_array
 from ..body.body import Body
+from ..body.loading import as_body
 from ..deformation.deformation import Deformation, articulated
 from ..deformation.rotors import RotorValue, mapping_of_joints
 from ..display import frozen
@@ -40,7 +41,7 @@ class RecordedFlight:
 
 
 def motion_from_recording(
-    body: Body,
+    body: Body | str,
     recorded: RecordedMotion,
     *,
     momentum: ArrayLike | None = None,
@@ -94,7 +95,7 @@ def motion_from_recording(
     >>> print(sp.motion_from_recording(cat, sp.read_recorded_motion("joints.csv", cat)).momentum_by)
     nothing
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     check_object(recorded, "RecordedMotion", "recorded")
     check_flag(find_axes, "find_axes")
     if momentum is not None:

@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arguments import check_choice, check_object, positive_argument, times_argument
+from ..arguments import check_choice, positive_argument, times_argument
 from ..arrays import Array, finite_array
 from ..body import Body, visuals
 from ..body.link_motions import link_motions
+from ..body.loading import as_body
 from ..deformation.deformation import articulated
 from ..display import frozen, short_repr
 from ..dynamics.moving_body import needed_body_and_path
@@ -219,7 +220,7 @@ class _Source(NamedTuple):
 
 def segment_momentum(
     motion: Any,
-    body: Body | None = None,
+    body: Body | str | None = None,
     *,
     times: ArrayLike | None = None,
     axes: str | ArrayLike = "inertial",
@@ -308,8 +309,8 @@ def segment_momentum(
     if isinstance(motion, Motion):
         source = _of_motion(motion, times)
     else:
+        body = as_body(body)
         if isinstance(motion, RecordedMotion):
-            check_object(body, "Body", "body")
             recorded, given = _of_recording(motion), motion.flight is not None
             if motion.smoothing is not None and motion.smoothing.low_pass is not None and attitude_noise is None:
                 warnings.warn(
@@ -319,9 +320,7 @@ def segment_momentum(
                     stacklevel=2,
                 )
         else:
-            check_object(body, "Body", "body")
             recorded, given = _of_trajectory(motion), False
-        assert body is not None
         if times is not None:
             raise ShapeError("times: a recording has its own; resample it as it is read (resample)")
         levels = None if joint_noise is None else _joint_levels(joint_noise, body)

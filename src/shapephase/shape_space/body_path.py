@@ -12,11 +12,13 @@ from .. import so3
 from ..arguments import check_object
 from ..arrays import Array, finite_array
 from ..body.body import Body
+from ..body.loading import as_body_or_particles
 from ..body.particles.point_masses import ParticleBody
 from ..errors import OpenPathError, ShapeError, TrajectoryWarning
 from ..integrator import machine_code
 from ..integrator.link_tree import tree_channels
 from ..integrator.sampling import Sampler
+from ..offers import offered
 from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import with_crossings
 from .path_series import evenly_divided, panel_edges
@@ -28,14 +30,24 @@ _LOOKS = 65  # times of the first loop of a function, at multiples of the golden
 _LOOKS_OF_A_SWING = 8  # times: a sine is then within 8 % of its largest value
 
 
-def in_joint_order(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
-    """Return the path with its columns in the order of the body's joints. Raises as `ShapePath.matched`."""
-    check_object(body, "Body", "body", or_kind="ParticleBody")
-    check_object(path, "ShapePath", "path")
-    return path.matched(body.joint_names, body.name)
+def as_path(value: ShapePath | str, body: Body | ParticleBody | None = None, name: str = "path") -> ShapePath:
+    """Return a path that a user gave, itself or by a name that `examples.named_motion` takes.
+
+    Raises like it, and WrongObjectError.
+    """
+    if isinstance(value, str):
+        return offered("ShapePath.by_name")(value, body)
+    check_object(value, "ShapePath", name)
+    return value
 
 
-def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
+def in_joint_order(body: Body | ParticleBody, path: ShapePath | str) -> ShapePath:
+    """Return the path with its columns in the order of the body's joints. Raises as `as_path`, `ShapePath.matched`."""
+    body = as_body_or_particles(body)
+    return as_path(path, body).matched(body.joint_names, body.name)
+
+
+def route_along(body: Body | ParticleBody, path: ShapePath | str) -> ShapePath:
     """Return the path in the order of the body's joints, with breaks where the body's motion is less smooth.
 
     Raises as `in_joint_order` and `with_crossings`.
@@ -43,7 +55,7 @@ def route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
     return with_crossings(body, in_joint_order(body, path))
 
 
-def users_route_along(body: Body | ParticleBody, path: ShapePath) -> ShapePath:
+def users_route_along(body: Body | ParticleBody, path: ShapePath | str) -> ShapePath:
     """Return `route_along` of a path that a user gave. Warns as `warn_of_degrees`."""
     route = route_along(body, path)
     warn_of_degrees(body, route)

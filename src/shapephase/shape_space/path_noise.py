@@ -13,6 +13,7 @@ from ..arrays import Array, finite_array
 from ..display import frozen
 from ..errors import ShapeError, WrongObjectError
 from ..letters import value_text
+from .body_path import as_path
 from .path_samples import PathSamples, columns_without_samples, path_samples
 from .shape_path import ShapePath
 
@@ -63,7 +64,7 @@ class PathErrors:
         return np.sqrt(self.covariance[..., which, which] + self.bias[..., which] ** 2)
 
 
-def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) -> PathErrors:
+def path_errors(path: ShapePath | str, t: ArrayLike, joints: ArrayLike | None = None) -> PathErrors:
     """Error bars of joints, their rates and accelerations, from the noise of the samples of a path.
 
     The bars of a smoothed recording hold the noise that is left and the bias of smoothing.
@@ -98,7 +99,7 @@ def path_errors(path: ShapePath, t: ArrayLike, joints: ArrayLike | None = None) 
     >>> bool(found.rate[0, 0] > 3.0 * found.rate[1, 0])  # more is open at an end
     True
     """
-    check_object(path, "ShapePath", "path")
+    path = as_path(path)
     times = times_argument(t, path.duration).ravel()
     samples, levels = _samples(path), _levels(path, joints)
     rows = max(samples.count * path.n_shape, samples.curve.coefficients[..., 0].size)

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.coupling import described
+from ..body.loading import as_body
 from ..display import frozen
 from ..inertia_tensor import principal_axes, triangle_defect
 from .body_path import path_gap, users_route_along
@@ -113,7 +113,7 @@ class PathSummary:
     is_loop: bool
 
 
-def body_summary(body: Body) -> BodySummary:
+def body_summary(body: Body | str) -> BodySummary:
     """Summarise a body at its neutral shape.
 
     Examples
@@ -122,7 +122,7 @@ def body_summary(body: Body) -> BodySummary:
     >>> round(summary.mass, 6), len(summary.joints), summary.principal_moments.round(4).tolist()
     (4.0, 23, [0.0119, 0.0799, 0.085])
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     neutral = body.shape()
     inertia = body.locked_inertia(neutral)
     moments, axes = principal_axes(inertia)
@@ -157,7 +157,7 @@ def body_summary(body: Body) -> BodySummary:
     )
 
 
-def path_summary(body: Body, path: ShapePath) -> PathSummary:
+def path_summary(body: Body | str, path: ShapePath | str) -> PathSummary:
     """Summarise a joint motion for a body.
 
     Raises
@@ -174,7 +174,7 @@ def path_summary(body: Body, path: ShapePath) -> PathSummary:
     >>> summary.duration, summary.is_loop
     (1.0, True)
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     route = users_route_along(body, path)
     lowest, highest, fastest = joint_extremes(route)
     lower, upper = body.joint_limits.T

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import check_object
 from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...body.drawing.appearance import visuals
+from ...body.loading import as_body
 from ...errors import ShapeError
 from ...letters import value_text
 from ...shape_space.curvature_field import curvature_on_plane
@@ -32,7 +32,7 @@ _DURATION = 4.0
 _SIZES = 5  # shapes along each joint at which the size of the body is taken
 
 
-def explore(body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None, up: str | None = None) -> Page:
+def explore(body: Body | str, joints: Sequence[str], *, rest: ArrayLike | None = None, up: str | None = None) -> Page:
     """Page with the curvature of the connection over two joints, to draw closed loops on.
 
     The page computes the turn of the body along the periodic cubic spline through the loop's points, by ordered
@@ -64,7 +64,7 @@ def explore(body: Body, joints: Sequence[str], *, rest: ArrayLike | None = None,
     >>> print(np.round(plane["box"], 3).tolist(), plane["connection_error"] < 1e-9)  # the map's ends [rad]
     [[-2.286, 1.186], [-1.68, 1.68]] True
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     if (
         isinstance(joints, str)
         or not isinstance(joints, Sequence | np.ndarray)

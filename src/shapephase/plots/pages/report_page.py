@@ -14,6 +14,7 @@ from ...phases.phases import PhaseSplit
 from ...reconstruction.reconstruction import Motion
 from ...run_progress import ProgressCallback, check_progress
 from ...segments.limbs import SegmentTree
+from ...shape_space.body_path import as_path
 from ...shape_space.shape_path import ShapePath
 from ..named_figures import FIGURES, figure_image
 from .page import Page
@@ -58,7 +59,7 @@ def report(
     motion: Motion,
     result: PhaseSplit,
     *,
-    shape_path: ShapePath | None = None,
+    shape_path: ShapePath | str | None = None,
     title: str | None = None,
     purpose: str | None = None,
     trail: str | None = None,
@@ -107,7 +108,7 @@ def report(
     check_object(motion, "Motion", "motion")
     check_object(result, "PhaseSplit", "result")
     if shape_path is not None:
-        check_object(shape_path, "ShapePath", "shape_path")
+        shape_path = as_path(shape_path, name="shape_path")
     check_progress(progress)
     _report_to(progress, 0.0, "recording the animation")
     scene, data = scene_and_data(motion, speed=None, frames=None, trail=trail, ghost=True, up=up, fall={})

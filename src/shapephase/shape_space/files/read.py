@@ -9,9 +9,10 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from ...arguments import check_object, made_by
+from ...arguments import made_by
 from ...arrays import Array
 from ...body.body import Body
+from ...body.loading import as_body
 from ...display import frozen
 from ...errors import ShapeError, TrajectoryError, unknown_name
 from ..shape_path import ShapePath, without_joints
@@ -73,7 +74,7 @@ class RecordedMotion:
 
 
 @show_options(ReadingOptions)
-def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions]) -> RecordedMotion:
+def read_recorded_motion(file: Any, body: Body | str, **options: Unpack[ReadingOptions]) -> RecordedMotion:
     """Read a recorded motion: the joints, and the base where it was recorded.
 
     The kind of file follows from its ending:
@@ -210,7 +211,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
     >>> print(recorded.path.duration, recorded.residual.max())
     2.0 0.0
     """
-    check_object(body, "Body", "body")
+    body = as_body(body)
     how = Reading.of(options, body)
     option, unit = how.given, how.given("time_unit")
     given, step = read_input(file, body, option("topic"), option("timestep"), option("joint_order"), how.names)
@@ -303,7 +304,7 @@ def read_recorded_motion(file: Any, body: Body, **options: Unpack[ReadingOptions
 
 
 @show_options(ReadingOptions)
-def read_shape_path(file: Any, body: Body, **options: Unpack[ReadingOptions]) -> ShapePath:
+def read_shape_path(file: Any, body: Body | str, **options: Unpack[ReadingOptions]) -> ShapePath:
     """Read a recorded motion as a path: a C2 spline, periodic where the last sample equals the first.
 
     Kinds of file, keyword arguments and errors are those of `read_recorded_motion`.

@@ -11,6 +11,7 @@ from ...arguments import check_object, made_by, number_argument, whole_argument
 from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_smooth
+from ...body.loading import as_body_or_particles
 from ...body.particles.point_masses import ParticleBody
 from ...display import frozen
 from ...errors import ShapeError
@@ -117,7 +118,7 @@ class Reach:
 
 
 def reachable(
-    body: Body | ParticleBody, shape: ArrayLike | None = None, *, most_orders: int = 5, tolerance: float = 1e-8
+    body: Body | ParticleBody | str, shape: ArrayLike | None = None, *, most_orders: int = 5, tolerance: float = 1e-8
 ) -> Reach:
     """Find the rotations that loops of the joints reach from a shape, the smallest such loops, and the best joints.
 
@@ -153,7 +154,7 @@ def reachable(
     >>> found.rank, found.pairs[0].joints
     (3, ('waist_pitch', 'waist_yaw'))
     """
-    check_object(body, "Body", "body", or_kind="ParticleBody")
+    body = as_body_or_particles(body)
     if isinstance(body, Body):
         check_smooth(body.chain.follows, "derivatives of the curvature need")
     least = number_argument(tolerance, "tolerance")
