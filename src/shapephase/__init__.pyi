@@ -99,7 +99,6 @@ from .shape_space.connection import (
 from .shape_space.curvature_field import curvature_on_plane, is_flat, stokes_holonomy
 from .shape_space.files.read import RecordedMotion, read_recorded_motion, read_shape_path
 from .shape_space.files.write import write_shape_path
-from .shape_space.many_paths import FinalAttitudes, final_attitudes
 from .shape_space.path_noise import PathErrors, path_errors
 from .shape_space.reach.holonomy_algebra import Reach, reachable
 from .shape_space.reach.manipulators import dynamic_manipulability, generalised_jacobian, reaction_null_space
@@ -123,7 +122,6 @@ __all__ = [
     "Derivatives",
     "EulerTop",
     "ExternalTorque",
-    "FinalAttitudes",
     "FixedPoints",
     "FloatingTrajectory",
     "ForcedMotion",
@@ -189,7 +187,6 @@ __all__ = [
     "examples",
     "export_motion",
     "exports",
-    "final_attitudes",
     "fixed_points",
     "free_hinges",
     "generalised_jacobian",

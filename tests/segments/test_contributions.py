@@ -21,9 +21,10 @@ from shapephase.segments import shapley_interactions, shapley_values
 from support.ball_bodies import BALLS
 from support.bodies import joint, link, random_loop, urdf
 from support.coupled_bodies import LEG, TURN, couplings
+from support.places import ROBOTS
 from support.random_chains import random_chain
 
-FLIGHTS = Path(__file__).parents[1] / "data" / "trampoline"
+FLIGHTS = ROBOTS / "trampoline"
 AXES = {"lateral": "y", "longitudinal": "z", "somersault": "y", "up": "z"}
 TURNS = 2.0 * np.pi
 

@@ -124,7 +124,6 @@ def calls(on: Objects) -> dict[str, Callable[[], Any]]:
         "contributions": lambda: sp.contributions(motion, "rotation", groups="joints"),
         "segment_momentum": lambda: sp.segment_momentum(motion),
         "clearance": lambda: sp.clearance(DIVER, SWING).approaches,
-        "final_attitudes": lambda: sp.final_attitudes(body, [path, path.reversed()], MOMENTUM),
         "horizontal_gauge": lambda: sp.reconstruct(sp.horizontal_gauge(deformation), MOMENTUM),
         "link_gauge": lambda: sp.link_gauge(deformation, given["link"]).inertia(TIMES),
         "mean_body_gauge": lambda: sp.mean_body_gauge(deformation).inertia(TIMES),

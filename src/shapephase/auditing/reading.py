@@ -19,8 +19,7 @@ from ..shape_space.files.inputs import read_input
 from ..shape_space.files.options import TrajectoryOptions, check_options, show_options
 from ..shape_space.files.read import RecordedMotion, read_recorded_motion
 from ..shape_space.files.times import recording_of
-from ._noise import estimated_noise
-from .floating_trajectory import FloatingTrajectory, rates_by_name
+from .floating_trajectory import FloatingTrajectory, estimated_noise, rates_by_name
 
 _CAPTURED = ("BVH", "C3D", "MVNX", "OpenSim")
 """Formats in which people are recorded; they say what is in degrees, and how attitudes are written."""

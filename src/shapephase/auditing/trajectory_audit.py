@@ -32,7 +32,6 @@ from ._engine_faults import (
 )
 from ._held_states import held_states
 from ._joint_offsets import joint_offsets
-from ._noise import TrajectoryNoise
 from ._observation import Observation, observed
 from ._other_readings import filtered_samples, other_readings, read_otherwise
 from ._outside_pushes import outside_pushes
@@ -42,7 +41,7 @@ from ._smooth_part import polynomials, smooth_part
 from ._surroundings import drag, wrong_gravity
 from ._wrong_inertias import wrong_inertias
 from .audit_result import Audit, RunAudit
-from .floating_trajectory import FloatingTrajectory
+from .floating_trajectory import FloatingTrajectory, TrajectoryNoise
 from .hypothesis import AND, Evidence, Hypothesis, Ranking
 
 _QUIET = 1e-6

@@ -32,7 +32,7 @@ from ..integrator.limited_steps import StepLimits
 from ..integrator.sampling import Sampler
 from ..letters import value_text
 from ..refinement import least_over
-from ..shape_space.body_path import FamilyVariants, path_gap, users_route_along
+from ..shape_space.body_path import path_gap, users_route_along
 from ..shape_space.scan.function_scan import FunctionScan
 from ..shape_space.shape_path import CLOSED, ShapePath
 from ._physical_validity import check_never_on_a_line, check_triangle
@@ -287,10 +287,6 @@ class DeformationFamily(Sequence[Deformation]):
         inertia, momentum = self.bodies.sample(*self.path.curve(times.ravel()))
         batch = (len(self), *times.shape)
         return inertia.reshape(*batch, 3, 3), momentum.reshape(*batch, 3)
-
-    def variants(self) -> FamilyVariants:
-        """All of them for the integrator, to be sampled side by side."""
-        return FamilyVariants(self.bodies, self.path)
 
 
 @overload

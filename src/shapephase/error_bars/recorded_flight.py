@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +12,7 @@ from ..arrays import finite_array
 from ..body.body import Body
 from ..deformation.deformation import Deformation, articulated
 from ..deformation.rotors import RotorValue, mapping_of_joints
-from ..display import short_repr
+from ..display import frozen
 from ..errors import AccuracyNotReached, ShapeError, TrajectoryError, TrajectoryWarning
 from ..reconstruction.reconstruction import Motion, momentum_from_rate, reconstruct
 from ..run_progress import ProgressCallback
@@ -23,7 +22,7 @@ from ..warning_filters import quiet
 from .recorded_momentum import RecordedMomentum, momentum_from_recording, warn_of_drift
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class RecordedFlight:
     """A recording as a motion. Made by `motion_from_recording`.
 
@@ -38,8 +37,6 @@ class RecordedFlight:
     motion: Motion
     momentum_by: str
     fitted: RecordedMomentum | None = None
-
-    __repr__ = short_repr
 
 
 def motion_from_recording(

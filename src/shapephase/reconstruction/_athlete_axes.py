@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import so3
-from ..arrays import Array, finite_array, lock_arrays
+from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.link_motions import link_motions
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..inertia_tensor import principal_axes
 from ..refinement import least_over
@@ -41,7 +41,7 @@ _NO_SIDES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class AthleteAxes:
     """Axes by which somersaults, tilt and twists are counted, with the source of each.
 
@@ -67,9 +67,6 @@ class AthleteAxes:
     somersault: Array
     up: Array
     reasons: dict[str, str]
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     def __str__(self) -> str:
         """Return the four sources in words, with the directions."""

@@ -16,13 +16,13 @@ from numpy.polynomial import legendre
 
 from .. import so3
 from ..arguments import vector_argument
-from ..arrays import Array, Integers, lock_arrays
+from ..arrays import Array, Integers
 from ..body.body import Body
 from ..body.link_motions import link_motions
 from ..deformation.deformation import Deformation
 from ..deformation.descriptions import ArticulatedDescription
 from ..deformation.rotors import Rotor, RotorDescription
-from ..display import short_repr
+from ..display import frozen
 from ..error_bars.wheels_along import WheelsAlong, reduced_chain, wheel_frames
 from ..errors import AccuracyNotReached, ChartPoleError, WrongObjectError
 from ..integrator.stepped import SteppedRotation
@@ -42,7 +42,7 @@ _MOST_HALVED = 20  # times: panels of 1e-6 of their first length
 _PARTS = 8  # of a step, at which angles of a link other than the base are continued: joints turn it more
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LinkChart:
     """Somersault, tilt and twist of one link of a body, Rotation = there Ry(somersault) Rx(tilt) Rz(twist) here^T.
 
@@ -59,9 +59,6 @@ class LinkChart:
     pose: Array
     here: Array
     there: Array
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     @classmethod
     def of(cls, motion: Motion, link: str, of_athlete: bool, **given: Any) -> LinkChart:
@@ -179,7 +176,7 @@ def _turns(body: Body, shapes: Array, rates: Array, frame: int) -> Array:
     return link_motions(body.chain, shapes, rates).turns[:, frame]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class DirectShares:
     """What the momentum and each joint did to an angle of a link, along the motion.
 
@@ -211,9 +208,6 @@ class DirectShares:
     total: Array
     largest_tilt: float
     tilt_time: float
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)

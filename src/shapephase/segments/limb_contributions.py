@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_keywords, check_object, number_argument, times_argument, vector_argument, whole_argument
-from ..arrays import Array, lock_arrays, read_only
+from ..arrays import Array, read_only
 from ..body.body import Body
-from ..display import number_with_bar, short_repr
+from ..display import frozen, number_with_bar
 from ..errors import ShapeError, WrongObjectError, unknown_name
 from ..letters import value_text
 from ..phases.phases import split
@@ -45,7 +45,7 @@ RESULTS = (*ANGLES, "rotation", "phase")
 Result = Callable[[Motion], float]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Contributions:
     """Shares of groups of joints in a result of a motion. Made by `contributions`; printing it shows a table.
 
@@ -99,9 +99,6 @@ class Contributions:
     direct: DirectShares | None
     _pairs: dict[str, tuple[str, str]] = field(repr=False, default_factory=dict)
     _held: HeldMotions | None = field(repr=False, default=None)
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     @property
     def scale(self) -> float:

@@ -16,7 +16,7 @@ from ..arguments import check_mapping, check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.link_motions import link_motions
-from ..display import short_repr
+from ..display import frozen
 from ..errors import ShapeError, unknown_name
 from ..letters import value_text
 
@@ -274,7 +274,7 @@ def _mirrored(first: Limb, second: Limb) -> bool:
     )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointGroups:
     """Groups of joints whose shares are computed.
 
@@ -295,8 +295,6 @@ class JointGroups:
     joints: dict[str, tuple[str, ...]]
     rest: tuple[str, ...]
     pairs: dict[str, tuple[str, str]]
-
-    __repr__ = short_repr
 
 
 def joint_groups(body: Body, groups: str | Mapping[str, str | Iterable[str]] = "limbs") -> JointGroups:

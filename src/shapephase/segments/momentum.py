@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_choice, check_object, positive_argument, times_argument
-from ..arrays import Array, finite_array, lock_arrays
+from ..arrays import Array, finite_array
 from ..body import Body, visuals
 from ..body.link_motions import link_motions
 from ..deformation.deformation import articulated
-from ..display import short_repr
+from ..display import frozen, short_repr
 from ..dynamics.moving_body import needed_body_and_path
 from ..errors import ShapeError, TrajectoryError, TrajectoryWarning, WrongObjectError
 from ..letters import value_text
@@ -85,7 +85,7 @@ class Normalisation:
     __repr__ = short_repr
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class FlightMomentum:
     """Whole momentum in one flight.
 
@@ -117,11 +117,8 @@ class FlightMomentum:
     relative_to: str
     more_than_noise: bool
 
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class SegmentMomentum:
     """Angular momentum about the centre of mass of the whole body, at N times, along C axes.
 
@@ -163,9 +160,6 @@ class SegmentMomentum:
     normalisation: Normalisation | None
     flights: tuple[FlightMomentum, ...]
     as_recorded: bool
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
     @property
     def by_link(self) -> Array:

@@ -10,14 +10,12 @@ from numpy.typing import ArrayLike
 
 from .. import so3
 from ..arguments import check_object
-from ..arrays import Array, Integers, Mask, finite_array
+from ..arrays import Array, finite_array
 from ..body.body import Body
-from ..body.family import BodyFamily
 from ..body.particles.point_masses import ParticleBody
 from ..errors import OpenPathError, ShapeError, TrajectoryWarning
 from ..integrator import machine_code
-from ..integrator.families import many_inverted
-from ..integrator.link_tree import tree_channels, trees_channels
+from ..integrator.link_tree import tree_channels
 from ..integrator.sampling import Sampler
 from .curves import Fourier, PiecewisePolynomial
 from .knot_crossings import with_crossings
@@ -112,30 +110,6 @@ def channels_at(body: Body | ParticleBody, shapes: Array, rates: Array) -> Array
     if isinstance(body, ParticleBody) or not body.chain.has_rows or not machine_code.is_used():
         return None
     return tree_channels(body.chain.rows, shapes, rates)
-
-
-class FamilyVariants:
-    """The bodies of a family along one path with columns in their order, planned by the one they were made from."""
-
-    def __init__(self, family: BodyFamily, path: ShapePath) -> None:
-        self._family, self._path = family, path
-        self.model = path_sampler(family.body, path)
-
-    def __len__(self) -> int:
-        """Number of bodies."""
-        return len(self._family)
-
-    def channels(self, rows: Integers, times: Array) -> tuple[Array, Mask]:
-        """I^-1 and I^-1 L_o of some at times, and which can be relied on: (V,), (S,) -> (V, S, 9), (V,)."""
-        shapes, rates = self._path.at_samples(times)
-        if machine_code.is_used() and self._family.body.chain.has_rows:
-            masses = self._family.mass[rows]
-            return trees_channels(self._family.body.chain.rows, self._family.rows[rows], masses, shapes, rates)
-        return many_inverted(*self._family.some(rows).sample(shapes, rates), times)
-
-    def alone(self, row: int) -> Sampler:
-        """Sampler of one of them."""
-        return path_sampler(self._family[row], self._path)
 
 
 def looks_like(values: Array, factor: float, lower: float, upper: float) -> bool:

@@ -12,7 +12,7 @@ from ..arrays import Array, Integers, Mask
 from ..body.body import Body
 from ..body.collisions.geometry import CollisionGeometry, Postures, collision_geometry
 from ..chebyshev import inside, nodes_on, values_to_coefficients
-from ..display import short_repr
+from ..display import frozen, short_repr
 from ..errors import ShapeError
 from ..letters import value_text
 from .body_path import users_route_along
@@ -49,7 +49,7 @@ class ClosestApproach:
         return f"{distance_text(self.links, self.distance)} at {self.time:.6g} s"
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Clearance:
     """Least distances of pairs of links along a path. Made by `clearance`.
 
@@ -61,8 +61,6 @@ class Clearance:
 
     approaches: tuple[ClosestApproach, ...]
     geometry: CollisionGeometry
-
-    __repr__ = short_repr
 
 
 def clearance(

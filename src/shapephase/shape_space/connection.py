@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +12,7 @@ from ..arguments import check_choice, check_function, check_object, times_argume
 from ..arrays import Array, finite_array
 from ..body.body import Body
 from ..body.particles.point_masses import ParticleBody
-from ..display import short_repr
+from ..display import frozen
 from ..errors import AccuracyNotReached, OpenPathError, ShapeError
 from ..inertia_tensor import inverse_inertia
 from ..integrator.integrate import stepped_rotation
@@ -157,7 +156,7 @@ def holonomy(body: Body | ParticleBody, path: ShapePath, tolerance: float = 1e-9
     return _lift(body, route, goal).end[0]
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class HorizontalLift:
     """The attitude of a body with zero angular momentum along a path of its joints. Made by `horizontal_lift`.
 
@@ -171,8 +170,6 @@ class HorizontalLift:
     body: Body | ParticleBody
     path: ShapePath
     solution: SteppedRotation
-
-    __repr__ = short_repr
 
     @property
     def duration(self) -> float:

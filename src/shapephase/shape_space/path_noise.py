@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from math import comb
 
@@ -10,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arguments import check_object, times_argument
-from ..arrays import Array, finite_array, lock_arrays
-from ..display import short_repr
+from ..arrays import Array, finite_array
+from ..display import frozen
 from ..errors import ShapeError, WrongObjectError
 from ..letters import value_text
 from .path_samples import PathSamples, columns_without_samples, path_samples
@@ -23,7 +22,7 @@ _ROUNDING = 8.0  # units in the last place: what arithmetic leaves of samples th
 _MOST_NUMBERS = 4_000_000  # in memory at once; more times are taken in parts
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class PathErrors:
     """Error bars of joints at some times, each from the noise of its own samples. Made by `path_errors`.
 
@@ -38,9 +37,6 @@ class PathErrors:
     times: Array
     covariance: Array
     bias: Array
-
-    __repr__ = short_repr
-    __post_init__ = lock_arrays
 
     @property
     def shape(self) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -18,9 +18,9 @@ from ..arguments import (
     positive_argument,
     times_argument,
 )
-from ..arrays import Array, lock_arrays, read_only
+from ..arrays import Array, read_only
 from ..card_pictures import MOST_POINTS, curves_picture
-from ..display import Card, card_html, card_text, numbers
+from ..display import Card, card_html, card_text, frozen, numbers
 from ..errors import OpenPathError, ShapeError, ShapePhaseError, TrajectoryError, unknown_name
 from ..integrator.smoothness import Smoothness
 from ..letters import value_text
@@ -67,7 +67,7 @@ class PathOrigin(Protocol):
 
 
 @made_by("read_shape_path(file, body), or ShapePath.fourier, spline, waypoints or function")
-@dataclass(frozen=True, eq=False)
+@frozen
 class ShapePath:
     """A motion of the joints, r(t) on [0, duration].
 
@@ -106,7 +106,6 @@ class ShapePath:
     origin: PathOrigin | None = None
     _seen: KeptValues = field(default_factory=KeptValues, init=False, repr=False)
 
-    __post_init__ = lock_arrays
     __repr__, _repr_html_ = card_text, card_html
 
     @staticmethod

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from ..arguments import check_object
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.coupling import described
-from ..display import short_repr
+from ..display import frozen
 from ..inertia_tensor import principal_axes, triangle_defect
 from .body_path import path_gap, users_route_along
 from .path_series import joint_extremes, times_of_fastest
@@ -20,7 +19,7 @@ from .shape_path import CLOSED, ShapePath
 _KINDS = {"rad": "revolute", "m": "prismatic", "1": "ball"}
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class JointSummary:
     """One joint: its kind ("revolute", "continuous" or "prismatic"), limits (infinite where there are none), unit.
 
@@ -33,10 +32,8 @@ class JointSummary:
     upper: float
     unit: str
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class PartSummary:
     """Rigid part: a link and those that are fixed to it. Made by `body_summary`.
 
@@ -53,10 +50,8 @@ class PartSummary:
     centre_of_mass: Array
     principal_moments: Array
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class BodySummary:
     """A body at its neutral shape. Made by `body_summary`.
 
@@ -86,10 +81,8 @@ class BodySummary:
     links: tuple[str, ...]
     parts: tuple[PartSummary, ...]
 
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class PathSummary:
     """A joint motion for a body. Made by `path_summary`.
 
@@ -118,8 +111,6 @@ class PathSummary:
     still_joints: tuple[str, ...]
     gap: Array
     is_loop: bool
-
-    __repr__ = short_repr
 
 
 def body_summary(body: Body) -> BodySummary:

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import check_object
 from ...arrays import Array, finite_array
-from ...display import short_repr
+from ...display import frozen
 from ...errors import ShapeError
 from ..body import Body
 from .geometry import CollisionGeometry, Separations, collision_geometry
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class LinkDistances:
     """Signed distances of P pairs of links at shapes (..., n). Made by `link_distances`.
 
@@ -31,8 +29,6 @@ class LinkDistances:
     distance: Array
     points: Array
     slopes: Array
-
-    __repr__ = short_repr
 
 
 def link_distances(body: Body, shape: ArrayLike, *, geometry: CollisionGeometry | None = None) -> LinkDistances:

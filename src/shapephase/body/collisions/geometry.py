@@ -17,7 +17,7 @@ import numpy as np
 
 from ...arguments import check_file_name, check_object
 from ...arrays import Array, Integers
-from ...display import short_repr
+from ...display import frozen
 from ...errors import MissingExtraError, NoCollisionGeometryError, VisualWarning, unknown_name
 from ..body import Body
 from ..drawing.appearance import collision_shapes
@@ -66,7 +66,7 @@ class Separations:
     normals: Array
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class CollisionGeometry:
     """Convex solids of a body's links, and the pairs of links whose distance counts. Made by `collision_geometry`.
 
@@ -83,8 +83,6 @@ class CollisionGeometry:
     pairs: tuple[tuple[str, str], ...]
     left_out: tuple[tuple[str, str, str], ...]
     missing: tuple[str, ...]
-
-    __repr__ = short_repr
 
     def __getstate__(self) -> dict[str, Any]:
         """Return everything but what is derived: solids of coal cannot be pickled."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +12,7 @@ from ... import so3
 from ...arguments import check_object, tolerance_argument
 from ...arrays import Array
 from ...body.body import Body
+from ...body.particles.point_masses import ParticleBody
 from ...errors import AccuracyNotReached, ShapeError
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import horizontal_lift
@@ -56,8 +58,8 @@ class _BoundaryProblem:
     duration : [s]
     """
 
-    body: Body
-    metric: str
+    body: Body | ParticleBody
+    metric: Any
     equations: Hamiltonian
     start: Array
     end: Array
@@ -117,11 +119,11 @@ class _BoundaryProblem:
 
 
 def shoot(
-    body: Body,
+    body: Body | ParticleBody,
     path: ShapePath,
     target: ArrayLike | None = None,
     *,
-    metric: str = "kinetic",
+    metric: Any = "kinetic",
     tolerance: float = 1e-10,
 ) -> Extremal:
     """Return the extremal next to a nearly optimal path, with the same start and end and a given rotation.
@@ -151,7 +153,7 @@ def shoot(
     >>> print(f"{path.cost:.4f} <= {sp.optimal_control.path_cost(cat, loop):.4f} J s")
     0.0204 <= 0.0204 J s
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     route = route_along(body, path)
     goal = tolerance_argument(tolerance)

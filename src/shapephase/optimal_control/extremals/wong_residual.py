@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ... import so3
 from ...arguments import check_object
 from ...arrays import Array
 from ...body.body import Body
+from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
 from ...shape_space.body_path import route_along
@@ -57,10 +59,10 @@ class WongFit:
 
 
 def wong_residual(
-    body: Body,
+    body: Body | ParticleBody,
     path: ShapePath,
     *,
-    metric: str = "kinetic",
+    metric: Any = "kinetic",
     joints: Sequence[str] | None = None,
     symmetric: Mapping[str, tuple[str, float]] | None = None,
 ) -> WongFit:
@@ -95,7 +97,7 @@ def wong_residual(
     >>> print(f"{sp.optimal_control.wong_residual(cat, loop).residual:.3f}")  # an extremal
     0.000
     """
-    check_object(body, "Body", "body")
+    check_object(body, "Body", "body", or_kind="ParticleBody")
     check_object(path, "ShapePath", "path")
     route = route_along(body, path)
     equations = hamiltonian(body, metric)
@@ -121,7 +123,7 @@ def wong_residual(
 
 
 def _fit(
-    body: Body,
+    body: Body | ParticleBody,
     known: Hamiltonian,
     coupling: Array,
     route: ShapePath,
@@ -166,7 +168,7 @@ def _fit(
     return WongFit(charge=charge, rate=rate, residual=residual)
 
 
-def _check_follows(body: Body, route: ShapePath, coupling: Array) -> None:
+def _check_follows(body: Body | ParticleBody, route: ShapePath, coupling: Array) -> None:
     """Raise TrajectoryError where joints of a path do not move as the coupling prescribes."""
     shapes = route.shape(np.linspace(0.0, route.duration, _SAMPLES))
     moves = shapes - shapes[0]

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...arguments import check_object, made_by, number_argument, whole_argument
-from ...arrays import Array, lock_arrays
+from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_smooth
 from ...body.particles.point_masses import ParticleBody
-from ...display import short_repr
+from ...display import frozen
 from ...errors import ShapeError
 from ..body_path import one_shape
 from ..connection import connection_slopes, curvature, horizontal_lift
@@ -30,7 +29,7 @@ _SEED = 26  # any fixed seed: repeatable results
 _LIFT_TOLERANCE = 1e-12  # [rad] of the lift that carries a curvature back
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class OrderReach:
     """Axes of the turns by loops small to some order of their stroke. Made by `reachable`.
 
@@ -47,11 +46,8 @@ class OrderReach:
     axes: Array
     singular_values: Array
 
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
-
-@dataclass(frozen=True, eq=False)
+@frozen
 class PairTurn:
     """Turn of the body by a small loop of two joints. Made by `reachable`.
 
@@ -68,9 +64,6 @@ class PairTurn:
     axis: Array
     units: str
 
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
-
     @property
     def degrees(self) -> float:
         """Degrees per square radian, or per product of the joints' units."""
@@ -78,7 +71,7 @@ class PairTurn:
 
 
 @made_by("reachable(body, shape)")
-@dataclass(frozen=True, eq=False)
+@frozen
 class Reach:
     """The rotations that loops of the joints reach from a shape. Made by `reachable`.
 
@@ -107,9 +100,6 @@ class Reach:
     orders: tuple[OrderReach, ...]
     loops: tuple[AxisLoop, ...]
     pairs: tuple[PairTurn, ...]
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     @property
     def gap(self) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -11,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from ... import so3
 from ...arguments import check_object, whole_argument
-from ...arrays import Array, finite_array, lock_arrays
+from ...arrays import Array, finite_array
 from ...body.body import Body
 from ...body.particles.point_masses import ParticleBody
-from ...display import short_repr
+from ...display import frozen
 from ...errors import AccuracyNotReached, ShapeError
 from ..body_path import check_closed, in_joint_order, route_along
 from ..connection import integral, mechanical_connection
@@ -30,7 +29,7 @@ _SMALL_STEP = 1e-11  # [rad] of the last correction
 _TURN_TOLERANCE = 1e-12  # change of the integral of the connection's size at which halving ends
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class MinimumPerturbation:
     """A frame U(r) for each shape of a region, with the least connection. Made by `minimum_perturbation`.
 
@@ -50,9 +49,6 @@ class MinimumPerturbation:
     powers: Array
     layers: Array
     mean_square: tuple[float, float]
-
-    __post_init__ = lock_arrays
-    __repr__ = short_repr
 
     def frame(self, shape: ArrayLike) -> Array:
         """U, the base's vectors seen from the frame: (..., n) -> (..., 3, 3)."""
