@@ -308,8 +308,8 @@ def segment_momentum(
     if isinstance(motion, Motion):
         source = _of_motion(motion, times)
     else:
+        check_object(body, "Body", "body")
         if isinstance(motion, RecordedMotion):
-            check_object(body, "Body", "body")
             recorded, given = _of_recording(motion), motion.flight is not None
             if motion.smoothing is not None and motion.smoothing.low_pass is not None and attitude_noise is None:
                 warnings.warn(
@@ -319,7 +319,6 @@ def segment_momentum(
                     stacklevel=2,
                 )
         else:
-            check_object(body, "Body", "body")
             recorded, given = _of_trajectory(motion), False
         assert body is not None
         if times is not None:
