@@ -31,8 +31,7 @@ _AT_ONCE = 10_000_000  # numbers of regressors in one pass: 80 MB
 class BodyFamily(Sequence["Body"]):
     """N bodies that differ in their inertias only: a sequence of them, made by `Body.with_inertias`.
 
-    `articulated` and `reconstruct` take it as they take a body. Where the links are and how they move is the same for
-    all, and computed once.
+    `articulated` and `reconstruct` take it as they take a body.
 
     Attributes
     ----------

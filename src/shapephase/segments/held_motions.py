@@ -1,4 +1,4 @@
-"""Motions of one body in which some groups of joints follow the motion and all others a baseline, many in one batch."""
+"""Motions of one body in which some groups of joints follow the motion, and all others a baseline."""
 
 from __future__ import annotations
 
