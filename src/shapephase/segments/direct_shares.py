@@ -26,7 +26,7 @@ from ..display import frozen
 from ..error_bars.wheels_along import WheelsAlong, reduced_chain, wheel_frames
 from ..errors import AccuracyNotReached, ChartPoleError, WrongObjectError
 from ..integrator.stepped import SteppedRotation
-from ..reconstruction.attitude_angles import EulerAngles, continued_angles
+from ..reconstruction.attitude_angles import EulerAngles, continued_angles, followed
 from ..reconstruction.reconstruction import Motion
 from ..refinement import least_over
 from ..shape_space.path_series import panel_edges
@@ -111,8 +111,9 @@ class LinkChart:
         def quaternions(sampled: Array) -> Array:
             return so3.quat_from_matrix(self.there.T @ self.attitude(motion, sampled) @ self.here)[None]
 
-        error = float(motion.error_estimate)
-        return continued_angles(quaternions, known, times, EulerAngles("YXZ"), error)[0]
+        chart, error = EulerAngles("YXZ"), float(motion.error_estimate)
+        curve = followed(quaternions, known, chart, error)
+        return continued_angles(quaternions, curve, times, chart, error)[0]
 
     def rates(self, attitudes: Array, about: Array | None) -> tuple[Array, Array]:
         """Rows that turn angular velocities in link axes into rates of angles, and the sine of the tilt.
