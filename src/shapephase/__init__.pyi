@@ -11,6 +11,7 @@ from . import (
     exports,
     inertia_tensor,
     integrator,
+    inverse_design,
     optimal_control,
     phases,
     planar,
@@ -54,6 +55,7 @@ from .errors import (
 )
 from .exports.tables import export_motion
 from .integrator.machine_code import compile_steps
+from .inverse_design.design import Design, design
 from .optimal_control.planning import plan_reorientation
 from .phases.continuation import OrbitBranch, continued_orbits
 from .phases.forced_split import ForcedSplit
@@ -120,6 +122,7 @@ __all__ = [
     "Deformation",
     "DeformationFamily",
     "Derivatives",
+    "Design",
     "EulerTop",
     "ExternalTorque",
     "FixedPoints",
@@ -178,6 +181,7 @@ __all__ = [
     "curvature_on_plane",
     "deformation",
     "derivatives",
+    "design",
     "dynamic_manipulability",
     "dynamic_phase_from_energy",
     "dynamics",
@@ -198,6 +202,7 @@ __all__ = [
     "in_gauge",
     "inertia_tensor",
     "integrator",
+    "inverse_design",
     "is_flat",
     "joint_torques",
     "link_gauge",
