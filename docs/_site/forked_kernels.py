@@ -62,7 +62,8 @@ def fork_kernels() -> None:
             shutil.rmtree(folder)
 
     atexit.register(stop)
-    local_provisioner.launch_kernel = lambda command, **given: ForkedKernel(address, command, given)
+    launch: Any = local_provisioner
+    launch.launch_kernel = lambda command, **given: ForkedKernel(address, command, given)
 
 
 class ForkedKernel:
