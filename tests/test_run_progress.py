@@ -119,6 +119,22 @@ def test_split_is_watched_too():
         sp.split(sp.reconstruct(cat(), MOMENTUM), progress=lambda *_: True)
 
 
+def test_a_search_for_closed_orbits_is_watched_and_stopped():
+    deformation = sp.articulated("cat_two_halves", sp.examples.kane_scher(0.0, 1.0))
+    reported: list[tuple[float, str]] = []
+    found = sp.phases.fixed_points(deformation, 0.005, progress=lambda *now: reported.append(now))
+    shares = [share for share, _ in reported]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    # A search is some dozens of stretches: most reports come before three quarters of the bar are full.
+    assert len(shares) > 10
+    assert np.median(shares) < 0.75
+    np.testing.assert_array_equal(found.directions, sp.phases.fixed_points(deformation, 0.005).directions)
+    for search in (sp.phases.fixed_points, sp.phases.closed_orbits):
+        with pytest.raises(RunStopped):
+            search(deformation, 0.005, progress=lambda *_: True)
+
+
 def test_stretches_fill_what_is_left():
     """By hand: 0.2 of the run for the first phase, 0.7 of that for its first stretch, and so on."""
     shares: list[float] = []

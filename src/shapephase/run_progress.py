@@ -24,6 +24,7 @@ SAMPLING = "sampling the body"
 STEPPING = "stepping"
 _PHASES = {LOOKING: 0.2, SAMPLING: 0.5, STEPPING: 0.9}  # share of the run still left that a phase usually takes
 _STRETCH = 0.7  # share of the phase still left that one stretch takes, since there may be others
+SEARCH_STRETCH = 0.12  # of searches, which are some dozens of stretches
 _NOTICEABLE = 0.005  # share of the run: smaller progress is not reported, so that a run makes 200 reports
 
 
@@ -36,8 +37,8 @@ def check_progress(progress: object) -> None:
 class _Watcher:
     """Reports to a callback what has been done."""
 
-    def __init__(self, callback: ProgressCallback) -> None:
-        self._callback = callback
+    def __init__(self, callback: ProgressCallback, stretch: float) -> None:
+        self._callback, self._stretch = callback, stretch
         self._phase, self._phase_end = "", 0.0
         self._share = self._start = self._end = 0.0
         self._total = self._done = 0
@@ -48,7 +49,7 @@ class _Watcher:
         is_new = phase != self._phase
         if is_new:
             self._phase, self._phase_end = phase, self._share + _PHASES[phase] * (1.0 - self._share)
-        self._start, self._end = self._share, self._share + _STRETCH * (self._phase_end - self._share)
+        self._start, self._end = self._share, self._share + self._stretch * (self._phase_end - self._share)
         self._total, self._done = total, 0
         self._report(always=is_new)
 
@@ -72,8 +73,10 @@ _WATCHER: ContextVar[_Watcher | None] = ContextVar("_WATCHER", default=None)
 
 
 @contextlib.contextmanager
-def watched(progress: ProgressCallback | None) -> Iterator[None]:
+def watched(progress: ProgressCallback | None, stretch: float = _STRETCH) -> Iterator[None]:
     """Report to a callback what is done within; None reports nothing.
+
+    stretch : share of the phase still left that one stretch takes
 
     Raises
     ------
@@ -84,7 +87,7 @@ def watched(progress: ProgressCallback | None) -> Iterator[None]:
     if progress is None:
         yield
         return
-    watcher = _Watcher(progress)
+    watcher = _Watcher(progress, stretch)
     token = _WATCHER.set(watcher)
     try:
         yield

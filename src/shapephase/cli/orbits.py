@@ -85,7 +85,7 @@ def orbits_command(
         seen = named_gauge(deformation, gauge)
         work.begin("finding what closes")
         expect_work(momenta=_MOMENTA)
-        found = fixed_points(seen, magnitude, tolerance=goal)
+        found = fixed_points(seen, magnitude, tolerance=goal, progress=work.watch)
         upright = so3.transpose(so3.between(np.array([0.0, 0.0, 1.0]), found.directions))
         work.begin("splitting")
         moved = [reconstruct(seen, [0.0, 0.0, magnitude], attitude, tolerance=found.tolerance) for attitude in upright]

@@ -80,7 +80,7 @@ class Member:
 
 
 class OutOfMembers(Exception):
-    """As many members as allowed were computed."""
+    """All members that were allowed are computed."""
 
 
 class Search:

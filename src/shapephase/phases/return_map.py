@@ -26,6 +26,7 @@ from ..integrator.many_rotations import GroupedRotations
 from ..integrator.stepped import SteppedRotation
 from ..letters import value_text
 from ..reconstruction.reconstruction import Motion, reconstruct
+from ..run_progress import SEARCH_STRETCH, ProgressCallback, watched
 from ._fixed_point_search import FAMILY_SPACING, SEARCH_TOLERANCE, search, spaced
 from ._loop_map import UP, MomentumLoop, closed_points, ends_of, exact_slopes, tangent_basis
 
@@ -179,6 +180,7 @@ def fixed_points(
     tolerance: float | None = None,
     most_directions: int = 100_000,
     executor: Executor | None = None,
+    progress: ProgressCallback | None = None,
 ) -> FixedPoints:
     """Directions of the body momentum that close together with the shape, as many as a search finds.
 
@@ -203,6 +205,7 @@ def fixed_points(
     executor : of `concurrent.futures`, or of a cluster (`distributed.Client.get_executor()`), that takes more than
         2048 directions in parts, and with derivatives more than 128; None: one part after the other, here. Results do
         not depend on it
+    progress : as for `reconstruct`; parts that an executor takes report nothing
 
     Raises
     ------
@@ -210,6 +213,8 @@ def fixed_points(
         If the shape does not close.
     AccuracyNotReached
         If errors grow so much along the loop that the tolerance cannot be met.
+    RunStopped
+        If `progress` stopped it.
 
     Notes
     -----
@@ -230,17 +235,18 @@ def fixed_points(
         raise ShapeError(
             f"most_directions: an integer from {_FEWEST_DIRECTIONS} is needed, got {value_text(most_directions)}"
         )
-    loop = MomentumLoop.of(deformation, _REACHABLE[0] if tolerance is None else tolerance, executor)
-    looser = _REACHABLE[1:] if tolerance is None else ()
-    starts, exhausted = search(loop, magnitude, _STARTS[0], most_directions)
-    points = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
-    for count in _STARTS[1:]:
-        if points.index_sum == _LEFSCHETZ or not points.index.all() or exhausted:
-            break
-        starts, exhausted = search(loop, magnitude, count, most_directions)
-        starts = np.concatenate([points.directions, starts])
+    with watched(progress, SEARCH_STRETCH):
+        loop = MomentumLoop.of(deformation, _REACHABLE[0] if tolerance is None else tolerance, executor)
+        looser = _REACHABLE[1:] if tolerance is None else ()
+        starts, exhausted = search(loop, magnitude, _STARTS[0], most_directions)
         points = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
-    return points
+        for count in _STARTS[1:]:
+            if points.index_sum == _LEFSCHETZ or not points.index.all() or exhausted:
+                break
+            starts, exhausted = search(loop, magnitude, count, most_directions)
+            starts = np.concatenate([points.directions, starts])
+            points = _first_reachable(loop, looser, magnitude, starts, exhausted=exhausted)
+        return points
 
 
 def _first_reachable(
@@ -254,7 +260,13 @@ def _first_reachable(
     return _fixed_points_from(loop, magnitude, starts, exhausted=exhausted)
 
 
-def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: float | None = None) -> list[Motion]:
+def closed_orbits(
+    deformation: Deformation,
+    magnitude: float,
+    *,
+    tolerance: float | None = None,
+    progress: ProgressCallback | None = None,
+) -> list[Motion]:
     """Motions (momentum along inertial z) whose body momentum closes in this deformation's gauge with the shape.
 
     The motions at the `fixed_points`, in their order, the highest first. Every loop and magnitude has at least two
@@ -264,11 +276,14 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
     ----------
     magnitude : of the angular momentum, above 0 [kg m^2/s]
     tolerance : of each motion's attitude [rad]; None: as for `fixed_points`; `Motion.tolerance` says which
+    progress : of the search, as for `reconstruct`
 
     Raises
     ------
     OpenPathError
         If the shape does not close.
+    RunStopped
+        If `progress` stopped it.
 
     Examples
     --------
@@ -278,7 +293,7 @@ def closed_orbits(deformation: Deformation, magnitude: float, *, tolerance: floa
     (True, 0.0)
     """
     check_object(deformation, "Deformation", "deformation")
-    points = fixed_points(deformation, magnitude, tolerance=tolerance)
+    points = fixed_points(deformation, magnitude, tolerance=tolerance, progress=progress)
     # R^T z is the direction of the momentum in the body.
     attitudes = so3.transpose(so3.between(np.broadcast_to(UP, points.directions.shape), points.directions))
     return [reconstruct(deformation, points.magnitude * UP, r, tolerance=points.tolerance) for r in attitudes]
