@@ -8,7 +8,6 @@ import math
 import threading
 from collections.abc import Iterable, Mapping
 from copy import copy
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from .. import so3
 from ..arguments import made_by, positive_argument, vector_argument
 from ..arrays import Array, finite_array
 from ..card_pictures import sticks_picture
-from ..display import Card, card_html, numbers, short_repr
+from ..display import Card, card_html, frozen, numbers
 from ..errors import ShapeError, unknown_name
 from ..inertia_tensor import second_moment
 from ..letters import value_text
@@ -34,6 +33,7 @@ from ._centroidal_maps import (
     momentum_gradients,
 )
 from ._model_tree import model_with, model_with_wheel, moving_joints
+from .couplings.coordinate_map import CoordinateMap
 from .couplings.coupling import Coupling
 from .couplings.joint_map import JointMap
 from .family import BodyFamily, Given, given_inertias
@@ -45,7 +45,7 @@ from .shape_arguments import ShapeArguments
 _MOST_NAMED = 4  # joints on a card: they fit on one line
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class MovingPart:
     """Links that are fixed to each other, and their inertia together, in the axes of the first.
 
@@ -67,8 +67,6 @@ class MovingPart:
     mass: float
     centre: Array
     inertia: Array
-
-    __repr__ = short_repr
 
 
 @made_by("load_body(file or name)")
@@ -140,6 +138,11 @@ class Body(ShapeArguments):
         self.rate_columns, self.n_rates = self._joints.rate_columns, len(self.rate_names)
         self.ball_joints = tuple(ball.name for ball in self.chain.follows.balls)
         self.link_names = tuple(f.name for f in model.frames if f.type == pin.FrameType.BODY)
+
+    @property
+    def follows(self) -> CoordinateMap:
+        """Coordinates of all joints from the shape."""
+        return self.chain.follows
 
     @property
     def n_joints(self) -> int:

@@ -7,6 +7,7 @@ from .extremals.wong_residual import WongFit, wong_residual
 from .plan import Plan, Start
 from .plan_options import Goal, Limits, Search, Waypoint
 from .planning import plan_reorientation
+from .small_loops import SmallLoop, small_loop
 from .symbolic import SymbolicBody, symbolic_body
 from .way_back import Undo, WayBack, undo
 
@@ -19,6 +20,7 @@ __all__ = [
     "Limits",
     "Plan",
     "Search",
+    "SmallLoop",
     "Start",
     "SymbolicBody",
     "Undo",
@@ -32,6 +34,7 @@ __all__ = [
     "path_cost",
     "plan_reorientation",
     "shoot",
+    "small_loop",
     "symbolic_body",
     "undo",
     "wong_residual",

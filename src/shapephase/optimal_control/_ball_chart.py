@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..body.body import Body
 from ..body.couplings.ball_joints import BallJoint, vector_part
+from ..body.particles.point_masses import ParticleBody
 from ..errors import TrajectoryError
 
 _FARTHEST = np.tan(np.radians(80.0))  # 160 degrees from the start about an axis; a half turn is infinitely far
@@ -30,11 +31,11 @@ class BallChart:
     starts: tuple[tuple[BallJoint, int, Array], ...]
 
     @classmethod
-    def of(cls, body: Body, start: Array, leaders: Sequence[int]) -> BallChart | None:
+    def of(cls, body: Body | ParticleBody, start: Array, leaders: Sequence[int]) -> BallChart | None:
         """Return the chart for the coordinates of some joints (m,), from a shape (n,); None if no ball joint moves."""
         starts = [
             (ball, list(leaders).index(ball.column), ball.quaternions(start[None])[0])
-            for ball in body.chain.follows.balls
+            for ball in body.follows.balls
             if ball.column in leaders
         ]
         return cls(starts=tuple(starts)) if starts else None

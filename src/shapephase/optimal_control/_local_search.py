@@ -207,7 +207,7 @@ def _cost(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> fl
     if task.cost == "acceleration":
         bend = basis.matrix(places, 2) @ polished.control @ task.coupling.T
         return float(0.5 * weights @ np.sum(bend**2, axis=1)) / polished.duration**3
-    return path_cost(task.body, polished.path, task.cost)
+    return path_cost(task.body, polished.path, task.metric.metric if task.metric else task.cost)
 
 
 def _within_limits(task: Reorientation, basis: SplineBasis, polished: PolishedPath) -> bool:

@@ -3,28 +3,31 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from .. import so3
-from ..arguments import check_choice, check_object
 from ..arrays import Array
 from ..body.body import Body
+from ..body.loading import as_body_or_particles
+from ..body.particles.point_masses import ParticleBody
 from ..dynamics.torques import joint_torques
 from ..errors import AccuracyNotReached
 from ..reconstruction.reconstruction import Motion
-from ..shape_space.body_path import route_along
+from ..shape_space.body_path import as_path, route_along
 from ..shape_space.connection import mechanical_connection
 from ..shape_space.shape_path import ShapePath
 from ._spline_basis import gauss_tableau
+from .cost_metric import METRIC_COSTS, CostMetric, metric_argument
 
 _NODES = 12  # Gauss nodes of a panel: exact for the rate cost of a cubic spline, ample for smooth paths
 _HALVINGS = 6  # of two panels between two breaks, until the cost has converged
 _CONVERGED = 1e-10  # relative change between subdivisions: 100 roundings of the body's matrices
 
 
-def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
-    """Cost "kinetic" or "rate" of a path (see `plan_reorientation`), with the body's own matrices.
+def path_cost(body: Body | ParticleBody | str, path: ShapePath | str, cost: Any = "kinetic") -> float:
+    """Cost of a path that is the integral of a metric (see `plan_reorientation`), with the body's own matrices.
 
     By Gauss quadrature with twelve nodes a panel; the panels between two breaks of the path are halved until the cost
     changes by no more than 1e-10 of itself.
@@ -42,14 +45,14 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     >>> print(f"{sp.optimal_control.path_cost(cat, loop, 'rate'):.6f} rad^2/s")
     5.169923 rad^2/s
     """
-    check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
-    check_choice(cost, "cost of a path", ("kinetic", "rate"))
+    body = as_body_or_particles(body)
+    path = as_path(path, body)
+    metric = metric_argument(body, cost, "cost of a path")
     route = route_along(body, path)
-    before, panels = _quadrature(body, route, cost, 2), 2
+    before, panels = _quadrature(body, route, metric, 2), 2
     for _ in range(_HALVINGS):
         panels *= 2
-        now = _quadrature(body, route, cost, panels)
+        now = _quadrature(body, route, metric, panels)
         if abs(now - before) <= _CONVERGED * abs(now):
             return now
         before = now
@@ -59,12 +62,12 @@ def path_cost(body: Body, path: ShapePath, cost: str = "kinetic") -> float:
     )
 
 
-def motion_cost(motion: Motion, body: Body, route: ShapePath, cost: str, effort_measure: Array) -> float:
+def motion_cost(motion: Motion, body: Body | ParticleBody, route: ShapePath, cost: Any, effort_measure: Array) -> float:
     """Cost of a motion along a route in the order of the body's joints, by any of the costs of `plan_reorientation`.
 
     effort_measure : (n,) units of efforts for the cost "effort" [N m or N]
     """
-    if cost in ("kinetic", "rate"):
+    if not isinstance(cost, str) or cost in METRIC_COSTS:
         return path_cost(body, route, cost)
     if cost == "time":
         return route.duration
@@ -74,10 +77,10 @@ def motion_cost(motion: Motion, body: Body, route: ShapePath, cost: str, effort_
     return float(weights @ np.sum((joint_torques(motion, times).torque / effort_measure) ** 2, axis=1))
 
 
-def _quadrature(body: Body, route: ShapePath, cost: str, panels: int) -> float:
+def _quadrature(body: Body | ParticleBody, route: ShapePath, metric: CostMetric, panels: int) -> float:
     """Integral of the cost's density over the path, with so many panels between two breaks."""
     times, weights = _gauss(route, panels)
-    return float(weights @ cost_density(body, cost, *route.curve(times)))
+    return float(weights @ cost_density(body, metric, *route.curve(times)))
 
 
 def _gauss(route: ShapePath, panels: int) -> tuple[Array, Array]:
@@ -88,8 +91,8 @@ def _gauss(route: ShapePath, panels: int) -> tuple[Array, Array]:
     return (ends[:-1, None] + steps[:, None] * inside).ravel(), (steps[:, None] * weights).ravel()
 
 
-def cost_density(body: Body, cost: str, shapes: Array, rates: Array) -> Array:
-    """Integrand of the cost "kinetic" or "rate": (N, n), (N, n) -> (N,)."""
-    if cost == "rate":
-        return 0.5 * np.sum(rates**2, axis=1)
+def cost_density(body: Body | ParticleBody, metric: CostMetric, shapes: Array, rates: Array) -> Array:
+    """Integrand of a cost, 1/2 r' g r': (N, n), (N, n) -> (N,)."""
+    if metric.name != "kinetic":
+        return 0.5 * np.einsum("na,nab,nb->n", rates, metric.values(shapes), rates)
     return body.kinetic_energy(shapes, rates, -so3.apply(mechanical_connection(body, shapes), rates))

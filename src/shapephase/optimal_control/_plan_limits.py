@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array
+from ..body.particles.point_masses import ParticleBody
 from ..dynamics.torques import joint_torques
 from ..errors import UnstatedLimitWarning
 from ..reconstruction.reconstruction import Motion
@@ -112,7 +113,7 @@ def closest_links(task: Reorientation, path: ShapePath) -> tuple[ClosestApproach
     if task.clearance is None or task.geometry is None:
         return ()
     geometry, times = task.geometry, np.linspace(0.0, path.duration, TIMES)
-    near = clearance(task.body, path, below=task.clearance + _NEAR, geometry=geometry).approaches
+    near = clearance(task.links, path, below=task.clearance + _NEAR, geometry=geometry).approaches
     postures = geometry.postures(path.shape(times)) if near else None
     result = []
     for approach in near:
@@ -159,6 +160,8 @@ def limit_shares(task: Reorientation, basis: SplineBasis, control: Array, motion
 def warn_of_unstated(task: Reorientation, limits: Limits) -> None:
     """Warn the caller's caller of limits taken from a file that does not state them (UnstatedLimitWarning)."""
     body, moves = task.body, np.abs(task.coupling).sum(axis=1) > 0.0
+    if isinstance(body, ParticleBody):
+        return
     unstated = {
         "rate": (limits.rate_limits, np.isinf(body.rate_limits) & moves, "they may move at any rate"),
         # A motor that holds its joint has an effort, too.

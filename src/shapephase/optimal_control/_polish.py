@@ -8,17 +8,15 @@ import numpy as np
 
 from .. import so3
 from ..arrays import Array, Mask
-from ..deformation.deformation import deformation_along
 from ..inertia_tensor import inverse_inertia
-from ..reconstruction.reconstruction import Motion, reconstruct
-from ..shape_space.body_path import route_along
+from ..reconstruction.reconstruction import Motion
 from ..shape_space.shape_path import ShapePath
 from ._plan_limits import derivative_limits, shortest_duration
 from ._spline_basis import SplineBasis, gauss_tableau
 from ._via_points import via_rows
-from .task import Reorientation
+from .task import Reorientation, motion_along
 
-_RECONSTRUCTION_TOLERANCE = 1e-10  # [rad]: a hundredth of what plans have to reach
+RECONSTRUCTION_TOLERANCE = 1e-10  # [rad]: a hundredth of what plans have to reach
 GOAL_TOLERANCE = 1e-8  # [rad], goal error that counts as reached: a hundred times the reconstruction's
 _CONVERGED = 5e-10  # [rad], goal error at which the next Newton step is lost in the reconstruction's error
 _STEPS = 8  # Newton steps at most: it converges quadratically
@@ -134,8 +132,7 @@ def _reconstructed(
 ) -> PolishedPath:
     """Return the path of control points and its motion, before corrections."""
     path = basis.path(task.shapes(control), duration, task.body.joint_names)
-    along = deformation_along(task.body, route_along(task.body, path))
-    motion = reconstruct(along, task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
+    motion = motion_along(task, path, RECONSTRUCTION_TOLERANCE)
     error = task.goal_error(motion.final_attitude, control[-1])
     return PolishedPath(control, duration, path, motion, error, error, 0, via_places)
 

@@ -12,8 +12,9 @@ from scipy.integrate import quad
 from .. import so3
 from ..arrays import Array, Integers
 from ..body.body import Body
+from ..body.particles.point_masses import ParticleBody
 from ..deformation.deformation import rigid
-from ..errors import AccuracyNotReached, SingularInertiaError, UnreachableGoalError
+from ..errors import AccuracyNotReached, ShapeError, SingularInertiaError, UnreachableGoalError
 from ..reconstruction.reconstruction import reconstruct
 from ..shape_space.connection import connection_slopes, curvature, horizontal_lift, mechanical_connection
 from ..shape_space.reach.holonomy_algebra import carried_curvature
@@ -107,7 +108,7 @@ def check_reachable(tasks: Sequence[Reorientation]) -> None:
     """Raise UnreachableGoalError if no motion of the joints reaches any of several goals of one body."""
     try:
         turns = _reachable_turns(tasks[0])
-    except (SingularInertiaError, AccuracyNotReached):
+    except (SingularInertiaError, AccuracyNotReached, ShapeError):  # particles may have no places far away
         return
     if turns is None:
         return
@@ -242,7 +243,7 @@ def _one_joint_turns(task: Reorientation, column: int) -> _ReachableTurns:
         rates = np.linalg.norm(turned, axis=-1)
         if task.link is not None:
             speeds = np.broadcast_to(task.coupling[:, column], shapes[-1].shape)
-            rates += np.linalg.norm(body.link_angular_velocity(shapes[-1], speeds, task.link), axis=-1)
+            rates += np.linalg.norm(task.links.link_angular_velocity(shapes[-1], speeds, task.link), axis=-1)
         slack = max(slack, 0.5 * _BETWEEN * float(rates.max()) * abs(limit - task.start[column]) / (_PLACES - 1))
     name = _names(task, np.array([column]))
     return _ReachableTurns(
@@ -303,7 +304,7 @@ def _with_angles(task: Reorientation, moves: Integers, plane: _ReachableTurns) -
     column, axis, body = int(moves[0]), plane.axis, task.body
     lower, upper = task.lower[column], task.upper[column]
     mover = int(np.argmax(np.abs(task.coupling[:, column])))
-    if np.count_nonzero(task.coupling) == 1 and body.chain.follows.is_identity and body.joint_units[mover] == "rad":
+    if np.count_nonzero(task.coupling) == 1 and body.follows.is_identity and body.joint_units[mover] == "rad":
         upper = min(upper, lower + 2.0 * np.pi)
     if axis is None or task.end is None or upper - lower > _LONGEST * _strokes(task)[column]:
         return plane
@@ -339,9 +340,9 @@ def _drawn(task: Reorientation) -> Array:
     return np.random.default_rng(_SEED).uniform(*task.reach(_RADIUS * _strokes(task)), (_SHAPES, task.dimension))
 
 
-def _is_analytic(body: Body) -> bool:
+def _is_analytic(body: Body | ParticleBody) -> bool:
     """True where a property of random shapes holds for all: not for functions with knots."""
-    return not any(len(function.knots) for joint in body.chain.follows.curved for _, function in joint.terms)
+    return not any(len(function.knots) for joint in body.follows.curved for _, function in joint.terms)
 
 
 def _strokes(task: Reorientation) -> Array:
@@ -356,7 +357,7 @@ def _link_attitudes(task: Reorientation, shapes: Array) -> Array:
     """Attitude of the pointed link, base axes: (N, n) -> (N, 3, 3); the identity for the base."""
     if task.link is None:
         return np.broadcast_to(np.eye(3), (len(shapes), 3, 3))
-    return task.body.link_pose(shapes, task.link)[:, :3, :3]
+    return task.links.link_pose(shapes, task.link)[:, :3, :3]
 
 
 def _more_joints(task: Reorientation) -> str:

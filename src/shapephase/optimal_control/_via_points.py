@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..body.body import Body
+from ..body.particles.point_masses import ParticleBody
 from ..errors import ShapeError, TrajectoryError
 from ._ball_chart import BallChart
 from ._spline_basis import SplineBasis
@@ -39,7 +40,7 @@ class ViaPoint:
 
 
 def via_points(
-    body: Body,
+    body: Body | ParticleBody,
     via: Sequence[Waypoint],
     duration: float | None,
     bounds: Array,
@@ -88,7 +89,7 @@ def via_points(
 
 
 def _coordinates(
-    body: Body, waypoint: Waypoint, bounds: Array, coupling: Array, offset: Array, name: str
+    body: Body | ParticleBody, waypoint: Waypoint, bounds: Array, coupling: Array, offset: Array, name: str
 ) -> tuple[Integers, Array]:
     """Return indices and values of the coordinates that a waypoint fixes."""
     if isinstance(waypoint.shape, Mapping):
@@ -112,7 +113,7 @@ def _coordinates(
     return columns, np.array([known[column] for column in columns.tolist()])
 
 
-def check_within(body: Body, joint: int, value: float, bounds: Array, name: str) -> None:
+def check_within(body: Body | ParticleBody, joint: int, value: float, bounds: Array, name: str) -> None:
     """Raise TrajectoryError where a joint of a posture called `name` is beyond its bounds (n, 2)."""
     low, high = bounds[joint]
     if not low - _TOLERANCE <= value <= high + _TOLERANCE:
@@ -122,7 +123,7 @@ def check_within(body: Body, joint: int, value: float, bounds: Array, name: str)
         )
 
 
-def check_follows(body: Body, joint: int, value: float, must: float, name: str) -> None:
+def check_follows(body: Body | ParticleBody, joint: int, value: float, must: float, name: str) -> None:
     """Raise TrajectoryError where a joint of a posture called `name` is not where others or the start put it."""
     if abs(must - value) > _TOLERANCE:
         raise TrajectoryError(

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..body.body import Body
+from ..body.particles.point_masses import ParticleBody
 from ..card_pictures import MOST_POINTS, curves_picture
 from ..display import Card, angle_text, card_html, card_text, momentum_text, numbers, short_repr
 from ..reconstruction.reconstruction import Motion
@@ -18,7 +19,14 @@ from ..so3 import angle
 from .plan_options import Goal
 
 # Radians; metres stand for them where joints slide.
-COST_UNITS = {"kinetic": "J s", "rate": "rad^2/s", "acceleration": "rad^2/s^3", "effort": "s", "time": "s"}
+COST_UNITS = {
+    "kinetic": "J s",
+    "rate": "rad^2/s",
+    "acceleration": "rad^2/s^3",
+    "effort": "s",
+    "time": "s",
+    "metric": "",
+}
 
 _SECOND_ORDER = {True: "a minimum among paths near by", False: "not met", None: "not known"}
 AGREEMENT = 1e-3  # relative difference of costs up to which starts have come to the same
@@ -64,7 +72,7 @@ class Plan:
     path : path of all its joints; a C2 spline with not-a-knot ends, also where it closes: `read_shape_path(...,
         close=False)` reads a file of its samples back unchanged
     motion : its reconstruction, to 1e-10 rad: independent of how the plan was found
-    cost_name : "kinetic", "rate", "acceleration", "effort" or "time"
+    cost_name : "kinetic", "rate", "acceleration", "effort", "time", or "metric" for a given one
     rates_at_ends : "zero", "periodic" or "free"
     cost : cost of `path`, by quadrature with the body's own matrices [J s, rad^2/s, rad^2/s^3 or s]
     goal_error : angle between the reconstructed attitude at the end and the goal [rad]
@@ -89,7 +97,7 @@ class Plan:
     closest : with `Limits(clearance=...)`, pairs of links that come nearer than that and 1 mm, the nearest first
     """
 
-    body: Body
+    body: Body | ParticleBody
     path: ShapePath
     motion: Motion
     cost_name: str

@@ -16,18 +16,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import check_executor, check_object
+from ..arguments import check_executor
 from ..arrays import Array
 from ..body.body import Body
+from ..body.loading import as_body_or_particles
+from ..body.particles.point_masses import ParticleBody
+from ..deformation.deformation import articulated
 from ..errors import PlanNotFound
+from ..reconstruction.reconstruction import reconstruct
 from ..run_progress import ProgressCallback, check_progress
 from ._local_search import Attempt, LocalSearch, corrected_attempt, failure_message, guessed_attitudes
 from ._path_cost import cost_density
 from ._plan_limits import limit_shares, position_share, warn_of_unstated
-from ._polish import GAUSS_NODES
+from ._polish import GAUSS_NODES, RECONSTRUCTION_TOLERANCE
 from ._reachable_turns import check_reachable
 from ._spline_basis import SplineBasis
 from .collocation import CollocationProgram
+from .cost_metric import METRIC_COSTS
 from .guesses.loops import PLACES, Guess, guess_of, guess_of_control, guess_of_path, guesses
 from .guesses.stroke_program import StrokeProgram, strokes_suffice
 from .guesses.strokes import guess_of_strokes, most_of_a_loop
@@ -61,7 +66,7 @@ _USUAL_ITERATIONS = 50  # iterations after which half of a start is reported as 
 
 
 def plan_reorientation(
-    body: Body,
+    body: Body | ParticleBody | str,
     goal: Goal | ArrayLike,
     *,
     momentum: ArrayLike = 0.0,
@@ -69,7 +74,7 @@ def plan_reorientation(
     start: ArrayLike | None = None,
     end: Any = None,
     via: Sequence[Waypoint] = (),
-    cost: str = "kinetic",
+    cost: Any = "kinetic",
     rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
     symmetric: Mapping[str, tuple[str, float]] | None = None,
@@ -96,7 +101,8 @@ def plan_reorientation(
         the joint motion without angular momentum, M the mass matrix with base b and joints s: joints that undo each
         other (a flat gimbal) move at no cost and may then jump; "rate", that of 1/2 |r'|^2; "acceleration", that
         of 1/2 |r''|^2; "effort", that of the squared torques and forces of all joints, each relative to its limit [s];
-        "time", the duration, under rate limits
+        "time", the duration, under rate limits. Or a metric g, a matrix (n, n) or a `casadi.Function` of the shape that
+        gives one: the integral of 1/2 r' g r'
     rates_at_ends : of the joints; "zero": from rest to rest, for the cost "acceleration" without acceleration at the
         ends, too; "periodic": equal at both ends, for gaits; "free": any, as in the theory of optimal loops: the
         body would have to be set in motion before the start, and stopped after the end
@@ -142,7 +148,7 @@ def plan_reorientation(
     >>> print(f"{sp.so3.angle(goal.T @ plan.motion.final_attitude):.6f} rad off")
     0.000000 rad off
     """
-    check_object(body, "Body", "body")
+    body = as_body_or_particles(body)
     check_executor(executor)
     check_progress(progress)
     chosen = Search() if search is None else search
@@ -230,7 +236,7 @@ def _jobs(tasks: Sequence[Reorientation], search: Search, monitor: _SearchMonito
         if first and monitor.stopped:
             break
         pieces = _PIECES if task.dimension <= _MANY_JOINTS else _PIECES_OF_MANY
-        if task.dimension <= _FEW_JOINTS and task.cost in ("kinetic", "rate") and task.equal_points == 1:
+        if task.dimension <= _FEW_JOINTS and task.cost in METRIC_COSTS and task.equal_points == 1:
             pieces = _PIECES_OF_FEW
         basis = SplineBasis(int(search.pieces or pieces))
         guess = None if search.guess is None else guess_of_path(task, basis, search.guess)
@@ -381,14 +387,17 @@ def _plan(
     """Return the plan of the best attempt; None where it has no path."""
     if best.polished is None:
         return None
-    task = best.task
+    task, motion = best.task, best.polished.motion
+    if isinstance(task.body, ParticleBody):
+        along = articulated(task.body, best.polished.path)
+        motion = reconstruct(along, task.momentum, tolerance=RECONSTRUCTION_TOLERANCE)
     return Plan(
         body=task.body,
         goal=goals[task],
         waypoint_times=best.polished.via_places * best.polished.duration,
         status=stopped or ("found" if best.report.converged else "not found"),
         path=best.polished.path,
-        motion=best.polished.motion,
+        motion=motion,
         cost_name=task.cost,
         rates_at_ends=task.rates_at_ends,
         cost=best.cost,
@@ -418,11 +427,11 @@ def hamiltonian_spread(task: Reorientation, basis: SplineBasis, control: Array, 
     Source: theory.md B6; Pontryagin's principle.
     """
     timed = any(point.place is not None for point in task.via)
-    if task.cost not in ("kinetic", "rate") or task.momentum.any() or task.limits_beyond_rates or timed:
+    if task.metric is None or task.momentum.any() or task.limits_beyond_rates or timed:
         return None
     places, _ = basis.gauss(GAUSS_NODES)
     rates = basis.matrix(places, 1) @ control / duration
-    density = cost_density(task.body, task.cost, task.shapes(basis.matrix(places) @ control), rates @ task.coupling.T)
+    density = cost_density(task.body, task.metric, task.shapes(basis.matrix(places) @ control), rates @ task.coupling.T)
     limited = np.any(np.abs(basis.rate_control @ control) > _AT_LIMIT * task.rate_limit * duration, axis=1)
     free = ~np.any(basis.rate_reaches & limited, axis=1)[_ENDS:-_ENDS]
     means = density.reshape(basis.pieces, -1).mean(axis=1)[_ENDS:-_ENDS][free]

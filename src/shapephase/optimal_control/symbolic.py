@@ -10,17 +10,21 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ..arguments import check_choice, check_object
+from ..arguments import check_choice
 from ..arrays import Array
 from ..body.body import Body
+from ..body.couplings.coordinate_map import CoordinateMap
 from ..body.couplings.functions import JointFunction
 from ..body.joint_chain import JointChain
+from ..body.loading import as_body_or_particles
+from ..body.particles._casadi_positions import symbol_kind
+from ..body.particles.point_masses import ParticleBody
 from ..display import short_repr
 from ..errors import unknown_name
 
 QUANTITIES = ("inertia", "momentum_matrix", "connection", "centre_of_mass", "shape_metric")
 
-_built: WeakKeyDictionary[Body, SymbolicBody] = WeakKeyDictionary()
+_built: WeakKeyDictionary[Body | ParticleBody, SymbolicBody] = WeakKeyDictionary()
 _building = Lock()
 
 
@@ -43,7 +47,8 @@ class SymbolicBody:
     shape_metric : g(r), (n, n): 1/2 rate g rate is the kinetic energy, about the centre of mass, of a motion with zero
         angular momentum. It is M_ss - M_sb M_bb^-1 M_bs of the mass matrix M with base b and joints s, and twice the
         form T_0 - 1/2 L_o I^-1 L_o
-    links : name of a link -> pose of its frame, (4, 4), from the base origin
+    chain : its tree of links; None: particles
+    maps : inertia, momentum_matrix, mass matrix and centre of mass of particles in one call; None: links
 
     Notes
     -----
@@ -57,7 +62,8 @@ class SymbolicBody:
     connection: Any
     centre_of_mass: Any
     shape_metric: Any
-    chain: JointChain = field(repr=False)
+    chain: JointChain | None = field(repr=False)
+    maps: Any = None
     _made: dict[str, Any] = field(default_factory=dict, repr=False)
 
     __repr__ = short_repr
@@ -85,7 +91,7 @@ class SymbolicBody:
         check_choice(quantity, "quantity", QUANTITIES)
         key = f"{quantity}_derivative"
         if key not in self._made:
-            shape = casadi.SX.sym("shape", self.n_shape)
+            shape = symbol_kind(self.inertia).sym("shape", self.n_shape)
             rows = casadi.jacobian(casadi.vec(getattr(self, quantity)(shape)), shape)
             self._made[key] = casadi.Function(key, [shape], [casadi.densify(rows)], ["shape"], [key])
         return self._made[key]
@@ -100,20 +106,20 @@ class SymbolicBody:
         """
         import casadi
 
-        if link not in self.chain.link_frames:
-            raise unknown_name(f"link of {self.name}", link, self.chain.link_frames)
+        if self.chain is None or link not in self.chain.link_frames:
+            raise unknown_name(f"link of {self.name}", link, () if self.chain is None else self.chain.link_frames)
         key = f"link_{tuple(self.chain.link_frames).index(link)}"
         if key not in self._made:
             shape = casadi.SX.sym("shape", self.n_shape)
             frame, pose = self.chain.link_frames[link]
-            turn, place = joint_frames(self.chain, joint_coordinates(self.chain, shape), shape)[frame]
+            turn, place = joint_frames(self.chain, joint_coordinates(self.chain.follows, shape), shape)[frame]
             last = casadi.SX([[0.0, 0.0, 0.0, 1.0]])
             upper = casadi.horzcat(turn @ constant(pose[:3, :3]), place + turn @ constant(pose[:3, 3]))
             self._made[key] = casadi.Function(key, [shape], [casadi.densify(casadi.vertcat(upper, last))])
         return self._made[key]
 
 
-def symbolic_body(body: Body) -> SymbolicBody:
+def symbolic_body(body: Body | ParticleBody | str) -> SymbolicBody:
     """Return the functions of a body; built at its first call, kept as long as the body.
 
     Source: the composite rigid body algorithm (Featherstone, Rigid Body Dynamics Algorithms, section 6.2), reduced by
@@ -126,10 +132,10 @@ def symbolic_body(body: Body) -> SymbolicBody:
     >>> print(np.array(functions.inertia(np.zeros(3))).diagonal().round(6))
     [0.005 0.02  0.02 ]
     """
-    check_object(body, "Body", "body")
+    body = as_body_or_particles(body)
     with _building:
         if body not in _built:
-            _built[body] = _symbolic(body)
+            _built[body] = _symbolic(body) if isinstance(body, Body) else _of_particles(body)
         return _built[body]
 
 
@@ -178,7 +184,7 @@ def _symbolic(body: Body) -> SymbolicBody:
 
     chain = body.chain
     shape = casadi.SX.sym("shape", body.n_shape)
-    frames = joint_frames(chain, joint_coordinates(chain, shape), shape)
+    frames = joint_frames(chain, joint_coordinates(chain.follows, shape), shape)
     masses, moments, tensors = _composites(chain, frames)
     centre = moments[0] / masses[0]
     inertia = _about(tensors[0], moments[0], centre)
@@ -194,23 +200,33 @@ def _symbolic(body: Body) -> SymbolicBody:
     full_angular = casadi.horzcat(none, *(angular - casadi.cross(centre, linear) for linear, angular in carried))
     fold = constant(chain.matrix)
     if not chain.follows.is_linear:
-        fold = coordinate_slopes(chain, shape)
+        fold = coordinate_slopes(chain.follows, shape)
     linear, momentum_matrix = full_linear @ fold, full_angular @ fold
     connection = solve_linear(inertia, momentum_matrix)
     mass_matrix = fold.T @ _joint_mass_matrix(chain, speeds, carried) @ fold
     metric = mass_matrix - linear.T @ linear / masses[0] - momentum_matrix.T @ connection
-    made = {
-        "inertia": inertia,
-        "momentum_matrix": momentum_matrix,
-        "connection": connection,
-        "centre_of_mass": centre,
-        "shape_metric": 0.5 * (metric + metric.T),
-    }
-    functions: dict[str, Any] = {
-        key: casadi.Function(key, [shape], [casadi.densify(casadi.cse(value))], ["shape"], [key])
-        for key, value in made.items()
-    }
-    return SymbolicBody(name=body.name, joint_names=body.joint_names, chain=chain, **functions)
+    values = inertia, momentum_matrix, connection, centre, 0.5 * (metric + metric.T)
+    return SymbolicBody(body.name, body.joint_names, *_functions(shape, values), chain=chain)
+
+
+def _of_particles(body: ParticleBody) -> SymbolicBody:
+    maps = body.maps()
+    shape = symbol_kind(maps).sym("shape", body.n_shape)
+    inertia, momentum_matrix, mass_matrix, centre = maps(shape)
+    connection = solve_linear(inertia, momentum_matrix)
+    metric = mass_matrix - momentum_matrix.T @ connection
+    values = inertia, momentum_matrix, connection, centre, 0.5 * (metric + metric.T)
+    return SymbolicBody(body.name, body.joint_names, *_functions(shape, values), chain=None, maps=maps)
+
+
+def _functions(shape: Any, values: tuple[Any, ...]) -> list[Any]:
+    """Functions of a shape, one for each of `QUANTITIES`."""
+    import casadi
+
+    return [
+        casadi.Function(key, [shape], [casadi.densify(casadi.cse(value))], ["shape"], [key])
+        for key, value in zip(QUANTITIES, values, strict=True)
+    ]
 
 
 def constant(array: Array) -> Any:
@@ -244,27 +260,27 @@ def joint_frames(chain: JointChain, joints: Any, shape: Any) -> list[tuple[Any, 
     return frames
 
 
-def coordinate_slopes(chain: JointChain, shape: Any) -> Any:
+def coordinate_slopes(follows: CoordinateMap, shape: Any) -> Any:
     """Derivatives of the coordinates of all joints by the shape; hinges of ball joints are counted from that shape."""
     import casadi
 
     about = casadi.SX.sym("about", shape.shape[0])
-    return casadi.substitute(casadi.jacobian(joint_coordinates(chain, shape, about), shape), about, shape)
+    return casadi.substitute(casadi.jacobian(joint_coordinates(follows, shape, about), shape), about, shape)
 
 
-def joint_coordinates(chain: JointChain, shape: Any, about: Any = None) -> Any:
+def joint_coordinates(follows: CoordinateMap, shape: Any, about: Any = None) -> Any:
     """Coordinates of all joints from the shape.
 
     about : shape from whose turns the three hinges of ball joints are counted; None: `shape`, so that they are zero
     """
     import casadi
 
-    joints = constant(chain.matrix) @ shape + casadi.DM(chain.offset)
-    for joint in chain.follows.curved:
+    joints = constant(follows.matrix) @ shape + casadi.DM(follows.offset)
+    for joint in follows.curved:
         joints[joint.row] = joint.start + sum(_followed(function, joints[k]) for k, function in joint.terms)
     if about is None:
         return joints
-    for ball in chain.follows.balls:
+    for ball in follows.balls:
         turn = _turn(about[ball.columns]).T @ _turn(shape[ball.columns])
         joints[ball.row] = casadi.atan2(-turn[1, 2], turn[2, 2])
         joints[ball.row + 1] = casadi.asin(turn[0, 2])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,10 +16,16 @@ from ..body.body import Body
 from ..body.collisions.distances import link_distances
 from ..body.collisions.geometry import CollisionGeometry, collision_geometry
 from ..body.couplings.coordinate_map import check_smooth
+from ..body.particles.point_masses import ParticleBody
+from ..deformation.deformation import deformation_along
 from ..errors import ShapeError, TrajectoryError, unknown_name
+from ..reconstruction.reconstruction import Motion, reconstruct
+from ..shape_space.body_path import route_along
 from ..shape_space.closest_approach import distance_text
+from ..shape_space.shape_path import ShapePath
 from ._ball_chart import BallChart
 from ._via_points import ViaPoint, check_follows, check_within, via_points
+from .cost_metric import METRIC_COSTS, CostMetric, metric_argument
 from .plan_options import RATES_AT_ENDS, Goal, Limits, Waypoint, goal_argument
 
 COSTS = ("kinetic", "rate", "acceleration", "effort", "time")
@@ -47,7 +53,8 @@ class Reorientation:
     momentum : (3,) about the centre of mass, inertial axes [kg m^2/s]
     duration : [s]; for the cost "time" the longest allowed
     start, end : (m,) coordinates; end None: free
-    cost : one of `COSTS`
+    cost : one of `COSTS`, or "metric"
+    metric : whose integral the cost is; None: another cost
     lower, upper : (m,) limits of the coordinates [rad or m]
     rate_limit : (m,) limits of their rates [rad/s or m/s], infinite where there are none
     acceleration_limit, jerk_limit : (m,) the same of the second and third derivatives
@@ -59,7 +66,7 @@ class Reorientation:
     clearance, geometry : least distance between links [m], and their solids; None: links may touch
     """
 
-    body: Body
+    body: Body | ParticleBody
     target: Array | None
     pointing: Array | None
     link: str | None
@@ -77,6 +84,7 @@ class Reorientation:
     jerk_limit: Array
     effort_measure: Array
     efforts_limited: bool
+    metric: CostMetric | None
     rates_at_ends: str
     coupling: Array
     offset: Array
@@ -87,6 +95,11 @@ class Reorientation:
     def shapes(self, coordinates: Array) -> Array:
         """Shape at coordinates: (..., m) -> (..., n)."""
         return coordinates @ self.coupling.T + self.offset
+
+    @property
+    def links(self) -> Body:
+        """The body, where links or only inertia and momentum are needed of it."""
+        return cast("Body", self.body)
 
     @property
     def dimension(self) -> int:
@@ -163,18 +176,24 @@ class Reorientation:
     def pointed_axis(self, last: Array) -> Array:
         """Pointed axis in axes of the base, at coordinates (m,): (3,). Only with `pointing`."""
         axis, _ = self.pointing_axes()
-        return axis if self.link is None else self.body.link_pose(self.shapes(last), self.link)[:3, :3] @ axis
+        return axis if self.link is None else self.links.link_pose(self.shapes(last), self.link)[:3, :3] @ axis
 
     def pointed_turn(self, last: Array) -> Array:
         """Turn of the pointed link against the base by each coordinate, at coordinates (m,): (3, m), base axes."""
         if self.link is None:
             return np.zeros((3, self.dimension))
         shapes = np.broadcast_to(self.shapes(last), (self.dimension, self.body.n_shape))
-        return self.body.link_angular_velocity(shapes, self.coupling.T, self.link).T
+        return self.links.link_angular_velocity(shapes, self.coupling.T, self.link).T
+
+
+def motion_along(task: Reorientation, path: ShapePath, tolerance: float) -> Motion:
+    """Return the motion of a task's body along a path, to a tolerance [rad]. Raises as `reconstruct`."""
+    along = deformation_along(task.links, route_along(task.body, path))
+    return reconstruct(along, task.momentum, tolerance=tolerance)
 
 
 def reorientation(
-    body: Body,
+    body: Body | ParticleBody,
     goal: Any,
     *,
     momentum: ArrayLike = 0.0,
@@ -182,7 +201,7 @@ def reorientation(
     start: ArrayLike | None = None,
     end: Any = None,
     via: Sequence[Waypoint] = (),
-    cost: str = "kinetic",
+    cost: Any = "kinetic",
     rates_at_ends: str = "zero",
     joints: Sequence[str] | None = None,
     symmetric: Mapping[str, tuple[str, float]] | None = None,
@@ -195,11 +214,15 @@ def reorientation(
     ShapeError, TrajectoryError, UnknownNameError
         For arguments of the wrong shape, ends beyond the limits, or unknown names.
     """
-    check_choice(cost, "cost", COSTS)
+    metric = None
+    if not isinstance(cost, str) or cost in METRIC_COSTS[:2]:
+        metric = metric_argument(body, cost, "cost", COSTS)
+        cost = metric.name
+    check_choice(cost, "cost", (*COSTS, "metric") if metric else COSTS)
     check_choice(rates_at_ends, "value of rates_at_ends", RATES_AT_ENDS)
     if not body.n_shape:
         raise ShapeError(f"{body.name} has no joints: nothing can turn it but its momentum")
-    check_smooth(body.chain.follows, "plans need", kinks_only=True)
+    check_smooth(body.follows, "plans need", kinks_only=True)
     if body.ball_joints and cost != "kinetic":
         raise ShapeError(
             f"cost={cost!r} depends on the choice of coordinates, and {body.ball_joints[0]} is a ball joint, where it "
@@ -262,6 +285,7 @@ def reorientation(
         start=start,
         end=end,
         cost=cost,
+        metric=metric,
         lower=lower,
         upper=upper,
         rate_limit=rate_limit,
@@ -278,10 +302,12 @@ def reorientation(
     )
 
 
-def _geometry(body: Body, limits: Limits, first: Array, last: Array | None) -> CollisionGeometry | None:
+def _geometry(body: Body | ParticleBody, limits: Limits, first: Array, last: Array | None) -> CollisionGeometry | None:
     """Return the solids of links that keep a distance, which they have at both ends; None where they may touch."""
     if limits.clearance is None:
         return None
+    if isinstance(body, ParticleBody):
+        raise ShapeError(f"clearance: {body.name} is a body of particles, which has no solids; leave it out")
     geometry = collision_geometry(body, srdf=limits.srdf)
     for shape, name in ((first, "start"), (last, "end")):
         if shape is None:
@@ -327,18 +353,22 @@ def _target(goal: Goal, windings: Array | None, winding_axes: Array) -> Array | 
     return None if goal.rotation is None else np.asarray(goal.rotation)
 
 
-def _pointed(body: Body, goal: Goal, last: Array | None) -> tuple[Array | None, str | None]:
+def _pointed(body: Body | ParticleBody, goal: Goal, last: Array | None) -> tuple[Array | None, str | None]:
     """Return axis and direction (2, 3), and its link; the axis is the base's where the last shape is given."""
     if goal.pointing is None:
         return None, None
     axis, direction = pair = np.asarray(goal.pointing)
     if goal.link is None:
         return pair, None
+    if isinstance(body, ParticleBody):
+        raise ShapeError(f"link: {body.name} is a body of particles, which has no links; point an axis of its frame")
     pointed = body.link_pose(body.shape() if last is None else last, goal.link)[:3, :3] @ axis
     return (pair, goal.link) if last is None else (np.stack([pointed, direction]), None)
 
 
-def _end_postures(body: Body, bounds: Array, start: ArrayLike | None, end: Any) -> tuple[Array, Array | None]:
+def _end_postures(
+    body: Body | ParticleBody, bounds: Array, start: ArrayLike | None, end: Any
+) -> tuple[Array, Array | None]:
     """Return the shapes at both ends, within the bounds (n, 2); None for a free end."""
     first = np.clip(body.shape(), *bounds.T) if start is None else _shape(body, start, "start")
     if isinstance(end, str):
@@ -354,7 +384,7 @@ def _end_postures(body: Body, bounds: Array, start: ArrayLike | None, end: Any) 
     return first, last
 
 
-def _shape(body: Body, value: ArrayLike, name: str) -> Array:
+def _shape(body: Body | ParticleBody, value: ArrayLike, name: str) -> Array:
     shape = finite_array(value, name)
     if shape.shape != (body.n_shape,):
         raise ShapeError(f"{name}: one coordinate for each of the {body.n_shape} joints, got shape {shape.shape}")
@@ -362,7 +392,7 @@ def _shape(body: Body, value: ArrayLike, name: str) -> Array:
     return shape
 
 
-def limits_of_joints(body: Body, given: ArrayLike | str | None, name: str, stated: Array) -> Array:
+def limits_of_joints(body: Body | ParticleBody, given: ArrayLike | str | None, name: str, stated: Array) -> Array:
     """Limit of each joint, infinite where there is none: (n,)."""
     if given is None:
         return np.full(body.n_shape, np.inf)
@@ -377,11 +407,13 @@ def limits_of_joints(body: Body, given: ArrayLike | str | None, name: str, state
     return np.array(np.broadcast_to(limits, body.n_shape))
 
 
-def _effort_measure(body: Body, cost: str, limits: Limits) -> Array:
+def _effort_measure(body: Body | ParticleBody, cost: str, limits: Limits) -> Array:
     """Units of efforts, infinite where there are none: (n,)."""
+    if isinstance(body, ParticleBody) and (cost == "effort" or not isinstance(limits.effort_limits, str | None)):
+        raise ShapeError(f"effort_limits: {body.name} is a body of particles, which has no motors; leave them out")
     measured_by = "body" if cost == "effort" and limits.effort_limits is None else limits.effort_limits
     measure = limits_of_joints(body, measured_by, "effort_limits", body.effort_limits)
-    if measured_by is not None and not body.chain.follows.is_linear:
+    if measured_by is not None and not body.follows.is_linear:
         raise ShapeError(
             f"effort_limits: {body.name} has ball joints, or joints that follow others along curves, whose efforts "
             "plans cannot bound; leave them out, and see joint_torques(plan.motion)"
@@ -396,7 +428,7 @@ def _effort_measure(body: Body, cost: str, limits: Limits) -> Array:
 
 
 def joint_coupling(
-    body: Body, joints: Sequence[str] | None, symmetric: Mapping[str, tuple[str, float]] | None
+    body: Body | ParticleBody, joints: Sequence[str] | None, symmetric: Mapping[str, tuple[str, float]] | None
 ) -> Array:
     """Matrix from rates of the free joints to those of all: (n, m). Raises UnknownNameError, TrajectoryError."""
     if joints is not None:
@@ -406,13 +438,13 @@ def joint_coupling(
     return _coupling(body, symmetric or {}, _fixed_joints(body, joints))[0]
 
 
-def _fixed_joints(body: Body, joints: Sequence[str] | None) -> list[int]:
+def _fixed_joints(body: Body | ParticleBody, joints: Sequence[str] | None) -> list[int]:
     moving = set(range(body.n_shape)) if joints is None else set(body.joint_columns(joints))
     return sorted(set(range(body.n_shape)) - moving)
 
 
 def _coupling(
-    body: Body, symmetric: Mapping[str, tuple[str, float]], fixed_joints: list[int]
+    body: Body | ParticleBody, symmetric: Mapping[str, tuple[str, float]], fixed_joints: list[int]
 ) -> tuple[Array, list[int], Array]:
     """Return the matrix from the free joints to all (n, m), the indices of the free ones, and factors (n,)."""
     followers = {

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from functools import cached_property
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,14 +16,10 @@ from ...arrays import Array, finite_array, lock_arrays
 from ...display import short_repr
 from ...errors import ShapeError, WrongObjectError, unknown_name
 from ...letters import value_text
-from ..engines.chain import WEIGHTS
+from ..couplings.coordinate_map import CoordinateMap
 from ..shape_arguments import ShapeArguments
-from ._casadi_positions import CasadiPositions, is_casadi_function
-
-_Places = Callable[[Array], tuple[ArrayLike, ArrayLike]]
-_STEP = 0.02  # of differences for second derivatives: errors of 1e-13 where places swing once in a radian
-_BROAD_STEP = 1e-4  # of differences that are compared with given derivatives
-_NOT_DERIVATIVES = 1e-5  # of the places' size: a thousand times what these differences leave of true derivatives
+from ._casadi_positions import CasadiPositions, is_casadi_function, particle_maps
+from ._given_positions import GivenPositions, Places
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +57,7 @@ class ParticleBody(ShapeArguments):
     joint_limits: Array
     continuous: Array
     name: str
-    places: Callable[[Array], tuple[Array, Array]]
+    places: CasadiPositions | GivenPositions
 
     __post_init__ = lock_arrays
     __repr__ = short_repr
@@ -69,7 +66,7 @@ class ParticleBody(ShapeArguments):
     def __getstate__(self) -> dict[str, Any]:
         """State for pickle. Raises LocalFunctionError for places given by a lambda."""
         given = self.places
-        check_picklable(given.function if isinstance(given, _Given) else given, "a body of particles")
+        check_picklable(given.function if isinstance(given, GivenPositions) else given, "a body of particles")
         return self.__dict__
 
     @property
@@ -77,10 +74,25 @@ class ParticleBody(ShapeArguments):
         """[kg]."""
         return float(self.masses.sum())
 
+    sha256 = None  # it comes from no file
+    ball_joints: ClassVar[tuple[str, ...]] = ()
+
+    @cached_property
+    def follows(self) -> CoordinateMap:
+        """Coordinates of all joints from the shape: the shape itself."""
+        count = self.n_shape
+        return CoordinateMap(self.joint_names, self.joint_names, np.eye(count), np.zeros(count))
+
     @property
-    def sha256(self) -> None:
-        """It comes from no file."""
-        return
+    def rate_limits(self) -> Array:
+        """Largest rates: (n,), infinite."""
+        return np.full(self.n_shape, np.inf)
+
+    effort_limits = rate_limits
+
+    def joint_columns(self, names: Iterable[str]) -> list[int]:
+        """Places of parameters in the shape vector, in ascending order. Raises UnknownNameError."""
+        return sorted({self.joint_index(name) for name in names})
 
     def shape(self, joints: Mapping[str, float] | None = None) -> Array:
         """The shape with the named parameters at these values, all others 0: -> (n,). Raises UnknownNameError."""
@@ -88,6 +100,15 @@ class ParticleBody(ShapeArguments):
         for name, value in (joints or {}).items():
             shape[self.joint_index(name)] = finite_array(value, f"parameter {name}")
         return shape
+
+    def maps(self) -> Any:
+        """Return I (3, 3), J (3, n), the mass matrix (n, n) and the centre of mass (3,) as functions of one shape (n,).
+
+        One `casadi.Function`; the mass matrix is that of a frame at rest, about the centre of mass.
+        Derivatives of places from a Python function are the given ones and their differences. The function has to be
+        kept as long as others that are made from it.
+        """
+        return particle_maps(self.places.symbolic(), self.masses)
 
     def positions(self, shape: ArrayLike) -> Array:
         """Places of the particles from their centre of mass: (..., n) -> (..., m, 3) [m]."""
@@ -158,14 +179,7 @@ class ParticleBody(ShapeArguments):
 
     def _bends(self, rows: Array) -> Array:
         """Second derivatives of the places, exactly symmetric: (N, n) -> (N, n, n, m, 3)."""
-        if isinstance(self.places, CasadiPositions):
-            bends = self.places.bends(rows)
-        else:
-            count = self.n_shape
-            moved = _STEP * np.arange(1, len(WEIGHTS) + 1)[:, None, None] * np.eye(count)
-            at = rows[:, None, None, None] + np.stack([moved, -moved], axis=0)
-            slopes = self.places(at.reshape(-1, count))[1].reshape(*at.shape[:-1], count, len(self.masses), 3)
-            bends = np.einsum("d,ndk...->nk...", np.array(WEIGHTS) / _STEP, slopes[:, 0] - slopes[:, 1])
+        bends = self.places.bends(rows)
         bends = 0.5 * (bends + np.swapaxes(bends, 1, 2))
         return bends - ((self.masses / self.mass) @ bends)[..., None, :]
 
@@ -184,6 +198,7 @@ def particle_body(
     *,
     units: str | Sequence[str] = "rad",
     continuous: Sequence[str] = (),
+    limits: Mapping[str, tuple[float, float]] | None = None,
     name: str = "particles",
 ) -> ParticleBody:
     """A body of point masses from their places as a function of a shape.
@@ -197,12 +212,14 @@ def particle_body(
     parameters : names of the n entries of a shape
     units : of all, or of each: "rad" or "m"
     continuous : names of those that turn without end, so that values 2 pi apart are the same shape
+    limits : name -> least and largest value of a parameter, for plans; others have none
     name : for people
 
     Raises
     ------
     ShapeError
-        If masses are not positive, arrays have other shapes, or derivatives are not those of the places.
+        If limits do not ascend, masses are not positive, arrays have other shapes, or derivatives are not those of the
+        places.
     WrongObjectError
         If `places` cannot be called.
 
@@ -233,60 +250,27 @@ def particle_body(
     if is_casadi_function(places):
         function = CasadiPositions(places, len(names), len(weights))
     elif callable(places) and not isinstance(places, type):
-        function = _Given(cast("_Places", places), len(weights))
+        function = GivenPositions(cast("Places", places), len(names), len(weights))
     else:
         raise WrongObjectError(
             f"places: a function of shapes that gives places and derivatives is needed, got {value_text(places)}"
         )
-    limits = np.tile([-np.inf, np.inf], (len(names), 1))
+    bounds = np.tile([-np.inf, np.inf], (len(names), 1))
+    for parameter, given in ({} if limits is None else limits).items():
+        if parameter not in names:
+            raise unknown_name("parameter", parameter, names)
+        bounds[names.index(parameter)] = low, high = finite_array(given, f"limits of {parameter}", (2,))
+        if not low <= high:
+            raise ShapeError(
+                f"limits: of {parameter}, the lower before the upper one are needed, got {value_text(given)}"
+            )
     turning = np.array([parameter in endless for parameter in names], dtype=bool)
     return ParticleBody(
         masses=weights,
         joint_names=names,
         joint_units=of_each,
-        joint_limits=limits,
+        joint_limits=bounds,
         continuous=turning,
         name=str(name),
         places=function,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Given:
-    """A user's places and derivatives, of the shapes they must have, and compared with each other."""
-
-    function: _Places
-    particles: int
-
-    def __call__(self, rows: Array) -> tuple[Array, Array]:
-        places, slopes = self._returned(rows)
-        if len(rows):
-            self._compare(rows[:1], places[:1], slopes[:1])
-        return places, slopes
-
-    def _returned(self, rows: Array) -> tuple[Array, Array]:
-        pair = self.function(rows)
-        if not isinstance(pair, tuple | list) or len(pair) != 2:
-            raise ShapeError(
-                f"places: a pair, places and their derivatives, must be returned for shapes, got {value_text(pair)}"
-            )
-        places, slopes = finite_array(pair[0], "places", unit="m"), finite_array(pair[1], "derivatives of places")
-        expected = (len(rows), self.particles, 3), (len(rows), rows.shape[1], self.particles, 3)
-        if (places.shape, slopes.shape) != expected:
-            raise ShapeError(
-                f"places: for shapes {rows.shape} places {expected[0]} and derivatives {expected[1]} are needed, got "
-                f"{places.shape} and {slopes.shape}"
-            )
-        return places, slopes
-
-    def _compare(self, row: Array, places: Array, slopes: Array) -> None:
-        step = _BROAD_STEP * np.eye(row.shape[1])
-        ahead, behind = (self._returned(row + sign * step)[0] for sign in (1.0, -1.0))
-        wrong = np.abs((ahead - behind) / (2.0 * _BROAD_STEP) - slopes[0]).max(axis=(1, 2), initial=0.0)
-        size = 1.0 + np.abs(places).max(initial=0.0) + np.abs(slopes).max(initial=0.0)
-        if wrong.max(initial=0.0) > _NOT_DERIVATIVES * size:
-            worst = int(np.argmax(wrong))
-            raise ShapeError(
-                f"places: the derivatives by parameter {worst} are not those of the places: at {value_text(row[0])} "
-                f"they are off by {wrong[worst]:.3g}"
-            )

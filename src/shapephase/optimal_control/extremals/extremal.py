@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebint
@@ -11,9 +12,11 @@ from numpy.typing import ArrayLike
 from scipy.integrate import OdeSolution
 
 from ... import so3
-from ...arguments import check_object, made_by, positive_argument, times_argument, tolerance_argument, vector_argument
+from ...arguments import made_by, positive_argument, times_argument, tolerance_argument, vector_argument
 from ...arrays import Array, check_reach
 from ...body.body import Body
+from ...body.loading import as_body_or_particles
+from ...body.particles.point_masses import ParticleBody
 from ...chebyshev import PiecewiseChebyshev, nodes_on, values_to_coefficients
 from ...display import short_repr
 from ...shape_space.shape_path import ShapePath
@@ -35,7 +38,7 @@ class Extremal:
     Attributes
     ----------
     body : the body that moves
-    metric : "kinetic" or "rate", what g is (see `extremal`)
+    metric : what g is (see `extremal`)
     duration : [s]
     charge : (3,) inertial axes [J s, or rad/s for "rate"]
     energy : 1/2 r' g r', kept by the motion [J, or rad^2/s^2]
@@ -43,8 +46,8 @@ class Extremal:
     solution : SciPy's: times -> states (2 n + 4, N): shapes, their canonical momenta, quaternion xyzw
     """
 
-    body: Body
-    metric: str
+    body: Body | ParticleBody
+    metric: Any
     duration: float
     charge: Array
     energy: float
@@ -105,13 +108,13 @@ class Extremal:
 
 
 def extremal(
-    body: Body,
+    body: Body | ParticleBody | str,
     shape: ArrayLike,
     rate: ArrayLike,
     charge: ArrayLike,
     duration: float,
     *,
-    metric: str = "kinetic",
+    metric: Any = "kinetic",
     tolerance: float = 1e-11,
 ) -> Extremal:
     """Return the normal extremal from a shape with a rate and a charge.
@@ -123,8 +126,8 @@ def extremal(
     shape, rate : (n,) at the start [rad or m], [rad/s or m/s]
     charge : (3,) lambda, inertial axes; the base starts at the identity [J s, or rad/s for "rate"]
     duration : [s]
-    metric : g of the cost, the integral of 1/2 r' g r': "kinetic", the reduced metric (`SymbolicBody.shape_metric`),
-        or "rate", the identity
+    metric : g of the cost, the integral of 1/2 r' g r': "kinetic", the reduced metric (`SymbolicBody.shape_metric`);
+        "rate", the identity; a matrix (n, n), or a `casadi.Function` of the shape that gives one
     tolerance : of each step, relative, between 1e-13 and 1e-4
 
     Raises
@@ -151,7 +154,7 @@ def extremal(
     >>> print(f"{path.cost:.6f} J s")
     0.002500 J s
     """
-    check_object(body, "Body", "body")
+    body = as_body_or_particles(body)
     start, speed = (vector_argument(value, name, body.n_shape) for value, name in ((shape, "shape"), (rate, "rate")))
     check_reach(start, "shape")
     check_reach(speed, "rate")

@@ -12,20 +12,22 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from ...arguments import check_choice, check_object
 from ...arrays import Array
 from ...body.body import Body
 from ...body.couplings.coordinate_map import check_no_balls, check_smooth
+from ...body.loading import as_body_or_particles
+from ...body.particles._casadi_positions import symbol_kind
+from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError
 from ...shape_space.connection import mechanical_connection
+from ..cost_metric import CostMetric, metric_argument
 from ..symbolic import call_casadi, quaternion_rate, solve_linear, symbolic_body
 
-_COSTS = ("kinetic", "rate")  # the integrals of a metric
 _LEAST_METRIC = 1e-12  # eigenvalue that still determines rates: the mass matrix is rounded to 1e-15
 _MOST = 200_000  # evaluations, after which the charge turns the motion too fast
 
-_built: WeakKeyDictionary[Body, dict[str, Hamiltonian]] = WeakKeyDictionary()
+_built: WeakKeyDictionary[Body | ParticleBody, dict[object, Hamiltonian]] = WeakKeyDictionary()
 _building = Lock()
 
 
@@ -59,12 +61,12 @@ class Hamiltonian:
         """Function r, u, l -> second derivatives of L by all three, (2 n + 3, 2 n + 3); built when first needed."""
         import casadi
 
-        parts = [casadi.SX.sym("x", self.slopes.numel_in(place)) for place in range(3)]
+        parts = [symbol_kind(self.slopes).sym("x", self.slopes.numel_in(place)) for place in range(3)]
         rows = casadi.jacobian(self.slopes(*parts), casadi.vertcat(*parts), {"symmetric": True})
         return casadi.Function("second", parts, [casadi.densify(rows)])
 
 
-def hamiltonian(body: Body, metric: str) -> Hamiltonian:
+def hamiltonian(body: Body | ParticleBody | str, metric: Any) -> Hamiltonian:
     """Return the equations of a body; built at its first call, kept as long as the body.
 
     Raises UnknownNameError, and ShapeError where a joint follows others by a function with knots.
@@ -76,19 +78,19 @@ def hamiltonian(body: Body, metric: str) -> Hamiltonian:
     >>> print(np.array(equations.metric(np.zeros(3))).diagonal().round(6))
     [0.005   0.005   0.00125]
     """
-    check_object(body, "Body", "body")
-    check_choice(metric, "metric", _COSTS)
-    check_smooth(body.chain.follows, "the equations of extremals need")
-    check_no_balls(body.chain.follows, "the equations of extremals need")
+    body = as_body_or_particles(body)
+    given = metric_argument(body, metric, "metric")
+    check_smooth(body.follows, "the equations of extremals need")
+    check_no_balls(body.follows, "the equations of extremals need")
     with _building:
         of_body = _built.setdefault(body, {})
-        if metric not in of_body:
-            of_body[metric] = _hamiltonian(body, metric)
-        return of_body[metric]
+        if given.key not in of_body:
+            of_body[given.key] = _hamiltonian(body, given.metric)
+        return of_body[given.key]
 
 
 def flow(
-    body: Body,
+    body: Body | ParticleBody,
     equations: Hamiltonian,
     shape: Array,
     rate: Array,
@@ -116,7 +118,9 @@ def initial_state(equations: Hamiltonian, shape: Array, rate: Array, charge: Arr
     return np.concatenate([shape, momentum, [0.0, 0.0, 0.0, 1.0]])
 
 
-def natural_scales(body: Body, equations: Hamiltonian, shape: Array, rate: Array, charge: Array) -> tuple[Array, float]:
+def natural_scales(
+    body: Body | ParticleBody, equations: Hamiltonian, shape: Array, rate: Array, charge: Array
+) -> tuple[Array, float]:
     """Typical magnitudes of an extremal's momenta (n,) and charge, whatever the units of the joints."""
     metric = np.array(equations.metric(shape))
     momenta = np.sqrt(np.diag(metric)) * (np.sqrt(rate @ metric @ rate) or 1.0)
@@ -157,7 +161,9 @@ def integrated(
     return result
 
 
-def checked_metric(body: Body, equations: Hamiltonian, shapes: Array, coupling: Array | None = None) -> Array:
+def checked_metric(
+    body: Body | ParticleBody, equations: Hamiltonian | CostMetric, shapes: Array, coupling: Array | None = None
+) -> Array:
     """Metric g of each shape, (N, n) -> (N, n, n). Raises SingularInertiaError where a motion has no energy.
 
     With a coupling (n, m), only its motions are checked.
@@ -178,16 +184,16 @@ def checked_metric(body: Body, equations: Hamiltonian, shapes: Array, coupling: 
     return whole
 
 
-def _hamiltonian(body: Body, cost: str) -> Hamiltonian:
+def _hamiltonian(body: Body | ParticleBody, metric: Any) -> Hamiltonian:
     import casadi
 
     symbols, n = symbolic_body(body), body.n_shape
-    shape, rate, moment = (casadi.SX.sym(*what) for what in (("r", n), ("u", n), ("l", 3)))
-    metric = symbols.shape_metric if cost == "kinetic" else casadi.Function("rate", [shape], [casadi.SX.eye(n)])
+    kind = symbol_kind(symbols.inertia) if metric.is_a("SXFunction") else casadi.MX
+    shape, rate, moment = (kind.sym(*what) for what in (("r", n), ("u", n), ("l", 3)))
     lagrangian = 0.5 * rate.T @ metric(shape) @ rate + moment.T @ symbols.connection(shape) @ rate
     gradient = casadi.gradient(casadi.cse(lagrangian), casadi.vertcat(shape, rate, moment))
     slopes = casadi.Function("slopes", [shape, rate, moment], [casadi.densify(casadi.cse(gradient))])
-    state, charge = casadi.SX.sym("state", 2 * n + 4), casadi.SX.sym("charge", 3)
+    state, charge = kind.sym("state", 2 * n + 4), kind.sym("charge", 3)
     here, vector, scalar = state[:n], state[2 * n : 2 * n + 3], state[2 * n + 3]
     across = casadi.cross(vector, charge)
     turned_back = charge + 2.0 * (casadi.cross(vector, across) - scalar * across) / casadi.sumsqr(state[2 * n :])

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3
-from ...arguments import check_object, tolerance_argument
+from ...arguments import tolerance_argument
 from ...arrays import Array
 from ...body.body import Body
+from ...body.loading import as_body_or_particles
+from ...body.particles.point_masses import ParticleBody
 from ...errors import AccuracyNotReached, ShapeError
-from ...shape_space.body_path import route_along
+from ...shape_space.body_path import as_path, route_along
 from ...shape_space.connection import horizontal_lift
 from ...shape_space.shape_path import ShapePath
 from .extremal import Extremal, extremal
@@ -56,8 +59,8 @@ class _BoundaryProblem:
     duration : [s]
     """
 
-    body: Body
-    metric: str
+    body: Body | ParticleBody
+    metric: Any
     equations: Hamiltonian
     start: Array
     end: Array
@@ -117,11 +120,11 @@ class _BoundaryProblem:
 
 
 def shoot(
-    body: Body,
-    path: ShapePath,
+    body: Body | ParticleBody | str,
+    path: ShapePath | str,
     target: ArrayLike | None = None,
     *,
-    metric: str = "kinetic",
+    metric: Any = "kinetic",
     tolerance: float = 1e-10,
 ) -> Extremal:
     """Return the extremal next to a nearly optimal path, with the same start and end and a given rotation.
@@ -151,8 +154,8 @@ def shoot(
     >>> print(f"{path.cost:.4f} <= {sp.optimal_control.path_cost(cat, loop):.4f} J s")
     0.0204 <= 0.0204 J s
     """
-    check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
+    body = as_body_or_particles(body)
+    path = as_path(path, body)
     route = route_along(body, path)
     goal = tolerance_argument(tolerance)
     turn = horizontal_lift(body, route).end if target is None else so3.rotation_argument(target, "target")

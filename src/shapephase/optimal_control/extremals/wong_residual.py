@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from ... import so3
-from ...arguments import check_object
 from ...arrays import Array
 from ...body.body import Body
+from ...body.loading import as_body_or_particles
+from ...body.particles.point_masses import ParticleBody
 from ...display import short_repr
 from ...errors import AccuracyNotReached, SingularInertiaError, TrajectoryError
-from ...shape_space.body_path import route_along
+from ...shape_space.body_path import as_path, route_along
 from ...shape_space.connection import connection_slopes, horizontal_lift, mechanical_connection
 from ...shape_space.shape_path import ShapePath
 from ..symbolic import call_casadi
@@ -57,10 +59,10 @@ class WongFit:
 
 
 def wong_residual(
-    body: Body,
-    path: ShapePath,
+    body: Body | ParticleBody | str,
+    path: ShapePath | str,
     *,
-    metric: str = "kinetic",
+    metric: Any = "kinetic",
     joints: Sequence[str] | None = None,
     symmetric: Mapping[str, tuple[str, float]] | None = None,
 ) -> WongFit:
@@ -95,8 +97,8 @@ def wong_residual(
     >>> print(f"{sp.optimal_control.wong_residual(cat, loop).residual:.3f}")  # an extremal
     0.000
     """
-    check_object(body, "Body", "body")
-    check_object(path, "ShapePath", "path")
+    body = as_body_or_particles(body)
+    path = as_path(path, body)
     route = route_along(body, path)
     equations = hamiltonian(body, metric)
     coupling = joint_coupling(body, joints, symmetric)
@@ -121,7 +123,7 @@ def wong_residual(
 
 
 def _fit(
-    body: Body,
+    body: Body | ParticleBody,
     known: Hamiltonian,
     coupling: Array,
     route: ShapePath,
@@ -166,7 +168,7 @@ def _fit(
     return WongFit(charge=charge, rate=rate, residual=residual)
 
 
-def _check_follows(body: Body, route: ShapePath, coupling: Array) -> None:
+def _check_follows(body: Body | ParticleBody, route: ShapePath, coupling: Array) -> None:
     """Raise TrajectoryError where joints of a path do not move as the coupling prescribes."""
     shapes = route.shape(np.linspace(0.0, route.duration, _SAMPLES))
     moves = shapes - shapes[0]

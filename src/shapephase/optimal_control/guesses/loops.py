@@ -8,16 +8,16 @@ import numpy as np
 
 from ... import so3
 from ...arrays import Array
-from ...deformation.deformation import deformation_along
 from ...errors import PlanNotFound, ShapePhaseError
-from ...reconstruction.reconstruction import Motion, reconstruct
+from ...reconstruction.reconstruction import Motion
 from ...shape_space.body_path import route_along
 from ...shape_space.connection import curvature, mechanical_connection
 from ...shape_space.shape_path import ShapePath
 from .._spline_basis import SplineBasis
 from .._via_points import bent_through, nearest_places
+from ..small_loops import widest_plane
 from ..symbolic import symbolic_body
-from ..task import Reorientation
+from ..task import Reorientation, motion_along
 
 PLACES = np.linspace(0.0, 1.0, 101)  # samples of a guess: dense enough for two rounds on any spline
 _RADIUS_FACTORS = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7)  # of the radius that a constant curvature would need
@@ -27,7 +27,6 @@ _STRAIGHT_FACTORS = (0.5, 1.0)  # of the way to a free end that turns far enough
 _ATTEMPTS = 10  # random loops for each one that is needed: some cannot be reconstructed
 _RECONSTRUCTION_TOLERANCE = 1e-6  # [rad]: guesses are off by far more
 _LEAST_SHARE = 1e-3  # of the way that a guess counts as turning, so that its price is finite
-_FLAT = 1e-9  # curvature in units of the metric below which loops turn the body by rounding alone
 _RIDGE = 1e-9  # on the metric, share of its mean eigenvalue: motions without energy get a finite length
 _RANK = 1e-8  # share of the largest singular value below which the connection does not turn
 _SAME = 1e-6  # [rad or m] between guesses that clipping to limits has made equal
@@ -128,23 +127,16 @@ def _circles(task: Reorientation) -> list[list[Array]]:
 
 
 def _plane(task: Reorientation, coordinates: Array, axis: Array) -> tuple[Array, Array, float] | None:
-    """Two orthonormal directions in the kinetic metric, and sigma; loops turn by +axis."""
+    """Two orthonormal directions in the metric, and sigma; loops turn by +axis."""
     shape = task.shapes(coordinates)
     moves = np.flatnonzero(task.movable)
     form = task.coupling.T @ (curvature(task.body, shape) @ axis) @ task.coupling
-    metric = task.coupling.T @ symbolic_body(task.body).shape_metric(shape).full() @ task.coupling
-    metric = metric[np.ix_(moves, moves)]
-    root = np.linalg.cholesky(ridged(metric, _RIDGE))
-    inverse = np.linalg.inv(root)
-    values, vectors = np.linalg.eigh(1j * inverse @ form[np.ix_(moves, moves)] @ inverse.T)
-    sigma = float(values[-1])
-    if sigma * np.linalg.norm(metric) <= _FLAT:
+    plane = widest_plane(form[np.ix_(moves, moves)], ridged(_metric(task, coordinates)[np.ix_(moves, moves)], _RIDGE))
+    if plane is None:
         return None
     first, second = np.zeros((2, task.dimension))
-    first[moves] = np.sqrt(2.0) * inverse.T @ np.real(vectors[:, -1])
-    second[moves] = np.sqrt(2.0) * inverse.T @ np.imag(vectors[:, -1])
-    # A loop from `first` to `second` turns by -F(first, second), which is to be positive.
-    return (first, second, sigma) if first @ form @ second < 0.0 else (first, -second, sigma)
+    first[moves], second[moves] = plane
+    return first, second, float(-first @ form @ second)
 
 
 def _straight(task: Reorientation) -> list[Array]:
@@ -203,8 +195,7 @@ def guess_of_control(
     control = np.clip(control, task.lower, task.upper)
     path = basis.path(task.shapes(control), task.duration, task.body.joint_names)
     try:
-        along = deformation_along(task.body, route_along(task.body, path))
-        motion = reconstruct(along, task.momentum, tolerance=_RECONSTRUCTION_TOLERANCE)
+        motion = motion_along(task, path, _RECONSTRUCTION_TOLERANCE)
     except ShapePhaseError:
         return None
     goal_error = task.goal_error(motion.final_attitude, control[-1])
@@ -222,8 +213,14 @@ def guess_of_control(
 
 
 def start_metric(task: Reorientation) -> Array:
-    """Kinetic metric of the coordinates at the start: (m, m)."""
-    return task.coupling.T @ symbolic_body(task.body).shape_metric(task.shapes(task.start)).full() @ task.coupling
+    """Metric of the coordinates at the start: (m, m)."""
+    return _metric(task, task.start)
+
+
+def _metric(task: Reorientation, coordinates: Array) -> Array:
+    """Given metric of the cost, else the kinetic one, at coordinates (m,): (m, m)."""
+    given = task.metric.metric if task.metric and task.cost == "metric" else symbolic_body(task.body).shape_metric
+    return task.coupling.T @ given(task.shapes(coordinates)).full() @ task.coupling
 
 
 def ridged(metric: Array, share: float) -> Array:

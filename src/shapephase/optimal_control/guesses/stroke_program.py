@@ -15,11 +15,12 @@ from ...shape_space.connection import mechanical_connection
 from .._polish import end_conditions
 from .._spline_basis import SplineBasis, gauss_tableau
 from ..collocation import STAGES, CollocationProgram, NlpSolution, final_conditions
+from ..cost_metric import METRIC_COSTS
 from ..nodes.node_functions import node_functions
 from ..solver_callback import IterationCallback
 from ..task import Reorientation
 
-_COSTS = ("kinetic", "rate", "time")
+_COSTS = (*METRIC_COSTS, "time")
 
 PIECES_OF_WAY = 6  # between legs: enough for a spline to lead from one stroke to another
 

@@ -10,7 +10,7 @@ import numpy as np
 from ... import so3
 from ...arrays import Array
 from ...shape_space.connection import connection_slopes, curvature, mechanical_connection
-from ..task import Reorientation
+from ..task import FARTHEST, Reorientation
 from .loops import ridged, start_metric
 from .stroke_program import PIECES_OF_WAY, Layout
 
@@ -88,7 +88,7 @@ def most_of_a_loop(task: Reorientation) -> float:
     moves = np.flatnonzero(task.movable)
     reach = np.stack([task.lower, task.upper], axis=1)[moves]
     closed = task.end is not None and np.array_equal(task.end, task.start)
-    if len(moves) != 2 or not closed or task.momentum.any() or not np.isfinite(reach).all():
+    if len(moves) != 2 or not closed or task.momentum.any() or np.ptp(reach, axis=1).max() >= FARTHEST:
         return np.inf
     shares = (np.arange(_CELLS) + 0.5) / _CELLS
     first, second = (low + shares * (high - low) for low, high in reach)
@@ -110,7 +110,7 @@ def guess_of_strokes(task: Reorientation, seed: int, pieces: int | None = None) 
     if task.momentum.any() or task.windings is not None or np.count_nonzero(task.movable) < 2:
         return None
     least = 3 * PIECES_OF_STROKE + 4 * PIECES_OF_WAY
-    if task.via or task.body.chain.follows.balls or (pieces is not None and pieces < least):
+    if task.via or task.body.follows.balls or (pieces is not None and pieces < least):
         return None
     metric = _metric(task)
     strokes = [stroke.begun_near(task.start, metric) for stroke in best_strokes(task, metric, seed)]
@@ -160,7 +160,7 @@ def _metric(task: Reorientation) -> Array:
     """Metric of lengths: (m, m), the cost's own where the cost is the integral of a metric."""
     if task.cost == "time":
         return np.diag(task.rate_limit**-2.0)
-    metric = start_metric(task) if task.cost == "kinetic" else task.coupling.T @ task.coupling
+    metric = start_metric(task) if task.cost in ("kinetic", "metric") else task.coupling.T @ task.coupling
     return ridged(metric, _RIDGE)
 
 

@@ -45,10 +45,10 @@ def node_efforts(task: Reorientation) -> NodeEfforts:
     """Return the functions of a task; those of its body are kept as long as the body."""
     import casadi
 
-    m, chain = task.dimension, task.body.chain
-    if task.body not in _built:
-        _built[task.body] = inverse_dynamics(chain)
-    dynamics, measured = _built[task.body], np.flatnonzero(np.isfinite(task.effort_measure))
+    m, chain = task.dimension, task.links.chain
+    if task.links not in _built:
+        _built[task.links] = inverse_dynamics(chain)
+    dynamics, measured = _built[task.links], np.flatnonzero(np.isfinite(task.effort_measure))
     y, multipliers, factor = casadi.MX.sym("y", 3 * m + 5), casadi.MX.sym("l", len(measured)), casadi.MX.sym("f")
     values, derivative, second = _dynamics_arguments(task)
     x, onward = values(y), derivative(y)
@@ -84,7 +84,7 @@ def _dynamics_arguments(task: Reorientation) -> tuple[Any, Any, Any]:
     """
     import casadi
 
-    m, chain = task.dimension, task.body.chain
+    m, chain = task.dimension, task.links.chain
     y, factors = casadi.SX.sym("y", 3 * m + 5), casadi.SX.sym("factors", 3 * len(chain.parents) + 3)
     from_shape = casadi.DM(chain.matrix @ task.coupling)
     place = from_shape @ y[:m] + casadi.DM(chain.matrix @ task.offset + chain.offset)

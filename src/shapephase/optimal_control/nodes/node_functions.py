@@ -10,6 +10,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...body.body import Body
+from ...body.particles._casadi_positions import symbol_kind
+from ...body.particles.point_masses import ParticleBody
 from .._spline_basis import SplineBasis
 from ..symbolic import joint_coordinates, quaternion_rate, solve_linear, turned_back
 from ..task import Reorientation
@@ -32,13 +34,20 @@ class NodeFunctions:
     hessian: Any
 
 
-_built: WeakKeyDictionary[Body, dict[tuple[object, ...], NodeFunctions]] = WeakKeyDictionary()
+_built: WeakKeyDictionary[Body | ParticleBody, dict[tuple[object, ...], NodeFunctions]] = WeakKeyDictionary()
 
 
 def node_functions(task: Reorientation) -> NodeFunctions:
     """Return the functions of a task, kept as long as its body."""
     kept = _built.setdefault(task.body, {})
-    key = (task.cost, task.coupling.shape, task.coupling.tobytes(), task.offset.tobytes(), task.momentum.tobytes())
+    key = (
+        task.cost,
+        task.metric and task.metric.key,
+        task.coupling.shape,
+        task.coupling.tobytes(),
+        task.offset.tobytes(),
+        task.momentum.tobytes(),
+    )
     if key not in kept:
         kept[key] = _node_functions(task)
     return kept[key]
@@ -48,21 +57,20 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     """Chain rule over three stages: coordinates and rates of joints, sixteen mechanical numbers, the turning."""
     import casadi
 
-    m, chain = task.dimension, task.body.chain
-    (mechanics, second_of_mechanics), ends = node_mechanics(chain), _ends(task)
+    m = task.dimension
+    (mechanics, second_of_mechanics), ends = node_mechanics(task.body), _ends(task)
     joints, second_of_joints = _joints(task)
     y = casadi.MX.sym("y", 2 * m + 5)
     place, rate, onward, back = joints(y[: 2 * m])
     shape = casadi.DM(task.coupling) @ y[:m] + casadi.DM(task.offset)
     numbers, by_place, by_rate = mechanics(place, rate, shape)
-    bare = casadi.DM(task.coupling) @ y[m : 2 * m]
-    effort = 0.5 * casadi.dot(bare, bare)
+    price = _price(task)
+    effort, at_rate, square = price(y[: 2 * m])
     inputs = casadi.vertcat(numbers, effort, y[2 * m :])
     turning, density = ends.values(inputs)
     # `onward`: derivatives of the joints by the shape; `back`: of their rates by the shape, zero where all joints that
     # follow others do so linearly.
     slopes = casadi.horzcat(by_place @ onward + by_rate @ back, by_rate @ onward)
-    at_rate = casadi.horzcat(casadi.MX(1, m), (casadi.DM(task.coupling.T @ task.coupling) @ y[m : 2 * m]).T)
     through = casadi.diagcat(casadi.vertcat(slopes, at_rate), casadi.MX.eye(5))
     jacobian = casadi.densify(ends.jacobian(inputs) @ through)
     multipliers, factor = casadi.MX.sym("multipliers", 4), casadi.MX.sym("factor")
@@ -72,8 +80,8 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
     lower = mixed @ onward + rates @ back
     corner = onward.T @ (places @ onward + mixed.T @ back) + back.T @ lower
     beside = onward.T @ lower
-    square = onward.T @ rates @ onward + gradient[SIZE] * casadi.DM(task.coupling.T @ task.coupling)
-    block = casadi.vertcat(casadi.horzcat(corner, beside.T), casadi.horzcat(beside, square))
+    block = casadi.vertcat(casadi.horzcat(corner, beside.T), casadi.horzcat(beside, onward.T @ rates @ onward))
+    block = block + gradient[SIZE] * square
     if second_of_joints is not None:
         block = block + second_of_joints(y[: 2 * m], by_place.T @ gradient[:SIZE], by_rate.T @ gradient[:SIZE])
     hessian = through.T @ bend @ through + casadi.diagcat(block, casadi.MX(5, 5))
@@ -82,6 +90,20 @@ def _node_functions(task: Reorientation) -> NodeFunctions:
         jacobian=casadi.Function("node_jacobian", [y], [jacobian]),
         hessian=casadi.Function("node_hessian", [y, multipliers, factor], [casadi.densify(hessian)]),
     )
+
+
+def _price(task: Reorientation) -> Any:
+    """Function of shape and its rate (2 m,): 1/2 r' g r' of a given metric, its slopes and second derivatives."""
+    import casadi
+
+    m, metric = task.dimension, None if task.metric is None or task.cost == "kinetic" else task.metric.metric
+    kind = casadi.SX if metric is None else symbol_kind(metric)
+    both = kind.sym("both", 2 * m)
+    rate, value = kind(casadi.DM(task.coupling)) @ both[m:], kind(1, 1)
+    if metric is not None:
+        value = 0.5 * rate.T @ metric(kind(casadi.DM(task.coupling)) @ both[:m] + casadi.DM(task.offset)) @ rate
+    square, slopes = casadi.hessian(value, both)
+    return casadi.Function("price", [both], [casadi.densify(value), slopes.T, square])
 
 
 def _joints(task: Reorientation) -> tuple[Any, Any]:
@@ -95,21 +117,21 @@ def _joints(task: Reorientation) -> tuple[Any, Any]:
     """
     import casadi
 
-    m, chain = task.dimension, task.body.chain
+    m, follows = task.dimension, task.body.follows
     both = casadi.SX.sym("both", 2 * m)
     coordinates, rate = both[:m], both[m:]
     shape = casadi.DM(task.coupling) @ coordinates + casadi.DM(task.offset)
     # Ball joints are three hinges counted from this very shape, which their derivatives are taken at.
     about = casadi.SX.sym("about", shape.shape[0])
-    place = joint_coordinates(chain, shape, about)
+    place = joint_coordinates(follows, shape, about)
     onward = casadi.jacobian(place, coordinates)
     rates = onward @ rate
     back = casadi.jacobian(rates, coordinates)
     parts = [casadi.substitute(part, about, shape) for part in (place, rates, onward, back)]
     values = casadi.Function("joints", [both], [casadi.densify(parts[0]), casadi.densify(parts[1]), *parts[2:]])
-    if chain.follows.is_linear:
+    if follows.is_linear:
         return values, None
-    of_place, of_rate = (casadi.SX.sym(name, len(chain.parents)) for name in ("of_place", "of_rate"))
+    of_place, of_rate = (casadi.SX.sym(name, len(follows.names)) for name in ("of_place", "of_rate"))
     bend, _ = casadi.hessian(casadi.dot(of_place, place) + casadi.dot(of_rate, rates), both)
     bend = casadi.substitute(bend, about, shape)
     return values, casadi.Function("joints_bend", [both, of_place, of_rate], [bend])
@@ -122,7 +144,7 @@ def _ends(task: Reorientation) -> NodeFunctions:
     """
     import casadi
 
-    inputs, mass = casadi.SX.sym("inputs", SIZE + 6), float(task.body.chain.masses.sum())
+    inputs, mass = casadi.SX.sym("inputs", SIZE + 6), task.body.mass
     moment, entries, angular, linear = inputs[:3], inputs[3:9], inputs[9:12], inputs[12:15]
     energy, effort, q, duration = inputs[15], inputs[16], inputs[17:21], inputs[21]
     about_origin = casadi.vertcat(
@@ -140,7 +162,7 @@ def _ends(task: Reorientation) -> NodeFunctions:
     density = casadi.SX(1, 1)
     if task.cost == "kinetic":
         density = 0.5 * (energy - casadi.dot(linear, linear) / mass - casadi.dot(momentum, solution)) / duration
-    elif task.cost == "rate":
+    elif task.metric is not None:
         density = effort / duration
     density = casadi.densify(density)
     multipliers, factor = casadi.SX.sym("multipliers", 4), casadi.SX.sym("factor")

@@ -28,16 +28,19 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array
+from ...body.body import Body
 from ...body.joint_chain import JointChain
-from ..symbolic import joint_frames
+from ...body.particles._casadi_positions import symbol_kind
+from ...body.particles.point_masses import ParticleBody
+from ..symbolic import joint_frames, symbolic_body
 from .spatial import Twist, gathered, links_of, passed_on, screws_of
 
 SIZE = 16  # numbers in z
 _INERTIA_ENTRIES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-def node_mechanics(chain: JointChain) -> tuple[Any, Any]:
-    """CasADi functions of coordinates and rates of all k joints of a tree, and the shape its ball joints are about.
+def node_mechanics(body: Body | ParticleBody) -> tuple[Any, Any]:
+    """CasADi functions of coordinates and rates of all k joints of a body, and the shape its ball joints are about.
 
     Returns
     -------
@@ -47,6 +50,31 @@ def node_mechanics(chain: JointChain) -> tuple[Any, Any]:
 
     Source: composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, section 6.2).
     """
+    return _of_tree(body.chain) if isinstance(body, Body) else _of_particles(body)
+
+
+def _of_particles(body: ParticleBody) -> tuple[Any, Any]:
+    """Functions of particles, whose places CasADi differentiates; they are counted from the centre of mass."""
+    import casadi
+
+    maps = symbolic_body(body).maps
+    kind, n = symbol_kind(maps), body.n_shape
+    place, rate, shape, factors = (kind.sym(*what) for what in (("q", n), ("u", n), ("r", n), ("c", SIZE)))
+    inertia, matrix, mass_matrix, _ = maps(place)
+    still = kind(3, 1)
+    numbers = casadi.vertcat(
+        still, *(inertia[entry] for entry in _INERTIA_ENTRIES), matrix @ rate, still, rate.T @ mass_matrix @ rate
+    )
+    slopes = [casadi.densify(casadi.jacobian(numbers, by)) for by in (place, rate)]
+    gradients = [casadi.gradient(casadi.dot(factors, numbers), by) for by in (place, rate)]
+    second = [casadi.jacobian(gradients[of], by) for of, by in ((0, place), (1, place), (1, rate))]
+    return (
+        casadi.Function("mechanics", [place, rate, shape], [casadi.densify(numbers), *slopes], {"cse": True}),
+        casadi.Function("mechanics_second", [place, rate, shape, factors], second, {"cse": True}),
+    )
+
+
+def _of_tree(chain: JointChain) -> tuple[Any, Any]:
     import casadi
 
     count = len(chain.parents)

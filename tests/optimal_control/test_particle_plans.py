@@ -1,0 +1,198 @@
+"""Optimal loops of bodies of particles: closed forms, published turns, and a transcription of another kind."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import shapephase as sp
+from shapephase import so3
+from shapephase.optimal_control import (
+    Search,
+    conjugate_times,
+    extremal,
+    path_cost,
+    plan_reorientation,
+    shoot,
+    small_loop,
+    wong_residual,
+)
+
+EPS = np.finfo(float).eps
+Z = np.array([0.0, 0.0, 1.0])
+BEFORE = np.array(
+    [[1.0, 0.0, 0.4], [-0.8, 0.6, -0.5], [0.1, -0.9, 0.5], [-0.3, 0.5, 0.8], [0.7, 0.8, -0.6], [-0.6, -0.7, -0.7]]
+)
+
+
+def corners(direction):
+    """Three unit masses of inertia 1 at a point of the unit sphere of shapes, whose pole is the regular triangle."""
+    wide = ca.sqrt(0.5 * (1.0 + direction[0]))
+    one = ca.vertcat(wide, 0.0) / np.sqrt(0.5)
+    two = ca.vertcat(direction[1], direction[2]) / (2.0 * wide) / np.sqrt(2.0 / 3.0)
+    return ca.vertcat((-one / 2).T, (one / 2).T, two.T)
+
+
+def triangle(chart):
+    """Its shape in the plane: "equal-area" (Lambert's), or "stereographic", about the pole."""
+    r = ca.SX.sym("r", 2)
+    square = ca.sumsqr(r)
+    if chart == "equal-area":
+        direction = ca.vertcat(r * ca.sqrt(1.0 - square / 4.0), 1.0 - square / 2.0)
+    else:
+        direction = ca.vertcat(2.0 * r, 1.0 - square) / (1.0 + square)
+    return sp.particle_body(np.ones(3), ca.Function("corners", [r], [corners(direction)]), ["x", "y"], units="m")
+
+
+def random_parts(seed):
+    """Masses, places at rest, and what two parameters and their sines move of them; even seeds are planar."""
+    rng = np.random.default_rng(seed)
+    parts = np.concatenate([[BEFORE], rng.normal(size=(4, 6, 3)) * np.array([0.3, 0.3, 0.2, 0.2])[:, None, None]])
+    return rng.uniform(0.5, 2.0, 6), parts * ([1.0, 1.0, 0.0] if seed % 2 == 0 else [1.0, 1.0, 1.0])
+
+
+def random_body(seed):
+    masses, parts = random_parts(seed)
+    r = ca.SX.sym("r", 2)
+    factors = [1.0, r[0], r[1], ca.sin(2.0 * r[1]), ca.sin(2.0 * r[0] + 1.0)]
+    places = sum(factor * ca.DM(part) for factor, part in zip(factors, parts, strict=True))
+    return sp.particle_body(masses, ca.Function("places", [r], [places]), ["a", "b"])
+
+
+class Sines:
+    """The places of `random_body` as a function of Python, with their derivatives."""
+
+    def __init__(self, seed):
+        self.masses, self.parts = random_parts(seed)
+
+    def __call__(self, shapes):
+        a, b = shapes.T
+        one, none = np.ones_like(a), np.zeros_like(a)
+        rows = [
+            [one, a, b, np.sin(2.0 * b), np.sin(2.0 * a + 1.0)],
+            [none, one, none, none, 2.0 * np.cos(2.0 * a + 1.0)],
+            [none, none, one, 2.0 * np.cos(2.0 * b), none],
+        ]
+        places, *slopes = (np.einsum("fn,fmk->nmk", np.array(factors), self.parts) for factors in rows)
+        return places, np.stack(slopes, axis=1)
+
+
+# --- the sphere of triangles: a charge in the field of a monopole ------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def sphere_plan():
+    return plan_reorientation(
+        triangle("stereographic"), so3.exp(0.6 * Z), rates_at_ends="free", search=Search(pieces=40)
+    )
+
+
+def test_the_cheapest_turn_of_three_bodies_costs_what_a_circle_on_their_sphere_does(sphere_plan):
+    """theory of reorientation: theta (2 pi - theta) / (2 T) for unit inertia; its slope is the charge pi - theta."""
+    angle = 0.6
+    np.testing.assert_allclose(sphere_plan.cost, 0.5 * angle * (2.0 * np.pi - angle), rtol=1e-8)
+    fit = wong_residual(sphere_plan.body, sphere_plan.path)
+    np.testing.assert_allclose(fit.charge, (np.pi - angle) * Z, rtol=0, atol=1e-3)
+    assert fit.residual < 1e-3
+    near = sphere_plan.path.shape(np.linspace(0.0, 1.0, 41))
+    directions = np.concatenate([2.0 * near, 1.0 - np.sum(near**2, axis=1, keepdims=True)], axis=1)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    # A circle lies in a plane.
+    assert np.linalg.svd(directions - directions.mean(axis=0), compute_uv=False)[2] < 1e-5
+
+
+def test_its_extremal_closes_at_a_conjugate_time(sphere_plan):
+    """The circle may be turned about its first point, so that neighbours meet where it closes."""
+    exact = shoot(sphere_plan.body, sphere_plan.path, sphere_plan.goal.rotation)
+    np.testing.assert_allclose(exact.cost, 0.3 * (2.0 * np.pi - 0.6), rtol=2e-9)
+    np.testing.assert_allclose(exact.charge, (np.pi - 0.6) * Z, rtol=0, atol=1e-8)
+    (meeting,) = conjugate_times(exact)
+    assert (round(meeting.time, 7), meeting.multiplicity) == (1.0, 1)
+
+
+def test_a_charge_in_a_constant_field_goes_round_in_circles():
+    """Dido's problem: in an equal-area chart with the metric of the plane a turn theta costs 4 pi theta / T."""
+    body, angle = triangle("equal-area"), 0.5
+    for metric in ("rate", np.eye(2)):
+        loop = small_loop(body, [0.2, -0.1], metric=metric)
+        np.testing.assert_allclose([loop.turn_about_axis, loop.cost(angle)], [0.5, 4.0 * np.pi * angle], rtol=1e-12)
+        exact = shoot(body, loop.path(angle), so3.exp(angle * Z), metric=metric)
+        np.testing.assert_allclose(exact.cost, 4.0 * np.pi * angle, rtol=1e-9)
+        around = exact.shape(np.linspace(0.0, 1.0, 32, endpoint=False))
+        radii = np.linalg.norm(around - around.mean(axis=0), axis=1)
+        np.testing.assert_allclose(radii, np.sqrt(2.0 * angle / np.pi), rtol=1e-9)
+    plan = plan_reorientation(
+        body, so3.exp(angle * Z), cost=np.eye(2), start=[0.2, -0.1], rates_at_ends="free", search=Search(pieces=24)
+    )
+    np.testing.assert_allclose(plan.cost, 4.0 * np.pi * angle, rtol=1e-6)
+    assert (plan.cost_name, plan.cost_unit) == ("metric", "")
+    np.testing.assert_allclose(path_cost(body, plan.path, np.eye(2)), plan.cost, rtol=1e-13)
+
+
+def test_conjugate_times_of_a_constant_field_are_its_periods():
+    """A charge l in a field 1/2 goes round in 4 pi / l, at any speed."""
+    path = extremal(triangle("equal-area"), [0.0, 0.0], [0.3, 0.1], 3.0 * np.pi * Z, 1.0, metric="rate")
+    (meeting,) = conjugate_times(path, until=1.5)
+    np.testing.assert_allclose(meeting.time, 4.0 / 3.0, rtol=1e-8)
+
+
+# --- small deformations -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_small_loops_are_the_eigenvalue_problem_of_small_deformations(seed):
+    """Shapere and Wilczek: F = 2 I^-1 sum m V_i x V_j for displacements V without momentum, g = sum m V_i . V_j."""
+    rng = np.random.default_rng(seed)
+    masses, rest, axis = rng.uniform(0.5, 2.0, 8), rng.normal(size=(8, 3)), so3.normalised(rng.normal(size=3))
+    moved = rng.normal(size=(4, 8, 3))
+    centred = [part - masses @ part / masses.sum() for part in (rest, *moved)]
+    still = np.stack(centred[1:]).reshape(4, -1)
+    weights = np.repeat(masses, 3)
+    turns = np.stack([np.cross(np.eye(3)[k], centred[0]).ravel() for k in range(3)])
+    # Displacements are made orthogonal to turns: they have no angular momentum.
+    still -= (still * weights) @ turns.T @ np.linalg.inv((turns * weights) @ turns.T) @ turns
+    parts = still.reshape(4, 8, 3)
+    r = ca.SX.sym("r", 4)
+    places = ca.DM(centred[0]) + sum(r[k] * ca.DM(parts[k]) for k in range(4))
+    body = sp.particle_body(masses, ca.Function("places", [r], [places]), list("abcd"))
+    crossed = np.cross(parts[:, None], parts[None])
+    momentum = 2.0 * np.einsum("m,ijmk->ijk", masses, crossed)
+    inverse = np.linalg.inv((turns * weights) @ turns.T)
+    form = momentum @ inverse @ axis
+    values = eigh(1j * form, (still * weights) @ still.T, eigvals_only=True)
+    loop = small_loop(body, np.zeros(4), axis)
+    np.testing.assert_allclose(loop.turn_about_axis, values[-1], rtol=1e-12)
+    # The turn is that of the area up to the cube of the radius: halving the radius divides the difference by eight.
+    misses = []
+    for size in (4e-4, 1e-4):
+        turn = so3.log(sp.holonomy(body, loop.path(size), 1e-12))
+        misses.append(np.linalg.norm(turn - np.pi * loop.radius(size) ** 2 * loop.turn))
+    assert misses[1] < misses[0] / 6.0
+    assert misses[0] < 0.05 * 4e-4
+    np.testing.assert_allclose(path_cost(body, loop.path(1e-8)), loop.cost(1e-8), rtol=1e-3 * np.sqrt(1e-1))
+
+
+def test_small_loops_are_ellipses_in_a_metric_of_unequal_axes():
+    loop = small_loop(triangle("equal-area"), [0.0, 0.0], metric=np.diag([1.0, 4.0]))
+    np.testing.assert_allclose(loop.turn_about_axis, 0.25, rtol=1e-13)
+    lengths = np.linalg.norm(loop.path(0.1).shape(np.linspace(0.0, 1.0, 5)[:2]), axis=1)
+    np.testing.assert_allclose(sorted(lengths, reverse=True)[0] / min(lengths), 2.0, rtol=1e-12)
+    np.testing.assert_allclose(so3.log(sp.holonomy(triangle("equal-area"), loop.path(0.1), 1e-12)), 0.1 * Z, atol=1e-11)
+
+
+# --- the pentagon -------------------------------------------------------------------------------------------
+
+
+def pentagon():
+    """Corners of unit mass on a closed chain of unit edges, about the regular one."""
+    k = np.arange(5)
+    free, rest = ca.MX.sym("free", 2), ca.MX.sym("rest", 2)
+    slow, fast = (ca.DM(np.stack([np.cos(f * k), np.sin(f * k)], axis=1)) for f in (0.4 * np.pi, 0.8 * np.pi))
+    headings = 0.4 * np.pi * k + fast @ free + slow @ rest
+    edges = ca.horzcat(ca.cos(headings), ca.sin(headings))
+    closing = ca.rootfinder("closing", "newton", ca.Function("gap", [rest, free], [ca.sum1(edges).T]))
+    corners = ca.cumsum(ca.substitute(edges, rest, closing(np.zeros(2), free)))
+    limits = {"free_1": (-1.2, 1.2), "free_2": (-1.2, 1.2)}
+    return sp.particle_body(np.ones(5), ca.Function("corners", [free], [corners]), ["free_1", "free_2"], limits=limits)
