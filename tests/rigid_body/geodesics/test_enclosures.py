@@ -114,7 +114,7 @@ def test_a_longer_way_in_place_of_the_shortest_is_not_certified(monkeypatch):
     true = shortest_geodesic(metric, attitude)
     assert true.length < time - 0.1
     longer = replace(true, momentum=time * start, length=time)
-    monkeypatch.setattr(enclosures, "found_geodesic", lambda *given: longer)
+    monkeypatch.setattr(enclosures, "found_geodesic", lambda *_: longer)
     found = distance_enclosure(metric, attitude, most_cells=30_000)
     assert not found.certified
     assert found.lower <= true.length < found.upper == pytest.approx(time, abs=1e-6)

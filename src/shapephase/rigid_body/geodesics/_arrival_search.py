@@ -37,6 +37,7 @@ _NEAR = 1.0  # [rad] up to which |J(theta)^-1 − 1| <= 0.51 theta, J the left o
 _JACOBIAN = 0.51
 _LOGARITHM = 1.05  # (theta/2)/sin(theta/2) at most
 _WORTH = 0.5  # of the centre's own bound: a cell whose bound is below is halved
+_NO_LENGTH = 1e-100  # dual length of a covector along a forbidden direction, whose square still is a number
 _BLOCK = 2000  # cells at once, those of the earliest times
 
 
@@ -127,7 +128,7 @@ def _progress(cover: MomentumCover, bounds: FlowBounds, cells: Cells, goal: Goal
     deviation = np.minimum(growth * radius, np.where(growth * radius < _NEAR, straight, np.inf))
     shortest = 1.0 / np.sqrt(a[0])
     covectors = np.stack([momentum, cover.units**2 * xi])
-    covectors /= np.maximum(np.sqrt(np.sum(a * covectors**2, axis=-1, keepdims=True)), np.finfo(float).tiny)
+    covectors /= np.maximum(np.sqrt(np.sum(a * covectors**2, axis=-1, keepdims=True)), _NO_LENGTH)
     size = np.linalg.norm(covectors, axis=-1)
     moved = sum(np.abs(np.sum(covectors * side, axis=-1)) for side in sides)
     moved += np.linalg.norm(np.einsum("cni,nij->cnj", covectors, z), axis=-1) * bend + size * rest
@@ -174,7 +175,8 @@ def _climb(inverse_moments: Array, height: Array, upwards: Array, deviation: Arr
         angle = np.sqrt(inverse_moments[0]) * length
         reach = deviation + angle
         swept = scale * length**2 / (2.0 * np.pi) + 0.5 * deviation * angle
-        third = angle**2 * (0.25 * upwards + 0.25 * reach * angle + 0.128 * reach**2) + 0.085 * reach * angle * upwards
+        third = angle**2 * (0.125 * upwards + 0.025 * reach * angle + 0.047 * reach**2)
+        third += 0.085 * reach * angle * upwards
         best = np.where((swept + third < missing) & (reach < _NEAR), length, best)
     return best
 
@@ -239,7 +241,7 @@ def first_arrival(
         work += len(block)
         ahead = _progress(cover, bounds, block, goal)
         block = replace(block, time=block.time + ahead.length)
-        left = block.time < stop
+        left = ~(block.time >= stop)
         if arrival is not None:
             n, _, _ = cover.chart(block.azimuth, block.height)
             inside = np.linalg.norm(n - arrival.n, axis=-1) + cover.radius(block) < arrival.radius
@@ -283,5 +285,5 @@ def _known_arrival(cover: MomentumCover, momentum: Array, count: int) -> KnownAr
     early = duration + 2.0 * size * curving  # eta per |q|²
     across = 1.0 + speed * size
     radius = 0.5 * singular[2] / (0.5 * speed * duration + across * (curving + turning * before * early))
-    radius = min(radius, half, 1.0 / max(float(bounds.growth[0, -1]), SLACK))
+    radius = min(radius, float(cover.radius(cell)[0]), 1.0 / max(float(bounds.growth[0, -1]), SLACK))
     return KnownArrival(n=n, radius=radius, before=before)

@@ -150,7 +150,7 @@ class FlowBounds:
     bend: Array
     """(M, S + 1) C, per |q|²."""
     rate: Array
-    """(M, S + 1) alpha K, the derivative of `growth`."""
+    """(M, S + 1) alpha K, the derivative of `growth`, from each node to the next."""
     closed: Mask
     """(M,) True where the bounds are near the centre's own values."""
 
@@ -194,14 +194,13 @@ def flow_bounds(cover: MomentumCover, cells: Cells, count: int) -> FlowBounds:
             widest, any_pair, rest = (between[:, None] * values[:, :k] for values in (tube, first, second))
             tube[:, k] = centre * radius + square * np.sum(reach * widest**2, axis=-1)
             first[:, k] = centre + linear * np.sum(reach * widest * any_pair, axis=-1)
-            # Within the last step the rest grows from its value at the start of it.
-            inside = rest[:, -1] + between * step * square * any_pair[:, -1] ** 2
-            rest[:, -1] = inside
+            # Within a step the rest grows from its value at the start of it.
+            rest += (between * step * square)[:, None] * any_pair**2
             second[:, k] = np.sum(reach * (linear * widest * rest + square * any_pair**2), axis=-1)
             growth[:, k] = growth[:, k - 1] + alpha * any_pair[:, -1] * step
-            bend[:, k] = bend[:, k - 1] + alpha * inside * step
+            bend[:, k] = bend[:, k - 1] + alpha * rest[:, -1] * step
         closed = first[:, -1] < _LOOSE * centre
-    return FlowBounds(step=step, growth=growth, bend=bend, rate=alpha * first, closed=closed)
+    return FlowBounds(step=step, growth=growth, bend=bend, rate=alpha * between[:, None] * first, closed=closed)
 
 
 def _norms(matrices: Array) -> Array:
