@@ -78,7 +78,7 @@ class KnownArrival:
     n: Array
     """(3,) its momentum in units of the cover."""
     radius: float
-    """Of the ball of momenta n."""
+    """Radius of the ball of momenta n."""
     before: float
     """Time before the arrival up to which no other arrives."""
 
@@ -277,7 +277,7 @@ def _known_arrival(cover: MomentumCover, momentum: Array, count: int) -> KnownAr
     fields = exponential_fields(a, momentum[None], np.array([duration]), attitude, slope)[0] * cover.units
     singular = np.linalg.svd(fields, compute_uv=False)
     size, speed = float(np.linalg.norm(momentum)), float(np.sqrt(a[0]))
-    # Of the way over eta: its rotation vector is eta u but for `turning` eta².
+    # The way over eta has the rotation vector eta u but for `turning` eta².
     turning = 0.5 * a[0] * speed * size + 0.27 * a[0]
     before = min(0.5 / (size * turning), _NEAR / speed)
     before = min(before, 0.5 * singular[2] / (float(bounds.rate[0].max()) + speed * singular[0]))

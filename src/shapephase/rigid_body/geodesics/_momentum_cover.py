@@ -142,7 +142,7 @@ class MomentumCover:
 
 @dataclass(frozen=True, eq=False)
 class FlowBounds:
-    """Of M cells of a coarse grid at S + 1 equal times from 0: bounds for all pairs of momenta of a cell."""
+    """Bounds for all pairs of momenta of a cell, for M cells of a coarse grid at S + 1 equal times from 0."""
 
     step: float
     growth: Array
