@@ -90,7 +90,7 @@ def test_nearly_axisymmetric_distances_hold_the_closed_form(equatorial, axial):
     """The search knows nothing of symmetry; the closed form is that of three moments of which two are equal."""
     closed = axisymmetric_metric(equatorial, axial)
     metric = left_invariant_metric([equatorial, equatorial * (1.0 + NEARLY), axial])
-    for attitude in Rotation.random(2, rng=2).as_matrix():
+    for attitude in Rotation.random(2, rng=np.random.default_rng(2)).as_matrix():
         found, expected = distance_enclosure(metric, attitude, width=1e-2), float(closed.distance(attitude))
         assert found.certified
         assert found.cells > 0
@@ -242,7 +242,7 @@ def random_metric(number):
 def test_twenty_attitudes_of_each_of_fifty_metrics(number):
     """Of 100,000 shots none is below the lower bound; the width is reached but where the work did not suffice."""
     metric = random_metric(number)
-    for row, attitude in enumerate(Rotation.random(20, rng=number).as_matrix()):
+    for row, attitude in enumerate(Rotation.random(20, rng=np.random.default_rng(number)).as_matrix()):
         found = distance_enclosure(metric, attitude)
         assert found.certified == (found.width <= 1e-3 * found.upper)
         assert found.certified or found.cells >= distance.MOST_CELLS
