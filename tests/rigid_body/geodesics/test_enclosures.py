@@ -213,6 +213,11 @@ def test_too_little_work_leaves_the_bounds_of_axisymmetric_metrics():
     assert distance_enclosure(metric, np.eye(3)).upper == 0.0
 
 
+def test_an_end_that_is_met_to_the_last_digit_has_no_gap():
+    """About a forbidden axis, too, where an infinite moment times a missed angle of 0 is not a number."""
+    assert distance.gap(left_invariant_metric([1.0, 2.0, np.inf]), 0.0) == 0.0
+
+
 def test_refusals():
     metric = left_invariant_metric([3.0, 2.0, 1.0])
     for wrong in (0.0, 1.0, -1e-3, np.nan):

@@ -163,7 +163,7 @@ def gap(metric: LeftInvariantMetric, residual: float) -> float:
     _, middle, largest = metric.moments
     # Across the forbidden axis, and a loop for the turn about it.
     bent = np.sqrt(middle) * (residual + np.sqrt(8.0 * np.pi * residual))
-    return float(min(np.sqrt(largest) * residual, bent))
+    return float(min(np.sqrt(largest) * residual, bent) if np.isfinite(largest) else bent)
 
 
 def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple[int, ShortestGeodesic]:
