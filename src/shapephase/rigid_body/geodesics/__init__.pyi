@@ -29,6 +29,7 @@ from ._serret_andoyer_constants import (
 )
 from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
 from .distance import ShortestGeodesic, nearest_attitude, shortest_geodesic
+from .enclosures import GeodesicEnclosure, cut_time_enclosure, distance_enclosure, distance_enclosure_on_su2
 from .left_invariant import LeftInvariantMetric, left_invariant_metric
 from .metric_profile import Assumptions, TabulatedStretch, assumptions, surface_of_metric
 from .serret_andoyer import SerretAndoyerMetric, serret_andoyer_metric
@@ -48,6 +49,7 @@ __all__ = [
     "Extremal",
     "GeodesicClass",
     "GeodesicConstants",
+    "GeodesicEnclosure",
     "GeodesicFamily",
     "LeftInvariantMetric",
     "SadovVariables",
@@ -69,6 +71,9 @@ __all__ = [
     "conjugate_points_of_momentum",
     "cut_locus",
     "cut_time",
+    "cut_time_enclosure",
+    "distance_enclosure",
+    "distance_enclosure_on_su2",
     "ellipsoid",
     "ellipsoid_period",
     "extremal",

@@ -56,15 +56,18 @@ def momentum_flow(inverse_moments: Array, start: Array, times: Array) -> tuple[A
 
 def attitude_flow(inverse_moments: Array, start: Array, times: Array) -> Array:
     """R(t) with R(0) the identity, body axes to inertial axes: (3,) descending, (N, 3), (N,) -> (N, 3, 3)."""
+    return so3.matrix_from_quat(quaternion_flow(inverse_moments, start, times))
+
+
+def quaternion_flow(inverse_moments: Array, start: Array, times: Array) -> Array:
+    """R(t) in unit quaternions xyzw, continued along t from 1: (3,) descending, (N, 3), (N,) -> (N, 4)."""
     p, q = _conserved(inverse_moments, start)
     # At rest, along an axis, or for three equal moments the body turns uniformly.
     uniform = (np.maximum(p, q) == 0.0) | ((start[:, 0] == 0.0) & (start[:, 2] == 0.0))
-    attitude = so3.exp(times[:, None] * inverse_moments * start)
+    quats = so3.quat_from_rotation_vector(times[:, None] * inverse_moments * start)
     if not uniform.all():
-        attitude[~uniform] = so3.matrix_from_quat(
-            _quaternion(inverse_moments, start[~uniform], times[~uniform], p[~uniform], q[~uniform])
-        )
-    return attitude
+        quats[~uniform] = _quaternion(inverse_moments, start[~uniform], times[~uniform], p[~uniform], q[~uniform])
+    return quats
 
 
 def exponential_fields(inverse_moments: Array, start: Array, times: Array, attitude: Array, slope: Array) -> Array:

@@ -28,6 +28,8 @@ from ...errors import ShapeError
 from ...letters import value_text
 from ...roots import bracketed_root, safe_newton
 
+_PAST_END = 1e-8  # [rad] beside an end of a bracket that is a root itself
+
 
 @dataclass(frozen=True)
 class AxisymmetricMetric:
@@ -193,7 +195,9 @@ class AxisymmetricMetric:
         side = 1.0 if way(quarter, 1.0)[2] >= target else -1.0
         angle = 0.0
         if target > 0.0:
-            angle = bracketed_root(lambda nu: way(nu, side)[2] - target, 0.0, quarter)
+            # On SU(2)'s cut tau = pi − arcsin |q_1 + i q_2| solves it too, past the cut if the angle falls towards it.
+            past = target == np.pi and way(_PAST_END, side)[2] > target
+            angle = bracketed_root(lambda nu: way(nu, side)[2] - target, _PAST_END if past else 0.0, quarter)
         sine, turn, _ = way(angle, side)
         tau = float(np.arctan2(sine, side * along * np.cos(angle)))
         # tau near pi has fewer digits than its sine.

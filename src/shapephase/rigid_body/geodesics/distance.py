@@ -19,23 +19,25 @@ Sources: theory.md section 7, Q6; Podobryaev and Sachkov 2016 for the cut times.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import so3, sphere
-from ...arguments import check_object
+from ...arguments import check_object, number_argument, whole_argument
 from ...arrays import Array
 from ...display import short_repr
 from ...errors import AccuracyNotReached, ShapeError
-from ._momentum_flow import attitude_flow, exponential_derivative
+from ._arrival_search import Goal, first_arrival
+from ._momentum_flow import exponential_derivative, quaternion_flow
 from .axisymmetric_cut import AxisymmetricMetric, axisymmetric_metric
 from .left_invariant import LeftInvariantMetric
 
 _FEW, _MANY = 48, 384  # directions of a search, and of the last where it finds nothing as short as the upper bound
 _STEPS = 60  # of Levenberg and Marquardt; the last few square the error, the others have to reach their basin
 _CLOSE = 1e-9  # relative: of residuals of an arrival, where the next step squares them, and of different lengths
+MOST_CELLS = 400_000  # of the proof that nothing shorter arrives: some ten seconds of processor time
 _ROUNDING = 1e-15  # [rad] of an attitude
 _MARGIN = 1e-7  # relative, by which rounding may put a length above its upper bound, or an end past the cut
 _FIRST_AXIS_LAST = [1, 2, 0]  # a cyclic order of the axes, so right-handed, with that of the smallest moment as third
@@ -50,27 +52,32 @@ class ShortestGeodesic:
     length: float
     """The distance [sqrt(kg) m]."""
     certified: bool
-    """Whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut."""
+    """Whether it is proven to be the shortest: the metric is axisymmetric, and the end not past the cut. With a width,
+    whether nothing is shorter than `length` by more than this part of it."""
     lower_bound: float
     upper_bound: float
-    """`lower_bound` and `upper_bound`: distances of axisymmetric metrics below and above this one [sqrt(kg) m]."""
+    """`lower_bound` and `upper_bound`: distances of axisymmetric metrics below and above this one, or with a width
+    those of `distance_enclosure` [sqrt(kg) m]."""
     residual: float
     """Angle by which the end misses the attitude [rad]."""
 
     __repr__ = short_repr
 
 
-def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> ShortestGeodesic:
+def shortest_geodesic(
+    metric: LeftInvariantMetric, attitude: ArrayLike, *, width: float | None = None, most_cells: int = MOST_CELLS
+) -> ShortestGeodesic:
     """The shortest geodesic from the identity to an attitude (3, 3).
 
     By left invariance that from R_0 to R_1 is R_0 times the one to R_0^T R_1. At points of the cut locus one of several
-    is found. For three different moments nothing proves that none was missed (`certified`), and where the way turns
-    more than once about the axis of the smallest moment, longer than 2 pi sqrt(I_1), many geodesics have nearly equal
-    length: there a shorter one may have been.
+    is found. For three different moments nothing proves that none was missed, and where the way turns more than once
+    about the axis of the smallest moment, longer than 2 pi sqrt(I_1), many geodesics have nearly equal length: there a
+    shorter one may have been. A width asks for the proof (`certified`), that of `distance_enclosure`.
 
     Source: theory.md Q6.
 
-    Raises AccuracyNotReached if no geodesic arrives that is as short as the upper bound.
+    Raises AccuracyNotReached if no geodesic arrives that is as short as the upper bound; ShapeError if width is not
+    between 0 and 1 or most_cells below 1.
 
     Examples
     --------
@@ -79,29 +86,84 @@ def shortest_geodesic(metric: LeftInvariantMetric, attitude: ArrayLike) -> Short
     >>> print(f"{found.length:.9f}")
     0.500000000
     """
+    goal = goal_of(metric, attitude)
+    found = found_geodesic(metric, goal)
+    if width is None:
+        return found
+    lower, upper, _ = proven_bounds(
+        metric, goal, found, width_argument(width), whole_argument(most_cells, "most_cells", 1)
+    )
+    return replace(found, lower_bound=lower, upper_bound=upper, certified=upper - lower <= width * upper)
+
+
+def width_argument(width: float) -> float:
+    """A relative width above 0 and below 1. Raises ShapeError for another one."""
+    part = number_argument(width, "width")
+    if not 0.0 < part < 1.0:
+        raise ShapeError(f"width: a part of the distance or time is needed, between 0 and 1, such as 1e-3; got {part}")
+    return part
+
+
+def goal_of(metric: LeftInvariantMetric, attitude: ArrayLike) -> Goal:
+    """One attitude (3, 3) in principal axes."""
     check_object(metric, "LeftInvariantMetric", "metric")
     matrix = so3.rotation_argument(attitude, "attitude")
     if matrix.shape != (3, 3):
         raise ShapeError(f"attitude: one rotation (3, 3) is needed, got {matrix.shape}; call it for each of them")
-    target = metric.axes.T @ matrix @ metric.axes
-    lower, upper = _bounds(metric, target)
-    closed, order = _axial_form(metric)
-    momentum, length, residual = np.zeros(3), 0.0, float(so3.angle(target))
+    return Goal(quat=so3.quat_from_matrix(metric.axes.T @ matrix @ metric.axes), on_su2=False)
+
+
+def found_geodesic(metric: LeftInvariantMetric, goal: Goal) -> ShortestGeodesic:
+    """The shortest geodesic of the closed form, or of those that the search finds."""
+    lower, upper = axial_bounds(metric, goal)
+    closed, order = axial_form(metric)
+    momentum, length, residual = np.zeros(3), 0.0, float(np.linalg.norm(goal.vector))
     if residual > _ROUNDING:
         if closed is None:
-            momentum = _searched(metric, target, upper)
+            momentum = _searched(metric, goal, upper)
         else:
-            momentum[order] = closed.shortest_momentum(target[np.ix_(order, order)])
+            quat = goal.on_axes(order)
+            momentum[order] = (
+                closed.shortest_momentum_on_su2(quat)
+                if goal.on_su2
+                else closed.shortest_momentum(so3.matrix_from_quat(quat))
+            )
         length = float(np.sqrt(np.sum(metric.inverse_moments * momentum**2)))
-        residual = float(np.linalg.norm(_rotation_errors(metric.inverse_moments, momentum[None], target)))
+        residual = float(np.linalg.norm(_rotation_errors(metric.inverse_moments, momentum[None], goal)))
+    certified = not length
+    if length and closed is not None:
+        cut = closed.cut_time_on_su2 if goal.on_su2 else closed.cut_time
+        certified = bool(cut(momentum[order]) >= 1.0 - _MARGIN)
     return ShortestGeodesic(
         momentum=metric.axes @ momentum,
         length=length,
-        certified=not length or (closed is not None and bool(closed.cut_time(momentum[order]) >= 1.0 - _MARGIN)),
+        certified=certified,
         lower_bound=lower,
         upper_bound=upper,
         residual=residual,
     )
+
+
+def proven_bounds(
+    metric: LeftInvariantMetric, goal: Goal, found: ShortestGeodesic, width: float, most: int
+) -> tuple[float, float, int]:
+    """Bounds of the distance that differ by the part `width` if `most` cells suffice, and the cells' number."""
+    upper = found.length + gap(metric, found.residual)
+    if found.certified:
+        return min(found.length * (1.0 - _MARGIN * width), found.length), upper, 0
+    stop, begin = upper * (1.0 - width * (1.0 - _MARGIN)), found.lower_bound * (1.0 - _CLOSE)
+    if begin >= stop:
+        return begin, upper, 0
+    search = first_arrival(metric.inverse_moments, goal, begin, stop, most)
+    return search.time, upper, search.work
+
+
+def gap(metric: LeftInvariantMetric, residual: float) -> float:
+    """Largest distance of attitudes that differ by a small angle."""
+    _, middle, largest = metric.moments
+    # Across the forbidden axis, and a loop for the turn about it.
+    bent = np.sqrt(middle) * (residual + np.sqrt(8.0 * np.pi * residual))
+    return float(min(np.sqrt(largest) * residual, bent) if np.isfinite(largest) else bent)
 
 
 def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple[int, ShortestGeodesic]:
@@ -129,7 +191,7 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
     matrices = so3.rotation_argument(attitudes, "attitudes")
     if matrices.ndim != 3 or not len(matrices):
         raise ShapeError(f"attitudes: one or more rotations (N, 3, 3) are needed, got {matrices.shape}")
-    lower = np.array([_bounds(metric, metric.axes.T @ matrix @ metric.axes)[0] for matrix in matrices])
+    lower = np.array([axial_bounds(metric, goal_of(metric, matrix))[0] for matrix in matrices])
     order = np.argsort(lower, kind="stable")
     best = int(order[0])
     nearest = shortest_geodesic(metric, matrices[best])
@@ -142,7 +204,7 @@ def nearest_attitude(metric: LeftInvariantMetric, attitudes: ArrayLike) -> tuple
     return best, nearest
 
 
-def _axial_form(metric: LeftInvariantMetric) -> tuple[AxisymmetricMetric | None, list[int]]:
+def axial_form(metric: LeftInvariantMetric) -> tuple[AxisymmetricMetric | None, list[int]]:
     """The closed form of a metric with two equal moments, else None, and the axes with that of symmetry as third."""
     smallest, middle, largest = metric.moments.tolist()
     if smallest == middle:
@@ -150,25 +212,25 @@ def _axial_form(metric: LeftInvariantMetric) -> tuple[AxisymmetricMetric | None,
     return axisymmetric_metric(largest, smallest) if middle == largest else None, _FIRST_AXIS_LAST
 
 
-def _searched(metric: LeftInvariantMetric, target: Array, upper: float) -> Array:
+def _searched(metric: LeftInvariantMetric, goal: Goal, upper: float) -> Array:
     """The momentum of the shortest geodesic that arrives, for three different moments. Raises AccuracyNotReached."""
     first, middle, largest = metric.moments.tolist()
     # Near the identity the metric is, in scaled turns, that of two equal moments.
     mean = np.sqrt(first * middle)
-    scaled = so3.log(target) * np.sqrt([first / mean, middle / mean, 1.0])
+    scaled = goal.vector * np.sqrt([first / mean, middle / mean, 1.0])
     near = float(np.linalg.norm(scaled)) < 0.5 * np.pi
     expected = float(axisymmetric_metric(mean, largest).distance(so3.exp(scaled))) if near else upper
-    best = _shortest_arrival(metric, target, _FEW, min(expected, upper))
+    best = _shortest_arrival(metric, goal, _FEW, min(expected, upper))
     # Starts are scaled to the last length; the second search rarely finds anything shorter.
     for _ in range(4):
-        other = _shortest_arrival(metric, target, _FEW, min(best[1], upper))
+        other = _shortest_arrival(metric, goal, _FEW, min(best[1], upper))
         improved = other[1] < best[1] * (1.0 - _CLOSE)
         best = other if other[1] < best[1] else best
         if not improved:
             break
     most = upper * (1.0 + _MARGIN + _ROUNDING / _reach(metric, upper).min())
     if best[1] > most:
-        best = min(best, _shortest_arrival(metric, target, _MANY, upper), key=lambda arrival: arrival[1])
+        best = min(best, _shortest_arrival(metric, goal, _MANY, upper), key=lambda arrival: arrival[1])
     if best[1] > most:
         raise AccuracyNotReached(
             f"distance: the shortest geodesic found has the length {best[1]:.9g}, but the distance is at most "
@@ -176,16 +238,24 @@ def _searched(metric: LeftInvariantMetric, target: Array, upper: float) -> Array
         )
     # To rounding: the shortest of many arrivals is one that stops a little short.
     start = best[0] / _largest_momenta(metric, best[1])
-    return _arrivals(metric, start[None], target, best[1], missed=0.0)[0][0]
+    return _arrivals(metric, start[None], goal, best[1], missed=0.0)[0][0]
 
 
-def _shortest_arrival(metric: LeftInvariantMetric, target: Array, count: int, length: float) -> tuple[Array, float]:
+def _shortest_arrival(metric: LeftInvariantMetric, goal: Goal, count: int, length: float) -> tuple[Array, float]:
     """The shortest of those that arrive from `count` directions at lengths like this; infinite if there is none."""
-    momenta, residuals = _arrivals(metric, _starts(count), target, length)
+    momenta, residuals = _arrivals(metric, _starts(count), goal, length)
     close = _CLOSE + _ROUNDING / _reach(metric, length).min()
     lengths = np.where(residuals < close, np.sqrt(np.sum(metric.inverse_moments * momenta**2, axis=-1)), np.inf)
     best = int(np.argmin(lengths))
     return momenta[best], float(lengths[best])
+
+
+def arrival_near(metric: LeftInvariantMetric, start: Array, goal: Goal) -> tuple[Array, float, float]:
+    """The momentum that the steps reach from one, its length, and by which angle it misses the goal."""
+    length = float(np.sqrt(np.sum(metric.inverse_moments * start**2)))
+    momenta, _ = _arrivals(metric, (start / _largest_momenta(metric, length))[None], goal, length)
+    missed = float(np.linalg.norm(_rotation_errors(metric.inverse_moments, momenta, goal)))
+    return momenta[0], float(np.sqrt(np.sum(metric.inverse_moments * momenta[0] ** 2))), missed
 
 
 def _starts(count: int) -> Array:
@@ -211,7 +281,7 @@ def _largest_momenta(metric: LeftInvariantMetric, length: float) -> Array:
 
 
 def _arrivals(
-    metric: LeftInvariantMetric, starts: Array, target: Array, length: float, missed: float = _ROUNDING
+    metric: LeftInvariantMetric, starts: Array, goal: Goal, length: float, missed: float = _ROUNDING
 ) -> tuple[Array, Array]:
     """Momenta that the steps reach from every start, and the errors of their ends relative to `_reach`.
 
@@ -222,7 +292,7 @@ def _arrivals(
     times, momenta = np.ones(len(starts)), starts * units
     # Half as much again as the longest start is room for steps.
     largest = 1.5 * float(np.linalg.norm(starts, axis=-1).max())
-    errors = _rotation_errors(inverse_moments, momenta, target) * weights
+    errors = _rotation_errors(inverse_moments, momenta, goal) * weights
     sizes = np.linalg.norm(errors, axis=-1)
     # Relative to the mean square of the differential: near Newton's step, but bounded where that is singular. Above 1e5
     # a start is given up: several steps in a row, each a tenth of the last, did not come closer.
@@ -238,7 +308,7 @@ def _arrivals(
         trial = _bent_step(momenta[rows] / units, step)
         norms = np.linalg.norm(trial, axis=-1, keepdims=True)
         trial *= units * np.minimum(1.0, largest / np.maximum(norms, largest))
-        error = _rotation_errors(inverse_moments, trial, target) * weights
+        error = _rotation_errors(inverse_moments, trial, goal) * weights
         apart = np.linalg.norm(error, axis=-1)
         better = apart < sizes[rows]
         taken = rows[better]
@@ -270,22 +340,20 @@ def _bent_step(start: Array, step: Array) -> Array:
     return np.concatenate([np.where(short, bent, flat + step[:, :2]), start[:, 2:] + step[:, 2:]], axis=-1)
 
 
-def _rotation_errors(inverse_moments: Array, momenta: Array, target: Array) -> Array:
+def _rotation_errors(inverse_moments: Array, momenta: Array, goal: Goal) -> Array:
     """Rotation vectors from where the momenta lead in a unit of time to the target."""
-    reached = attitude_flow(inverse_moments, momenta, np.ones(len(momenta)))
-    return so3.log(so3.transpose(reached) @ target)
+    return goal.errors(quaternion_flow(inverse_moments, momenta, np.ones(len(momenta))))
 
 
-def _bounds(metric: LeftInvariantMetric, target: Array) -> tuple[float, float]:
+def axial_bounds(metric: LeftInvariantMetric, goal: Goal) -> tuple[float, float]:
     """Distances of axisymmetric metrics that are nowhere longer, and nowhere shorter."""
     smallest, middle, largest = metric.moments.tolist()
-    turned = target[np.ix_(_FIRST_AXIS_LAST, _FIRST_AXIS_LAST)]
 
-    def about_smallest(moment: float) -> float:
-        return float(axisymmetric_metric(moment, smallest).distance(turned))
+    def distance(equatorial: float, axial: float, order: list[int]) -> float:
+        closed, quat = axisymmetric_metric(equatorial, axial), goal.on_axes(order)
+        return float(closed.distance_on_su2(quat) if goal.on_su2 else closed.distance(so3.matrix_from_quat(quat)))
 
-    def about_largest(moment: float) -> float:
-        return float(axisymmetric_metric(moment, largest).distance(target))
-
-    lower, upper = max(about_smallest(middle), about_largest(smallest)), about_largest(middle)
-    return lower, min(upper, about_smallest(largest)) if np.isfinite(largest) else upper
+    about_largest = [0, 1, 2]
+    lower = max(distance(middle, smallest, _FIRST_AXIS_LAST), distance(smallest, largest, about_largest))
+    upper = distance(middle, largest, about_largest)
+    return lower, min(upper, distance(largest, smallest, _FIRST_AXIS_LAST)) if np.isfinite(largest) else upper

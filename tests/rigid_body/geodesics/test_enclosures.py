@@ -1,0 +1,254 @@
+"""Enclosures of distances and cut times: closed forms, curves of known length, planted longer ways, what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from shapephase import so3
+from shapephase.errors import ShapeError
+from shapephase.rigid_body.geodesics import (
+    _arrival_search,
+    _momentum_cover,
+    axisymmetric_metric,
+    cut_time_enclosure,
+    distance,
+    distance_enclosure,
+    distance_enclosure_on_su2,
+    enclosures,
+    left_invariant_metric,
+    shortest_geodesic,
+)
+
+NEARLY = 1e-9  # by which moments differ that are equal in the closed form: distances then differ by half of it
+ROUNDING = 1e-10
+
+
+def shortest_of_shots(metric, attitude, count, seed):
+    """Least length of a geodesic, random in direction and time, and a straight turn from its end to the attitude.
+
+    Where a direction is forbidden the turn is made by (I_2, I_2, inf), in closed form.
+    """
+    rng = np.random.default_rng(seed)
+    start = metric.unit_speed(rng.normal(size=(count, 3)) * np.where(np.isfinite(metric.moments), 1.0, 2.0))
+    bound = shortest_geodesic(metric, attitude).length
+    times = bound * rng.uniform(0.0, 1.1, count)
+    ends = metric.attitude(start, times)
+    rest = so3.log(so3.transpose(ends) @ attitude) @ metric.axes
+    if not metric.is_sub_riemannian:
+        return (times + np.sqrt(np.sum(metric.moments * rest**2, axis=-1))).min()
+    closed = axisymmetric_metric(metric.moments[1], np.inf)
+    near = np.argsort(times + np.sqrt(metric.moments[1]) * np.linalg.norm(rest, axis=-1))[:50]
+    turned = so3.exp(rest[near])
+    return (times[near] + closed.distance(turned)).min()
+
+
+@pytest.mark.parametrize(
+    ("moments", "turn"),
+    [
+        ((3.0, 2.0, 1.0), (0.3, -0.5, 0.2)),
+        ((3.0, 2.0, 1.0), (1.7, 1.2, -1.9)),
+        ((1.0, 2.5, 1.7), (-0.4, 2.0, 1.0)),
+        ((np.inf, 2.0, 1.0), (0.6, 0.4, -0.8)),
+    ],
+    ids=str,
+)
+def test_no_curve_is_shorter_than_the_lower_bound(moments, turn):
+    metric, attitude = left_invariant_metric(moments), so3.exp(np.array(turn))
+    found = distance_enclosure(metric, attitude)
+    assert found.certified
+    assert found.width <= 1e-3 * found.upper
+    assert found.lower <= shortest_of_shots(metric, attitude, 5000, 1)
+    # The upper bound is the length of a geodesic that arrives.
+    np.testing.assert_allclose(metric.attitude(found.momentum), attitude, rtol=0.0, atol=1e-11)
+    assert found.upper == pytest.approx(metric.speed(found.momentum), abs=1e-6)
+    shortest = shortest_geodesic(metric, attitude, width=1e-3)
+    assert shortest.certified
+    assert shortest.lower_bound == found.lower
+
+
+@pytest.fixture
+def half_of_the_axisymmetric_bound(monkeypatch):
+    """The search has to begin at half of a lower bound that would leave it nothing to do."""
+
+    def halved(metric, goal):
+        lower, upper = axial_bounds(metric, goal)
+        return 0.5 * lower, upper
+
+    axial_bounds = distance.axial_bounds
+    monkeypatch.setattr(distance, "axial_bounds", halved)
+
+
+@pytest.mark.usefixtures("half_of_the_axisymmetric_bound")
+@pytest.mark.parametrize(
+    ("equatorial", "axial"), [(1.0, 2.5), (1.0, 0.4), pytest.param(1.0, np.inf, marks=pytest.mark.full)]
+)
+def test_nearly_axisymmetric_distances_hold_the_closed_form(equatorial, axial):
+    """The search knows nothing of symmetry; the closed form is that of three moments of which two are equal."""
+    closed = axisymmetric_metric(equatorial, axial)
+    metric = left_invariant_metric([equatorial, equatorial * (1.0 + NEARLY), axial])
+    for attitude in Rotation.random(2, rng=np.random.default_rng(2)).as_matrix():
+        found, expected = distance_enclosure(metric, attitude, width=1e-2), float(closed.distance(attitude))
+        assert found.certified
+        assert found.cells > 0
+        assert found.lower <= expected * (1.0 + NEARLY)
+        assert found.upper >= expected * (1.0 - NEARLY)
+
+
+@pytest.mark.usefixtures("half_of_the_axisymmetric_bound")
+@pytest.mark.parametrize("angle", [0.4, 3.0, 5.5])
+def test_nearly_round_distances_on_su2_are_angles(angle):
+    metric = left_invariant_metric([1.0, 1.0 + NEARLY, 1.0 + 2.0 * NEARLY])
+    axis = np.array([0.48, -0.6, 0.64])
+    found = distance_enclosure_on_su2(metric, np.append(np.sin(0.5 * angle) * axis, np.cos(0.5 * angle)), width=1e-2)
+    assert found.certified
+    assert found.cells > 0
+    assert found.lower <= angle * (1.0 + NEARLY)
+    assert found.upper >= angle * (1.0 - NEARLY)
+
+
+def test_minus_one_is_as_far_as_a_whole_turn_about_the_axis_of_the_smallest_moment():
+    moments = [2.5, 0.7, 4.0]
+    found = distance_enclosure_on_su2(left_invariant_metric(moments), [0.0, 0.0, 0.0, -1.0])
+    assert found.certified
+    expected = 2.0 * np.pi * np.sqrt(min(moments))
+    assert found.lower <= expected <= found.upper * (1.0 + 1e-14)
+
+
+@pytest.mark.parametrize("turn", [pytest.param(1e-2, marks=pytest.mark.full), 1e-4])
+def test_small_turns_about_the_forbidden_axis_are_loops(turn):
+    """Of the area turn, in scaled turns: sqrt(4 pi turn sqrt(I_1 I_2)), but for a part of the size of its square."""
+    found = distance_enclosure(left_invariant_metric([1.0, 2.0, np.inf]), so3.exp(np.array([0.0, 0.0, turn])))
+    expected = np.sqrt(4.0 * np.pi * turn * np.sqrt(2.0))
+    assert found.certified
+    assert found.lower < expected < found.upper * (1.0 + turn)
+
+
+@pytest.mark.parametrize("inverse_moments", [(1.0, 0.5, 0.3), (1.0, 0.9, 0.0), (2.0, 0.4, 0.35)], ids=str)
+def test_random_pairs_of_momenta_part_by_no_more_than_their_cell_says(inverse_moments):
+    """The angle between their attitudes, and what is left of it beside the derivative; bounds are near the largest."""
+    inverse, rng, duration = np.array(inverse_moments), np.random.default_rng(4), 3.0
+    metric = left_invariant_metric([np.inf if a == 0.0 else 1.0 / a for a in inverse])
+    cover = _arrival_search.momentum_cover(inverse, duration, _arrival_search.largest_axial(inverse, 0.5 * duration))
+    count, size = 20, 40
+    ones = np.ones(size)
+    cells = _momentum_cover.Cells(
+        azimuth=rng.uniform(0.0, 2.0 * np.pi, size),
+        height=rng.uniform(-1.0, 1.0, size),
+        half_azimuth=0.03 * ones,
+        half_height=0.03 * ones,
+        time=0.0 * ones,
+        ancestor=np.arange(size),
+    )
+    bounds = _momentum_cover.flow_bounds(cover, cells, count)
+    assert bounds.closed.all()
+    used = []
+    for _ in range(25):
+        moved = [rng.uniform(-1.0, 1.0, (2, size)) * 0.03 for _ in range(2)]
+        pair = [cover.chart(cells.azimuth + a, cells.height + h)[0] for a, h in moved]
+        distances = np.linalg.norm(pair[1] - pair[0], axis=-1)
+        row = int(rng.integers(1, count + 1))
+        time = row * bounds.step
+        first, second = (metric.axes @ (n * cover.units).T for n in pair)
+        ends = [metric.attitude(start.T, time) for start in (first, second)]
+        change = so3.transpose(ends[0]) @ ends[1]
+        turned = so3.log(change)
+        straight = np.einsum("nij,nj->ni", metric.differential(first.T, time), (second - first).T)
+        growth, bend = bounds.at(cells.ancestor, np.full(size, time))
+        assert np.all(np.linalg.norm(turned, axis=-1) <= growth * distances + ROUNDING)
+        rest = np.linalg.norm(turned - straight, axis=-1)
+        bound = (bend + 0.25 * 1.05 * growth**2) * distances**2
+        assert np.all(rest <= bound + ROUNDING)
+        used.append((rest / bound).max())
+    assert max(used) > 0.02
+
+
+def test_a_longer_way_in_place_of_the_shortest_is_not_certified(monkeypatch):
+    metric = left_invariant_metric([1.0, 2.0, 3.0])
+    start = metric.unit_speed([1.0, 0.6, -0.9])
+    time = 0.8 * float(metric.conjugate_time(start))
+    attitude = metric.attitude(start, time)
+    true = shortest_geodesic(metric, attitude)
+    assert true.length < time - 0.1
+    longer = replace(true, momentum=time * start, length=time)
+    monkeypatch.setattr(enclosures, "found_geodesic", lambda *_: longer)
+    found = distance_enclosure(metric, attitude, most_cells=30_000)
+    assert not found.certified
+    assert found.lower <= true.length < found.upper == pytest.approx(time, abs=1e-6)
+
+
+@pytest.mark.parametrize(("equatorial", "axial"), [(1.0, 2.5), pytest.param(1.0, 0.4, marks=pytest.mark.full)])
+def test_nearly_axisymmetric_cut_times_hold_the_closed_form(equatorial, axial):
+    closed = axisymmetric_metric(equatorial, axial)
+    metric = left_invariant_metric([equatorial, equatorial * (1.0 + NEARLY), axial])
+    momentum = np.array([0.5, 0.3, 0.9])
+    found, expected = cut_time_enclosure(metric, momentum), float(closed.cut_time(momentum))
+    assert found.certified
+    assert found.lower <= expected * (1.0 + NEARLY)
+    assert found.upper >= expected * (1.0 - NEARLY)
+    exact = cut_time_enclosure(left_invariant_metric([equatorial, equatorial, axial]), momentum)
+    assert exact.upper == pytest.approx(expected, rel=1e-12)
+    assert exact.certified
+
+
+def test_half_a_turn_about_a_principal_axis_is_where_both_senses_meet():
+    """About the axis of the middle moment: no other way is shorter up to there, though no theorem says so."""
+    metric = left_invariant_metric([1.0, 2.0, 3.0])
+    found = cut_time_enclosure(metric, [0.0, 2.0, 0.0])
+    assert found.certified
+    assert found.lower <= np.pi <= found.upper
+    # Twice as fast, half the time.
+    assert cut_time_enclosure(metric, [0.0, 4.0, 0.0]).upper == pytest.approx(0.5 * found.upper, rel=1e-9)
+
+
+def test_too_little_work_leaves_the_bounds_of_axisymmetric_metrics():
+    metric, attitude = left_invariant_metric([1.0, 2.0, 3.0]), so3.exp(np.array([1.7, 1.2, -1.9]))
+    found, bounds = distance_enclosure(metric, attitude, most_cells=1), shortest_geodesic(metric, attitude)
+    assert not found.certified
+    assert found.lower == pytest.approx(bounds.lower_bound, rel=1e-8)
+    assert not cut_time_enclosure(metric, [1.0, 1.0, 1.0], most_cells=1).certified
+    assert distance_enclosure(metric, np.eye(3)).upper == 0.0
+
+
+def test_an_end_that_is_met_to_the_last_digit_has_no_gap():
+    """About a forbidden axis, too, where an infinite moment times a missed angle of 0 is not a number."""
+    assert distance.gap(left_invariant_metric([1.0, 2.0, np.inf]), 0.0) == 0.0
+
+
+def test_refusals():
+    metric = left_invariant_metric([3.0, 2.0, 1.0])
+    for wrong in (0.0, 1.0, -1e-3, np.nan):
+        with pytest.raises(ShapeError, match="width"):
+            distance_enclosure(metric, np.eye(3), width=wrong)
+    with pytest.raises(ShapeError, match="most_cells"):
+        shortest_geodesic(metric, np.eye(3), width=1e-3, most_cells=0)
+    with pytest.raises(ShapeError, match="attitude"):
+        distance_enclosure(metric, np.broadcast_to(np.eye(3), (2, 3, 3)))
+    with pytest.raises(ShapeError, match="quat_xyzw"):
+        distance_enclosure_on_su2(metric, np.ones((2, 4)) / 2.0)
+    with pytest.raises(ShapeError, match="momentum"):
+        cut_time_enclosure(metric, [0.0, 0.0, 0.0])
+
+
+def random_metric(number):
+    """Moments up to fivefold apart; every fifth metric has a forbidden axis."""
+    rng = np.random.default_rng(number)
+    moments = np.exp(rng.uniform(0.0, np.log(5.0), 3))
+    if number % 5 == 0:
+        moments[rng.integers(3)] = np.inf
+    return left_invariant_metric(moments)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("number", range(50))
+def test_twenty_attitudes_of_each_of_fifty_metrics(number):
+    """Of 100,000 shots none is below the lower bound; the width is reached but where the work did not suffice."""
+    metric = random_metric(number)
+    for row, attitude in enumerate(Rotation.random(20, rng=np.random.default_rng(number)).as_matrix()):
+        found = distance_enclosure(metric, attitude)
+        assert found.certified == (found.width <= 1e-3 * found.upper)
+        assert found.certified or found.cells >= distance.MOST_CELLS
+        assert found.lower <= shortest_of_shots(metric, attitude, 100_000, row)
