@@ -52,18 +52,22 @@ def triangle(chart):
 
 
 def random_parts(seed):
-    """Masses, places at rest, and what two parameters and their sines move of them; even seeds are planar."""
-    rng = np.random.default_rng(seed)
-    parts = np.concatenate([[BEFORE], rng.normal(size=(4, 6, 3)) * np.array([0.3, 0.3, 0.2, 0.2])[:, None, None]])
-    return rng.uniform(0.5, 2.0, 6), parts * ([1.0, 1.0, 0.0] if seed % 2 == 0 else [1.0, 1.0, 1.0])
+    """Masses, places at rest, and what parameters and sines of the first two move; even seeds are planar."""
+    rng, flat = np.random.default_rng(seed), seed % 2 == 0
+    sizes = np.array([0.3, 0.3, 0.2, 0.2] if flat else [0.3, 0.3, 0.3, 0.2, 0.2])
+    parts = np.concatenate([[BEFORE], rng.normal(size=(len(sizes), 6, 3)) * sizes[:, None, None]])
+    return rng.uniform(0.5, 2.0, 6), parts * ([1.0, 1.0, 0.0] if flat else [1.0, 1.0, 1.0])
+
+
+def random_places(r, parts):
+    factors = [1.0, *ca.vertsplit(r), ca.sin(2.0 * r[1]), ca.sin(2.0 * r[0] + 1.0)]
+    return sum(factor * ca.DM(part) for factor, part in zip(factors, parts, strict=True))
 
 
 def random_body(seed):
     masses, parts = random_parts(seed)
-    r = ca.SX.sym("r", 2)
-    factors = [1.0, r[0], r[1], ca.sin(2.0 * r[1]), ca.sin(2.0 * r[0] + 1.0)]
-    places = sum(factor * ca.DM(part) for factor, part in zip(factors, parts, strict=True))
-    return sp.particle_body(masses, ca.Function("places", [r], [places]), ["a", "b"])
+    r = ca.SX.sym("r", len(parts) - 3)
+    return sp.particle_body(masses, ca.Function("places", [r], [random_places(r, parts)]), list("abc")[: r.shape[0]])
 
 
 class Sines:
@@ -201,3 +205,124 @@ def pentagon():
     corners = ca.cumsum(ca.substitute(edges, rest, closing(np.zeros(2), free)))
     limits = {"free_1": (-1.2, 1.2), "free_2": (-1.2, 1.2)}
     return sp.particle_body(np.ones(5), ca.Function("corners", [free], [corners]), ["free_1", "free_2"], limits=limits)
+
+
+# --- a transcription of another kind ------------------------------------------------------------------------
+
+
+def spectral_optimum(masses, parts, goal, plan):
+    """Least cost of a loop by collocation of rates and attitudes in eight panels of twelve Gauss nodes, by IPOPT.
+
+    Mechanics from the positions: the angular momentum of the particles is zero, and the cost their kinetic energy. The
+    search starts from a plan, so that it comes to the same of several optima.
+    """
+    n, flat, panels, stages = len(parts) - 3, not parts[:, :, 2].any(), 8, 12
+    nodes, weights = np.polynomial.legendre.leggauss(stages)
+    times = ((np.arange(panels)[:, None] + 0.5 * (nodes + 1.0)) / panels).ravel()
+    weights = np.tile(0.5 * weights / panels, panels)
+    # Integrals from the start of a panel to its nodes, of the polynomial through values at the nodes.
+    series = np.polynomial.legendre.legint(np.eye(stages), lbnd=-1.0)
+    inside = np.polynomial.legendre.legval(nodes, series).T
+    inside = inside @ np.linalg.inv(np.polynomial.legendre.legvander(nodes, stages - 1)) * 0.5 / panels
+    within = ca.kron(ca.DM.eye(panels), ca.DM(inside.T))
+    onward = ca.kron(ca.DM.eye(panels), ca.DM(weights[:stages]))
+    from_begin = ca.kron(ca.DM.eye(panels), ca.DM.ones(1, stages))
+    r, u, q = (ca.SX.sym(*what) for what in (("r", n), ("u", n), ("q", 4)))
+    places = random_places(r, parts)
+    places = places - ca.repmat(ca.DM(masses / masses.sum()).T @ places, 6, 1)
+    moving = ca.reshape(ca.jtimes(places, r, u), 6, 3)
+    at, going = ([part[k, :].T for k in range(6)] for part in (places, moving))
+    inertia = sum(m * (ca.dot(x, x) * ca.SX.eye(3) - x @ x.T) for m, x in zip(masses, at, strict=True))
+    omega = -ca.inv(inertia) @ sum(m * ca.cross(x, v) for m, x, v in zip(masses, at, going, strict=True))
+    energy = 0.5 * sum(m * ca.sumsqr(v + ca.cross(omega, x)) for m, x, v in zip(masses, at, going, strict=True))
+    turning = 0.5 * ca.vertcat(q[3] * omega + ca.cross(q[:3], omega), -ca.dot(q[:3], omega))
+    count, one = len(times), ca.DM([0.0, 0.0, 0.0, 1.0])
+    node = ca.Function("node", [r, u, q], [turning, energy]).map(count)
+    rates, states = ca.MX.sym("rates", n, count), ca.MX.sym("states", n + 4, count)
+    begins = ca.MX.sym("begins", n + 4, panels + 1)
+    turned, energies = node(states[:n, :], rates, states[n:, :])
+    flow = ca.vertcat(rates, turned)
+    x, y, z, w = so3.quat_from_matrix(goal)
+    missing = ca.DM([[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]]) @ begins[n:, -1]
+    rows = [
+        states - begins[:, :-1] @ from_begin - flow @ within,
+        begins[:, 1:] - begins[:, :-1] - flow @ onward,
+        begins[:, 0] - ca.vertcat(ca.DM(plan.path.shape(0.0)), one),
+        begins[:n, -1] - ca.DM(plan.path.shape(0.0)),
+        missing[2] if flat else missing,
+    ]
+    rows = ca.vertcat(*(ca.vec(row) for row in rows))
+    unknown = ca.vertcat(ca.vec(rates), ca.vec(states), ca.vec(begins))
+
+    def known(at):
+        turns = so3.quat_from_matrix(plan.motion.attitude(at))
+        return np.concatenate([plan.path.shape(at), turns * np.where(turns[:, 3:] < 0.0, -1.0, 1.0)], axis=1)
+
+    guess = [plan.path.rate(times), known(times), known(np.linspace(0.0, 1.0, panels + 1))]
+    options = {"ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-10}, "print_time": False}
+    solver = ca.nlpsol("loop", "ipopt", {"x": unknown, "f": ca.dot(energies.T, weights), "g": rows}, options)
+    result = solver(x0=np.concatenate([part.ravel() for part in guess]), lbg=0.0, ubg=0.0)
+    assert solver.stats()["return_status"] == "Solve_Succeeded"
+    return float(result["f"])
+
+
+@pytest.mark.parametrize("seed", full_but(range(10), 8))
+def test_plans_of_random_bodies_cost_what_another_transcription_finds(seed):
+    rng = np.random.default_rng(100 + seed)
+    body, (masses, parts) = random_body(seed), random_parts(seed)
+    goal = so3.exp(0.15 * Z if seed % 2 == 0 else 0.05 * (so3.normalised(rng.normal(size=3))))
+    plan = plan_reorientation(body, goal, rates_at_ends="free", search=Search(pieces=80))
+    assert plan.goal_error < 1e-9
+    np.testing.assert_allclose(plan.cost, spectral_optimum(masses, parts, goal, plan), rtol=1e-6)
+    again = sp.reconstruct(sp.articulated(body, plan.path), 0.0 * Z, tolerance=1e-11).final_attitude
+    assert so3.angle(goal.T @ again) < 1e-9
+
+
+def test_places_by_a_function_of_python_give_the_same_plan():
+    """Second and third derivatives are differences there; the optimum depends on the first alone."""
+    places, goal = Sines(0), so3.exp(0.15 * Z)
+    given = sp.particle_body(places.masses, places, ["a", "b"])
+    shape = np.array([0.2, -0.3])
+    for name in ("inertia", "momentum_matrix", "shape_metric"):
+        found, known = (np.array(getattr(symbolic_body(body), name)(shape)) for body in (given, random_body(0)))
+        np.testing.assert_allclose(found, known, rtol=0, atol=50 * EPS)
+    search = Search(pieces=12, iterations=60)
+    costs = [
+        plan_reorientation(body, goal, rates_at_ends="free", search=search).cost for body in (given, random_body(0))
+    ]
+    np.testing.assert_allclose(*costs, rtol=1e-9)
+
+
+# --- what is refused ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("goal", "options", "error", "match"),
+    [
+        (so3.exp(0.3 * np.array([1.0, 0.0, 0.0])), {}, UnreachableGoalError, r"about one axis alone, \[0, 0, 1\]"),
+        (Goal(pointing=(Z, Z), link="arm"), {}, ShapeError, "has no links"),
+        (so3.exp(0.3 * Z), {"cost": "effort"}, ShapeError, "has no motors"),
+        (so3.exp(0.3 * Z), {"limits": Limits(effort_limits=1.0)}, ShapeError, "has no motors"),
+        (so3.exp(0.3 * Z), {"limits": Limits(clearance=0.1)}, ShapeError, "has no solids"),
+        (so3.exp(0.3 * Z), {"cost": np.diag([1.0, -1.0])}, ShapeError, "positive definite"),
+        (so3.exp(0.3 * Z), {"cost": np.eye(3)}, ShapeError, r"2, 2\)"),
+        (so3.exp(0.3 * Z), {"cost": ca.Function("g", [ca.SX.sym("r", 2)], [1.0])}, ShapeError, "casadi.Function"),
+        (so3.exp(0.3 * Z), {"cost": "metric"}, UnknownNameError, "kinetic"),
+        (so3.exp(0.3 * Z), {"start": [2.0, 0.0]}, sp.errors.TrajectoryError, "free_1"),
+    ],
+)
+def test_what_particles_cannot_do_is_refused(goal, options, error, match):
+    body = pentagon() if "start" in options else triangle("equal-area")
+    with pytest.raises(error, match=match):
+        plan_reorientation(body, goal, **options)
+
+
+def test_loops_that_do_not_turn_are_refused():
+    with pytest.raises(ShapeError, match="no small loop"):
+        small_loop(triangle("equal-area"), [0.0, 0.0], [1.0, 0.0, 0.0])
+    with pytest.raises(ShapeError, match="axis"):
+        small_loop(triangle("equal-area"), [0.0, 0.0], [0.0, 0.0, 0.0])
+    with pytest.raises(ShapeError, match="limits"):
+        sp.particle_body([1, 1, 1], Sines(0), ["a", "b"], limits={"a": (1.0, -1.0)})
+    with pytest.raises(UnknownNameError, match="parameter"):
+        sp.particle_body([1, 1, 1], Sines(0), ["a", "b"], limits={"c": (-1.0, 1.0)})
